@@ -49,7 +49,7 @@ class Unit:
 
     def text(self, value: float | None) -> str:
         """For reading: rounded, without the unit; a dash where there is none."""
-        return "–" if value is None else f"{value * self.scale:.{self.digits}f}"
+        return "–" if value is None else rounded(value * self.scale, self.digits)
 
     def brief(self, value: float | None) -> str:
         """For reading what somebody has set: as `text`, three digits at least, and no zeros at the end."""
@@ -123,6 +123,11 @@ def unit_named(symbol: str, si: str) -> Unit:
         shown = dict.fromkeys(unit.symbol or "no unit" for unit in known)
         raise ValueError(f"it cannot be in {symbol!r}: write it in {' or '.join(shown)}")
     return found
+
+
+def rounded(value: float, digits: int, sign: str = "") -> str:
+    """Return a number with so many decimal places, and never −0; `sign` "+" shows that of others, too."""
+    return f"{round(value, digits) + 0.0:{sign}.{digits}f}"
 
 
 def percent_body_weight(body_mass: float) -> Unit:

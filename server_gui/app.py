@@ -15,7 +15,6 @@ from PySide6.QtCore import QObject, QSettings, Qt, QTimer, Signal
 from PySide6.QtWidgets import QApplication
 
 from gateway.client import Address
-from gateway.units import Units
 from gateway.wire.resource import ResourceSnapshotParams
 from gateway.wire.stop import Stopped
 from server_gui.core.archive.archive import Archive
@@ -34,6 +33,7 @@ from server_gui.processes.sim_control import SimControl
 from server_gui.views.application import application, kept_settings, kept_theme
 from server_gui.views.first_run.demo_bar import DemoBar
 from server_gui.views.first_run.opening import Opening
+from server_gui.views.kept import kept_units
 from server_gui.views.main_window import SLOW, MainWindow
 from server_gui.views.stop_keys import StopKeys
 from server_gui.views.theme import Look
@@ -48,7 +48,9 @@ FOLLOWING: Final = FollowSettings(
     look_s=1.0,
     resources=ResourceSnapshotParams(processes=False),
     journal_s=2.0,
+    buses_s=1.0,
 )
+OWN: Final = "simulated"  # what the window's own robot is called before it has told its name
 BREAK_OFF_S: Final = 5.0  # for what is read from the store at the end
 MOST_PREDICTIONS: Final = 4096  # what may wait for a window that hangs
 
@@ -110,7 +112,7 @@ class App:
         self._opening = opening
         self._own = OwnRobot() if opening is None else opening.own
         self.demo: DemoBar | None = None  # once a simulated robot of ours is followed
-        self._desk_units(kept)
+        self.desk.shown.units = kept_units(kept)
         self.theme = kept_theme(qt, kept)
         operator = "" if record is None else record.operator
         self._archive = Archive(settings, self.desk, self._poster.deliver, operator, file)
@@ -119,6 +121,7 @@ class App:
         self.window.stopped.connect(lambda: self.stop("STOP button of the window"))
         self.window.stop_all.connect(lambda: self.desk.stop_all("STOP ALL of the window"))
         self.window.added.connect(lambda where: self.follow(name_of(where), Address.parse(where)))
+        self.window.removed.connect(self.leave)
         self.window.simulator.connect(self._own.start)
         self.window.closed.connect(qt.quit)
         self._keys = StopKeys(qt)
@@ -153,13 +156,25 @@ class App:
         mailbox = Mailbox()
         network = self.feeds.network
         link = Link(network, address, mailbox.put, lambda: self._poster.deliver(station.lost_control))
-        station = Station(name, str(address), link, self._poster.deliver, self.desk.news)
+        is_named = name not in (name_of(str(address)), OWN)
+        station = Station(name, str(address), link, self._poster.deliver, self.desk.news, is_named=is_named)
         station.predictions.off = not self._predicts
         self._mailboxes[name], self._stations[name] = mailbox, station
         self._followed.append(Followed(station, mailbox, network.run(link.run()), Ticks()))
         self.feeds.follow(name, address)
         self.desk.add(station)
         return station
+
+    def leave(self, station: Station) -> None:
+        """Follow a robot no more; it goes on as it is."""
+        followed = next((one for one in self._followed if one.station is station), None)
+        if followed is None:
+            return
+        self.feeds.leave(station.name)
+        followed.link.cancel()
+        self._followed.remove(followed)
+        del self._mailboxes[station.name], self._stations[station.name]
+        self.desk.remove(station)
 
     def stop(self, reason: str) -> None:
         """STOP the robot that is looked at; from any thread."""
@@ -181,7 +196,8 @@ class App:
             if followed.link.done():
                 followed.link.result()  # it ends only by a mistake of ours, which must not stay unseen
         for news in [self._predicted.popleft() for _ in range(len(self._predicted))]:
-            self._stations[news.robot].take_prediction(news)
+            if news.robot in self._stations:
+                self._stations[news.robot].take_prediction(news)
         self.feeds.look(self.desk.recording)
         self._look_at_own()
         self.window.refresh()
@@ -193,7 +209,9 @@ class App:
 
     def _show(self, robot: str, event: Event) -> None:
         """What has come; in the network's thread."""
-        self._mailboxes[robot].put(event)
+        mailbox = self._mailboxes.get(robot)  # of one that was left a last event may come
+        if mailbox is not None:
+            mailbox.put(event)
 
     # --- the simulated robot
 
@@ -209,17 +227,12 @@ class App:
             self._opening.look(self.desk.selected, window=self.window.isVisible())
 
     def _follow_own(self, address: Address) -> None:
-        station = self.follow("simulated", address)
+        station = self.follow(OWN, address)
         self.desk.select(station)
         if self._own.folder is not None:
             control = SimControl(self._own.folder)
             deliver = self._poster.deliver
             self.demo = DemoBar(self.window, self._own, control, station, self.theme, deliver)
-
-    def _desk_units(self, kept: QSettings) -> None:
-        by_si = kept.value("units")
-        if isinstance(by_si, dict):
-            self.desk.shown.units = Units(by_si=by_si)
 
 
 def run(

@@ -21,6 +21,7 @@ from drivers.bus.master import NMT_COMMAND, NMT_START, NMT_STOP, MasterCycles
 from drivers.bus.sender import Sender, always
 from drivers.bus.settings import CanSettings, Role
 from drivers.bus.thread_switching import FastSwitching
+from drivers.bus.traffic import Traffic
 from drivers.errors import Unavailable
 from drivers.urgency import make_urgent
 
@@ -60,6 +61,7 @@ class CanBus:
         self._urgent = urgent
         self.problem: str | None = None  # why it is not open, in words
         self.health = BusHealth(settings.bitrate)
+        self.traffic = Traffic()
         self.frames = 0  # that came; error frames are none of them
         self.opened = 0  # times
         self.failed_handlers = 0  # those of users' ticks are among them
@@ -214,6 +216,7 @@ class CanBus:
         with self._lock:
             self._transport, self.problem = transport, None
             self.health.opened()
+            self.traffic.opened()
             self.opened += 1
             users = self._users
         FastSwitching.begin()
@@ -251,6 +254,8 @@ class CanBus:
         while not self._stopping.is_set():
             frames = transport.receive(TICK_S)
             self.frames += len(frames)
+            if frames:
+                self.traffic.take(frames)
             for stamp_ns, can_id, data in frames:
                 self._received_bytes += len(data)
                 handler = handler_of(can_id)
@@ -266,6 +271,7 @@ class CanBus:
                 next_tick_ns = now_ns + tick_ns
                 accepted = self._accept(transport, accepted)
                 self.health.look(now_ns, partial(self._counts, transport))
+                self.traffic.look(now_ns)
                 self._tick(now_ns)
 
     def _counts(self, transport: Transport) -> tuple[int, int, int]:

@@ -25,6 +25,7 @@ class CanDevice:
 
     def start(self) -> None:
         """Open the bus if nobody else has."""
+        self.node.probes = True
         self.node.attach(self, self.name)
 
     def stop(self) -> None:
@@ -32,13 +33,16 @@ class CanDevice:
         self.node.detach(self)
 
     def quality(self, now_ns: int) -> Quality:
-        """By its heartbeat, where it has one; else whether it answered when it came up."""
+        """By its heartbeat, where it has one; else by whether it answers when it is asked now and then."""
         age_ms = self.node.life.silent_ms(now_ns)
         problem = self.node.problem(now_ns)
+        silence = self.node.silence(now_ns)
         state = State.OK if self.node.ready else State.LOST
         if self.node.ready and self.node.life.lost(now_ns):
             lost = age_ms is not None and age_ms > self.settings.lost_after_s * 1000
             state = State.LOST if lost else State.STALE
+        elif silence is not None:
+            state, problem = State.LOST, silence
         elif self.node.ready and self.node.life.active_emcy is not None:
             state = State.FAULT
             problem = f"it reports {self.node.life.active_emcy.text(self.node.description.vendor_id)}"

@@ -9,6 +9,9 @@ from drivers.bus.nmt import NmtState, parse_heartbeat
 
 EMCY_HISTORY = 64
 HEARTBEATS_MISSED = 2.5  # periods without a heartbeat, where no time is configured
+BEATS = 4  # intervals that a period is learned from
+OTHER_PERIOD = 0.25  # of the announced one: a master has given the device another since
+SHORTEST_S = 0.02  # that is learned
 
 
 class LifeListener(Protocol):
@@ -33,6 +36,8 @@ class NodeLife:
         self.heartbeat_ns: int | None = None
         self.timeout_s = configured_timeout_s
         self._configured_timeout_s = configured_timeout_s
+        self._period_s: float | None = None
+        self._beats: deque[float] = deque(maxlen=BEATS)
         self._listeners: tuple[LifeListener, ...] = ()
 
     def subscribe(self, listener: LifeListener) -> Callable[[], None]:
@@ -48,11 +53,26 @@ class NodeLife:
         """Forget what is no longer true; what is counted stays."""
         self.nmt_state = self.active_emcy = self.heard_ns = self.heartbeat_ns = None
         self.timeout_s = self._configured_timeout_s
+        self._period_s = None
+        self._beats.clear()
 
     def expect_every(self, period_s: float | None) -> None:
         """The device's own heartbeat period, where no time is configured; `None`: it has no heartbeat."""
         if self._configured_timeout_s is None:
+            self._period_s = period_s
             self.timeout_s = period_s * HEARTBEATS_MISSED if period_s else None
+
+    def _learn(self, interval_s: float) -> None:
+        """The period that a device really has: its 1017h may be given to it later, by another master.
+
+        The second shortest of the last intervals, so that neither a lost nor a doubled frame counts.
+        """
+        self._beats.append(interval_s)
+        if self._configured_timeout_s is not None or len(self._beats) < BEATS:
+            return
+        found_s = max(sorted(self._beats)[1], SHORTEST_S)
+        if self._period_s is None or abs(found_s - self._period_s) > OTHER_PERIOD * self._period_s:
+            self.expect_every(found_s)
 
     def on_heartbeat(self, stamp_ns: int, data: bytes) -> NmtState | None:
         """Take a frame of 700h + node id; `None` where it is none."""
@@ -66,6 +86,8 @@ class NodeLife:
                 listener.on_boot_up(stamp_ns)
         else:
             self.heartbeats += 1
+            if self.heartbeat_ns is not None:
+                self._learn((stamp_ns - self.heartbeat_ns) / 1e9)
         self.heard_ns = self.heartbeat_ns = stamp_ns
         self.nmt_state = state
         return state
@@ -98,6 +120,7 @@ class NodeLife:
         if self.lost(now_ns):
             silent_s = (self.silent_ms(now_ns) or 0) / 1000
             return f"its heartbeat is missing for {silent_s:.1f} s: check the node's power and cable"
-        if self.nmt_state not in (None, NmtState.OPERATIONAL):
+        # After a boot-up message alone nobody knows: a node may start itself.
+        if self.nmt_state in (NmtState.STOPPED, NmtState.PRE_OPERATIONAL):
             return f"it is {self.nmt_state.words} (NMT) and sends no PDOs until its master starts it"
         return None

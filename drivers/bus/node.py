@@ -33,6 +33,8 @@ FIRST_RETRY_S = 0.1  # also how long the first attempt waits: a cold start must 
 LAST_RETRY_S = 2.0
 DOUBT_S = 0.1  # how often a node is asked that answers twice, to see when it does so no more
 _NOT_ASKED = "it has not come up, so nobody knows what it is: nothing is written to it"
+PROBE_S = 1.0  # how often a node is asked that has no heartbeat and says nothing
+SILENT_S = 3.0  # without a word, though it was asked
 EMCY = 0x080
 
 
@@ -71,6 +73,8 @@ class Node(BusUser):
         self._guard_ns = 0
         self._guard_problem: str | None = None
         self._doubt_ns = 0
+        self.probes = False  # whether it is asked where it says nothing: a user who gets no PDOs wants that
+        self._probe_ns = 0
         self._generation = 0  # counts what makes an earlier boot worthless
         self._booted_generation = 0  # of the boot that is under way, or was the last
         self._booting: Future[None] | None = None
@@ -256,8 +260,24 @@ class Node(BusUser):
         if self.ready and self.channel.doubled and now_ns >= self._doubt_ns:
             self._doubt_ns = now_ns + round(DOUBT_S * 1e9)
             self.worker.submit(_ask_type)
+        if self.probes and self.ready and now_ns >= self._probe_ns and self._unheard_s(now_ns) > PROBE_S:
+            self._probe_ns = now_ns + round(PROBE_S * 1e9)
+            self.worker.submit(_ask_type)
         for arrivals in self.arrivals:
             arrivals.look(now_ns)
+
+    def _unheard_s(self, now_ns: int) -> float:
+        """For how long a node that is probed has said nothing but PDOs; 0 for those with a heartbeat."""
+        if self.life.timeout_s is not None or not self.probes:
+            return 0.0
+        return (self.life.silent_ms(now_ns) or 0.0) / 1000
+
+    def silence(self, now_ns: int) -> str | None:
+        """That a node without a heartbeat answers no more, in words; `None` while it does."""
+        silent_s = self._unheard_s(now_ns)
+        if not self.ready or silent_s <= SILENT_S:
+            return None
+        return f"it has answered nothing for {silent_s:.1f} s: check the node's power and cable"
 
     def _ask_life(self, now_ns: int) -> None:
         """Node guarding: the answer is the node's state and counts as a heartbeat (CiA 301 §7.2.8)."""

@@ -6,7 +6,6 @@ import math
 import sys
 import threading
 import time
-import tomllib
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -14,8 +13,9 @@ import msgspec
 
 from drivers.bus.bus import CanBus
 from drivers.bus.settings import CanSettings
+from drivers.cli.named import named
 from drivers.cli.sensor import run_parsed
-from drivers.errors import SettingsError, Unavailable
+from drivers.errors import Unavailable
 from drivers.identify import format_of
 from drivers.imu import zero
 from drivers.imu.build import build_imu
@@ -25,9 +25,12 @@ from drivers.imu.settings import Axes, ImuSettings, kind_of
 from drivers.imu.trunk import TrunkImu
 from drivers.insole import fit as fitting
 from drivers.insole.calibration import CellCalibration, loaded_counts
-from drivers.insole.device import USUAL_LAYOUT, layout_of
+from drivers.insole.device import USUAL_LAYOUT, layout_of, line_for
+from drivers.insole.foot import Foot
 from drivers.insole.formats import FORMATS as INSOLE_FORMATS
 from drivers.insole.frame import InsoleFrame
+from drivers.insole.layout import Layout
+from drivers.insole.settings import InsoleSettings
 from drivers.line import Line
 from drivers.samples import State
 from drivers.site import Site
@@ -60,7 +63,8 @@ def main(arguments: Sequence[str]) -> int:
 def _insole_options(parser: argparse.ArgumentParser) -> Callable[[argparse.Namespace], int]:
     parser.description = (
         "Measures the unloaded cells, then known loads on the whole insole; fits, shows the fit, and asks "
-        "before it writes. Name the file in [insole.NAME] as `calibration`."
+        "before it writes. Name the file in [insole.NAME] as `calibration`. ROBOT.toml:NAME instead of a "
+        "port takes everything from [insole.NAME]. A device that sends pressure needs no calibration."
     )
     parser.add_argument(
         "--format", choices=tuple(INSOLE_FORMATS), default="insole-cobs", help="default: %(default)s"
@@ -114,33 +118,40 @@ def _axes(text: str) -> tuple[str, ...]:
 class _Average:
     """A line's user that averages the cells' counts of one foot."""
 
-    def __init__(self, foot: str | None, cells: int) -> None:
+    def __init__(self, foot: Foot | None, cells: int) -> None:
         self._foot = foot
         self._cells = cells
         self.sums: list[float] | None = None
         self.frames = 0
+        self.refused = ""  # why the last frame that came does not count
 
     def received(self, frames: Sequence[InsoleFrame], _stamp_ns: int) -> None:
         for frame in frames:
             self._add(frame)
 
     def _add(self, frame: InsoleFrame) -> None:
-        wanted = frame.foot is None or self._foot in (None, frame.foot)
-        if not wanted or len(frame.cells) != self._cells or frame.calibrated:
+        self.refused = self._why_not(frame)
+        if self.refused:
             return
         before = self.sums or [0.0] * self._cells
         self.sums = [total + (count or 0.0) for total, count in zip(before, frame.cells, strict=True)]
         self.frames += 1
+
+    def _why_not(self, frame: InsoleFrame) -> str:
+        if frame.foot is not None and self._foot not in (None, frame.foot):
+            return f"frames of the {frame.foot} foot come, not of the {self._foot} one"
+        if len(frame.cells) != self._cells:
+            return (
+                f"frames of {len(frame.cells)} cells come, and the layout has {self._cells}: name another one"
+            )
+        return "it sends pressure already and needs no calibration" if frame.calibrated else ""
 
     def disconnected(self) -> None:
         self.sums, self.frames = None, 0
 
 
 def _insole(options: argparse.Namespace) -> int:
-    layout = layout_of(options.format, options.layout)
-    line = Line(
-        options.port, options.baud, options.format, INSOLE_FORMATS[options.format].parser(layout), format_of
-    )
+    line, layout, foot = _insole_in_file(options.port) or _insole_on_port(options)
     base = CellCalibration(
         polarity="falling" if options.falling else "rising",
         full_scale=options.falling,
@@ -149,7 +160,7 @@ def _insole(options: argparse.Namespace) -> int:
     rising = loaded_counts(base)
 
     def measure() -> list[float]:
-        return [rising(count) for count in _average(line, options.foot, len(layout.cells))]
+        return [rising(count) for count in _average(line, foot, len(layout.cells))]
 
     _say("Take all load off the insole (shoe on, foot lifted), then press Enter.")
     _read()
@@ -163,6 +174,30 @@ def _insole(options: argparse.Namespace) -> int:
         _say(f"  load {load.force:7.1f} N   measured {force:7.1f} N   off by {force - load.force:+6.1f} N")
     _say(f"  error {fitted.rms_error:.1f} N (rms)")
     return _write(options.write, fitting.text(fitted, _now()))
+
+
+_Sole = tuple[Line[InsoleFrame], Layout, Foot | None]  # what is listened to, its cells, whose frames count
+
+
+def _insole_on_port(options: argparse.Namespace) -> _Sole:
+    settings = InsoleSettings(port=options.port, baudrate=options.baud, format=options.format)
+    layout = layout_of(options.format, options.layout)
+    return line_for(settings, layout, format_of), layout, options.foot
+
+
+def _insole_in_file(where: str) -> _Sole | None:
+    """The insole at `ROBOT.toml:NAME`; `None` for a port.
+
+    Raises:
+        SettingsError: the file, its table or the layout cannot be used.
+
+    """
+    with named(where, "insole") as found:
+        if found is None:
+            return None
+        settings = msgspec.convert(found.table, InsoleSettings)
+    layout = layout_of(settings.format, settings.layout, found.file.parent)
+    return line_for(settings, layout, format_of), layout, settings.side(found.name)
 
 
 def _imu(options: argparse.Namespace) -> int:
@@ -194,23 +229,17 @@ def _imu_in_file(where: str) -> TrunkImu | None:
         SettingsError: the file or its table cannot be used.
 
     """
-    file, colon, name = where.rpartition(":")
-    if not (colon and file.endswith(".toml")):
-        return None
-    try:
-        tables = tomllib.loads(Path(file).read_text(encoding="utf-8"))
-        table = tables["imu"][name]
-        settings = msgspec.structs.replace(msgspec.convert(table, kind_of(table)), zero=None)
-        bus = table.get("bus")
-        buses = {} if bus is None else {bus: CanBus(bus, CanSettings.from_table(tables["can"][bus]))}
-    except KeyError as error:
-        raise SettingsError(f"{file} has no table of the name {error}, which [imu.{name}] needs") from error
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, msgspec.ValidationError) as error:
-        raise SettingsError(f"{file}: {error}") from error
-    return build_imu(name, settings, Site(Path(file), buses, recognise=format_of))
+    with named(where, "imu") as found:
+        if found is None:
+            return None
+        settings = msgspec.structs.replace(msgspec.convert(found.table, kind_of(found.table)), zero=None)
+        bus = found.table.get("bus")
+        tables = {} if bus is None else {bus: found.tables["can"][bus]}
+        buses = {name: CanBus(name, CanSettings.from_table(table)) for name, table in tables.items()}
+    return build_imu(found.name, settings, Site(found.file, buses, recognise=format_of))
 
 
-def _average(line: Line[InsoleFrame], foot: str | None, cells: int) -> list[float]:
+def _average(line: Line[InsoleFrame], foot: Foot | None, cells: int) -> list[float]:
     average = _Average(foot, cells)
     line.start(average)
     try:
@@ -219,7 +248,8 @@ def _average(line: Line[InsoleFrame], foot: str | None, cells: int) -> list[floa
     finally:
         line.stop(average)
     if average.sums is None or not average.frames:
-        raise Unavailable(problem or f"no uncalibrated frame of {cells} cells came from {line.path}")
+        came = f"{line.path}: {average.refused}" if average.refused else ""
+        raise Unavailable(came or problem or f"no frame of {cells} cells came from {line.path}")
     return [total / average.frames for total in average.sums]
 
 

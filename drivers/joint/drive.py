@@ -12,12 +12,12 @@ from functools import partial
 
 from drivers.bus.arrivals import Arrivals
 from drivers.bus.bus import CanBus
-from drivers.bus.emcy import error_text
 from drivers.bus.frames import EXTENDED, FrameHandler
 from drivers.bus.node import shared_node
 from drivers.bus.pdo import Tpdo
 from drivers.bus.sdo.channel import SdoChannel
 from drivers.component import Kind
+from drivers.error_codes import error_text
 from drivers.errors import DeviceAbort, Mismatch
 from drivers.freshness import Freshness
 from drivers.joint.cia402 import STATE_BITS, STATE_OF, DriveState

@@ -22,11 +22,12 @@ class Proposal:
 
 
 def files(folders: Sequence[Path]) -> tuple[Path, ...]:
-    """Every EDS and DCF file in these folders and below, and those that ship."""
+    """Every EDS and DCF file in these folders and below, and those that ship; each once."""
     found = (
         path for folder in folders for path in sorted(folder.rglob("*")) if path.suffix.lower() in SUFFIXES
     )
-    return (*found, *(SHIPPED / name for name in shipped()))
+    every = (*found, *(SHIPPED / name for name in shipped()))
+    return tuple({path.resolve(): path for path in reversed(every)}.values())[::-1]
 
 
 class Library:

@@ -5,13 +5,24 @@ import fnmatch
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import MappingProxyType
+from typing import Final
 
 from gateway.cli.text import did_you_mean, say, warn
-from gateway.client import Address, BadAddress, ClientError, ConnectionState, LinkSettings, Robot
+from gateway.client import (
+    Address,
+    BadAddress,
+    ClientError,
+    ConnectionState,
+    LinkSettings,
+    Robot,
+    Unreachable,
+)
 from gateway.client.address import DEFAULT_HOST, DEFAULT_PORT
 from gateway.wire.component import ChannelInfo
 from gateway.wire.robot import Description
 from gateway.wire.stream import ModuleName
+
+USUAL: Final = Address()  # who is asked where nobody says whom
 
 
 class UnknownName(ClientError):
@@ -42,7 +53,7 @@ def add_robot(made: argparse.ArgumentParser) -> None:
         "--robot",
         metavar="HOST:PORT",
         type=address,
-        default=Address(),
+        default=USUAL,
         help=f"the gateway to ask (default {DEFAULT_HOST}:{DEFAULT_PORT})",
     )
 
@@ -65,7 +76,12 @@ def connect(arguments: argparse.Namespace, command: str) -> Robot:
             linked = False
             warn(command, f"the link to {address} dropped; trying again")
 
-    return Robot(address, LinkSettings(client=f"gwrms {command}"), report)
+    try:
+        return Robot(address, LinkSettings(client=f"gwrms {command}"), report)
+    except Unreachable as error:
+        if address != USUAL:
+            raise
+        raise Unreachable(f"{error} Another one is asked by --robot HOST:PORT") from error
 
 
 def widened(asked: Iterable[str], description: Description) -> list[str]:

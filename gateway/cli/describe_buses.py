@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 
+from drivers.error_codes import error_check
 from gateway.amounts import NONE, percent
 from gateway.cli.text import table
 from gateway.wire.bus import BusInfo, NodeInfo
@@ -26,7 +27,7 @@ def chapters(robot: Description) -> Iterator[str]:
     now_ns = robot.clock.monotonic_ns
     emcys = [row for part in robot.components for row in _emcy(part, now_ns)]
     if emcys:
-        yield table(("COMPONENT", "LAST EMCY", "AGE", ""), emcys, right=(2,))
+        yield table(("COMPONENT", "LAST EMCY", "AGE", "CHECK"), emcys, right=(2,))
     found = [(where, _age(now_ns - one.since_ns), one.words, one.check) for where, one in _findings(robot)]
     if found:
         yield table(("FOUND AT", "FOR", "WHAT", "CHECK"), found, right=(1,))
@@ -53,7 +54,7 @@ def _node(bus: BusInfo, node: NodeInfo) -> tuple[str, ...]:
 
 def _emcy(part: ComponentInfo, now_ns: int) -> Iterator[tuple[str, ...]]:
     if part.emcy:
-        ended = "" if part.emcy.active else "taken back"
+        ended = error_check(part.emcy.code) if part.emcy.active else "taken back"
         yield part.name, part.emcy.words, _age(now_ns - part.emcy.stamp_ns), ended
 
 

@@ -30,8 +30,8 @@ def main(argv: list[str]) -> int:
     if page is not None:
         say(page.read_text(encoding="utf-8"))
         return 0
-    close = did_you_mean(wanted, {*known, *(name.rpartition("/")[2] for name in known)})
-    warn("docs", f"there is no page {wanted!r}{close or '; all are listed by gwrms docs'}")
+    close = did_you_mean(wanted.rpartition("/")[2], {name.rpartition("/")[2] for name in known})
+    warn("docs", f"there is no page {wanted!r}{close or ';'} all are listed by gwrms docs")
     return 1
 
 

@@ -55,6 +55,8 @@ def pair(argv: list[str]) -> int:
     arguments = made.parse_args(argv)
     if arguments.yes and not (arguments.name and arguments.role):
         made.error("--yes needs --name and --role: who comes is taken as that")
+    if not arguments.yes and not sys.stdin.isatty():
+        raise NobodyToAsk("there is no terminal to ask on; give --name, --role and --yes")
     robot, folder = _robot(arguments)
     if changes.ensure_keys(folder, robot.robot.name):
         say(f"The robot's key was made in {folder.keys}. Start its gateway again: it speaks TLS only then.\n")
@@ -108,8 +110,6 @@ def _confirmed(candidate: Candidate, arguments: argparse.Namespace) -> tuple[str
     """What the person here says; no role where they refuse."""
     if arguments.yes:
         return arguments.name, arguments.role
-    if not sys.stdin.isatty():
-        raise NobodyToAsk("there is no terminal to ask on; give --name, --role and --yes")
     wished = arguments.name or (candidate.name if NAME.fullmatch(candidate.name) else "")
     say(f"\nA desk has proved the code. It calls itself {candidate.name!r}, its key is\n")
     say(f"{grouped(candidate.fingerprint)}\n\n")

@@ -43,9 +43,15 @@ def _take_back(robot: Robot, written: Written) -> str:
     except RemoteError as error:
         if error.kind != Kind.UNKNOWN_NAME:
             raise
-        return str(error)
+        return _ended(error, written)
     before = written.before
     return "; ".join(f"{name} = {exact(before.get(name))}: {what}" for name, what in outcome.items())
+
+
+def _ended(error: RemoteError, written: Written) -> str:
+    """How the robot ended it, by the names of what was tried: a write's number says nothing to a person."""
+    how = str(error).partition(" is not on trial: ")[2] or str(error)
+    return f"{', '.join(written.before)}: {how}"
 
 
 def _wait(robot: Robot, write: int, ends: float, *, countdown: bool) -> bool:

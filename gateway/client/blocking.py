@@ -11,6 +11,7 @@ from gateway.client.client import Client
 from gateway.client.clock import ClockOffset
 from gateway.client.link import LinkSettings, OnState
 from gateway.client.subscription import Batch
+from gateway.wire.bus import Buses
 from gateway.wire.component import Snapshot
 from gateway.wire.control import JournalEntries
 from gateway.wire.cost import GatewayCost
@@ -85,6 +86,10 @@ class Robot:
     def components(self, *channels: str) -> Snapshot:
         """The newest value of the channels (globs; none means all)."""
         return self._wait(self._client.components(*channels))
+
+    def buses(self) -> Buses:
+        """Every CAN bus with its nodes, and who talks on it; gateways of before 0.1 do not know this."""
+        return self._wait(self._client.buses())
 
     def cost(self) -> GatewayCost:
         """What monitoring costs the robot; rates are since the last call, None the first time."""

@@ -8,6 +8,7 @@ from gateway.client.address import Address
 from gateway.client.errors import LinkLost, NotConnected, RemoteError
 from gateway.client.link import Link, LinkSettings, OnState
 from gateway.client.subscription import Subscription
+from gateway.wire.bus import BUS_SNAPSHOT, Buses
 from gateway.wire.component import COMPONENT_SNAPSHOT, STATUS_SNAPSHOT, Snapshot, SnapshotParams
 from gateway.wire.control import (
     CONTROL_ACQUIRE,
@@ -118,6 +119,10 @@ class Client:
     async def components(self, *channels: str) -> Snapshot:
         """The newest value of the channels (globs; none means all)."""
         return await self.link.call(COMPONENT_SNAPSHOT, SnapshotParams(list(channels) or None))
+
+    async def buses(self) -> Buses:
+        """Every CAN bus with its nodes, and who talks on it; gateways of before 0.1 do not know this."""
+        return await self.link.call(BUS_SNAPSHOT, Params())
 
     async def cost(self) -> GatewayCost:
         """What monitoring costs the robot; rates are since the last call, None the first time."""

@@ -257,7 +257,7 @@ complete -c gwrms -n '_shtab_gwrms_using sensor decode' -l format -xka "bno08x-r
 complete -c gwrms -n '_shtab_gwrms_using sensor decode' -l layout -x -d 'an insole'"'"'s layout file, or one that ships: insole-3, insole-8, insole-16, insole-18, insole-35'
 complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a calibrate -d 'an insole'"'"'s pressure, an IMU'"'"'s zero'
 complete -c gwrms -n '_shtab_gwrms_using calibrate' -s h -l help -d 'show this help message and exit'
-complete -c gwrms -n '_shtab_gwrms_using calibrate; and test $_shtab_gwrms_npos -eq 0' -a insole -d 'Measures the unloaded cells, then known loads on the whole insole; fits, shows the fit, and asks before it writes. Name the file in [insole.NAME] as `calibration`.'
+complete -c gwrms -n '_shtab_gwrms_using calibrate; and test $_shtab_gwrms_npos -eq 0' -a insole -d 'Measures the unloaded cells, then known loads on the whole insole; fits, shows the fit, and asks before it writes. Name the file in [insole.NAME] as `calibration`. ROBOT.toml:NAME instead of a port takes everything from [insole.NAME]. A device that sends pressure needs no calibration.'
 complete -c gwrms -n '_shtab_gwrms_using calibrate insole' -s h -l help -d 'show this help message and exit'
 complete -c gwrms -n '_shtab_gwrms_using calibrate insole' -l write -xka "(__fish_complete_path (commandline -ct))" -d 'where the result goes'
 complete -c gwrms -n '_shtab_gwrms_using calibrate insole' -l format -xka "brilliant-star insole-cobs insole-csv insole-frame" -d 'default: insole-cobs'

@@ -59,7 +59,7 @@ _shtab_gwrms_commands() {
 _shtab_gwrms_calibrate_commands() {
   local _commands=(
     imu:'Takes the present posture as upright and writes it. Stand upright and still; name the file in [imu.NAME] as `zero`. ROBOT.toml:NAME instead of a port takes everything from [imu.NAME], also for an IMU on a CAN bus.'
-    insole:'Measures the unloaded cells, then known loads on the whole insole; fits, shows the fit, and asks before it writes. Name the file in [insole.NAME] as `calibration`.'
+    insole:'Measures the unloaded cells, then known loads on the whole insole; fits, shows the fit, and asks before it writes. Name the file in [insole.NAME] as `calibration`. ROBOT.toml:NAME instead of a port takes everything from [insole.NAME]. A device that sends pressure needs no calibration.'
   )
   _describe 'gwrms calibrate commands' _commands
 }

@@ -46,7 +46,7 @@ def read(file: Path) -> dict[str, Any]:
     try:
         data = file.read_bytes()
     except OSError as error:
-        raise Unreadable(Finding("", "", f"cannot be read: {error.strerror}; name one")) from error
+        raise Unreadable(Finding("", "", f"cannot be read: {error.strerror}")) from error
     for mark, remedy in _ENCODINGS:
         if data.startswith(mark):
             raise Unreadable(Finding("", "", remedy))

@@ -3,6 +3,8 @@
 from msgspec import Struct
 
 from gateway.wire.finding import FindingInfo
+from gateway.wire.method import Method, Params
+from gateway.wire.role import Role
 
 CLOSED = "closed"  # a bus's state that is not open
 
@@ -24,6 +26,14 @@ class NodeInfo(Struct, frozen=True):
     findings: list[FindingInfo] = []
 
 
+class TalkInfo(Struct, frozen=True):
+    """Frames of one kind and node within the last second, by CiA 301's pre-defined connection set."""
+
+    kind: str
+    node_id: int | None  # None: they belong to no node
+    frames_per_s: float
+
+
 class BusInfo(Struct, frozen=True):
     """One bus. Load and frames are of the last second; the counters are since the gateway watches it.
 
@@ -42,3 +52,15 @@ class BusInfo(Struct, frozen=True):
     nodes: list[NodeInfo]
     problem: str | None = None  # why it is not open, or what its controller or its link says
     findings: list[FindingInfo] = []
+    talks: list[TalkInfo] = []  # the most first; of frames that came to the gateway
+
+
+class Buses(Struct, frozen=True):
+    """Result of `bus.snapshot`."""
+
+    stamp_ns: int
+    buses: list[BusInfo]
+
+
+BUS_SNAPSHOT = Method("bus.snapshot", Params, Buses, module="component", role=Role.VIEWER)
+METHODS = (BUS_SNAPSHOT,)

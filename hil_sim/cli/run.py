@@ -108,20 +108,23 @@ def main(argv: list[str]) -> int:
 
 
 def _run(file: Path, script: Script, arguments: argparse.Namespace) -> Ran:
-    """Run one, and print what came of it."""
+    """Run one, and print what came of it; at once which, for it takes its time."""
     began_s = time.time()
+    if not arguments.json:
+        _say(report.head(file, script))
     with ExitStack() as stack:
         folder = arguments.dir or Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="gwrms-")))
         ran = Ran(file, script, run(script, folder, arguments.speed), began_s)
     if ran.outcome.problem:
         sys.stderr.write(f"gwrms sim run: {file}: {ran.outcome.problem}\n")
-    sys.stdout.write(
-        json.dumps(records.as_json(ran), ensure_ascii=False) + "\n"
-        if arguments.json
-        else report.text(file, script, ran.outcome)
-    )
-    sys.stdout.flush()
+    told = json.dumps(records.as_json(ran), ensure_ascii=False) + "\n"
+    _say(told if arguments.json else report.result(ran.outcome))
     return ran
+
+
+def _say(text: str) -> None:
+    sys.stdout.write(text)
+    sys.stdout.flush()
 
 
 def _write(file: Path, content: bytes) -> None:

@@ -12,8 +12,18 @@ _MARKS = {Result.PASSED: "ok    ", Result.FAILED: "FAILED", Result.INCONCLUSIVE:
 
 
 def text(file: Path, script: Script, outcome: Outcome) -> str:
+    """Return the whole: `head`, then `result`."""
+    return head(file, script) + result(outcome)
+
+
+def head(file: Path, script: Script) -> str:
+    """Return the first line, which can be said before it is run."""
+    return f"{file}: {script.title}\n"
+
+
+def result(outcome: Outcome) -> str:
     """Return a line for each expectation, and below it what was seen."""
-    lines = [f"{file}: {script.title}"]
+    lines = []
     for verdict in outcome.verdicts:
         lines.append(f"  {_MARKS[verdict.result]}  {verdict.expected}")
         lines.append(f"          {verdict.seen}")

@@ -85,7 +85,9 @@ class Store:
         """
         url = checked_url(url or default_url())
         if Objects(url).read(ABOUT) is None:
-            raise NoSuchTable(f"there is no store at {url} yet: nothing has been uploaded to it")
+            raise NoSuchTable(
+                f"there is no store at {url} yet: nothing has been uploaded to it (gwrms collect --upload)"
+            )
         return cls(url, several_writers=False)
 
     def append(

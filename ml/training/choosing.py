@@ -60,9 +60,18 @@ def held_out(groups: Iterable[str], wanted: Sequence[str] = (), others: int = 0)
     if not chosen or len(known) - len(chosen) + others < 2:
         raise UnusableData(
             f"wearers or sessions with labels: {', '.join(known) or 'none'}; "
-            "it takes two to learn from and one to judge by"
+            f"it takes two to learn from and one to judge by: {_remedy(len(known) + others)}"
         )
     return chosen
+
+
+def _remedy(there: int) -> str:
+    if there > 2:
+        return "hold out fewer, or name whose the others are (gwrms label SESSION --wearer NAME)"
+    return (
+        "record more people, label what they do (gwrms label SESSION LABEL --from T --to T) "
+        "and say who they are (gwrms label SESSION --wearer NAME)"
+    )
 
 
 def _known(name: str, known: Sequence[str], others: int) -> str:

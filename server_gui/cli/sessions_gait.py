@@ -83,9 +83,9 @@ def _told(found: RecordedGait) -> Iterator[str]:
         for joint, error in sorted(found.errors.items())
     ]
     if ranges:
-        yield "\n" + table(("JOINT", "RANGE OF MOTION"), ranges, right=(1,))
+        yield "\n" + table(("JOINT", "RANGE OF MOTION"), ranges, right=(1,)).rstrip("\n")
     if errors:
-        yield "\n" + table(("JOINT", "TRACKING ERROR (RMS)", "LARGEST"), errors, right=(1, 2))
+        yield "\n" + table(("JOINT", "TRACKING ERROR (RMS)", "LARGEST"), errors, right=(1, 2)).rstrip("\n")
 
 
 def _leg(leg: Leg, found: LegGait) -> tuple[str, ...]:

@@ -13,7 +13,8 @@ from server_gui.core.tuning.stop import StopProgress, StopState
 
 EPILOG: Final = """keys
   s, space     STOP: quick stop on every drive (software, not safety-rated)
-  r r          end a held stop, pressed twice: every drive is switched off, none is enabled
+  r r          end a held stop and clear faults, pressed twice: every drive is switched off, none
+               is enabled
   ↑ ↓          choose a parameter
   ← →          lower or raise it; the lease is held only while it is written
   q            end

@@ -100,7 +100,9 @@ class Controls:
         """End a held stop; a key that is hit by mistake does nothing."""
         if not self.asks_again:
             self._reset_until_s = time.monotonic() + AGAIN_S
-            self.note = "r again ends a held stop: every drive is switched off, none is enabled"
+            self.note = (
+                "r again ends a held stop and clears faults: every drive is switched off, none is enabled"
+            )
             return
         self._reset_until_s = 0.0
         self.note = "ending the held stop …"

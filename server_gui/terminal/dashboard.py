@@ -35,7 +35,7 @@ def draw(station: Station, controls: Controls, where: str, size: tuple[int, int]
         return footer
     page = Layout()
     page.split_column(
-        Layout(panels.header(station.robot, where, look), size=above),
+        Layout(panels.header(station, where, look), size=above),
         Layout(name="body"),
         Layout(footer, size=below),
     )

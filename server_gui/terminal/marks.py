@@ -2,11 +2,11 @@
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 from rich.text import Text
 
 from gateway.plain import plain
+from server_gui.core.alarms.marks import GLYPHS, Mark, state_mark
 
 LEFT = "#56b4e9"  # Okabe–Ito sky blue
 RIGHT = "#e69f00"  # Okabe–Ito orange
@@ -20,28 +20,7 @@ NONE = "–"
 BLOCKS = "▁▂▃▄▅▆▇█"
 
 
-@dataclass(frozen=True, slots=True)
-class Mark:
-    """A state for the eye: never by colour alone."""
-
-    shape: str
-    colour: str
-
-
-STATES: dict[str, Mark] = {
-    "ok": Mark("●", GOOD),
-    "stale": Mark("◌", OLD),
-    "lost": Mark("✕", BAD),
-    "fault": Mark("■", BAD),
-    "operation enabled": Mark("●", GOOD),
-    "switched on": Mark("◐", WARN),
-    "ready to switch on": Mark("◔", WARN),
-    "switch on disabled": Mark("○", DIM),
-    "not ready to switch on": Mark("○", DIM),
-    "quick stop active": Mark("▲", WARN),
-    "fault reaction active": Mark("■", BAD),
-}
-UNKNOWN = Mark("?", WARN)
+COLOURS = {"good": GOOD, "warn": WARN, "bad": BAD, "old": OLD, "dim": DIM, "accent": LEFT}
 
 
 def side_colour(component: str) -> str:
@@ -57,9 +36,12 @@ def words(text: str, style: str = "") -> Text:
 
 def state_text(word: str, more: str = "") -> Text:
     """Return a state as shape, colour and word, and what else there is to say of it."""
-    said = word.replace("_", " ").lower()
-    mark = STATES.get(said, UNKNOWN)
-    return words(f"{mark.shape} {said} {more}".rstrip(), mark.colour)
+    return mark_text(state_mark(word.replace("_", " ").lower()), more)
+
+
+def mark_text(mark: Mark, more: str = "") -> Text:
+    """Return a mark as shape, colour and word."""
+    return words(f"{GLYPHS[mark.shape]} {mark.word} {more}".rstrip(), COLOURS[mark.colour])
 
 
 def sparkline(values: Iterable[float | None], low: float, high: float, width: int) -> str:

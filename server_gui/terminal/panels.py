@@ -15,6 +15,8 @@ from gateway.client import ConnectionState
 from gateway.plain import plain
 from gateway.units import Unit, Units
 from gateway.wire.parameter import ParameterInfo, ParameterValue
+from server_gui.core.alarms.alarm import Active
+from server_gui.core.alarms.marks import GLYPHS
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.news import NewsKind
 from server_gui.core.follow.robot import Robot
@@ -26,6 +28,7 @@ from server_gui.core.tuning.writing import WriteState
 from server_gui.terminal.controls import Controls
 from server_gui.terminal.marks import (
     BAD,
+    COLOURS,
     DIM,
     GOOD,
     NONE,
@@ -33,6 +36,7 @@ from server_gui.terminal.marks import (
     WARN,
     bar,
     degrees,
+    mark_text,
     needle,
     scale,
     side_colour,
@@ -69,13 +73,17 @@ WIDE = Look(angle=28, past=34, foot=20, parameter=10, share=12, roomy=True)
 NARROW = Look(angle=22, past=0, foot=12, parameter=9, share=0, roomy=False)
 
 
-def header(robot: Robot, where: str, look: Look) -> RenderableType:
-    """Return which robot, how it is reached, how old what is shown is, what is wrong."""
+def header(station: Station, where: str, look: Look) -> RenderableType:
+    """Return which robot, its worst state, how it is reached, how old what is shown is."""
+    robot = station.robot
     row = Table.grid(expand=True, padding=(0, 2))
     row.add_column(ratio=1)
     row.add_column(justify="right")
     name = robot.description.robot if robot.description is not None else where
-    row.add_row(Text.assemble((plain(name), "bold"), ("  " + plain(where), DIM)), _link(robot, look))
+    known = mark_text(station.mark)
+    row.add_row(
+        Text.assemble((plain(name), "bold"), "  ", known, ("  " + plain(where), DIM)), _link(robot, look)
+    )
     if not look.roomy:
         return row
     return Panel(row, title="[bold]GWRMS[/]", title_align="left", box=box.ROUNDED, border_style=DIM)
@@ -90,8 +98,7 @@ def _link(robot: Robot, look: Look) -> Text:
     age = NONE if age_s is None else f"{age_s * 1000:.0f} ms"
     trip = NONE if link.round_trip_ns is None else f"{link.round_trip_ns / 1e6:.1f} ms"
     text = Text.assemble(
-        state_text("stale" if robot.is_stale() else "ok"),
-        f"  age {age}  {robot.rate_hz():.0f} Hz  ",
+        f"age {age}  {robot.rate_hz():.0f} Hz  ",
         f"round trip {trip}  " if look.roomy else "",
     )
     lost = link.missed + link.dropped
@@ -142,7 +149,7 @@ def _drive(robot: Robot, name: str, stale: bool) -> Text:
     if stale or word is None:
         return words(word or NONE, style=OLD)
     code = robot.values.get(f"{name}.error_code")
-    return state_text(word, f"{int(code):04X}h" if code else "")
+    return state_text(word, f"0x{int(code):04X}" if code else "")
 
 
 def _part_state(robot: Robot, name: str) -> Text:
@@ -296,25 +303,31 @@ def _news(station: Station, controls: Controls, where: str) -> Text:
         return words(controls.note, style=WARN)
     if writing.state in NOT_WRITTEN:
         return words(f"✕ {writing.state.value}: {writing.text}", style=BAD)
-    if robot.last_failure is not None:
-        return words(f"✕ {robot.last_failure.what}: {robot.last_failure.reason}", style=BAD)
-    if robot.link.problem is not None:
-        return words(f"✕ {robot.link.problem}", style=BAD)
-    bad = robot.not_ok()
-    if bad:
-        return words(
-            "  ".join(f"{part.name} {part.state}: {part.problem or 'no reason known'}" for part in bad),
-            style=WARN,
-        )
-    if controls.writing:
-        return words(controls.note, style=DIM)
-    newest = next(iter(station.news.items), None)
+    active, newest = station.alarms.active, next(iter(station.news.items), None)
     if newest is not None and newest.kind is NewsKind.STOP and time.time() - newest.utc_s < SAID_S:
         return words(newest.text, style=WARN)
+    if active and active[0].alarm.mark.colour in ("bad", "warn"):
+        return _alarm(active)
+    if robot.last_failure is not None:
+        return words(f"✕ {robot.last_failure.what}: {robot.last_failure.reason}", style=BAD)
+    if controls.writing:
+        return words(controls.note, style=DIM)
     if writing.state is WriteState.DONE:
         return words(f"✓ {writing.text}", style=GOOD)
+    if active:
+        return _alarm(active)
     hint = f"or in another terminal: gwrms set --robot {where} gait.step_length=0.5"
     return words(controls.note or hint, style=DIM)
+
+
+def _alarm(active: Sequence[Active]) -> Text:
+    """The worst: what, then what to check, and how many more there are."""
+    alarm, more = active[0].alarm, len(active) - 1
+    others = f"  (+{more} more)" if more else ""
+    key = "  r r clears it" if alarm.clears else ""
+    check = f"  → {alarm.check}" if alarm.check else ""
+    style = COLOURS[alarm.mark.colour]
+    return words(f"{GLYPHS[alarm.mark.shape]} {alarm.line}{others}{key}{check}", style=style)
 
 
 def _panel(content: RenderableType, title: str, robot: Robot, note: str = "") -> Panel:

@@ -19,17 +19,17 @@ from server_gui.views.widgets.rows import SORT_ROLE, Index, RowsModel
 TITLES: Final = (
     "Time",
     "Robot",
-    "Who",
     "What",
     "Of",
+    "What came of it",
     "Old",
     "New",
     "Read back",
     "Unit",
-    "What came of it",
+    "Who",
     "Told by",
 )
-TIME, ROBOT, WHO, WHAT, THING, OLD, NEW, READ_BACK, UNIT, OUTCOME, TOLD_BY = range(len(TITLES))
+TIME, ROBOT, WHAT, THING, OUTCOME, OLD, NEW, READ_BACK, UNIT, WHO, TOLD_BY = range(len(TITLES))
 NUMBERS: Final = (OLD, NEW, READ_BACK)
 BAD: Final = ("NOT ", "FAILED", "refused", "write taken back")  # in an outcome that is looked at first
 
@@ -52,7 +52,7 @@ class ActsModel(RowsModel[Line]):
     """Each robot's lines, oldest first."""
 
     def __init__(self, theme: Theme) -> None:
-        super().__init__(TITLES, lambda line: line.key)
+        super().__init__(TITLES, lambda line: line.key, (TIME,))
         self._theme = theme
 
     def data(self, index: Index, role: int = 0) -> Any:
@@ -97,14 +97,14 @@ def _tip(line: Line) -> str:
 _TEXTS: Final[tuple[Callable[[Line], str], ...]] = (
     _when,
     lambda line: line.robot,
-    lambda line: line.act.who,
     lambda line: line.act.what,
     lambda line: line.act.thing,
+    lambda line: line.act.outcome,
     lambda line: _number(line, line.act.old),
     lambda line: _number(line, line.act.new),
     lambda line: _number(line, line.act.read_back),
     lambda line: line.unit.symbol if line.act.new is not None else "",
-    lambda line: line.act.outcome,
+    lambda line: line.act.who,
     lambda line: line.told_by,
 )
 

@@ -5,7 +5,8 @@ import sys
 from PySide6.QtCore import QSettings
 from PySide6.QtWidgets import QApplication
 
-from server_gui.views.theme import Look, Theme
+from server_gui.views.kept import kept_look, kept_scale
+from server_gui.views.theme import Theme
 
 
 def application() -> QApplication:
@@ -25,4 +26,4 @@ def kept_settings() -> QSettings:
 
 def kept_theme(qt: QApplication, kept: QSettings) -> Theme:
     """Return the look and the size of text that were chosen last."""
-    return Theme(qt, Look(str(kept.value("look", "dark"))), float(str(kept.value("scale", 100))) / 100)
+    return Theme(qt, kept_look(kept), kept_scale(kept))

@@ -29,6 +29,7 @@ from server_gui.views.widgets.plain import PlainLabel
 from server_gui.views.widgets.rows import Filtered, Index, RowsTable
 
 EVERY_ROBOT, EVERYBODY = "All robots", "Everybody"
+WIDEST: Final = 300  # of a column, at text of 100 %: its tip has the rest
 MOST: Final = 4  # robots of which everything is said at once
 AWAY: Final = "What was collected before cannot be read now, and is tried again"
 CSV_TITLES: Final = (
@@ -94,7 +95,7 @@ class Audit(QWidget):
             combo.currentIndexChanged.connect(self._filter)
         export = QPushButton("CSV …")
         export.setToolTip("What is shown, in SI units with every digit")
-        export.clicked.connect(lambda: ask_save(self, "Export as CSV", "csv", self._export))
+        export.clicked.connect(lambda: ask_save(self, "Export as CSV", "csv", self._export, "audit"))
         self._theme = theme
         self.table = self._table()
         theme.scaled.connect(self._restyle)
@@ -167,11 +168,13 @@ class Audit(QWidget):
         said += [] if problem is None else [f"{AWAY}: {problem}"]
         set_text(self.verdict, "\n".join(said))
         broken = any(one.is_altered for one in asked.values())
-        self.verdict.setProperty("tone", "bad" if broken else "good")
+        known = bool(asked) and all(one.is_known for one in asked.values())
+        self.verdict.setProperty("tone", "bad" if broken else "good" if known else "plain")
         self.verdict.style().polish(self.verdict)
 
     def _restyle(self) -> None:
         self.table.verticalHeader().setDefaultSectionSize(self._theme.px(20))
+        self.table.horizontalHeader().setMaximumSectionSize(self._theme.px(WIDEST))
 
     def _table(self) -> RowsTable:
         table = RowsTable(self.chosen, "What was done to the robots", TIME)

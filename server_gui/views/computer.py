@@ -20,7 +20,7 @@ def facts(station: Station, seen: ResourceSnapshot) -> str:
     table = station.processes
     if table is not None and table.thermal is not UNSET:
         known = [f"{name} {value:.0f} °C" for name, value in table.thermal.items() if value is not None]
-        lines.append(f"Temperatures: {', '.join(known) or 'this computer tells none'}")
+        lines.append(f"Temperatures: {', '.join(known) or 'this computer reports none'}")
     lines += _costs(station.cost)
     if seen.memory.swap_used:
         lines.append(f"Swapped out: {seen.memory.swap_used / MIB:.0f} MiB")

@@ -3,28 +3,40 @@
 from collections.abc import Mapping, Sequence
 from typing import Final
 
-from PySide6.QtCore import QByteArray, Qt
-from PySide6.QtWidgets import QDockWidget, QMainWindow, QTabWidget, QWidget
+from PySide6.QtCore import QByteArray, QEvent, QObject, QRect, Qt
+from PySide6.QtWidgets import QDockWidget, QMainWindow, QScrollArea, QTabWidget, QWidget
 
 from server_gui.views.theme import Theme
 
 LAYOUT: Final = 1  # rises when a stored layout no longer fits
+WIDE: Final = 1600  # wide, at text of 100 %: from here on parameters are shown with range and default
 ROOMY: Final = 1100  # wide, at text of 100 %: what is narrower has no room for everything at once
 STACK: Final = 340  # wide, likewise: panels that are one behind the other
+MOVES: Final = (QEvent.Type.Move, QEvent.Type.Resize, QEvent.Type.Show)
 Area = Qt.DockWidgetArea
 
 
-class Docks:
+class Docks(QObject):
     """Of a window, whose `fit` is called whenever its size, or that of the text, has changed.
 
     The last panel is seen only when it is asked for. What people have arranged in a roomy window is kept
-    while it is narrow, and over the end of the program.
+    while it is narrow, and over the end of the program. However they are arranged, they are scrolled rather
+    than make the window larger than its screen, and one that floats goes out of the way of `uncovered`.
     """
 
-    def __init__(self, window: QMainWindow, theme: Theme, panels: Mapping[str, tuple[QWidget, Area]]) -> None:
+    def __init__(
+        self,
+        window: QMainWindow,
+        theme: Theme,
+        panels: Mapping[str, tuple[QWidget, Area]],
+        uncovered: QWidget,
+    ) -> None:
+        super().__init__(window)
         self._window = window
+        self._uncovered = uncovered
         self._theme = theme
         self.is_narrow = False
+        self._is_wide = False
         window.setCorner(Qt.Corner.BottomLeftCorner, Area.LeftDockWidgetArea)
         window.setCorner(Qt.Corner.BottomRightCorner, Area.RightDockWidgetArea)
         window.setTabPosition(Area.AllDockWidgetAreas, QTabWidget.TabPosition.North)
@@ -40,8 +52,9 @@ class Docks:
         return self._roomy if self.is_narrow else self._window.saveState(LAYOUT)
 
     def restore(self, state: QByteArray) -> None:
-        """Arrange them as it was kept."""
-        self._window.restoreState(state, LAYOUT)
+        """Arrange them as it was kept; as they were at first where Qt cannot."""
+        if not self._window.restoreState(state, LAYOUT):
+            self._window.restoreState(self._usual, LAYOUT)
 
     def reset(self, shown: Sequence[QDockWidget]) -> None:
         """Everything where it was at first, and these in sight."""
@@ -60,6 +73,11 @@ class Docks:
             dock.setVisible(not in_sight)
         self._put_away = in_sight
 
+    def bring(self, dock: QDockWidget) -> None:
+        """Show this one, in front of those that are at its place."""
+        dock.show()
+        dock.raise_()
+
     @property
     def has_room(self) -> bool:
         """Whether all of them have room beside the tabs."""
@@ -74,18 +92,35 @@ class Docks:
                 self._stack()
             else:
                 self._unstack()
-        if scaled:
+        is_wide = self._window.width() >= self._theme.px(WIDE)
+        if scaled or (is_wide is not self._is_wide and not self.is_narrow):
             self._size()
+        self._is_wide = self._is_wide if self.is_narrow else is_wide
 
     def _dock(self, title: str, widget: QWidget, area: Area) -> QDockWidget:
         dock = QDockWidget(title)
         dock.setObjectName(title)
-        dock.setWidget(widget)
+        dock.setWidget(_scrolled(widget))
+        dock.installEventFilter(self)
         self._window.addDockWidget(area, dock)
         return dock
 
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        if event.type() in MOVES and isinstance(watched, QDockWidget) and watched.isFloating():
+            self._uncover(watched)
+        return False
+
+    def _uncover(self, dock: QDockWidget) -> None:
+        """Below what nothing may cover, where it floats above that."""
+        whole = self._uncovered
+        above = QRect(whole.mapToGlobal(whole.rect().topLeft()), whole.size())
+        frame = dock.frameGeometry()
+        if whole.isVisible() and dock.isVisible() and frame.intersects(above):
+            dock.move(frame.x(), above.bottom() + 1)
+
     def _size(self) -> None:
-        widths, px = (225, 400), self._theme.px
+        px = self._theme.px
+        widths = (225, 400 if self._window.width() < px(WIDE) else 600)
         if self.is_narrow:
             self._window.resizeDocks(self.all[:1], [px(STACK)], Qt.Orientation.Horizontal)
             return
@@ -111,3 +146,12 @@ class Docks:
             if bar is not None:
                 bar.deleteLater()
         self.restore(self._roomy)
+
+
+def _scrolled(widget: QWidget) -> QScrollArea:
+    """Where a panel has less room than it needs."""
+    area = QScrollArea()
+    area.setWidgetResizable(True)
+    area.setWidget(widget)
+    area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+    return area

@@ -1,90 +1,202 @@
-"""What happened, newest first: links, states, faults, writes, stops, who had control."""
+"""What happened, newest first, with what still lasts on top: links, faults, writes, stops, control."""
 
 import datetime
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, Final
 
-from PySide6.QtCore import QAbstractTableModel, QModelIndex, QPersistentModelIndex, Qt
-from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView
+from PySide6.QtCore import QAbstractTableModel, QModelIndex, QPersistentModelIndex, QSize, Qt, Signal
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QComboBox,
+    QHBoxLayout,
+    QHeaderView,
+    QLineEdit,
+    QTableView,
+    QVBoxLayout,
+    QWidget,
+)
 
 from gateway.plain import plain
+from server_gui.core.alarms.alarm import Active
+from server_gui.core.alarms.marks import GLYPHS, NEWS, Mark
 from server_gui.core.desk.desk import Desk
-from server_gui.core.follow.news import Item
-from server_gui.views.joint_table import GLYPHS
-from server_gui.views.marks import NEWS
+from server_gui.core.desk.station import Station
+from server_gui.core.follow.news import Item, NewsKind
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.plain import tip
 
 Index = QModelIndex | QPersistentModelIndex
 COLUMNS: Final = 4
+# What of them is shown; active alarms are whatever is chosen.
+CHOICES: Final[dict[str, frozenset[NewsKind]]] = {
+    "Everything": frozenset(NewsKind),
+    "Faults and stops": frozenset({NewsKind.FAULT, NewsKind.STOP, NewsKind.NOT_STOPPED}),
+    "Lost, stale, links": frozenset({NewsKind.LOST, NewsKind.STALE, NewsKind.LINK}),
+    "Warnings": frozenset({NewsKind.WARNING}),
+    "Writes and control": frozenset({NewsKind.PARAMETER, NewsKind.CONTROL}),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A row: when, of what sort, of which robot, what; and what is seen of it in the signals."""
+
+    when: str
+    mark: Mark
+    robot: str
+    text: str
+    at: tuple[Station, str, int] | None = None  # robot, channel, instant
 
 
 class NewsModel(QAbstractTableModel):
-    """The desk's news."""
+    """Active alarms, then the desk's news as they are chosen."""
 
     def __init__(self, desk: Desk, theme: Theme) -> None:
         super().__init__()
         self._desk = desk
         self._theme = theme
-        self._items: list[Item] = []
-        self._revision = -1
+        self._kinds = CHOICES["Everything"]
+        self._words: Sequence[str] = ()
+        self.lines: list[Line] = []
+        self.pinned = 0  # lines that are active alarms
+        self._revision: object = None
 
     def refresh(self) -> None:
         """Take what is new."""
-        news = self._desk.news
-        if news.revision == self._revision:
-            return
+        revision = (self._desk.news.revision, *(one.alarms.revision for one in self._desk.stations))
+        if revision != self._revision:
+            self._revision = revision
+            self._take()
+
+    def choose(self, kinds: frozenset[NewsKind], words: Sequence[str]) -> None:
+        """Show only these kinds, and what has all of these words in it."""
+        self._kinds, self._words = kinds, words
+        self._take()
+
+    def _take(self) -> None:
+        active = [_of_alarm(station, one) for station in self._desk.stations for one in station.alarms.active]
+        news = (_of_item(item) for item in self._desk.news.items if item.kind in self._kinds)
         self.beginResetModel()
-        self._revision, self._items = news.revision, list(news.items)
+        self.pinned = len(active)
+        self.lines = [*active, *(line for line in news if self._has_words(line))]
         self.endResetModel()
 
+    def _has_words(self, line: Line) -> bool:
+        said = f"{line.mark.word} {line.robot} {line.text}".lower()
+        return all(word in said for word in self._words)
+
     def rowCount(self, parent: Index = QModelIndex()) -> int:  # noqa: B008 - Qt's own default
-        return 0 if parent.isValid() else len(self._items)
+        return 0 if parent.isValid() else len(self.lines)
 
     def columnCount(self, parent: Index = QModelIndex()) -> int:  # noqa: B008 - Qt's own default
         return COLUMNS
 
     def data(self, index: Index, role: int = 0) -> Any:
-        item = self._items[index.row()]
-        mark = NEWS[item.kind]
+        line, column = self.lines[index.row()], index.column()
+        is_pinned = index.row() < self.pinned
         match role:
             case Qt.ItemDataRole.DisplayRole:
-                when = datetime.datetime.fromtimestamp(item.utc_s, datetime.UTC).astimezone()
-                glyph = GLYPHS.get(mark.shape, "◆")
-                return (f"{when:%H:%M:%S}", f"{glyph} {mark.word}", plain(item.robot), plain(item.text))[
-                    index.column()
-                ]
-            case Qt.ItemDataRole.ForegroundRole if index.column() < 2:
-                return self._theme.colour(mark.colour if index.column() else "dim")
+                kind = f"{GLYPHS.get(line.mark.shape, '◆')} {line.mark.word}"
+                return (line.when, kind, plain(line.robot), plain(line.text))[column]
+            case Qt.ItemDataRole.ForegroundRole if column < 2:
+                return self._theme.colour(line.mark.colour if column else "dim")
+            case Qt.ItemDataRole.FontRole if is_pinned:
+                return self._theme.text_font(bold=True)
             case Qt.ItemDataRole.ToolTipRole:
-                return tip(item.text)
+                return tip(line.text)
+            case Qt.ItemDataRole.AccessibleTextRole:
+                return f"{'active: ' if is_pinned else ''}{line.mark.word} {line.robot} {line.text}"
         return None
 
 
-class EventsPanel(QTableView):
-    """The newest at the top."""
+class EventsPanel(QWidget):
+    """Active alarms, then the newest; `shown` brings a robot, a channel and an instant that was chosen."""
+
+    shown = Signal(object, str, object)
 
     def __init__(self, desk: Desk, theme: Theme) -> None:
         super().__init__()
         self._theme = theme
         self._news = NewsModel(desk, theme)
-        self.setModel(self._news)
-        self.setAccessibleName("Events of all robots")
-        self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
-        self.setTabKeyNavigation(False)
-        self.setShowGrid(False)
-        self.setWordWrap(False)
-        self.verticalHeader().hide()
-        self.horizontalHeader().hide()
-        self.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
-        self.horizontalHeader().setSectionResizeMode(COLUMNS - 1, QHeaderView.ResizeMode.Stretch)
-        self.horizontalHeader().setResizeContentsPrecision(0)  # as wide as what is in sight, not all there is
+        self.setObjectName("page")
+        self.words, self.kinds = QLineEdit(), QComboBox()
+        self.words.setPlaceholderText("Filter events")
+        self.words.setAccessibleName("Filter of the events: words")
+        self.words.setClearButtonEnabled(True)
+        self.words.textChanged.connect(self._choose)
+        self.kinds.addItems(list(CHOICES))
+        self.kinds.setAccessibleName("Filter of the events: kinds")
+        self.kinds.currentIndexChanged.connect(self._choose)
+        self.table = QTableView()
+        self.table.setModel(self._news)
+        self.table.setAccessibleName("Events of all robots; Return shows the signal of an active alarm")
+        self.table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+        self.table.setTabKeyNavigation(False)
+        self.table.setShowGrid(False)
+        self.table.setWordWrap(False)
+        self.table.verticalHeader().hide()
+        header = self.table.horizontalHeader()
+        header.hide()
+        header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        header.setSectionResizeMode(COLUMNS - 1, QHeaderView.ResizeMode.Stretch)
+        header.setResizeContentsPrecision(0)  # as wide as what is in sight, not all there is
+        self.table.activated.connect(self._activated)
+        tools = QHBoxLayout()
+        tools.setContentsMargins(4, 3, 4, 2)
+        tools.addWidget(self.words, 1)
+        tools.addWidget(self.kinds)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        column.addLayout(tools)
+        column.addWidget(self.table, 1)
         theme.changed.connect(self._restyle)
         self._restyle()
+
+    @property
+    def lines(self) -> Sequence[Line]:
+        """What is shown, the active alarms first."""
+        return self._news.lines
+
+    @property
+    def pinned(self) -> Sequence[Line]:
+        """The active alarms."""
+        return self._news.lines[: self._news.pinned]
 
     def refresh(self) -> None:
         """Take what is new."""
         self._news.refresh()
 
+    def minimumSizeHint(self) -> QSize:
+        return QSize(self._theme.px(120), self._theme.px(60))
+
+    def _choose(self) -> None:
+        self._news.choose(CHOICES[self.kinds.currentText()], self.words.text().lower().split())
+
+    def _activated(self, index: QModelIndex) -> None:
+        at = self._news.lines[index.row()].at
+        if at is not None:
+            self.shown.emit(*at)
+
     def _restyle(self) -> None:
-        self.verticalHeader().setDefaultSectionSize(self._theme.px(19))
-        self.setMinimumHeight(self._theme.px(60))
+        self.table.verticalHeader().setDefaultSectionSize(self._theme.px(19))
+        self.table.setMinimumHeight(self._theme.px(40))
+
+
+def _of_alarm(station: Station, one: Active) -> Line:
+    alarm = one.alarm
+    where = alarm.where or alarm.subject.replace("_", " ")
+    text = ": ".join(filter(None, (where, alarm.what)))
+    known = alarm.channel is not None and one.at_ns is not None
+    at = (station, str(alarm.channel), one.at_ns or 0) if known else None
+    return Line(f"since {_clock(one.since_s)}", alarm.mark, station.title, text, at)
+
+
+def _of_item(item: Item) -> Line:
+    again = "" if item.first_s is None else f"  ({item.count} times since {_clock(item.first_s)})"
+    return Line(_clock(item.utc_s), NEWS[item.kind], item.robot, f"{item.text}{again}")
+
+
+def _clock(utc_s: float) -> str:
+    return f"{datetime.datetime.fromtimestamp(utc_s, datetime.UTC).astimezone():%H:%M:%S}"

@@ -1,15 +1,16 @@
-"""Always in sight: robot, drives, status, link, warnings, what became of a STOP, and STOP itself."""
+"""Always in sight: robot, drives, status, link, alarms, what became of a STOP, and STOP itself."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Final
 
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QFontMetrics
+from PySide6.QtCore import QSize, Qt, Signal
+from PySide6.QtGui import QFontMetrics, QResizeEvent
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
-from server_gui.core.tuning.stop import StopState
+from server_gui.core.tuning.stop import StopProgress, StopState
 from server_gui.views.marks import Mark, age_text, drives_mark
 from server_gui.views.predictions import status
 from server_gui.views.theme import Theme
@@ -21,17 +22,32 @@ from server_gui.views.widgets.stop_button import StopButton
 
 STOP_MARKS: Final = {
     StopState.SENT: Mark("half", "warn", "sent"),
-    StopState.CONFIRMED: Mark("disc", "good", "confirmed"),
+    StopState.CONFIRMED: Mark("triangle", "warn", "STOPPED"),
     StopState.NOT_CONFIRMED: Mark("square", "bad", "NOT CONFIRMED"),
 }
-Words = tuple[Mark, str, str]
+STOP_SHARE: Final = 0.3  # of the width, which STOP may take at most
+LEAST: Final = 84  # wide, at text of 100 %: a chip with less says nothing
+# Left out in this order where there is less room; alarms stand below the header too.
+SPARE: Final = ("status", "robot", "link", "drives", "warnings")
+
+
+@dataclass(frozen=True, slots=True)
+class Words:
+    """What a chip says: of its detail as many parts as there is room for, and in its tip all."""
+
+    mark: Mark
+    main: str
+    parts: tuple[str, ...] = ()
+    tip: str = ""
 
 
 class Chip(QFrame):
-    """A mark, what it means, and a line of detail."""
+    """A mark, what it means, and a line of detail; of what has no room whole parts are left out."""
 
     def __init__(self, theme: Theme, name: str) -> None:
         super().__init__()
+        self._theme = theme
+        self._words = Words(Mark("ring", "old"), "")
         self.setObjectName("card")
         self.setAccessibleName(name)
         self._icon = MarkIcon(theme, 12)
@@ -49,18 +65,49 @@ class Chip(QFrame):
     def main_text(self) -> str:
         return self._main.text()
 
-    def show_words(self, mark: Mark, main: str, detail: str) -> None:
-        self._icon.show_mark(mark)
-        set_text(self._main, main)
-        set_text(self._detail, detail)
-        set_tip(self, f"{main}\n{detail}")
+    @property
+    def needs(self) -> int:
+        """How wide it is with all of its first line."""
+        bold = QFontMetrics(self._theme.text_font(bold=True))
+        return max(bold.horizontalAdvance(self._words.main) + self._around, self._theme.px(LEAST))
+
+    @property
+    def wants(self) -> int:
+        """How wide it is with everything."""
+        plain = QFontMetrics(self._theme.text_font())
+        return max(self.needs, plain.horizontalAdvance(" · ".join(self._words.parts)) + self._around)
+
+    def say(self, words: Words) -> None:
+        """Show this."""
+        self._words = words
+        self._icon.show_mark(words.mark)
+        set_text(self._main, words.main)
+        set_tip(self, words.tip or "\n".join(filter(None, (words.main, " · ".join(words.parts)))))
+        self.setAccessibleDescription(f"{words.main}, {' · '.join(words.parts)}")
+        self._fit()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._fit()
+
+    def _fit(self) -> None:
+        room = self.width() - self._around
+        plain, parts = QFontMetrics(self._theme.text_font()), self._words.parts
+        texts = [" · ".join(parts[:count]) for count in range(len(parts), 0, -1)]
+        fits = (text for text in texts if plain.horizontalAdvance(text) <= room)
+        last = texts[-1] if texts and not any(sign.isdigit() for sign in texts[-1]) else ""  # a name at most
+        set_text(self._detail, next(fits, last))
+
+    @property
+    def _around(self) -> int:
+        return self._theme.px(12) + 34
 
 
 class Header(QWidget):
-    """`stopped` asks for a STOP of the robot that is looked at, `reset` to end one that is held."""
+    """`stopped` asks for a STOP of the robot that is looked at, `reset` to end the one of a station."""
 
     stopped = Signal()
-    reset = Signal()
+    reset = Signal(object)
 
     def __init__(self, desk: Desk, theme: Theme, menu: QPushButton) -> None:
         super().__init__()
@@ -71,130 +118,185 @@ class Header(QWidget):
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self._brand = PlainLabel("GWRMS")
         self._brand.setObjectName("brand")
-        row = QHBoxLayout(self)
-        row.setContentsMargins(12, 5, 12, 5)
-        row.setSpacing(8)
-        row.addWidget(self._brand)
-        names = (("robot", 3), ("drives", 3), ("status", 3), ("link", 4), ("warnings", 4))
-        self._chips = {name: Chip(theme, name) for name, _ in names}
-        for name, share in names:
-            row.addWidget(self._chips[name], share)
+        self._row = QHBoxLayout(self)
+        self._row.setContentsMargins(12, 5, 12, 5)
+        self._row.setSpacing(8)
+        self._row.addWidget(self._brand)
+        self._chips = {name: Chip(theme, name) for name in _WORDS}
         self._outcome = Chip(theme, "what became of the STOP")
-        row.addWidget(self._outcome, 4)
+        for chip in (*self._chips.values(), self._outcome):
+            self._row.addWidget(chip, 1)
+        self._empty = QWidget()  # takes the room where there is no chip
+        self._row.addWidget(self._empty, 1)
         self.reset_button = QPushButton("Reset stop…")
         self.reset_button.setToolTip("Ends a held stop. Every drive stays switched off: nothing is enabled.")
-        self.reset_button.clicked.connect(self.reset)
-        row.addWidget(self.reset_button)
+        self.reset_button.clicked.connect(lambda: self.reset.emit(self._desk.selected))
+        self._row.addWidget(self.reset_button)
         self.menu = menu
-        row.addWidget(menu)
+        self._row.addWidget(menu)
         self.stop = StopButton()
         self.stop.stopped.connect(self.stopped)
-        row.addWidget(self.stop)
+        self._row.addWidget(self.stop)
         theme.changed.connect(self._restyle)
         self._restyle()
 
     @property
     def outcome_text(self) -> str:
         """What became of the STOP, as it is shown; empty while nothing is."""
-        return self._outcome.main_text if self._outcome.isVisible() else ""
+        return self._outcome.main_text if not self._outcome.isHidden() else ""
+
+    def minimumSizeHint(self) -> QSize:
+        """Of what is never left out."""
+        return QSize(
+            self.width() - self._room(has_outcome=self._has_outcome), super().minimumSizeHint().height()
+        )
 
     def be_short(self, is_short: bool) -> None:
         """Leave out what stands elsewhere too, where there is little room: STOP names the robot."""
         self._is_short = is_short
         self._brand.setVisible(not is_short)
+        self._fit()
 
     def refresh(self) -> None:
         """Show how it is now."""
         station = self._desk.selected
-        for name, words in _WORDS.items():
-            self._chips[name].setVisible(station is not None and not (self._is_short and name == "robot"))
-            if station is not None:
-                self._chips[name].show_words(*words(station))
+        if station is not None:
+            for name, words in _WORDS.items():
+                self._chips[name].say(words(station))
         self._refresh_stop(station)
+        self._fit()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._fit()
 
     def _refresh_stop(self, station: Station | None) -> None:
-        set_text_of_button(self.stop, "STOP" if station is None else f"STOP  {station.title}")
+        self.stop.name(None if station is None else station.title)
         self.stop.setEnabled(station is not None)
         stopping = None if station is None else station.stopping
-        shown = stopping is not None and (stopping.state is not StopState.IDLE or stopping.held)
-        self._outcome.setVisible(shown)
         self.reset_button.setVisible(stopping is not None and stopping.held)
-        self._chips["warnings"].setVisible(station is not None and not shown)
-        self._chips["link"].setVisible(station is not None and not (shown and self._is_short))
-        if shown and stopping is not None:
-            mark = STOP_MARKS.get(stopping.state, Mark("triangle", "warn", "held"))
-            main = "STOP held" if stopping.state is StopState.IDLE else f"STOP {stopping.state.value}"
-            detail = stopping.text or "until it is reset"
-            self._outcome.show_words(mark, main, detail)
+        if stopping is not None:
+            self._outcome.say(_outcome(stopping))
+
+    def _fit(self) -> None:
+        """Show as many chips as have room for all of their first line, and give each what it needs."""
+        station = self._desk.selected
+        self.stop.most = max(round(self.width() * STOP_SHARE), self._theme.px(150))
+        self._empty.setVisible(station is None)
+        has_outcome = self._has_outcome
+        shown = [] if station is None else [name for name in self._chips if self._is_wanted(name)]
+        room = self._room(has_outcome=has_outcome)
+        for name in SPARE:
+            if sum(self._chips[one].needs + self._row.spacing() for one in shown) > room and name in shown:
+                shown.remove(name)
+        for name, chip in self._chips.items():
+            chip.setVisible(name in shown)
+            chip.setMinimumWidth(chip.needs if name in shown else 0)
+            self._row.setStretchFactor(chip, chip.wants if name in shown else 0)
+        self._outcome.setVisible(has_outcome)
+        self._outcome.setMinimumWidth(self._outcome.needs if has_outcome else 0)
+        self._row.setStretchFactor(self._outcome, self._outcome.wants if has_outcome else 0)
+
+    @property
+    def _has_outcome(self) -> bool:
+        station = self._desk.selected
+        stopping = None if station is None else station.stopping
+        return stopping is not None and (stopping.state is not StopState.IDLE or stopping.held)
+
+    def _is_wanted(self, name: str) -> bool:
+        return not (self._is_short and name == "robot")
+
+    def _room(self, *, has_outcome: bool) -> int:
+        """How much is left for the chips."""
+        margins, spacing = self._row.contentsMargins(), self._row.spacing()
+        fixed = [self._brand, self.reset_button, self.menu, self.stop]
+        taken = sum(one.sizeHint().width() + spacing for one in fixed if not one.isHidden())
+        taken += self._outcome.needs + spacing if has_outcome else 0
+        return self.width() - margins.left() - margins.right() - taken
 
     def _restyle(self) -> None:
         self.stop.setFont(self._theme.text_font(1.45, bold=True))
         self._brand.setFont(self._theme.text_font(1.5, bold=True))
         self.stop.setMinimumWidth(self._theme.px(150))
-        bold = QFontMetrics(self._theme.text_font(bold=True))
-        longest = max(bold.horizontalAdvance(f"STOP {state.value}") for state in StopState)
-        self._outcome.setMinimumWidth(longest + self._theme.px(12) + 40)  # of this no word may be missing
+        self._fit()
 
 
-def set_text_of_button(button: QPushButton, text: str) -> None:
-    """Change a button only where it says something else."""
-    if button.text() != text:
-        button.setText(text)
+def _outcome(stopping: StopProgress) -> Words:
+    if stopping.state is StopState.IDLE:
+        mark, main = Mark("triangle", "warn", "STOPPED"), "STOP held"
+        return Words(mark, main, ("until it is reset",), f"STOP held: {stopping.said}")
+    tip = "\n".join(filter(None, (stopping.text, *stopping.proof_lines)))
+    parts: dict[StopState, tuple[str, ...]] = {
+        StopState.SENT: ("the drives are asked",),
+        StopState.CONFIRMED: (f"{stopping.drives} drives in {stopping.answered_ms or 0:.0f} ms",),
+        StopState.NOT_CONFIRMED: ("use the hardware stop",),
+    }
+    return Words(STOP_MARKS[stopping.state], f"STOP {stopping.state.value}", parts[stopping.state], tip)
 
 
 def _robot(station: Station) -> Words:
-    description = station.robot.description
-    role = "" if description is None else f" · {description.role}"
-    return Mark("diamond", "accent"), station.title, f"{station.address}{role}"
+    description, mark = station.robot.description, station.mark
+    parts = [mark.word]
+    if station.is_named and station.called != station.title:
+        parts.append(station.called)
+    parts.append(station.address)
+    parts += [] if description is None else [description.role]
+    return Words(mark, station.title, tuple(parts))
 
 
 def _drives(station: Station) -> Words:
     joints = station.robot.names("joint")
     if not station.is_live:
-        return Mark("ring", "old"), "Drives not known now", f"–/{len(joints)} enabled · CiA 402"
+        return Words(Mark("ring", "old"), "Drives not known", (f"–/{len(joints)} enabled", "CiA 402"))
     mark = drives_mark(station.robot)
     enabled = sum(station.robot.word(f"{joint}.state") == "operation enabled" for joint in joints)
-    return mark, mark.word.capitalize(), f"{enabled}/{len(joints)} enabled · CiA 402"
+    return Words(mark, mark.word.capitalize(), (f"{enabled}/{len(joints)} enabled", "CiA 402"))
 
 
 def _status(station: Station) -> Words:
     if not station.is_live:
-        return Mark("ring", "old"), "Status not known", "no live data"
+        return Words(Mark("ring", "old"), "Status not known", ("no live data",))
     line = status(station)
     if line is not None:
-        return line.mark, line.text, line.detail
+        return Words(line.mark, line.text, (line.detail,))
     gait, why = station.processing.derived().gait, f"by steps; not predicted: {station.predictions.problem}"
     if not gait.walking:
-        return Mark("ring", "dim"), "Not walking", why
+        return Words(Mark("ring", "dim"), "Not walking", (why,))
     cadence = "–" if gait.cadence_spm is None else f"{gait.cadence_spm:.0f}"
-    return Mark("diamond", "accent"), f"Walking  {cadence} steps/min", why
+    return Words(Mark("diamond", "accent"), f"Walking  {cadence} steps/min", (why,))
 
 
 def _link(station: Station) -> Words:
     robot, link = station.robot, station.robot.link
     age = age_text(robot.age_s())
+    old = f" · {age} old" if robot.age_s() is not None else ""
     if not station.is_linked:
-        return Mark("cross", "bad"), f"No link · {age} old", link.problem or link.state.value
+        main = f"No link{old}" if link.links else "Never reached"
+        return Words(Mark("cross", "bad"), main, (link.problem or link.state.value,))
     lost = link.missed + link.dropped
     trip = "–" if link.round_trip_ns is None else f"{link.round_trip_ns / 1e6:.1f} ms"
-    detail = f"round trip {trip} · {lost} lost · {link.links} links"
+    again = (f"linked {link.links} times",) if link.links > 1 else ()
+    parts = (f"{lost} lost", f"round trip {trip}", *again)
+    if robot.age_s() is None:
+        return Words(Mark("ring", "old"), "Linked, no data yet", parts)
     if robot.is_stale():
-        return Mark("triangle", "warn"), f"STALE · {age} old", detail
-    return Mark("disc", "warn" if lost else "good"), f"{age} old · {robot.rate_hz():.0f} Hz", detail
+        return Words(Mark("triangle", "warn"), f"STALE · {age} old", parts)
+    return Words(Mark("disc", "warn" if lost else "good"), f"{age} old · {robot.rate_hz():.0f} Hz", parts)
 
 
-def _warnings(station: Station) -> Words:
-    bad = station.robot.not_ok()
+def _alarms(station: Station) -> Words:
+    active = station.alarms.active
+    said = "\n".join(one.alarm.line for one in active)
+    if active:
+        first = station.alarms.worst or active[0].alarm
+        count = f"{len(active)} alarms" if len(active) > 1 else "1 alarm"
+        where = first.where.partition(",")[0] or first.what
+        return Words(first.mark, f"{count}: {first.mark.word}", (where,), said)
+    if station.robot.is_recording:
+        return Words(Mark("diamond", "accent"), "A recording", ("no fault shown",))
     if not station.is_live or not station.robot.parts:
-        before = (
-            f"before: {'; '.join(f'{part.name} {part.state}' for part in bad)}" if bad else "no live data"
-        )
-        return Mark("ring", "old"), "Warnings not known", before
-    if not bad:
-        return Mark("disc", "good"), "No warnings", "every component is ok"
-    said = "; ".join(f"{part.name} {part.state}: {part.problem or 'no reason known'}" for part in bad)
-    word = "1 warning" if len(bad) == 1 else f"{len(bad)} warnings"
-    return Mark("triangle", "warn"), word, said
+        return Words(Mark("ring", "old"), "Alarms not known", ("no live data",))
+    return Words(Mark("disc", "good"), "No alarms", ("every component is ok",))
 
 
 _WORDS: Final[dict[str, Callable[[Station], Words]]] = {
@@ -202,5 +304,5 @@ _WORDS: Final[dict[str, Callable[[Station], Words]]] = {
     "drives": _drives,
     "status": _status,
     "link": _link,
-    "warnings": _warnings,
+    "warnings": _alarms,
 }

@@ -1,78 +1,113 @@
-"""The joint table: a row a joint, what its drive tells, in the units of choice."""
+"""The joint table: what each drive tells, in the units of choice, with bars where there is a limit."""
 
+import re
+from dataclasses import dataclass
 from typing import Any, Final
 
-from PySide6.QtCore import QAbstractTableModel, QModelIndex, QPersistentModelIndex, Qt
-from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView
+from PySide6.QtCore import QAbstractTableModel, QModelIndex, QPersistentModelIndex, QRectF, QSize, Qt
+from PySide6.QtGui import QFontMetrics, QPainter, QResizeEvent
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QHeaderView,
+    QStyledItemDelegate,
+    QStyleOptionViewItem,
+    QTableView,
+)
 
+from gateway.units import Unit, rounded
+from server_gui.core.alarms.marks import GLYPHS
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
+from server_gui.core.follow.robot import Part
+from server_gui.core.tuning.stop import StopState
 from server_gui.views.marks import state_mark
 from server_gui.views.theme import Theme
+from server_gui.views.widgets.plain import tip
 
 Index = QModelIndex | QPersistentModelIndex
-# column → quantity, and the SI unit where the robot does not say
+# column → quantity; the SI unit of each
 COLUMNS: Final = (
     ("Joint", ""),
     ("State", ""),
-    ("Angle", "position"),
-    ("Target", "target"),
+    ("Angle / target", "position"),
     ("Velocity", "velocity"),
     ("Torque", "torque"),
     ("Current", "current"),
     ("Temp.", "temperature"),
     ("Error", "error_code"),
+    ("Stopped", ""),
 )
+JOINT, STATE, ANGLE, VELOCITY, TORQUE, CURRENT, TEMPERATURE, ERROR, STOP = range(len(COLUMNS))
 SI: Final = {
     "position": "rad",
-    "target": "rad",
     "velocity": "rad/s",
     "torque": "N·m",
     "current": "A",
     "temperature": "°C",
 }
-SIGNED: Final = frozenset({"position", "target", "velocity", "torque", "current"})
-GLYPHS: Final = {"disc": "●", "ring": "○", "half": "◐", "cross": "✕", "square": "■", "triangle": "▲"}
+SIGNED: Final = frozenset({"position", "velocity", "torque", "current"})
+SPARE: Final = (CURRENT, VELOCITY, TEMPERATURE, STOP)  # left out in this order where there is less room
+FAR_RAD: Final = 0.175  # 10°: the end of the bar of how far a joint is from its target
+NEAR_LIMIT: Final = 0.8  # of a limit
+CODE: Final = re.compile(r"0x[0-9A-Fa-f]{4}(?P<words> [^(;:]+)?")
+ENABLED: Final = "operation enabled"  # only then it is to be where its target is
+NONE: Final = "–"
+MOST_ERROR: Final = 280  # wide, in words
+BAR = Qt.ItemDataRole.UserRole + 1
+
+
+@dataclass(frozen=True, slots=True)
+class Bar:
+    """From the middle to one side, −1 to 1; `colour` is a name of the palette."""
+
+    share: float
+    colour: str
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """What stands in a cell, in which colour of the palette, and below it a bar."""
+
+    text: str
+    colour: str = "text"
+    bar: Bar | None = None
+    tip: str = ""
 
 
 class JointModel(QAbstractTableModel):
-    """Texts of the robot that is looked at; only the cells that have changed are drawn again."""
+    """Texts of the robot that is looked at; only the rows that have changed are drawn again."""
 
     def __init__(self, desk: Desk, theme: Theme) -> None:
         super().__init__()
         self._desk = desk
         self._theme = theme
         self._joints: list[str] = []
-        self._cells: list[list[str]] = []
-        self._colours: list[list[str]] = []
+        self._cells: list[list[Cell]] = []
 
     def refresh(self) -> None:
         """Show how it is now."""
         station = self._desk.selected
         joints = [] if station is None else station.robot.names("joint")
-        if joints != self._joints:
+        rows = [] if station is None else [_row(station, joint, self._desk) for joint in joints]
+        if joints != self._joints or not self._cells:
             self.beginResetModel()
-            self._joints, self._cells, self._colours = joints, [], []
+            self._joints, self._cells = joints, rows
             self.endResetModel()
-        if station is None or not joints:
             return
-        rows = [_row(station, joint, self._desk) for joint in joints]
-        cells = [[text for text, _ in row] for row in rows]
-        colours = [[colour for _, colour in row] for row in rows]
-        if not self._cells:
-            self.beginResetModel()
-            self._cells, self._colours = cells, colours
-            self.endResetModel()
-        else:
-            self._update(cells, colours)
-
-    def _update(self, cells: list[list[str]], colours: list[list[str]]) -> None:
-        before = list(zip(self._cells, self._colours, strict=True))
-        self._cells, self._colours = cells, colours
-        last = len(COLUMNS) - 1
+        before, self._cells = self._cells, rows
         for row, known in enumerate(before):
-            if known != (cells[row], colours[row]):
-                self.dataChanged.emit(self.index(row, 0), self.index(row, last))
+            if known != rows[row]:
+                self.dataChanged.emit(self.index(row, 0), self.index(row, len(COLUMNS) - 1))
+
+    def widest(self, column: int, metrics: QFontMetrics) -> int:
+        """Return how wide a column is at least, so that nothing in it is cut."""
+        texts = [row[column].text for row in self._cells]
+        texts.append(str(self.headerData(column, Qt.Orientation.Horizontal, Qt.ItemDataRole.DisplayRole)))
+        return max(metrics.horizontalAdvance(text) for text in texts)
+
+    def empty(self) -> set[int]:
+        """Return the columns that say nothing yet: no stop was sent."""
+        return {STOP} if all(row[STOP].text == NONE for row in self._cells) else set()
 
     def rowCount(self, parent: Index = QModelIndex()) -> int:  # noqa: B008 - Qt's own default
         return 0 if parent.isValid() else len(self._cells)
@@ -83,86 +118,216 @@ class JointModel(QAbstractTableModel):
     def headerData(self, section: int, orientation: Qt.Orientation, role: int = 0) -> Any:
         if orientation is Qt.Orientation.Horizontal and role == Qt.ItemDataRole.DisplayRole:
             title, quantity = COLUMNS[section]
-            unit = _unit(self._desk, quantity)
-            return f"{title} {unit}".rstrip()
+            return f"{title} {_unit(self._desk, quantity).symbol}" if quantity in SI else title
+        if role == Qt.ItemDataRole.TextAlignmentRole and ANGLE <= section <= TEMPERATURE:
+            return Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
         return None
 
     def data(self, index: Index, role: int = 0) -> Any:
-        row, column = index.row(), index.column()
+        cell, column = self._cells[index.row()][index.column()], index.column()
         match role:
             case Qt.ItemDataRole.DisplayRole:
-                return self._cells[row][column]
+                return cell.text
             case Qt.ItemDataRole.ForegroundRole:
-                return self._theme.colour(self._colours[row][column])
-            case Qt.ItemDataRole.TextAlignmentRole if column >= 2:
+                return self._theme.colour(cell.colour)
+            case Qt.ItemDataRole.TextAlignmentRole if ANGLE <= column <= TEMPERATURE:
                 return Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
-            case Qt.ItemDataRole.FontRole if column >= 2:
+            case Qt.ItemDataRole.FontRole if ANGLE <= column <= TEMPERATURE:
                 return self._theme.number_font()
+            case Qt.ItemDataRole.ToolTipRole if cell.tip:
+                return tip(cell.tip)
+            case _ if role == BAR:
+                return cell.bar
         return None
 
 
+class BarDelegate(QStyledItemDelegate):
+    """Draws a cell's bar below its text: from the middle, as far as its share."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+
+    def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: Index) -> None:
+        super().paint(painter, option, index)
+        bar = index.data(BAR)
+        if not isinstance(bar, Bar):
+            return
+        box = QRectF(option.rect.adjusted(6, 0, -6, 0))
+        field = QRectF(box.left(), box.bottom() - 3, box.width(), 2)
+        painter.fillRect(field, self._theme.colour("border"))
+        share = min(max(bar.share, -1.0), 1.0)
+        middle, reach = field.center().x(), field.width() / 2 * abs(share)
+        left = middle if share >= 0 else middle - reach
+        painter.fillRect(QRectF(left, field.top() - 1, reach, 4), self._theme.colour(bar.colour))
+        painter.fillRect(QRectF(middle - 0.5, field.top() - 2, 1, 6), self._theme.colour("dim"))
+
+
 class JointTable(QTableView):
-    """The table of a `JointModel`."""
+    """The table of a `JointModel`: as high as its rows; where it is narrow, without its spare columns."""
 
     def __init__(self, model: JointModel, theme: Theme) -> None:
         super().__init__()
         self._theme = theme
+        self._model = model
         self.setModel(model)
+        self.setItemDelegate(BarDelegate(theme))
         self.setAccessibleName("Joints")
         self.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
-        self.setTabKeyNavigation(False)
+        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.setShowGrid(False)
         self.setAlternatingRowColors(True)
+        self.setTextElideMode(Qt.TextElideMode.ElideRight)  # of an error the code stays
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.verticalHeader().hide()
-        self.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
-        self.horizontalHeader().setSectionResizeMode(1, QHeaderView.ResizeMode.Fixed)
+        self.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
+        self.horizontalHeader().setSectionResizeMode(ERROR, QHeaderView.ResizeMode.Stretch)
         self.horizontalHeader().setDefaultAlignment(
             Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
         )
         theme.changed.connect(self._restyle)
+        model.modelReset.connect(self._restyle)
+        model.dataChanged.connect(self._fit)
         self._restyle()
 
+    def minimumSizeHint(self) -> QSize:
+        return QSize(self._theme.px(150), self.sizeHint().height())
+
+    def sizeHint(self) -> QSize:
+        rows = max(self._model.rowCount(), 1) * self.verticalHeader().defaultSectionSize()
+        return QSize(self._theme.px(600), rows + self.horizontalHeader().sizeHint().height() + 2)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._fit()
+
     def _restyle(self) -> None:
-        self.verticalHeader().setDefaultSectionSize(self._theme.px(21))
-        self.horizontalHeader().setMinimumSectionSize(self._theme.px(52))
-        self.setColumnWidth(1, self._theme.px(160))
-        self.setMinimumHeight(self._theme.px(120))
+        self.verticalHeader().setDefaultSectionSize(self._theme.px(20))
+        self.setFixedHeight(self.sizeHint().height())
+        self._fit()
+
+    def _fit(self) -> None:
+        """Every column as wide as what is in it; what has no room is left out whole."""
+        widths = [self._width(column) for column in range(len(COLUMNS))]
+        shown = set(range(len(COLUMNS))) - self._model.empty()
+        for column in SPARE:
+            if sum(widths[known] for known in shown) > self.viewport().width():
+                shown.discard(column)
+        spare = max(self.viewport().width() - sum(widths[known] for known in shown), 0) // max(len(shown), 1)
+        for column, width in enumerate(widths):
+            self.setColumnHidden(column, column not in shown)
+            wanted = width + (spare if column != ERROR else 0)
+            if column in shown and column != ERROR and abs(self.columnWidth(column) - wanted) > 1:
+                self.setColumnWidth(column, wanted)
+
+    def _width(self, column: int) -> int:
+        numbers = ANGLE <= column <= TEMPERATURE
+        metrics = QFontMetrics(self._theme.number_font() if numbers else self._theme.text_font())
+        widest = self._model.widest(column, metrics) + self._theme.px(16)
+        return min(widest, self._theme.px(MOST_ERROR)) if column == ERROR else widest
 
 
-def _unit(desk: Desk, quantity: str) -> str:
-    return desk.shown.units.unit(quantity, SI[quantity]).symbol if quantity in SI else ""
+def _unit(desk: Desk, quantity: str) -> Unit:
+    return desk.shown.units.unit(quantity, SI[quantity])
 
 
-def _row(station: Station, joint: str, desk: Desk) -> list[tuple[str, str]]:
+def _row(station: Station, joint: str, desk: Desk) -> list[Cell]:
     robot = station.robot
     part = robot.parts[joint]
     gone = part.state in ("stale", "lost")
-    stale = gone or robot.is_stale()
+    stale = gone or not station.is_live
     mark = state_mark(part.state if gone else robot.word(f"{joint}.state"))
     age = "" if not gone or part.age_ms is None else f" {part.age_ms / 1000:.1f} s"
     side = joint.partition("_")[0]
-    cells = [
-        (joint.replace("_", " "), side if side in ("left", "right") else "text"),
-        (f"{GLYPHS.get(mark.shape, '◆')} {mark.word}{age}", "old" if robot.is_stale() else mark.colour),
+    state = f"{GLYPHS.get(mark.shape, '◆')} {mark.word}{age}"
+    return [
+        Cell(joint.replace("_", " "), side if side in ("left", "right") else "text"),
+        Cell(state, "old" if not station.is_live else mark.colour),
+        _angle(station, joint, desk, stale=stale),
+        *(_value(station, joint, "velocity", desk, stale=stale),),
+        _torque(station, joint, desk, stale=stale),
+        *(_value(station, joint, quantity, desk, stale=stale) for quantity in ("current", "temperature")),
+        _error(station, part, stale=stale),
+        _stop(station, joint),
     ]
-    for _, quantity in COLUMNS[2:-1]:
-        value = _value(station, joint, quantity)
-        unit = desk.shown.units.unit(quantity, SI[quantity])
-        text = unit.text(value)
-        sign = "+" if quantity in SIGNED and value is not None and value >= 0 else ""
-        cells.append((f"{sign}{text}", "old" if stale or value is None else "text"))
-    code = robot.values.get(f"{joint}.error_code")
-    cells.append(("–" if not code else f"0x{int(code):04X}", "bad" if code else "dim"))
-    return cells
 
 
-def _value(station: Station, joint: str, quantity: str) -> float | None:
-    """A joint's value; where the drive tells no target, it is its position and its following error."""
+def _value(station: Station, joint: str, quantity: str, desk: Desk, *, stale: bool) -> Cell:
+    value = station.robot.values.get(f"{joint}.{quantity}")
+    return Cell(_text(_unit(desk, quantity), quantity, value), "old" if stale or value is None else "text")
+
+
+def _text(unit: Unit, quantity: str, value: float | None) -> str:
+    if value is None:
+        return "–"
+    return rounded(value * unit.scale, unit.digits, "+" if quantity in SIGNED else "")
+
+
+def _angle(station: Station, joint: str, desk: Desk, *, stale: bool) -> Cell:
+    """Where it is, where it should be, and how far that is apart."""
+    unit = _unit(desk, "position")
+    position, target = station.robot.values.get(f"{joint}.position"), _target(station, joint)
+    text = f"{_text(unit, 'position', position)} / {_text(unit, 'position', target)}"
+    if position is None or target is None:
+        return Cell(text, "old" if stale or position is None else "text")
+    off = position - target
+    follows = not stale and station.robot.word(f"{joint}.state") == ENABLED
+    bar = None if not follows else Bar(off / FAR_RAD, "warn" if abs(off) > FAR_RAD / 2 else "accent")
+    return Cell(
+        text, "old" if stale else "text", bar, f"{_text(unit, 'position', off)} {unit.symbol} from its target"
+    )
+
+
+def _target(station: Station, joint: str) -> float | None:
+    """Where the drive tells no target, it is its position and its following error."""
     values = station.robot.values
-    if quantity != "target":
-        return values.get(f"{joint}.{quantity}")
     position, error = values.get(f"{joint}.position"), values.get(f"{joint}.following_error")
     told = values.get(f"{joint}.target_position")
     if told is not None or position is None or error is None:
         return told
     return position + error
+
+
+def _torque(station: Station, joint: str, desk: Desk, *, stale: bool) -> Cell:
+    """The torque as a share of what the drive may give, where that is known."""
+    plain = _value(station, joint, "torque", desk, stale=stale)
+    value, held = (
+        station.robot.values.get(f"{joint}.torque"),
+        station.robot.parameters.get(f"{joint}.max_torque"),
+    )
+    if value is None or held is None or not held.value or held.unit != SI["torque"]:
+        return plain
+    limit, share = f"{held.value * _unit(desk, 'torque').scale:g}", value / held.value
+    text = f"{plain.text} / {limit}"
+    if stale:
+        return Cell(text, plain.colour)
+    colour = "bad" if abs(share) >= 1.0 else "warn" if abs(share) >= NEAR_LIMIT else "accent"
+    return Cell(text, plain.colour, Bar(share, colour), f"{100 * abs(share):.0f} % of its limit")
+
+
+def _error(station: Station, part: Part, *, stale: bool) -> Cell:
+    """The drive's error code in words, or what is wrong with the component; nothing known is no dash."""
+    code = station.robot.values.get(f"{part.name}.error_code")
+    problem = part.problem or ""
+    if code:
+        number = f"0x{int(code):04X}"
+        found = CODE.search(problem)
+        words = (found["words"] or "").strip() if found and found[0].startswith(number) else ""
+        return Cell(f"{number} {words}".strip(), "old" if stale else "bad", None, problem)
+    if part.state != "ok" and problem:
+        return Cell(problem, "old" if not station.is_live else "bad", None, problem)
+    if stale:
+        return Cell("not known", "old")
+    return Cell("–", "dim")
+
+
+def _stop(station: Station, joint: str) -> Cell:
+    """What has shown that the latest stop stopped this drive; without proof it is not known to have."""
+    stopping = station.stopping
+    proof = stopping.proofs.get(joint)
+    if proof is not None:
+        said = f"{proof.after_ms:.0f} ms" if proof.after_ms > 0 else "before"
+        return Cell(said, "good" if station.is_live else "old", None, f"{proof.state}, {said} after the STOP")
+    if stopping.state is StopState.IDLE:
+        return Cell(NONE, "dim", None, "no stop was sent since the window began")
+    return Cell("no proof", "bad" if stopping.state is StopState.NOT_CONFIRMED else "warn")

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from typing import Final, Protocol
 
-from PySide6.QtCore import QByteArray, QSettings, QSize, QTimer, Signal
+from PySide6.QtCore import QPoint, QSettings, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import (
     QAction,
     QActionGroup,
@@ -28,17 +28,24 @@ from PySide6.QtWidgets import (
 from gateway.units import UNITS, Units
 from server_gui.core.archive.archive import Archive
 from server_gui.core.desk.desk import Desk
+from server_gui.core.desk.station import Station
+from server_gui.views.alarms import AlarmStrip
 from server_gui.views.audit import Audit
+from server_gui.views.bus_health import BusHealthView
 from server_gui.views.cloud.panel import Cloud
 from server_gui.views.docks import Area, Docks
 from server_gui.views.empty import EmptyView
 from server_gui.views.events_panel import EventsPanel
 from server_gui.views.header import Header
 from server_gui.views.help import Help
+from server_gui.views.kept import keep_bytes, kept_bytes
+from server_gui.views.keys_sheet import KeysSheet
 from server_gui.views.models.panel import ModelsPage
 from server_gui.views.overview import Overview
 from server_gui.views.parameters.panel import ParametersPanel
+from server_gui.views.parameters.trial_bar import TrialBar
 from server_gui.views.recordings.panel import Recordings
+from server_gui.views.reset import ask_clear, ask_reset
 from server_gui.views.resources import Resources
 from server_gui.views.robots_panel import RobotsPanel
 from server_gui.views.signals import Signals
@@ -58,7 +65,8 @@ CHOICES: Final = (
     "A",
 )  # quantities with more than one unit worth choosing
 
-
+ROBOTS: Final = 9  # that have a key
+LEAST: Final = 240  # high, at text of 100 %
 USUAL: Final = QSize(1680, 1000)  # where the screen has room for that
 
 
@@ -71,11 +79,12 @@ class View(Protocol):
 
 
 class MainWindow(QMainWindow):
-    """`stopped` and `stop_all` ask for a STOP, `added` for another robot, `simulator` for a simulated one."""
+    """`stopped` and `stop_all` ask for a STOP, `added`, `removed` bring a robot, `simulator` asks for one."""
 
     stopped = Signal()
     stop_all = Signal()
     added = Signal(str)
+    removed = Signal(object)
     simulator = Signal()
     closed = Signal()
 
@@ -92,14 +101,24 @@ class MainWindow(QMainWindow):
         menu = QPushButton("View")
         self.header = Header(desk, theme, menu)
         self.header.stopped.connect(self.stopped)
-        self.header.reset.connect(lambda: desk.selected.reset() if desk.selected else None)
+        self.header.reset.connect(lambda station: ask_reset(self, station))
+        self.alarms = AlarmStrip(desk, theme)
+        self.alarms.cleared.connect(lambda station: ask_clear(self, station))
+        self.alarms.shown.connect(self.show_around)
         self.robots = RobotsPanel(desk, theme)
         self.robots.stop_all.connect(self.stop_all)
         self.robots.added.connect(self.added)
+        self.robots.removed.connect(self.removed)
         self.parameters = ParametersPanel(desk, theme)
+        self.trial = TrialBar(desk)
+        self.trial.keep.connect(lambda: desk.selected.keep_trial() if desk.selected else None)
+        self.trial.take_back.connect(lambda: desk.selected.end_trial() if desk.selected else None)
         self.events = EventsPanel(desk, theme)
+        self.events.shown.connect(self.show_around)
         self.overview, self.signals = Overview(desk, theme), Signals(desk, theme)
+        self.overview.opened.connect(self._open_in_signals)
         self.resources = Resources(desk, theme)
+        self.buses = BusHealthView(desk, theme)
         self.audit = Audit(desk, theme, None if archive is None else archive.journals)
         self.help, self.help_button = Help(theme), QPushButton("?")
         self.empty = EmptyView(theme)
@@ -107,8 +126,17 @@ class MainWindow(QMainWindow):
         self.empty.simulator.connect(self.simulator)
         self.empty.recordings.connect(self._look_at_recordings)
         self.tabs = QTabWidget()
-        self._views: tuple[View, ...] = (self.overview, self.signals, self.resources, self.audit)
-        for title, view in zip(("&Overview", "&Signals", "&Resources", "&Audit"), self._views, strict=True):
+        self.tabs.setAccessibleName("Views")
+        self._views: tuple[View, ...] = (
+            self.overview,
+            self.signals,
+            self.resources,
+            self.buses,
+            self.audit,
+        )
+        for title, view in zip(
+            ("&Overview", "&Signals", "&Resources", "&Bus", "&Audit"), self._views, strict=True
+        ):
             self.tabs.addTab(Scrolled(view), title)
         self._live = len(self._views)  # tabs that show the robot that is looked at
         if archive is not None:
@@ -128,6 +156,7 @@ class MainWindow(QMainWindow):
         self._offer_help()
         menu.setMenu(self._view_menu())
         self._restore()
+        self._opened_as = self.size()
         theme.scaled.connect(self._scaled)
 
     def refresh(self) -> None:
@@ -141,8 +170,11 @@ class MainWindow(QMainWindow):
             return
         self._pages.setCurrentIndex(1 if shown else 0)
         self.header.refresh()
+        self.alarms.refresh()
+        self._hold_header()
         self.robots.refresh()
         self.parameters.refresh()
+        self.trial.refresh(shown=not _is_seen(self.parameters.trial))
         self.events.refresh()
         self._bar.refresh()
 
@@ -151,10 +183,17 @@ class MainWindow(QMainWindow):
         self.signals.usual = globs
         self.tabs.setCurrentIndex(self._views.index(self.signals))
 
+    def show_around(self, station: Station, channel: str, at_ns: int) -> None:
+        """Show a channel some seconds before and after an instant of a robot's signals."""
+        self._desk.select(station)
+        self.tabs.setCurrentIndex(self._views.index(self.signals))
+        self.signals.refresh()
+        self.signals.show_around((channel,), at_ns)
+
     def closeEvent(self, event: QCloseEvent) -> None:
-        self.kept.setValue("geometry", self.saveGeometry())
+        keep_bytes(self.kept, "geometry", self.saveGeometry())
         if self._is_arranged:
-            self.kept.setValue("state", self._panels.state)
+            keep_bytes(self.kept, "state", self._panels.state)
         self.kept.setValue("look", self._theme.look.value)
         self.kept.setValue("scale", round(self._theme.scale * 100))
         self.kept.setValue("units", dict(self._desk.shown.units.by_si))
@@ -168,8 +207,16 @@ class MainWindow(QMainWindow):
 
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
+        self.header.refresh()  # what it has no robot for takes room from STOP
+        self._hold_header()
+        QTimer.singleShot(0, self, self._settle)
+
+    def _settle(self) -> None:
+        """Once it is shown, with the frame that the screen's manager has given it."""
         if not self._is_arranged:
-            QTimer.singleShot(0, self, self._arrange)
+            self._arrange()
+        if self.size() == self._opened_as:
+            self._onto_screen()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
@@ -182,8 +229,27 @@ class MainWindow(QMainWindow):
         self._manual.show()
         self._manual.raise_()
 
+    def _open_in_signals(self, channels: Sequence[str]) -> None:
+        self.tabs.setCurrentIndex(self._views.index(self.signals))
+        self.signals.refresh()
+        self.signals.choose(channels)
+
     def _look_at_recordings(self) -> None:
         self.tabs.setCurrentIndex(self._live)
+
+    def _find(self) -> None:
+        """Words that are typed are seen, also where the panel was hidden."""
+        self._panels.bring(self.docks[1])
+        self.parameters.find_parameter()
+
+    def _end_trial(self, *, keep: bool) -> None:
+        station = self._desk.selected
+        if station is not None and station.writing.trial is not None:
+            (station.keep_trial if keep else station.end_trial)()
+
+    def _choose_robot(self, place: int) -> None:
+        if place < len(self._desk.stations):
+            self._desk.select(self._desk.stations[place])
 
     # --- how it is put together
 
@@ -192,7 +258,10 @@ class MainWindow(QMainWindow):
         column = QVBoxLayout(middle)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
+        column.addWidget(self.alarms)
+        column.addWidget(self.trial)
         column.addWidget(self._pages, 1)
+        self.keys = KeysSheet(self._theme, middle)
         self.setCentralWidget(middle)
         self.setMenuWidget(self.header)
         left, right, below = Area.LeftDockWidgetArea, Area.RightDockWidgetArea, Area.BottomDockWidgetArea
@@ -202,7 +271,7 @@ class MainWindow(QMainWindow):
             "Events": (self.events, below),
             "Help": (self.help, right),
         }
-        self._panels = Docks(self, self._theme, panels)
+        self._panels = Docks(self, self._theme, panels, self.header)
         *self.docks, self._manual = self._panels.all
 
     def _scaled(self) -> None:
@@ -218,6 +287,11 @@ class MainWindow(QMainWindow):
                 part.be_short(is_narrow)
             self.panels_button.setVisible(is_narrow)
         self._panels.fit(scaled=scaled)
+
+    def _hold_header(self) -> None:
+        """Never narrower than the header, which Qt does not see to, nor larger than the screen."""
+        needed = QSize(self.header.minimumSizeHint().width(), self._theme.px(LEAST))
+        self.setMinimumSize(needed.boundedTo(self.screen().availableSize()))
 
     def _offer_help(self) -> None:
         self.help_button.setAccessibleName("Help")
@@ -235,6 +309,12 @@ class MainWindow(QMainWindow):
         row.addWidget(self.help_button)
         self.tabs.setCornerWidget(corner)
         QShortcut(QKeySequence.StandardKey.HelpContents, self, self.show_help)
+        QShortcut(QKeySequence.StandardKey.Find, self, self._find)
+        QShortcut(QKeySequence("?"), self, self.keys.turn)
+        QShortcut(QKeySequence("Ctrl+K"), self, lambda: self._end_trial(keep=True))
+        QShortcut(QKeySequence("Ctrl+T"), self, lambda: self._end_trial(keep=False))
+        for place in range(ROBOTS):
+            QShortcut(QKeySequence(f"Ctrl+{place + 1}"), self, lambda place=place: self._choose_robot(place))
 
     def _view_menu(self) -> QMenu:
         menu = QMenu(self)
@@ -244,6 +324,7 @@ class MainWindow(QMainWindow):
         hide = menu.addAction("Hide panels, or show them")
         hide.setShortcut(QKeySequence("F9"))
         hide.triggered.connect(self._panels.put_away)
+        menu.addAction("Keys").triggered.connect(self.keys.turn)
         menu.addAction("Reset layout").triggered.connect(self.reset_layout)
         menu.addSeparator()
         looks = {look.value.capitalize(): look for look in Look}
@@ -269,9 +350,10 @@ class MainWindow(QMainWindow):
         return choose
 
     def _restore(self) -> None:
-        geometry = self.kept.value("geometry")
-        if isinstance(geometry, QByteArray):
+        geometry = kept_bytes(self.kept, "geometry")
+        if geometry is not None:
             self.restoreGeometry(geometry)
+            self._onto_screen()
         if not self.isMaximized():
             self._arrange()
 
@@ -282,17 +364,34 @@ class MainWindow(QMainWindow):
         arranged anew (QMainWindowLayout::restoreState, Qt 6.11).
         """
         self._is_arranged = True
-        state = self.kept.value("state")
-        if isinstance(state, QByteArray):
+        state = kept_bytes(self.kept, "state")
+        if state is not None:
             self._panels.restore(state)
         if self.isVisible():
             self._fit(scaled=True)
+
+    def _onto_screen(self) -> None:
+        """Whole on the screen that it is on: of another one it may be too large, or beside this one."""
+        if self.windowState() & (Qt.WindowState.WindowMaximized | Qt.WindowState.WindowFullScreen):
+            return
+        room, frame = self.screen().availableGeometry(), self.frameGeometry()
+        self.resize(self.size().boundedTo(room.size() - frame.size() + self.size()))
+        frame = self.frameGeometry()
+        left = min(max(frame.left(), room.left()), room.right() + 1 - frame.width())
+        top = min(max(frame.top(), room.top()), room.bottom() + 1 - frame.height())
+        if frame.topLeft() != QPoint(left, top):
+            self.move(left, top)
 
 
 def _within(panel: QWidget) -> bool:
     """Whether the keyboard is in it."""
     focused = QApplication.focusWidget()
     return focused is not None and panel.isAncestorOf(focused)
+
+
+def _is_seen(widget: QWidget) -> bool:
+    """Whether any of it is on the screen: not behind another panel, and not scrolled away."""
+    return widget.isVisible() and not widget.visibleRegion().isEmpty()
 
 
 def _choices(menu: QMenu, texts: list[str], chosen: str, choose: Callable[[str], None]) -> None:

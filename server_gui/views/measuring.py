@@ -53,7 +53,9 @@ class Measuring(Card):
         apart_s = b_s - a_s
         rate = "" if apart_s == 0.0 else f" · 1/Δt {1 / abs(apart_s):.4g} Hz"
         marks = ["▸ " if place == active else "" for place in (0, 1)]
-        self.set_title(f"{marks[0]}A {a_s:.3f} s   {marks[1]}B {b_s:.3f} s   Δt {apart_s:+.3f} s{rate}")
+        self.set_title(
+            f"{marks[0]}A {a_s:.3f} s   {marks[1]}B {b_s:.3f} s   Δt {apart_s:+.3f} s{rate}", whole=True
+        )
         if self.table.rowCount() != len(rows):
             self.table.setRowCount(len(rows))
             self._fit(len(rows))
@@ -65,11 +67,11 @@ class Measuring(Card):
 
     def focusInEvent(self, event: QFocusEvent) -> None:
         super().focusInEvent(event)
-        self.set_note("A or B chooses, ← → moves by a sample, with Shift by ten")
+        self.set_note("A or B chooses, ← → moves by a sample, with Shift by ten", "")
 
     def focusOutEvent(self, event: QFocusEvent) -> None:
         super().focusOutEvent(event)
-        self.set_note("drag a cursor, or click here and use the keys")
+        self.set_note("drag a cursor, or click here and use the keys", "")
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         key = Qt.Key(event.key())

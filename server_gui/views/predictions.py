@@ -2,100 +2,138 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
 from typing import Final
 
-from ml.registry.card import Source
 from ml.robot.task import ABNORMAL, UNKNOWN
-from ml.serving.trust import Level, Trust
-from server_gui.core.desk.leg_phase import LegPhase, phase_at
+from ml.serving.trust import Level
+from server_gui.core.desk.belief import belief, is_stopped
+from server_gui.core.desk.leg_phase import LegPhase, apart, leg_phase, phase_at
 from server_gui.core.desk.station import Station
-from server_gui.core.prediction.current import Recalled, Told
-from server_gui.core.prediction.state import WITHIN_DAYS
+from server_gui.core.prediction.current import STALE_S, Recalled, Told
 from server_gui.core.processing.gait_events import Leg
 from server_gui.views.marks import Mark
 
 ACTIVITY, FALLING, GAIT_PHASE = "activity", "falling", "gait_phase"
 STEADY: Final = "steady"
 LEAST: Final = 0.01  # what is less probable is not worth a word
-SOURCES: Final = {
-    Source.SIMULATED: "simulated model",
-    Source.RECORDED: "from recordings",
-    Source.MIXED: "recordings and simulator",
-}
-TITLES: Final = {ACTIVITY: "Does", FALLING: "Balance", GAIT_PHASE: "Stride"}
+TITLES: Final = {FALLING: "Balance", GAIT_PHASE: "Stride"}
+AGREES: Final = 8.0  # % of a stride, that steps and a model may be apart
+ON_PURPOSE: Final = "a stop is held: what a model says of it counts for nothing"
 
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """A mark, what it says, and where that comes from."""
+    """A mark, what it says, what there is to know of it, in few words too, and all else for a tool tip."""
 
     mark: Mark
     text: str
     detail: str = ""
+    short: str = ""
+    tip: str = ""
+
+    @property
+    def short_text(self) -> str:
+        """Without what is said elsewhere."""
+        return "Stopped" if self.mark.word == "stopped" else self.text
+
+    @property
+    def wordings(self) -> tuple[str, ...]:
+        """As one line, the fullest first."""
+        details = (self.detail, self.short, "")
+        return tuple(dict.fromkeys(" · ".join(filter(None, (self.text, one))) for one in details))
 
 
-def said(shown: Told) -> Line:
-    """Return what a model says now: the label and how probable, or that it does not know."""
+def said(shown: Told, *, stopped: bool = False) -> Line:
+    """Return what a model says now: the label and how probable, or that it does not know.
+
+    Of a robot that is `stopped` on purpose nothing is called unlike what is known.
+    """
     prediction = shown.prediction
     if shown.is_stale():
         return Line(Mark("ring", "old", "old"), "No prediction now", f"the last {shown.age_s():.0f} s ago")
-    word, detail = label_text(prediction.label), _detail(shown)
+    falls = prediction.task == FALLING and prediction.label not in (STEADY, ABNORMAL, UNKNOWN)
+    if stopped and not falls and (prediction.task == ACTIVITY or not _knows(shown)):
+        return Line(Mark("ring", "dim", "stopped"), "Stopped on purpose", ON_PURPOSE, "a stop is held")
+    word, worth = label_text(prediction.label), belief(shown)
+    details = (" · ".join(filter(None, (worth.wordings[0], _runner_up(shown)))), worth.wordings[-1])
     if prediction.label == ABNORMAL:
-        return Line(Mark("triangle", "warn", ABNORMAL), word, f"novelty {prediction.novelty:.1f} · {detail}")
-    if prediction.label == UNKNOWN:
-        return Line(Mark("ring", "dim", UNKNOWN), word, detail)
-    if prediction.values:
-        word = " · ".join(
-            f"{name[0].upper()} {100 * value:.0f} %" for name, value in prediction.values.items()
+        novelty = f"novelty {prediction.novelty:.1f}"
+        return Line(
+            Mark("triangle", "warn", ABNORMAL), word, f"{novelty} · {details[0]}", novelty, _tip(shown)
         )
-    falls = prediction.task == FALLING and prediction.label != STEADY
-    mark = Mark("square", "bad", prediction.label) if falls else Mark("diamond", "accent", prediction.label)
-    return Line(mark, f"{word}  {prediction.probability:.2f}", detail)
+    if prediction.label == UNKNOWN:
+        return Line(Mark("ring", "dim", UNKNOWN), word, *details, _tip(shown))
+    shape = ("square", "bad") if falls else ("diamond", "accent")
+    text = f"{word} {100 * prediction.probability:.0f} %"
+    return Line(Mark(*shape, prediction.label), text, *details, _tip(shown))
 
 
 def status(station: Station) -> Line | None:
     """Return the one line of the header: a fall before all, then activity; None without a model."""
     shown = station.predictions.told
-    falling = shown.get(FALLING)
+    falling, stopped = shown.get(FALLING), is_stopped(station)
     if falling is not None and not falling.is_stale():
-        line = said(falling)
+        line = said(falling, stopped=stopped)
         if line.mark.colour == "bad":
             return _as_predicted(line)
-    return _as_predicted(said(shown[ACTIVITY])) if ACTIVITY in shown else None
+    return _as_predicted(said(shown[ACTIVITY], stopped=stopped)) if ACTIVITY in shown else None
+
+
+def activity(station: Station) -> Line:
+    """Return what the wearer does: by a model where one says so, else by the steps that were seen."""
+    gait, shown = station.processing.derived().gait, station.predictions.told.get(ACTIVITY)
+    if not station.is_live:
+        return Line(Mark("ring", "old", "not known"), "Activity not known", "no live data")
+    if shown is not None and not shown.is_stale():
+        return said(shown, stopped=is_stopped(station))
+    why = station.predictions.problem or "the model says nothing now"
+    if is_stopped(station):
+        return Line(Mark("ring", "dim", "stopped"), "Stopped on purpose", "a stop is held")
+    if not gait.walking:
+        return Line(Mark("ring", "dim", "not walking"), "Not walking", "by the steps seen", "by steps", why)
+    return Line(Mark("diamond", "accent", "walking"), "Walking", "by the steps seen", "by steps", why)
 
 
 def lines(station: Station) -> Iterator[Line]:
-    """Yield the overview's lines: tasks with their models, rules that hold, faults of devices."""
-    predictions = station.predictions
-    told_by_task = predictions.told
+    """Yield the overview's lines: balance and stride, rules that hold, devices in trouble."""
+    predictions, stopped = station.predictions, is_stopped(station)
     for task, title in TITLES.items():
-        if task in told_by_task:
-            shown = told_by_task[task]
-            line = said(shown)
-            told = filter(None, (line.detail, model_text(shown), quality_text(shown)))
-            yield Line(line.mark, f"{title}: {line.text}", " · ".join(told))
+        shown = predictions.told.get(task)
+        if shown is not None and not (task == GAIT_PHASE and shown.is_stale()):
+            line = said(shown, stopped=stopped)
+            if task == GAIT_PHASE and line.mark.colour == "accent":
+                line = _stride(station, line)
+            yield replace(line, text=f"{title}: {line.text}")
     if predictions.problem:
-        yield Line(Mark("ring", "old", "no model"), "Not predicted", predictions.problem)
+        yield Line(
+            Mark("ring", "old", "no model"), "Not predicted", predictions.problem, "", predictions.problem
+        )
     for rule in predictions.rules:
         yield Line(Mark("triangle", "warn", "rule"), f"Rule {rule.rule.action.value}", rule.text)
-    wrong = station.robot.not_ok()
-    for part in wrong:
-        yield Line(
-            Mark("square", "bad", part.state), f"{part.name} {part.state}", part.problem or "no reason known"
-        )
-    if not wrong and station.robot.parts:
-        yield Line(Mark("disc", "good", "ok"), "Devices: every one is ok")
+    for part in station.robot.not_ok():
+        why = part.problem or "no reason known"
+        name = part.name.replace("_", " ")
+        yield Line(Mark("square", "bad", part.state), f"{name} {part.state}", why, "", why)
 
 
 def model_phases(station: Station) -> dict[Leg, LegPhase | None]:
-    """Return where each leg is in its stride by a model; None where it does not know."""
+    """Return where each leg is in its stride by a model; None where it does not know.
+
+    A model speaks of the window that it was given; since then the stride has gone on.
+    """
     shown = station.predictions.told.get(GAIT_PHASE)
-    if shown is None or shown.is_stale() or shown.prediction.label in (UNKNOWN, ABNORMAL):
+    if shown is None or shown.is_stale() or not _knows(shown):
         return dict.fromkeys(Leg)
-    values = shown.prediction.values
-    percents = {leg: 100.0 * values[leg.value] for leg in Leg if leg.value in values}
-    return {leg: LegPhase(percents[leg], phase_at(percents[leg])) if leg in percents else None for leg in Leg}
+    derived, values = station.processing.derived(), shown.prediction.values
+    late_s = (derived.stamp_ns - shown.prediction.stamp_ns) / 1e9
+    found: dict[Leg, LegPhase | None] = dict.fromkeys(Leg)
+    for leg in Leg:
+        if leg.value in values:
+            stride_s = derived.gait.legs[leg].stride_s
+            since = 0.0 if stride_s is None or not 0.0 <= late_s <= STALE_S else late_s / stride_s
+            percent = 100.0 * ((values[leg.value] + since) % 1.0)
+            found[leg] = LegPhase(percent, phase_at(percent))
+    return found
 
 
 def label_text(label: str) -> str:
@@ -103,21 +141,24 @@ def label_text(label: str) -> str:
     return label.replace("_", " ").capitalize()
 
 
-def model_text(shown: Told) -> str:
-    """Return which model, how old, from what it has learned; of a recording, that it was said then."""
-    if isinstance(shown, Recalled):
-        return f"said then by {shown.prediction.model}"
-    card = shown.predicted.card
-    days = (datetime.now(UTC) - card.made).days
-    age = "new today" if days < 1 else "1 day old" if days == 1 else f"{days} days old"
-    return f"{card.id}, {age}, {SOURCES[card.source]}"
+def _stride(station: Station, line: Line) -> Line:
+    """The ring has the numbers; here stands whether both that know one agree."""
+    derived, modelled = station.processing.derived(), model_phases(station)
+    steps = {leg: leg_phase(derived, leg, derived.stamp_ns) for leg in Leg}
+    pairs = [(steps[leg], modelled[leg]) for leg in Leg]
+    differences = [apart(one.percent, other.percent) for one, other in pairs if one and other]
+    if not differences:
+        return replace(line, text="by the model alone")
+    if max(differences) <= AGREES:
+        return replace(line, text="steps and model agree")
+    mark = Mark("triangle", "warn", "differs")
+    return replace(line, mark=mark, text=f"model and steps differ by {max(differences):.0f} %")
 
 
-def quality_text(shown: Told) -> str:
-    """Return how right the model was on this robot of late, where somebody has labelled that."""
-    if isinstance(shown, Recalled) or shown.predicted.quality is None:
-        return ""
-    return f"last {WITHIN_DAYS} days: {shown.predicted.quality.text}"
+def _knows(shown: Told) -> bool:
+    prediction = shown.prediction
+    drifted = not isinstance(shown, Recalled) and shown.predicted.trust.level is Level.DRIFTED
+    return prediction.label not in (UNKNOWN, ABNORMAL) and not drifted
 
 
 def _as_predicted(line: Line) -> Line:
@@ -125,21 +166,20 @@ def _as_predicted(line: Line) -> Line:
     return replace(line, detail=" · ".join(filter(None, ("predicted", line.detail))))
 
 
-def _detail(shown: Told) -> str:
-    """What speaks against believing it, and the runner-up, where there is one."""
+def _runner_up(shown: Told) -> str:
+    """What it may be as well, where it may."""
     prediction = shown.prediction
-    doubt = "" if isinstance(shown, Recalled) else _doubt(shown.predicted.trust)
     others = sorted(prediction.probabilities.items(), key=lambda item: -item[1])
     if prediction.label in (UNKNOWN, ABNORMAL):
-        runner = f"likeliest {label_text(others[0][0]).lower()} {others[0][1]:.2f}" if others else ""
-    else:
-        others = [item for item in others if item[0] != prediction.label and item[1] >= LEAST]
-        runner = f"next {label_text(others[0][0]).lower()} {others[0][1]:.2f}" if others else ""
-    return " · ".join(filter(None, (doubt, runner)))
+        return f"likeliest {label_text(others[0][0]).lower()} {100 * others[0][1]:.0f} %" if others else ""
+    others = [item for item in others if item[0] != prediction.label and item[1] >= LEAST]
+    return f"else {label_text(others[0][0]).lower()} {100 * others[0][1]:.0f} %" if others else ""
 
 
-def _doubt(trust: Trust) -> str:
-    if trust.level is Level.DRIFTED:
-        channels = ", ".join(trust.drifted[:2])
-        return f"DRIFTED: {channels or 'unlike what it has learned'}"
-    return "" if trust.level is Level.GOOD else f"trust {trust.level.value}"
+def _tip(shown: Told) -> str:
+    """Which model, which nobody reads at arm's length."""
+    if isinstance(shown, Recalled):
+        return f"model {shown.prediction.model}"
+    predicted = shown.predicted
+    told = [f"model {predicted.card.id}", *belief(shown).wordings[:1]]
+    return "\n".join(told if predicted.quality is None else [*told, predicted.quality.text])

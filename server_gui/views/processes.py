@@ -2,24 +2,28 @@
 
 from typing import Any, Final
 
+from msgspec import UNSET
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView
 
 from gateway.plain import plain
 from gateway.wire.resource import ProcessUse
 from server_gui.views.theme import Theme
+from server_gui.views.widgets.plain import tip
 from server_gui.views.widgets.rows import SORT_ROLE, Filtered, Index, RowsModel, RowsTable
 
-TITLES: Final = ("Name", "PID", "CPU %", "Memory MiB")
-NAME, PID, CPU, MEMORY = range(4)
+TITLES: Final = ("Name", "Command", "PID", "CPU %", "Memory MiB")
+NAME, COMMAND, PID, CPU, MEMORY = range(5)
 MIB: Final = 1 << 20
+ROOM: Final = {NAME: 460, PID: 370}  # wide at least, at text of 100 %, for these columns beside the command
 
 
 class ProcessModel(RowsModel[ProcessUse]):
     """A row a process."""
 
     def __init__(self, theme: Theme) -> None:
-        super().__init__(TITLES, lambda process: (process.pid, process.name))
+        super().__init__(TITLES, lambda process: (process.pid, process.name), (CPU, MEMORY))
         self._theme = theme
 
     def data(self, index: Index, role: int = 0) -> Any:
@@ -29,9 +33,11 @@ class ProcessModel(RowsModel[ProcessUse]):
                 return plain(_text(process, column))
             case _ if role == SORT_ROLE:
                 return _key(process, column)
-            case Qt.ItemDataRole.TextAlignmentRole if column != NAME:
+            case Qt.ItemDataRole.ToolTipRole:
+                return tip(command_of(process))
+            case Qt.ItemDataRole.TextAlignmentRole if column >= PID:
                 return Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
-            case Qt.ItemDataRole.FontRole if column != NAME:
+            case Qt.ItemDataRole.FontRole if column >= PID:
                 return self._theme.number_font()
         return None
 
@@ -41,20 +47,48 @@ class ProcessTable(RowsTable):
 
     def __init__(self, theme: Theme) -> None:
         self.processes = ProcessModel(theme)
-        self.sorted = Filtered(self.processes, NAME)
+        self.sorted = Filtered(self.processes)
         super().__init__(self.sorted, "Processes of the robot's computer", CPU)
         self._theme = theme
         self.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
         header = self.horizontalHeader()
         header.setSectionResizeMode(QHeaderView.ResizeMode.Interactive)
-        header.setSectionResizeMode(NAME, QHeaderView.ResizeMode.Stretch)
+        header.setSectionResizeMode(COMMAND, QHeaderView.ResizeMode.Stretch)
+        self.setTextElideMode(Qt.TextElideMode.ElideMiddle)
         theme.changed.connect(self._restyle)
         self._restyle()
 
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._make_room()
+
+    def _make_room(self) -> None:
+        """The command tells processes apart, where not all has room."""
+        for column, least in ROOM.items():
+            self.setColumnHidden(column, self.width() < self._theme.px(least))
+
     def _restyle(self) -> None:
         self.verticalHeader().setDefaultSectionSize(self._theme.px(20))
-        for column, width in ((PID, 58), (CPU, 68), (MEMORY, 98)):
+        for column, width in ((NAME, 96), (PID, 62), (CPU, 68), (MEMORY, 104)):
             self.setColumnWidth(column, self._theme.px(width))
+        self._make_room()
+
+
+def command_of(process: ProcessUse) -> str:
+    """Return the command line; the name where the robot does not tell it, as of a kernel's thread."""
+    return process.name if process.cmdline is UNSET or not process.cmdline else process.cmdline
+
+
+def arguments_of(process: ProcessUse) -> str:
+    """Return what tells processes of one name apart: the command without the path of its interpreter."""
+    words = command_of(process).split()
+    while len(words) > 1 and (_is_interpreter(words[0]) or words[0].startswith("-")):
+        words.pop(0)
+    return " ".join([words[0].rpartition("/")[2], *words[1:]]) if words else ""
+
+
+def _is_interpreter(word: str) -> bool:
+    return word.rpartition("/")[2].startswith(("python", "sh", "bash", "perl", "node"))
 
 
 def _text(process: ProcessUse, column: int) -> str:
@@ -62,8 +96,10 @@ def _text(process: ProcessUse, column: int) -> str:
         case 0:
             return process.name
         case 1:
-            return str(process.pid)
+            return arguments_of(process)
         case 2:
+            return str(process.pid)
+        case 3:
             return "–" if process.cpu_percent is None else f"{process.cpu_percent:.1f}"
         case _:
             return f"{process.memory_bytes / MIB:.1f}"
@@ -74,8 +110,10 @@ def _key(process: ProcessUse, column: int) -> str | float:
         case 0:
             return process.name.lower()
         case 1:
-            return process.pid
+            return arguments_of(process).lower()
         case 2:
+            return process.pid
+        case 3:
             return -1.0 if process.cpu_percent is None else process.cpu_percent
         case _:
             return float(process.memory_bytes)

@@ -64,7 +64,7 @@ class Resources(QWidget):
         computer.body.addStretch(1)
         self.table = ProcessTable(theme)
         self.words = QLineEdit()
-        self.words.setPlaceholderText("Filter processes by name")
+        self.words.setPlaceholderText("Filter processes by name or command")
         self.words.setClearButtonEnabled(True)
         self.words.setAccessibleName("Filter of the processes")
         self.words.textChanged.connect(self.table.sorted.setFilterFixedString)
@@ -117,7 +117,9 @@ class Resources(QWidget):
         age_s = _age_s(station.processes_at_ns)
         old = age_s is not None and age_s > OLD_S
         count = self.table.processes.rowCount()
-        self._processes.set_note(f"STALE, {age_text(age_s)} old" if old else f"{count} processes")
+        self._processes.set_note(
+            *(f"STALE, {age_text(age_s)} old", "STALE") if old else (f"{count} processes",)
+        )
         self.table.setEnabled(not old)
 
     def _watch(self) -> None:
@@ -156,11 +158,14 @@ class Resources(QWidget):
             return
         age_s = _age_s(station.robot.resources_at_ns)
         old = f"STALE, {age_text(age_s)} old · " if _is_old(station) else ""
-        self.cpu.set_note(f"{old}{len(seen.cpu.per_core)} cores")
+        cores = len(seen.cpu.per_core)
+        self.cpu.set_note(f"{old}{cores} {'core' if cores == 1 else 'cores'}", old[:5])
         memory = seen.memory
         share = 100 * memory.used / memory.total
-        self.memory.set_note(f"{old}{share:.0f} % · {memory.used / GIB:.2f} of {memory.total / GIB:.1f} GiB")
-        self.temperature.set_note(held_back(station.processes))
+        amount = f"{share:.0f} % · {memory.used / GIB:.2f} of {memory.total / GIB:.1f} GiB"
+        self.memory.set_note(f"{old}{amount}", f"{old[:5]} {share:.0f} %".strip(), old[:5])
+        held = held_back(station.processes)
+        self.temperature.set_note(held, held.partition(" · ")[0], "▲" if "▲" in held else "")
         set_text(self.facts, facts(station, seen))
 
 

@@ -1,4 +1,4 @@
-"""Every robot: state, age of its data, a stop of its own; add one; STOP ALL."""
+"""Every robot: state, age of its data, a stop of its own; add and remove one; STOP ALL."""
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent, QMouseEvent
@@ -7,6 +7,7 @@ from PySide6.QtWidgets import (
     QHBoxLayout,
     QLineEdit,
     QScrollArea,
+    QToolButton,
     QVBoxLayout,
     QWidget,
 )
@@ -14,19 +15,22 @@ from PySide6.QtWidgets import (
 from gateway.client import Address, BadAddress
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
-from server_gui.views.marks import age_text, station_mark
+from server_gui.views.ask import ask
+from server_gui.views.marks import age_text
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.elided import ElidedLabel
 from server_gui.views.widgets.mark import MarkIcon
 from server_gui.views.widgets.plain import PlainLabel
 from server_gui.views.widgets.stop_button import StopButton
+from server_gui.views.widgets.whole import WholeLabel
 
 
 class RobotCard(QFrame):
-    """One robot; `chosen` when it is clicked, or Return or Space is pressed on it."""
+    """One robot; `chosen` when it is clicked, or Return or Space is pressed on it; `removed` likewise."""
 
     chosen = Signal()
+    removed = Signal()
 
     def __init__(self, station: Station, theme: Theme) -> None:
         super().__init__()
@@ -35,20 +39,26 @@ class RobotCard(QFrame):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAccessibleName(f"Robot {station.name}")
         self._icon = MarkIcon(theme, 12)
-        self._name, self._state, self._link = ElidedLabel("title"), PlainLabel(), ElidedLabel("dim")
-        self._state.setObjectName("dim")
-        self._state.setWordWrap(True)
+        self._name, self._state, self._link = ElidedLabel("title"), WholeLabel("dim"), ElidedLabel("dim")
         self.stop = StopButton("robot_stop")
-        self.stop.setText("Stop")
+        self.remove = QToolButton()
+        self.remove.setText("✕")
+        self.remove.setToolTip("Remove it from this window: nothing of it is stopped")
+        self.remove.setStyleSheet("padding: 1px 3px; border: none;")
+        self.remove.clicked.connect(self.removed)
         words = QVBoxLayout()
         words.setSpacing(1)
         for label in (self._name, self._state, self._link):
             words.addWidget(label)
-        row = QHBoxLayout(self)
-        row.setContentsMargins(9, 7, 8, 7)
+        row = QHBoxLayout()
         row.addWidget(self._icon, 0, Qt.AlignmentFlag.AlignTop)
         row.addLayout(words, 1)
-        row.addWidget(self.stop, 0, Qt.AlignmentFlag.AlignTop)
+        row.addWidget(self.remove, 0, Qt.AlignmentFlag.AlignTop)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(9, 7, 8, 7)
+        column.setSpacing(5)
+        column.addLayout(row)
+        column.addWidget(self.stop)
 
     @property
     def texts(self) -> tuple[str, str, str]:
@@ -58,10 +68,13 @@ class RobotCard(QFrame):
     def refresh(self, *, selected: bool) -> None:
         """Show how it is now."""
         station, robot = self.station, self.station.robot
-        mark = station_mark(station)
+        mark = station.mark
         self._icon.show_mark(mark)
         set_text(self._name, station.title)
-        set_text(self._state, mark.word if station.is_linked else f"{mark.word}: {_why(station)}")
+        self.stop.name(station.title)
+        self.remove.setAccessibleName(f"Remove {station.title}")
+        worst = station.alarms.worst
+        set_text(self._state, mark.word if worst is None else worst.line)
         age = age_text(robot.age_s())
         live = "" if robot.is_stale() else f" · {robot.rate_hz():.0f} Hz"
         set_text(self._link, f"{age}{' old' if robot.age_s() is not None else ''}{live}")
@@ -80,9 +93,10 @@ class RobotCard(QFrame):
 
 
 class RobotsPanel(QWidget):
-    """`added` brings the address of a robot to follow; `stop_all` asks for a STOP of every robot."""
+    """`added` brings an address, `removed` the station of a robot to leave; `stop_all` is STOP ALL."""
 
     added = Signal(str)
+    removed = Signal(object)
     stop_all = Signal()
 
     def __init__(self, desk: Desk, theme: Theme) -> None:
@@ -111,7 +125,7 @@ class RobotsPanel(QWidget):
         self.said.setWordWrap(True)
         self.said.hide()
         self.all_stop = StopButton()
-        self.all_stop.setText("STOP ALL")
+        self.all_stop.name("ALL")
         self.all_stop.setAccessibleName("STOP every robot")
         self.all_stop.stopped.connect(self.stop_all)
         everything = QVBoxLayout(self)
@@ -125,7 +139,13 @@ class RobotsPanel(QWidget):
 
     def refresh(self) -> None:
         """Show how all of them are now."""
-        for station in self._desk.stations[len(self.cards) :]:
+        stations = self._desk.stations
+        for card in [card for card in self.cards if card.station not in stations]:
+            self.cards.remove(card)
+            self._list.removeWidget(card)
+            card.hide()
+            card.deleteLater()
+        for station in stations[len(self.cards) :]:
             self._add_card(station)
         for card in self.cards:
             card.refresh(selected=card.station is self._desk.selected)
@@ -137,9 +157,19 @@ class RobotsPanel(QWidget):
         card = RobotCard(station, self._theme)
         card.chosen.connect(lambda: self._desk.select(station))
         card.stop.stopped.connect(lambda: station.stop("stop button in the list of robots"))
-        card.stop.setAccessibleName(f"STOP {station.name}")
+        card.stop.name(station.title)
+        card.removed.connect(lambda: self._ask_to_remove(station))
         self.cards.append(card)
         self._list.insertWidget(self._list.count() - 1, card)
+
+    def _ask_to_remove(self, station: Station) -> None:
+        text = (
+            f"Remove {station.title} ({station.address}) from this window?\n\n"
+            "Nothing of it is stopped: it goes on as it is, but no longer in sight, and STOP of this window "
+            "does not reach it any more. What this window has on trial there goes back. Its recording by "
+            "this window ends; what is recorded is kept."
+        )
+        ask(self, f"Remove {station.title}", text, "Remove", lambda: self.removed.emit(station))
 
     def _add(self) -> None:
         text = self.address.text().strip()
@@ -159,8 +189,3 @@ class RobotsPanel(QWidget):
         """Say what is wrong with the address that was typed."""
         self.said.setText(text)
         self.said.setVisible(bool(text))
-
-
-def _why(station: Station) -> str:
-    link = station.robot.link
-    return link.problem or link.state.value

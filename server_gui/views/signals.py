@@ -1,6 +1,7 @@
 """Signals: chosen channels over time, one plot a unit; pause, zoom, measure, export while data go on."""
 
 import csv
+import datetime
 import fnmatch
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -10,7 +11,9 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QKeySequence, QResizeEvent, QShortcut
 from PySide6.QtWidgets import (
+    QBoxLayout,
     QComboBox,
     QHBoxLayout,
     QLineEdit,
@@ -22,7 +25,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from gateway.units import Unit
+from gateway.units import Unit, Units
 from gateway.wire.component import ChannelInfo
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.measuring import measure, nearest
@@ -35,9 +38,12 @@ from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.elided import ElidedLabel
 from server_gui.views.widgets.files import ask_save, save_whole
 from server_gui.views.widgets.plain import PlainLabel
+from server_gui.views.widgets.plot import PlacedFlag
 
 Floats = npt.NDArray[np.float64]
 MOST_CURVES: Final = 24
+NARROW, LIST = 700, 150  # wide, at text of 100 %: tools in two rows; the channels at least
+AROUND_S: Final = 5.0  # that are shown before and after an event
 SLOW: Final = 5  # frames between two looks at what people read
 SPANS_S: Final = (2, 5, 10, 30, 60, 100)
 USUAL: Final = ("left_hip.position", "right_hip.position", "left_insole.force", "right_insole.force")
@@ -50,6 +56,7 @@ class Frozen:
 
     times: Floats
     columns: dict[str, Floats]
+    newest_ns: int  # of its rows, on the robot's clock
 
     def times_of(self, seconds: float) -> Floats:
         """Return those of the last `seconds`."""
@@ -70,6 +77,7 @@ class Signals(QWidget):
         self.plots: list[UnitPlot] = []
         self._frozen: Frozen | None = None
         self._frame = 0
+        self._jumped_ns: int | None = None  # on the robot's clock
         self._exported = ""  # what came of the latest export
         self._at = [0.0, 0.0]  # the cursors, s until the newest row
         self._active = 0
@@ -95,11 +103,10 @@ class Signals(QWidget):
         self._stack.addWidget(self.empty)
         left, right = QWidget(), QWidget()
         left_box, right_box = QVBoxLayout(left), QVBoxLayout(right)
-        left_box.setContentsMargins(8, 8, 0, 8)
-        right_box.setContentsMargins(0, 8, 8, 8)
+        left_box.setContentsMargins(0, 0, 0, 8)
+        right_box.setContentsMargins(0, 0, 0, 8)
         left_box.addWidget(self._words)
         left_box.addWidget(self.channels, 1)
-        right_box.addLayout(self._tools())
         right_box.addLayout(self._stack, 1)
         right_box.addWidget(self.measuring)
         splitter = QSplitter()
@@ -108,9 +115,11 @@ class Signals(QWidget):
         splitter.setStretchFactor(1, 1)
         splitter.setSizes([theme.px(190), theme.px(700)])
         everything = QVBoxLayout(self)
-        everything.setContentsMargins(0, 0, 0, 0)
-        everything.addWidget(splitter)
-        theme.changed.connect(self._rebuild)
+        everything.setContentsMargins(8, 8, 8, 0)
+        everything.addLayout(self._tools())
+        everything.addWidget(splitter, 1)
+        self._restyle()
+        theme.changed.connect(self._restyle)
 
     def refresh(self) -> None:
         """Draw what is chosen; while paused, what was there then."""
@@ -129,6 +138,7 @@ class Signals(QWidget):
         self._frame += 1
         if self._frame % SLOW == 1:
             set_text(self.said, self._state(station) + self._exported)
+            self._flag(station)
             for plot in self.plots:
                 plot.show_values([self._newest(station, name) for name in plot.channels])
             if self.cursors.isChecked():
@@ -149,6 +159,12 @@ class Signals(QWidget):
             item.setCheckState(0, Qt.CheckState.Checked if wanted else Qt.CheckState.Unchecked)
         self.channels.blockSignals(False)
         self._rebuild()
+
+    def show_around(self, names: Sequence[str], at_ns: int) -> None:
+        """Choose these, and stand still with the seconds around an instant of the robot's clock in sight."""
+        self.choose(names)
+        self.pause.setChecked(False)  # else it would be what was seen before
+        self.show_at(at_ns)
 
     def save_csv(self, path: Path) -> None:
         """Save what is on screen, in SI units, a row a time."""
@@ -174,7 +190,7 @@ class Signals(QWidget):
 
     # --- how it is put together
 
-    def _tools(self) -> QHBoxLayout:
+    def _tools(self) -> QBoxLayout:
         self._span = QComboBox()
         self._span.addItems([f"{seconds} s" for seconds in SPANS_S])
         self._span.setCurrentIndex(SPANS_S.index(10))
@@ -196,14 +212,63 @@ class Signals(QWidget):
         self.cursors.setToolTip("Two cursors with their difference, and every curve over what is in sight")
         self.cursors.toggled.connect(self._show_cursors)
         as_csv, as_png = QPushButton("CSV …"), QPushButton("PNG …")
+        as_csv.setAccessibleName("Save what is on screen as CSV")
+        as_png.setAccessibleName("Save what is on screen as a picture")
+        self._before, self._next = QPushButton("◀"), QPushButton("▶")
+        for button, way, which in ((self._before, -1, "before"), (self._next, 1, "after")):
+            button.setAccessibleName(f"To the event {which}")
+            button.setToolTip(f"To the event {which}: a stop, fault, write, trial or mark")
+            button.clicked.connect(lambda _=False, way=way: self._turn(way))
+        self._keys(as_csv)
         as_csv.clicked.connect(lambda: self._ask("csv", self.save_csv))
         as_png.clicked.connect(lambda: self._ask("png", self.save_png))
         self.said = ElidedLabel("dim")
-        row = QHBoxLayout()
-        for widget in (self._span, self.pause, self.fit, self.box, self.cursors, as_csv, as_png):
-            row.addWidget(widget)
-        row.addWidget(self.said, 1)
-        return row
+        self._rows = QBoxLayout(QBoxLayout.Direction.LeftToRight)
+        often = (self._span, self.pause, self.fit, self.box, self.cursors)
+        for widgets in (often, (self._before, self._next, as_csv, as_png, self.said)):
+            row = QHBoxLayout()
+            for widget in widgets:
+                row.addWidget(widget, int(widget is self.said))
+            if widgets is often:
+                row.addStretch(1)
+            self._rows.addLayout(row, int(widgets is not often))
+        return self._rows
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        direction, is_narrow = QBoxLayout.Direction, self.width() < self._theme.px(NARROW)
+        self._rows.setDirection(direction.TopToBottom if is_narrow else direction.LeftToRight)
+
+    def _keys(self, as_csv: QPushButton) -> None:
+        """Keys of this page; the sheet of keys tells them."""
+        buttons = {
+            "Ctrl+Shift+P": self.pause,
+            "Ctrl+0": self.fit,
+            "Ctrl+D": self.cursors,
+            "Ctrl+E": as_csv,
+            "Ctrl+Up": self._before,
+            "Ctrl+Down": self._next,
+        }
+        for key, button in buttons.items():
+            button.setShortcut(key)
+            button.setToolTip(" ".join(filter(None, (button.toolTip(), f"({key})"))))
+        moves: dict[str, Callable[[], None]] = {
+            "Ctrl++": lambda: self._look(0.5),
+            "Ctrl+-": lambda: self._look(2.0),
+            "Ctrl+Left": lambda: self._look(1.0, -0.25),
+            "Ctrl+Right": lambda: self._look(1.0, 0.25),
+        }
+        for key, move in moves.items():
+            shortcut = QShortcut(QKeySequence(key), self, move)
+            shortcut.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
+
+    def _look(self, wider: float, later: float = 0.0) -> None:
+        """See so many times of the time, moved by a share of it."""
+        left, right = self._window
+        span = min((right - left) * wider, float(SPANS_S[self._span.currentIndex()]))
+        end = min(right + later * span, 0.0)
+        begin = max(end - span, -float(SPANS_S[self._span.currentIndex()]))
+        self._zoomed(begin, min(begin + span, 0.0))
 
     def _list_channels(self, station: Station) -> None:
         infos = _infos(station)
@@ -213,6 +278,7 @@ class Signals(QWidget):
         usual = [info.name for info in infos if any(fnmatch.fnmatchcase(info.name, g) for g in self.usual)]
         before = self.chosen if self._items() else usual[:MOST_CURVES]
         self._described = described
+        units = self._desk.shown.units
         self.channels.blockSignals(True)
         self.channels.clear()
         groups: dict[str, QTreeWidgetItem] = {}
@@ -220,7 +286,7 @@ class Signals(QWidget):
             if info.component not in groups:
                 groups[info.component] = QTreeWidgetItem(self.channels, [info.component.replace("_", " ")])
                 groups[info.component].setFlags(Qt.ItemFlag.ItemIsEnabled)
-            item = QTreeWidgetItem(groups[info.component], [f"{info.quantity}  {info.unit}".rstrip()])
+            item = QTreeWidgetItem(groups[info.component], [_title(info, units)])
             item.setData(0, NAME_ROLE, info.name)
             item.setCheckState(0, Qt.CheckState.Unchecked)
         self.channels.blockSignals(False)
@@ -238,6 +304,7 @@ class Signals(QWidget):
         """A plot for each unit of the chosen channels."""
         for plot in self.plots:
             self._stack.removeWidget(plot)
+            plot.hide()
             plot.deleteLater()
         station = self._desk.selected
         chosen = self.chosen[:MOST_CURVES]
@@ -253,11 +320,17 @@ class Signals(QWidget):
             self._stack.addWidget(plot, 1)
             plot.plot.zoomed.connect(self._zoomed)
             plot.plot.moved.connect(self._move)
+            plot.plot.fitted.connect(self._follow)
         self._choose_by_box(self.box.isChecked())
         self._mark()
         self.empty.setVisible(not self.plots)
         if self._frozen is not None and station is not None:
             self._freeze(station)
+
+    def _restyle(self) -> None:
+        self.channels.setIndentation(self._theme.px(10))
+        self.channels.setMinimumWidth(self._theme.px(LIST))
+        self._rebuild()
 
     def _filter(self, words: str) -> None:
         wanted = words.lower().split()
@@ -274,13 +347,13 @@ class Signals(QWidget):
             plot.plot.set_seconds(float(SPANS_S[place]))
 
     def _paused(self, on: bool) -> None:
-        self._frozen = None
+        self._frozen, self._jumped_ns = None, None
         if on and self._desk.selected is not None:
             self._freeze(self._desk.selected)
 
     def _freeze(self, station: Station) -> None:
         times, columns = self._live(station, float(SPANS_S[-1]))
-        self._frozen = Frozen(times, columns)
+        self._frozen = Frozen(times, columns, station.rings.newest_ns or 0)
 
     def _follow(self) -> None:
         for plot in self.plots:
@@ -295,6 +368,53 @@ class Signals(QWidget):
     def _choose_by_box(self, on: bool) -> None:
         for plot in self.plots:
             plot.plot.choose_by_box(on)
+
+    # --- what happened
+
+    def show_at(self, stamp_ns: int, around_s: float = AROUND_S) -> bool:
+        """Stand still with this instant of the robot's clock in the middle; False where it is gone by now."""
+        station = self._desk.selected
+        if station is None:
+            return False
+        self.pause.setChecked(True)
+        frozen = self._frozen
+        if frozen is None or not len(frozen.times):
+            return False
+        at = (stamp_ns - frozen.newest_ns) / 1e9
+        if not frozen.times[0] - frozen.times[-1] <= at <= 0.0:
+            return False
+        wanted = next((place for place, span in enumerate(SPANS_S) if span >= around_s - at), -1)
+        self._span.setCurrentIndex(wanted % len(SPANS_S))
+        self._zoomed(max(at - around_s, -float(SPANS_S[wanted])), min(at + around_s, 0.0))
+        self._jumped_ns = stamp_ns
+        self._frame = 0
+        return True
+
+    def _turn(self, way: int) -> None:
+        """To the next event, or the one before: of where one has jumped to, else of the newest."""
+        station = self._desk.selected
+        if station is None:
+            return
+        newest_ns = station.rings.newest_ns or 0
+        here_ns = newest_ns + 1 if self._jumped_ns is None else self._jumped_ns
+        flags = [flag for flag in station.flags if (flag.at_ns - here_ns) * way > 0]
+        if flags:
+            flag = flags[0] if way > 0 else flags[-1]
+            found = self.show_at(flag.at_ns)
+            self._exported = f" · {flag.kind.value}: {flag.text}" if found else " · that is too long ago"
+
+    def _flag(self, station: Station) -> None:
+        """Every plot shows what happened in its time."""
+        newest_ns = station.rings.newest_ns if self._frozen is None else self._frozen.newest_ns
+        if newest_ns is None:
+            return
+        begin_ns = newest_ns - round(SPANS_S[-1] * 1e9)
+        found = station.flags.between(begin_ns, newest_ns + 1)
+        placed = [PlacedFlag((flag.at_ns - newest_ns) / 1e9, flag.kind, flag.text) for flag in found]
+        for plot in self.plots:
+            plot.plot.show_flags(placed)
+        for button in (self._before, self._next):
+            button.setEnabled(bool(len(station.flags)))
 
     # --- cursors
 
@@ -340,7 +460,10 @@ class Signals(QWidget):
         self.measuring.show_readings(float(times[a]), float(times[b]), self._active, rows)
 
     def _ask(self, kind: str, save: Callable[[Path], None]) -> None:
-        ask_save(self, f"Export as {kind.upper()}", kind, lambda path: self.export(save, path))
+        station = self._desk.selected
+        robot = "signals" if station is None else station.title
+        name = f"{robot}-{datetime.datetime.now().astimezone():%Y%m%d-%H%M%S}"
+        ask_save(self, f"Export as {kind.upper()}", kind, lambda path: self.export(save, path), name)
 
     def export(self, save: Callable[[Path], None], path: Path) -> None:
         """Save what is on screen, and say what came of it."""
@@ -383,6 +506,8 @@ class Signals(QWidget):
         many = f" · {more} more are not drawn: {MOST_CURVES} at a time" if more > 0 else ""
         if self._frozen is not None:
             return f"Paused, data go on{many}"
+        if station.robot.age_s() is None:
+            return f"no data yet{many}"
         if station.robot.is_stale():
             return f"STALE, {age_text(station.robot.age_s())} old{many}"
         return f"{station.robot.rate_hz():.0f} rows/s{many}"
@@ -393,6 +518,12 @@ def _infos(station: Station) -> list[ChannelInfo]:
     return (
         [] if description is None else [info for info in description.channels if info.component != "resource"]
     )
+
+
+def _title(info: ChannelInfo, units: Units) -> str:
+    """Return what a channel is called below its component, in the unit that its plot has."""
+    symbol = units.unit(info.quantity, info.unit).symbol
+    return f"{info.quantity.replace('_', ' ')}  {symbol}".rstrip()
 
 
 def _open_group(item: QTreeWidgetItem) -> None:

@@ -1,22 +1,31 @@
-"""The status bar: where data come from and how well, what is recorded, what STOP is not."""
+"""The last line: the robot's computer and bus, who uses most of it, what is recorded, what STOP is not."""
 
 import collections
 import time
 from typing import Final
 
-from PySide6.QtWidgets import QStatusBar
+from PySide6.QtCore import QEvent, Qt
+from PySide6.QtWidgets import QApplication, QStatusBar
 
+from server_gui.core.desk.busiest import busiest
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.recording import Tone
 from server_gui.core.desk.station import Station
-from server_gui.views.marks import Mark, age_text
+from server_gui.core.processing.bus_health import Level, worst
+from server_gui.views.bus_health import LEVELS
+from server_gui.views.marks import Mark
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
-from server_gui.views.widgets.elided import ElidedLabel
+from server_gui.views.widgets.fitted import FittedLabel
 from server_gui.views.widgets.mark import MarkIcon
 from server_gui.views.widgets.plain import PlainLabel, set_tip
 
 FRAMES: Final = 60
+STOP: Final = (
+    "STOP: F12 or Ctrl+Space · software, not a safety-rated emergency stop",
+    "F12: software stop, no emergency stop",
+    "F12: software stop",
+)
 TONES: Final = {
     Tone.GOOD: Mark("disc", "good", "recording"),
     Tone.WARNING: Mark("triangle", "warn", "recording, with a warning"),
@@ -32,16 +41,27 @@ class StatusBar(QStatusBar):
         super().__init__()
         self._desk = desk
         self._frames: collections.deque[float] = collections.deque(maxlen=FRAMES)
-        self._link, self.recording, self._window = ElidedLabel(), ElidedLabel(), PlainLabel()
-        self._icon = MarkIcon(theme, 11)
-        stop = ElidedLabel()
-        stop.setText("STOP: F12 or Ctrl+Space · software, not a safety-rated emergency stop")
-        self.addWidget(self._link, 5)
+        self.computer, self.bus, self.recording = FittedLabel(), FittedLabel(), FittedLabel()
+        self._window = PlainLabel()
+        self._icon, self._bus_icon = MarkIcon(theme, 11), MarkIcon(theme, 11)
+        stop = FittedLabel()
+        stop.say(*STOP)
+        stop.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        self.addWidget(self.computer)
+        self.addWidget(self._bus_icon)
+        self.addWidget(self.bus)
         self.addWidget(self._icon)
-        self.addWidget(self.recording, 5)
-        self.addWidget(stop, 4)
+        self.addWidget(self.recording)
+        self.addWidget(stop, 1)
         self.addPermanentWidget(self._window)
         self.setSizeGripEnabled(False)
+        theme.changed.connect(self._restyle)
+
+    def _restyle(self) -> None:
+        """As high as its words at once: else what is around is laid out twice."""
+        for label in (self.computer, self.bus, self.recording, self._window):
+            label.ensurePolished()
+        QApplication.sendPostedEvents(self, QEvent.Type.LayoutRequest)
 
     def frame(self) -> None:
         """Count a frame that was drawn."""
@@ -50,16 +70,23 @@ class StatusBar(QStatusBar):
     def refresh(self) -> None:
         """Show how it is now."""
         station = self._desk.selected
-        set_text(self._link, "no robot" if station is None else _line(station))
+        self.computer.say(*(("no robot", "") if station is None else _computer(station)))
+        level, words = (Level.UNKNOWN, ("",)) if station is None else worst(station.robot)
+        self._bus_icon.show_mark(LEVELS[level])
+        self._bus_icon.setVisible(station is not None)
+        self.bus.say(*words)
         self._refresh_recording(None if station is None else station.address)
-        set_text(self._window, f"{self._rate():.0f} frames/s")
+        set_text(self._window, f"{self._rate():.0f} fps")
+        set_tip(self._window, "frames that this window draws a second")
 
     def _refresh_recording(self, address: str | None) -> None:
         said = self._desk.recording.said(address)
         self._icon.show_mark(TONES[said.tone])
         first = said.detail.partition("\n")[0]
         wrong = said.tone in (Tone.WARNING, Tone.BAD) and first
-        set_text(self.recording, f"{said.text}: {first}" if wrong else said.text)
+        short = said.text.partition(" · ")[0]
+        wordings = (f"{said.text}: {first}" if wrong else said.text, said.text, short)
+        self.recording.say(*dict.fromkeys(wordings))
         set_tip(self.recording, said.detail)
 
     def _rate(self) -> float:
@@ -68,11 +95,14 @@ class StatusBar(QStatusBar):
         return (len(self._frames) - 1) / max(self._frames[-1] - self._frames[0], 1e-6)
 
 
-def _line(station: Station) -> str:
-    robot, link = station.robot, station.robot.link
-    trip = "–" if link.round_trip_ns is None else f"{link.round_trip_ns / 1e6:.1f} ms"
-    return (
-        f"{station.title}  {station.address}  {link.state.value} · round trip {trip} · "
-        f"{robot.rate_hz():.0f} rows/s · data {age_text(robot.age_s())} old · "
-        f"{link.missed + link.dropped} lost"
-    )
+def _computer(station: Station) -> tuple[str, ...]:
+    """CPU and memory of the robot's computer, and who uses most; the fullest wording first."""
+    seen = station.robot.resources
+    if seen is None or not station.is_live:
+        return "CPU – · memory –", "CPU –"
+    share = "–" if not seen.memory.total else f"{100 * seen.memory.used / seen.memory.total:.0f} %"
+    cpu = "–" if seen.cpu.percent is None else f"{seen.cpu.percent:.0f} %"
+    most = busiest(station)
+    short = f"CPU {cpu} · memory {share}"
+    full = () if most is None else (f"{short} · most: {most.name} {most.percent:.0f} %",)
+    return *full, short

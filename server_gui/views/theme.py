@@ -21,13 +21,18 @@ class Look(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Colours:
-    """A palette: Okabe–Ito hues, darkened for white paper so that they keep 4.5 : 1 of contrast."""
+    """A palette: Okabe–Ito hues, made darker or lighter until they reach WCAG 2.2 AA on their grounds.
+
+    Every text has 4.5 : 1, what tells a field or a button from its ground (`edge`) 3 : 1. `border` only
+    parts what would be understood without it. From `green` on: curves that belong to no side.
+    """
 
     window: str
     panel: str
     card: str
     field: str
     border: str
+    edge: str
     text: str
     dim: str
     accent: str
@@ -39,6 +44,12 @@ class Colours:
     bad: str
     old: str
     staged: str
+    green: str
+    pink: str
+    vermilion: str
+    yellow: str
+    violet: str
+    lime: str
     stop: str = "#c8102e"
     stop_border: str = "#ffd400"
 
@@ -50,6 +61,7 @@ PALETTES: Final = {
         card="#1a2028",
         field="#12171e",
         border="#2c3440",
+        edge="#6b7687",
         text="#e8ecf1",
         dim="#98a3b3",
         accent="#3d9bea",
@@ -59,8 +71,14 @@ PALETTES: Final = {
         good="#2dbb8c",
         warn="#e8d93a",
         bad="#ff7a45",
-        old="#6d7786",
-        staged="#3a3310",
+        old="#8590a0",
+        staged="#332d0e",
+        green="#009e73",
+        pink="#cc79a7",
+        vermilion="#e06a1b",
+        yellow="#f0e442",
+        violet="#8f8fd6",
+        lime="#7fb36b",
     ),
     Look.LIGHT: Colours(
         window="#eef1f4",
@@ -68,6 +86,7 @@ PALETTES: Final = {
         card="#ffffff",
         field="#ffffff",
         border="#ced6df",
+        edge="#7b8794",
         text="#18212c",
         dim="#566273",
         accent="#0a63b0",
@@ -77,8 +96,14 @@ PALETTES: Final = {
         good="#007a58",
         warn="#7d6c00",
         bad="#c23b00",
-        old="#8a94a1",
+        old="#626d7c",
         staged="#fff3c4",
+        green="#00795a",
+        pink="#a8437d",
+        vermilion="#b04a00",
+        yellow="#7d6c00",
+        violet="#5b5bb0",
+        lime="#457334",
     ),
 }
 
@@ -102,6 +127,7 @@ QLabel#dim, QLabel#note {{ color: {dim}; }}
 QLabel#title {{ font-weight: bold; }}
 QLabel#brand {{ color: {accent}; padding-right: 8px; }}
 QLabel#banner {{ background: {staged}; border: 1px solid {warn}; border-radius: 4px; padding: 5px 8px; }}
+QLabel#banner[tone="plain"] {{ background: {card}; border-color: {border}; }}
 QLabel#banner[tone="bad"] {{ border-color: {bad}; }}
 QLabel#banner[tone="good"] {{ background: {card}; border-color: {good}; }}
 QTabWidget::pane {{ border: none; border-top: 1px solid {border}; }}
@@ -109,8 +135,9 @@ QTabBar {{ background: {panel}; }}
 QTabBar::tab {{ background: transparent; color: {dim}; padding: 7px 14px; border: none;
     border-bottom: 2px solid transparent; }}
 QTabBar::tab:selected {{ color: {text}; border-bottom: 2px solid {accent}; }}
+QTabBar QToolButton {{ padding: 0; border-radius: 0; }}
 QTabBar::tab:focus, QTabBar::tab:hover {{ color: {text}; }}
-QPushButton, QToolButton {{ background: {card}; border: 1px solid {border}; border-radius: 4px;
+QPushButton, QToolButton {{ background: {card}; border: 1px solid {edge}; border-radius: 4px;
     padding: 5px 10px; }}
 QPushButton:hover, QToolButton:hover {{ border-color: {accent}; }}
 QPushButton:focus, QToolButton:focus, QComboBox:focus {{ border: 1px solid {accent}; }}
@@ -124,10 +151,11 @@ QPushButton#stop {{ background: {stop}; color: white; border: 3px solid {stop_bo
 QPushButton#stop:pressed {{ background: #7d0a1d; }}
 QPushButton#stop:focus {{ border-color: white; }}
 QPushButton#robot_stop {{ color: {bad}; border-color: {bad}; padding: 2px 8px; font-weight: bold; }}
-QLineEdit, QAbstractSpinBox, QComboBox, QPlainTextEdit {{ background: {field}; border: 1px solid {border};
+QLineEdit, QAbstractSpinBox, QComboBox, QPlainTextEdit {{ background: {field}; border: 1px solid {edge};
     border-radius: 4px; padding: 4px 6px; selection-background-color: {accent};
     selection-color: {on_accent}; }}
 QLineEdit:focus, QAbstractSpinBox:focus {{ border-color: {accent}; }}
+QAbstractSpinBox {{ padding-right: 16px; }}
 QAbstractSpinBox QLineEdit {{ border: none; padding: 0; background: transparent; }}
 QComboBox QAbstractItemView, QMenu {{ background: {card}; border: 1px solid {border};
     selection-background-color: {accent}; selection-color: {on_accent}; }}
@@ -137,24 +165,26 @@ QMenu::item:disabled {{ color: {old}; }}
 QAbstractItemView {{ background: {card}; alternate-background-color: {panel}; border: none;
     selection-background-color: {selection}; selection-color: {text}; outline: 0; }}
 QAbstractItemView#framed {{ border: 1px solid {border}; }}
+QAbstractItemView#framed:focus, QTextBrowser:focus {{ border-color: {accent}; }}
 QTreeView::item {{ padding: 3px 0; }}
-QTreeView::indicator {{ width: 10px; height: 10px; background: {field}; border: 1px solid {old};
+QTreeView::indicator {{ width: 10px; height: 10px; background: {field}; border: 1px solid {edge};
     border-radius: 2px; }}
 QTreeView::indicator:checked {{ background: {accent}; border-color: {accent}; }}
 QHeaderView {{ background: {panel}; }}
+QHeaderView::up-arrow, QHeaderView::down-arrow {{ image: none; width: 0; height: 0; }}
 QHeaderView::section {{ background: {panel}; color: {dim}; border: none; border-right: 1px solid {border};
     border-bottom: 1px solid {border}; padding: 4px 6px; }}
 QScrollArea, QScrollArea > QWidget > QWidget#page {{ background: transparent; border: none; }}
 QScrollBar:vertical {{ background: transparent; width: 9px; }}
 QScrollBar:horizontal {{ background: transparent; height: 9px; }}
-QScrollBar::handle {{ background: {border}; border-radius: 4px; min-height: 24px; min-width: 24px; }}
+QScrollBar::handle {{ background: {edge}; border-radius: 4px; min-height: 24px; min-width: 24px; }}
 QScrollBar::handle:hover {{ background: {old}; }}
 QScrollBar::add-line, QScrollBar::sub-line {{ width: 0; height: 0; }}
-QSlider::groove:horizontal {{ background: {border}; height: 4px; border-radius: 2px; }}
+QSlider::groove:horizontal {{ background: {edge}; height: 4px; border-radius: 2px; }}
 QSlider::sub-page:horizontal {{ background: {accent}; border-radius: 2px; }}
 QSlider::handle:horizontal {{ background: {text}; width: 12px; margin: -5px 0; border-radius: 6px; }}
 QSlider::handle:horizontal:focus {{ background: {accent}; }}
-QProgressBar {{ background: {field}; border: 1px solid {border}; border-radius: 4px; max-height: 8px; }}
+QProgressBar {{ background: {field}; border: 1px solid {edge}; border-radius: 4px; max-height: 8px; }}
 QProgressBar::chunk {{ background: {accent}; border-radius: 3px; }}
 """
 

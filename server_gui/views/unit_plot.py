@@ -11,7 +11,7 @@ from gateway.units import Unit
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_text
 from server_gui.views.widgets.plain import rich
-from server_gui.views.widgets.plot import Curve, Plot, css
+from server_gui.views.widgets.plot import Curve, Mouse, Plot, css
 
 # Okabe & Ito's colours for what is neither the first left nor the first right channel of its plot.
 OTHERS: Final = ("#009e73", "#cc79a7", "#d55e00", "#f0e442", "#8f8fd6", "#7fb36b")
@@ -21,10 +21,10 @@ class UnitPlot(Card):
     """One plot."""
 
     def __init__(self, theme: Theme, unit: Unit, channels: Sequence[str], seconds: float) -> None:
-        super().__init__(unit.symbol or "no unit")
+        super().__init__(_title(unit, channels))
         self.unit = unit
         self.channels = tuple(channels)
-        self.plot = Plot(theme, seconds, least=1e-3, zooms=True)
+        self.plot = Plot(theme, seconds, least=1e-3, mouse=Mouse.ALL)
         self._curves = [
             Curve(name, colour) for name, colour in zip(channels, _colours(channels), strict=True)
         ]
@@ -45,6 +45,13 @@ class UnitPlot(Card):
             for curve, value in zip(self._curves, values, strict=True)
         )
         set_text(self._legend, "&nbsp;&nbsp; ".join(names))
+
+
+def _title(unit: Unit, channels: Sequence[str]) -> str:
+    """What is measured, and in which unit: a unit alone says too little."""
+    quantities = dict.fromkeys(name.rpartition(".")[2].replace("_", " ") for name in channels)
+    said = ", ".join(quantities).capitalize()
+    return f"{said} ({unit.symbol})" if unit.symbol else said
 
 
 def _colours(channels: Sequence[str]) -> list[str]:

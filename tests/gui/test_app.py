@@ -94,6 +94,18 @@ def test_a_robot_is_added_while_the_window_runs(app: App, robot: FakeRobot) -> N
         assert app.desk.stations[0].is_linked
 
 
+def test_a_robot_is_left_while_the_window_runs_and_can_come_back(app: App, robot: FakeRobot) -> None:
+    with FakeRobot() as other:
+        app.window.added.emit(other.address)
+        wait(lambda: app.desk.stations[1].is_linked, "followed the other")
+        app.window.removed.emit(app.desk.stations[1])
+        wait(lambda: len(app.window.robots.cards) == 1, "left the other")
+        assert other.called("robot.stop") == []
+        app.window.added.emit(other.address)
+        wait(lambda: app.desk.stations[1].is_linked, "followed the other again")
+    assert app.desk.stations[0].is_linked
+
+
 def test_the_simulator_that_is_offered_at_first_walks_in_the_window(qt: QApplication, tmp_path: Path) -> None:
     kept = QSettings(str(tmp_path / "kept.ini"), QSettings.Format.IniFormat)
     with running(qt, ServerSettings(), kept) as app:

@@ -108,7 +108,7 @@ def test_a_gateway_of_an_older_protocol_is_named_and_disturbs_no_other(old: App,
     for _ in range(7):
         old.tick()
     problem = f"{robot.address} speaks protocol 0, this program speaks 1; update the older of the two"
-    assert old.window.robots.cards[0].texts[1] == f"no link: {problem}"
+    assert old.window.robots.cards[0].texts[1] == f"never reached: {problem}"
     assert old.window.header.isVisible()
     robot.protocol = 1
     wait(lambda: not ancient.robot.is_stale(), "showed it once it was updated")
@@ -163,7 +163,7 @@ def test_what_is_asked_about_files_stands_in_nobody_s_way(window: MainWindow, tm
     path, chosen = tmp_path / "walk.csv", list[Path]()
     path.write_text("before", encoding="utf-8")
     dialogs = [
-        ask_save(window, "Export", "csv", chosen.append),
+        ask_save(window, "Export", "csv", chosen.append, "walk"),
         ask_open(window, "Open", ("csv",), chosen.append),
     ]
     assert not any(dialog.isModal() for dialog in dialogs)

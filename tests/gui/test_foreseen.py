@@ -9,6 +9,7 @@ import pytest
 from gateway.client import ConnectionState
 from ml.registry.card import Source
 from ml.serving.trust import Trust
+from server_gui.core.desk.leg_phase import leg_phase
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.events import LinkChanged
 from server_gui.core.prediction.current import OFF, Recalled, Shown
@@ -17,13 +18,14 @@ from server_gui.core.prediction.state import Quality
 from server_gui.core.processing.gait_events import Leg
 from server_gui.core.settings.prediction import Action, RuleSettings
 from server_gui.views.main_window import MainWindow
-from server_gui.views.predictions import lines, model_phases, status
+from server_gui.views.predictions import activity, lines, model_phases, status
 from tests.gui.fakes import Bench
 from tests.gui.foreseen import predicted
 from tests.gui.running import wait
 from tests.support.desk import looked, walking
 
 HOUR_S = 3600.0
+UNCHECKED = "not yet checked on this robot, learned in the simulator 3 days ago"
 WALKS = {"walk": 0.94, "turn": 0.04, "stand": 0.02}
 
 
@@ -50,25 +52,30 @@ def test_what_is_predicted_is_said_with_how_sure_and_what_else_it_may_be(
     window: MainWindow, station: Station
 ) -> None:
     station.take_prediction(predicted("walk", WALKS))
-    shown(window, lambda: chip(window) == "Walk  0.94\npredicted · next turn 0.04")
-    model = "activity-3fa2c1, 3 days old, simulated model"
-    said = f"Does: Walk  0.94 · next turn 0.04 · {model}"
-    shown(window, lambda: window.overview.status_lines.texts[0] == said)
-    assert "p 0.94" in window.overview._ring._below
+    said = f"{UNCHECKED} · else turn 4 %"
+    shown(window, lambda: chip(window) == f"Walk 94 %\npredicted · {said}")
+    now = window.overview.now.activity
+    shown(window, lambda: now.main.text().startswith("Walk 94 %  "))
+    assert now.detail.text() == said
+    assert "activity-3fa2c1" in now.toolTip()
+    assert "activity-3fa2c1" not in now.main.text() + now.detail.text(), "nobody reads a model's hash"
+    assert window.overview._ring._word == "Walk 94 %"
 
 
 def test_how_right_the_model_was_of_late_stands_beside_it(station: Station) -> None:
     quality = Quality(312, 292, 1, 19, {})
     station.take_prediction(dataclasses.replace(predicted("walk", WALKS), quality=quality))
-    told = "93.6 % right, 0.3 % wrong, 6.1 % not said of 312 labelled"
-    assert next(lines(station)).detail.endswith(f"simulated model · last 7 days: {told}")
+    line = activity(station)
+    assert line.detail == "right 94 % last week (312 checked) · else turn 4 %"
+    assert line.short == "right 94 % last week"
+    assert "93.6 % right, 0.3 % wrong, 6.1 % not said of 312 labelled" in line.tip
 
 
 @pytest.mark.parametrize(
     ("label", "novelty", "said"),
     [
-        ("unknown", 0.2, "Unknown\npredicted · likeliest walk 0.41"),
-        ("abnormal", 1.7, "Abnormal\npredicted · novelty 1.7 · likeliest walk 0.41"),
+        ("unknown", 0.2, f"Unknown\npredicted · {UNCHECKED} · likeliest walk 41 %"),
+        ("abnormal", 1.7, f"Abnormal\npredicted · novelty 1.7 · {UNCHECKED} · likeliest walk 41 %"),
     ],
 )
 def test_a_model_that_does_not_know_says_so(
@@ -76,8 +83,7 @@ def test_a_model_that_does_not_know_says_so(
 ) -> None:
     station.take_prediction(predicted(label, {"walk": 0.41, "stand": 0.4}, novelty=novelty))
     shown(window, lambda: chip(window) == said)
-    assert window.overview._ring._word == label.capitalize()
-    assert "p 0" not in window.overview._ring._below, "that is another class's"
+    assert window.overview._ring._word == label.capitalize(), "the probability is another class's"
 
 
 def test_a_fall_stands_before_all_else(station: Station) -> None:
@@ -85,11 +91,11 @@ def test_a_fall_stands_before_all_else(station: Station) -> None:
     station.take_prediction(predicted("steady", {"steady": 0.99, "fall": 0.01}, "falling"))
     line = status(station)
     assert line is not None
-    assert line.text == "Walk  0.94"
+    assert line.text == "Walk 94 %"
     station.take_prediction(predicted("fall", {"steady": 0.03, "fall": 0.97}, "falling"))
     line = status(station)
     assert line is not None
-    assert (line.mark.shape, line.mark.colour, line.text) == ("square", "bad", "Fall  0.97")
+    assert (line.mark.shape, line.mark.colour, line.text) == ("square", "bad", "Fall 97 %")
 
 
 def test_a_robot_that_differs_from_what_was_learned_is_said_to(station: Station) -> None:
@@ -97,7 +103,21 @@ def test_a_robot_that_differs_from_what_was_learned_is_said_to(station: Station)
     station.take_prediction(predicted("walk", WALKS, trust=drifted, source=Source.RECORDED))
     line = status(station)
     assert line is not None
-    assert "DRIFTED: left_hip.position" in line.detail
+    assert "unlike what it has learned (left_hip.position): do not rely on it" in line.detail
+
+
+def test_a_robot_that_somebody_has_stopped_is_not_called_abnormal(station: Station) -> None:
+    drifted = Trust(600, 0.9, 0.0, 3.5, {"left_hip.position": 0.4})
+    station.take_prediction(predicted("abnormal", {"walk": 0.41}, novelty=3.5, trust=drifted))
+    station.stopping.held = True
+    line = status(station)
+    assert line is not None
+    assert (line.text, line.mark.colour) == ("Stopped on purpose", "dim")
+    assert "unlike" not in line.detail
+    station.take_prediction(predicted("fall", {"steady": 0.03, "fall": 0.97}, "falling"))
+    line = status(station)
+    assert line is not None
+    assert line.text == "Fall 97 %", "a fall is told of a stopped robot, too"
 
 
 def test_a_prediction_that_is_old_is_not_shown_as_one(window: MainWindow, station: Station) -> None:
@@ -126,6 +146,21 @@ def test_without_a_model_it_says_how_to_get_one_and_shows_the_steps(
     shown(window, lambda: f"Not predicted · {OFF}" in window.overview.status_lines.texts)
 
 
+def test_steps_and_model_are_one_number_and_said_to_differ_where_they_do(station: Station) -> None:
+    derived = station.processing.derived()
+    seen = leg_phase(derived, Leg.LEFT, derived.stamp_ns)
+    assert seen is not None
+    share = seen.percent / 100
+    for late_s, off, said in ((0.0, 0.0, "agree"), (0.2, -0.2, "agree"), (0.0, 0.14, "differ by 14 %")):
+        values = {"left": (share + off) % 1.0}
+        news = predicted("stride", {"stride": 0.9}, "gait_phase", values=values)
+        stamp_ns = derived.stamp_ns - round(late_s * 1e9)
+        prediction = dataclasses.replace(news.prediction, stamp_ns=stamp_ns)
+        station.take_prediction(dataclasses.replace(news, prediction=prediction))
+        line = next(one for one in lines(station) if one.text.startswith("Stride"))
+        assert line.text.endswith(said)
+
+
 def test_the_model_s_phase_stands_beside_that_of_the_steps(window: MainWindow, station: Station) -> None:
     station.take_prediction(
         predicted("stride", {"stride": 0.9}, "gait_phase", values={"left": 0.25, "right": 0.75})
@@ -138,9 +173,7 @@ def test_the_model_s_phase_stands_beside_that_of_the_steps(window: MainWindow, s
     window.refresh()
     assert window.overview._ring._modelled == phases
     assert window.overview._ring._phases[Leg.LEFT] is not None
-    shown(
-        window, lambda: window.overview.status_lines.texts[0].startswith("Stride: L 25 % · R 75 %  0.90 · ")
-    )
+    shown(window, lambda: window.overview.status_lines.texts[0].startswith("Stride: "))
     station.take_prediction(
         predicted("unknown", {"stride": 0.2}, "gait_phase", values={"left": 0.25, "right": 0.75})
     )
@@ -156,9 +189,9 @@ def test_rules_that_hold_and_devices_in_trouble_stand_beside(window: MainWindow,
     shown(window, lambda: len(window.overview.status_lines.texts) == 3)
     texts = window.overview.status_lines.texts
     assert [text.partition(" · ")[0] for text in texts] == [
-        "Balance: Fall  0.97",
+        "Balance: Fall 97 %",
         "Rule alarm",
-        "left_knee fault",
+        "left knee fault",
     ]
     assert texts[2].endswith("i²t at 83 %")
 
@@ -175,6 +208,6 @@ def test_what_was_said_when_a_recording_was_made_is_said_to_be_of_then(
 ) -> None:
     walks = predicted("walk", WALKS).prediction
     station.predictions.recalled = {"activity": Recalled(walks, 0.1)}
-    shown(window, lambda: window.overview._ring._word == "Walk")
-    said = "Does: Walk  0.94 · next turn 0.04 · said then by activity-3fa2c1"
-    shown(window, lambda: window.overview.status_lines.texts[0] == said)
+    shown(window, lambda: window.overview._ring._word == "Walk 94 %")
+    said = "said then by the model activity-3fa2c1 · else turn 4 %"
+    shown(window, lambda: window.overview.now.activity.detail.text() == said)

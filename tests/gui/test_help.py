@@ -37,7 +37,7 @@ def test_f1_tells_of_the_tab_or_of_the_panel_that_has_the_keyboard(window: MainW
     window.parameters.filters.words.setFocus()
     QTest.keyClick(window.parameters.filters.words, Qt.Key.Key_F1)
     assert window.help.choice.currentText() == "Parameters"
-    assert "the robot column shows six" in " ".join(window.help.text.toPlainText().split())
+    assert "the robot column shows four" in " ".join(window.help.text.toPlainText().split())
 
 
 def test_the_button_beside_the_tabs_does_the_same_and_stop_stays_in_sight(window: MainWindow) -> None:

@@ -1,6 +1,7 @@
 """The overview shows what is so, in the units of choice, and how old it is when it is so no more."""
 
 import math
+import time
 from collections.abc import Iterator
 
 import numpy as np
@@ -8,12 +9,16 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QImage
 
+from gateway.client import ConnectionState
 from gateway.units import Units
 from gateway.wire.component import LayoutInfo
 from server_gui.core.desk.leg_phase import leg_phase, phase_at
 from server_gui.core.desk.soles import cells_of, sole
+from server_gui.core.follow.events import LinkChanged
 from server_gui.core.processing.gait_events import Leg
-from server_gui.views.joint_table import JointModel
+from server_gui.core.tuning.stop import Proof
+from server_gui.core.tuning.writing import Trial
+from server_gui.views.joint_table import ERROR, STOP, TORQUE, JointModel
 from server_gui.views.overview import Overview
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.figure import ANKLE, SHANK, THIGH, Pose, chain
@@ -69,23 +74,23 @@ def test_phases_end_where_the_literature_says(percent: float, name: str) -> None
 def test_the_joint_table_shows_degrees_and_the_drive_state_in_words(theme: Theme, bench: Bench) -> None:
     bench.station.take([looked(), telemetry([1], {"left_knee.position": [0.5], "left_knee.state": [4.0]})])
     left_knee = cells(JointModel(bench.desk, theme), 1)
-    assert left_knee[:3] == ["left knee", "● operation enabled", "+28.6"]
+    assert left_knee[:3] == ["left knee", "● operation enabled", "+28.6 / –"]
 
 
 def test_another_unit_is_shown_at_once(theme: Theme, bench: Bench) -> None:
     bench.station.take([telemetry([1], {"left_knee.position": [0.5]})])
     bench.desk.shown.change(Units(by_si={"rad": "rad"}))
     model = JointModel(bench.desk, theme)
-    assert cells(model, 1)[2] == "+0.500"
-    assert model.headerData(2, Qt.Orientation.Horizontal) == "Angle rad"
+    assert cells(model, 1)[2] == "+0.500 / –"
+    assert model.headerData(2, Qt.Orientation.Horizontal) == "Angle / target rad"
 
 
 def test_a_missing_value_is_a_dash_and_never_the_old_one(theme: Theme, bench: Bench) -> None:
     model = JointModel(bench.desk, theme)
     bench.station.take([telemetry([1], {"left_knee.position": [0.5]})])
-    assert cells(model, 1)[2] == "+28.6"
+    assert cells(model, 1)[2] == "+28.6 / –"
     bench.station.take([telemetry([2], {"left_knee.position": [None]})])
-    assert cells(model, 1)[2] == "–"
+    assert cells(model, 1)[2] == "– / –"
 
 
 def test_a_lost_joint_is_named_lost_with_its_age(theme: Theme, bench: Bench) -> None:
@@ -111,7 +116,7 @@ def test_before_the_first_data_it_says_that_there_are_none(overview: Overview) -
 
 
 def test_an_insole_that_no_layout_describes_is_drawn_in_its_order(overview: Overview, bench: Bench) -> None:
-    bench.station.take([described(cells=20), walking(20, cells=20)])
+    bench.station.take([described(cells=20), walking(20, -3600.0, cells=20)])
     overview.refresh()
     assert "20 cells in their order" in overview.notes[2]
     assert len(colours(overview.grab().toImage())) > 50
@@ -119,7 +124,7 @@ def test_an_insole_that_no_layout_describes_is_drawn_in_its_order(overview: Over
 
 def test_an_insole_that_the_robot_describes_is_drawn_as_it_says(overview: Overview, bench: Bench) -> None:
     cells = [(0.05 + 0.01 * number, 0.02 if number % 2 else -0.02, 1e-3) for number in range(20)]
-    bench.station.take([described(layout=LayoutInfo("own-20", cells)), walking(20, cells=20)])
+    bench.station.take([described(layout=LayoutInfo("own-20", cells)), walking(20, -3600.0, cells=20)])
     overview.refresh()
     assert overview.notes[2] == "20 cells, own-20"
     assert sole(bench.station.robot, "left").cells == tuple((x, y) for x, y, _ in cells)
@@ -188,3 +193,92 @@ def test_the_trail_is_bounded_and_a_foot_in_the_air_has_none(theme: Theme) -> No
     assert len(foot._trail) < 50
     foot.show_pressures([0.0] * 16, None, live=True)
     assert len(colours(foot.grab().toImage())) > 3
+
+
+def test_a_sole_that_tells_nothing_says_why_and_leaves_the_other_no_share(
+    overview: Overview, bench: Bench
+) -> None:
+    bench.station.take([walking(20, -3600.0)])
+    overview._read_s = 0.0
+    overview.refresh()
+    texts = {side: overview._loads[side].text() for side in ("left", "right")}
+    assert all(text.endswith(" N") for text in texts.values())
+    assert overview._shares["left"].text().endswith(" % of the load")
+    lost = looked()
+    lost.quality.quality["left_insole"] = {"state": "lost", "age_ms": 4200.0, "problem": "it went away"}
+    columns: dict[str, list[float | None]] = {"left_insole.force": [None], "right_insole.force": [600.0]}
+    newest_ns = bench.station.rings.newest_ns or 0
+    bench.station.take([lost, telemetry([newest_ns + 1], columns)])
+    overview._read_s = 0.0
+    overview.refresh()
+    assert overview._loads["left"].text() == "LEFT  insole lost"
+    assert overview._maps["left"].accessibleDescription() == "insole lost"
+    assert overview._loads["right"].text() == "RIGHT  600 N"
+    assert overview._shares["right"].text() == "– of the load"
+
+
+def test_a_joint_in_trouble_is_in_words_with_its_code_and_no_zero_is_negative(
+    theme: Theme, bench: Bench
+) -> None:
+    why = "the drive is in fault: 0x2310 continuous overcurrent at the output (register: generic)"
+    columns: dict[str, list[float | None]] = {
+        "left_knee.state": [7.0],
+        "left_knee.error_code": [float(0x2310)],
+        "left_knee.torque": [-0.0],
+        "left_knee.position": [-0.0001],
+    }
+    received_ns = time.monotonic_ns()
+    bench.station.take([telemetry([received_ns], columns, received_ns), looked(state="fault", problem=why)])
+    shown = cells(JointModel(bench.desk, theme), 1)
+    assert shown[ERROR] == "0x2310 continuous overcurrent at the output"
+    assert shown[TORQUE] == "+0.00 / 80"
+    assert shown[2] == "+0.0 / –"
+    assert cells(JointModel(bench.desk, theme), 0)[ERROR] == "–"
+
+
+def test_proof_of_a_stop_stands_at_each_joint(theme: Theme, bench: Bench) -> None:
+    received_ns = time.monotonic_ns()
+    bench.station.take([telemetry([received_ns], {"left_knee.state": [5.0]}, received_ns)])
+    model = JointModel(bench.desk, theme)
+    assert cells(model, 1)[STOP] == "–"
+    bench.station.stopping.sent()
+    bench.station.stopping.proofs = {"left_knee": Proof(38.4, "quick stop active")}
+    assert cells(model, 1)[STOP] == "38 ms"
+    assert cells(model, 0)[STOP] == "no proof"
+
+
+def test_a_trial_is_kept_or_taken_back_where_it_is_seen(overview: Overview, bench: Bench) -> None:
+    overview.refresh()
+    assert not overview.now.trial.isVisible()
+    until_ns = time.monotonic_ns() + 24 * 10**9
+    trial = Trial(7, {"gait.step_length": 0.42}, {"gait.step_length": 0.4}, until_ns)
+    bench.station.writing.trial = trial
+    overview._read_s = 0.0
+    overview.refresh()
+    assert overview.now.trial.isVisible()
+    assert overview.now.trial.main.text() == "On trial: gait step length 400 → 420 mm"
+    assert overview.now.trial.detail.text().startswith("taken back in 2")
+    overview.now.keep.click()
+    overview.now.take_back.click()
+    assert bench.first.named("confirm") == [(7,)]
+    assert bench.first.named("revert") == [(7,)]
+
+
+@pytest.mark.parametrize("happened", ["nothing", "link lost", "old"])
+def test_nothing_on_the_overview_is_green_where_nothing_is_known(
+    overview: Overview, theme: Theme, bench: Bench, happened: str
+) -> None:
+    if happened != "nothing":
+        bench.station.take([walking(300, 3.0 if happened == "old" else -3600.0), looked()])
+    if happened == "link lost":
+        bench.station.take([LinkChanged(ConnectionState.WAITING, "no route", time.monotonic_ns())])
+    overview._read_s = 0.0
+    overview.refresh()
+    marks = [fact._icon._mark for fact in (overview.now.drives, overview.now.activity)]
+    marks += [icon._mark for icon, label in overview.status_lines._rows if not label.isHidden()]
+    assert "good" not in {mark.colour for mark in marks}
+    assert overview._ring._word == "Not known"
+    model = JointModel(bench.desk, theme)
+    model.refresh()
+    assert "good" not in {cell.colour for row in model._cells for cell in row}
+    assert "text" not in {row[column].colour for row in model._cells for column in range(2, 7)}

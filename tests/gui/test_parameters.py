@@ -48,7 +48,7 @@ def settle(panel: ParametersPanel) -> None:
 
 def test_values_are_shown_in_degrees_and_millimetres(panel: ParametersPanel) -> None:
     assert row(panel, "gait.step_length")[ROBOT] == "400"
-    assert row(panel, "gait.trunk_angle")[ROBOT] == "2.86479"
+    assert row(panel, "gait.trunk_angle")[ROBOT] == "2.865"
 
 
 def test_a_staged_value_is_shown_and_not_sent(panel: ParametersPanel, bench: Bench) -> None:

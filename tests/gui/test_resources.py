@@ -13,7 +13,7 @@ from gateway.wire.cost import BudgetInfo, ClientCost, GatewayCost
 from gateway.wire.resource import ProcessUse, Throttling
 from server_gui.core.follow.events import Costs, LinkChanged
 from server_gui.views.computer import held_back
-from server_gui.views.processes import CPU, MEMORY, NAME
+from server_gui.views.processes import CPU, MEMORY, NAME, PID
 from server_gui.views.resources import Resources
 from server_gui.views.theme import Theme
 from tests.gui.fakes import Bench, destroy
@@ -62,7 +62,7 @@ def test_the_table_sorts_both_ways_on_every_column(view: Resources, bench: Bench
     assert show(view, bench, *uses) == ["c", "b", "a"], "the highest CPU is not at the top"
     for column, rising in (
         (NAME, ["a", "b", "c"]),
-        (1, ["c", "b", "a"]),
+        (PID, ["c", "b", "a"]),
         (CPU, ["a", "b", "c"]),
         (MEMORY, ["a", "c", "b"]),
     ):

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from gateway.units import Units
+from server_gui.core.desk.flags import Flag, FlagKind
 from server_gui.views.signals import MOST_CURVES, Signals
 from server_gui.views.theme import Theme
 from tests.gui.fakes import Bench, destroy
@@ -109,3 +110,29 @@ def test_the_view_begins_with_what_was_asked_for(theme: Theme, bench: Bench) -> 
         "right_hip.velocity"
     }
     destroy(made)
+
+
+def test_one_jumps_from_event_to_event_and_every_plot_shows_them(signals: Signals, bench: Bench) -> None:
+    station = bench.station
+    newest_ns = station.rings.newest_ns
+    assert newest_ns is not None
+    first, last = newest_ns - 2_000_000_000, newest_ns - 1_000_000_000
+    station.flags.add(Flag(first, "left knee: fault", FlagKind.FAULT), Flag(last, "stairs", FlagKind.MARK))
+    signals._turn(-1)
+    assert signals.pause.isChecked(), "the instant runs away"
+    left, right = signals.plots[0].plot.window_s
+    assert left <= -1.0 <= right
+    signals._turn(-1)
+    signals.refresh()
+    assert "fault: left knee: fault" in signals.said.text()
+    assert [flag.at for flag in signals.plots[0].plot._flags] == pytest.approx([-2.0, -1.0])
+    signals._turn(1)
+    signals.refresh()
+    assert "mark: stairs" in signals.said.text()
+    assert not signals.show_at(newest_ns - 3_600_000_000_000), "what is gone by now was shown"
+
+
+def test_a_channel_is_listed_in_the_unit_that_it_is_drawn_in(signals: Signals) -> None:
+    titles = {str(item.text(0)) for item in signals._items()}
+    assert {"position  °", "torque  N·m", "cell 0  kPa"} <= titles
+    assert {plot.unit.symbol for plot in signals.plots} <= {"°", "N", "N·m", "kPa"}

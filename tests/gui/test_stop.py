@@ -137,7 +137,7 @@ def test_stop_is_in_sight_on_every_tab_and_while_changes_are_reviewed(
 
 
 def test_a_held_stop_is_reset_by_its_own_button_which_enables_nothing(header: Header, bench: Bench) -> None:
-    header.reset.connect(bench.station.reset)
+    header.reset.connect(lambda station: station.reset())
     bench.station.stop("test")
     bench.first.answer(ALL)
     header.refresh()

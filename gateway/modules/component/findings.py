@@ -10,7 +10,7 @@ from drivers.bus.life import NodeLife
 from drivers.bus.node import Node
 from drivers.component import Component
 from drivers.samples import Finding
-from gateway.wire.bus import CLOSED, BusInfo, NodeInfo
+from gateway.wire.bus import CLOSED, BusInfo, NodeInfo, TalkInfo
 from gateway.wire.component import EmcyInfo
 from gateway.wire.finding import FindingInfo
 
@@ -39,6 +39,7 @@ def _bus(bus: CanBus, now_ns: int) -> BusInfo:
         nodes=[_node(nodes[node_id], now_ns) for node_id in sorted(nodes)],
         problem=bus.trouble,
         findings=finding_infos(health.findings),
+        talks=[TalkInfo(one.kind, one.node_id, round(one.frames_per_s, 1)) for one in bus.traffic.talks],
     )
 
 

@@ -19,7 +19,7 @@ from gateway.modules.component.assembly import BUILDERS, Robot, assemble, facts
 from gateway.modules.component.findings import bus_infos, emcy_info, finding_infos
 from gateway.process.futures import done, then
 from gateway.streaming.sources import Selection, Source, channel_info, check_globs, narrow, whole
-from gateway.wire.bus import BusInfo
+from gateway.wire.bus import BUS_SNAPSHOT, Buses, BusInfo
 from gateway.wire.component import (
     COMPONENT_SNAPSHOT,
     ChannelInfo,
@@ -29,6 +29,7 @@ from gateway.wire.component import (
     Snapshot,
     SnapshotParams,
 )
+from gateway.wire.method import Params
 
 if TYPE_CHECKING:
     from gateway.connections.session import Session
@@ -69,7 +70,7 @@ class ComponentModule:
         self._context = context
         self._warm_ns = 0
         self._waiting: list[tuple[Callable[[], bool], Future[None]]] = []
-        self.handlers = Handlers(on(COMPONENT_SNAPSHOT, self._snapshot))
+        self.handlers = Handlers(on(COMPONENT_SNAPSHOT, self._snapshot), on(BUS_SNAPSHOT, self._buses))
 
     def start(self) -> None:
         """Build and start everything; a component that cannot start is left out, and it is said why."""
@@ -191,6 +192,9 @@ class ComponentModule:
         chosen = narrow(selections, params.channels)
         ready = self.when_known(chosen)
         return then(ready, lambda _none: self._answer(chosen, everything=params.channels is None))
+
+    def _buses(self, _session: "Session", _params: Params) -> "Future[Buses]":
+        return done(Buses(time.monotonic_ns(), self.buses()))
 
     def _answer(self, chosen: list[Selection], *, everything: bool) -> Snapshot:
         # Everything: also those without channels, and those that are not there.

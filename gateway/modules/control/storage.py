@@ -166,7 +166,7 @@ class _Run:
                 said = f"unknown: {why}" if state is None else STATE_WORDS[state]
                 raise self._refusal(
                     Kind.WRONG_STATE,
-                    f"the state of {drive} is {said}; a device may be deaf while it writes its memory: "
+                    f"the state of {drive} is {said}; a device may not answer while it writes its memory: "
                     "stop the drives first",
                 )
 

@@ -39,6 +39,11 @@ class History:
         told = self.station is not None and self.station.audit.problem is not None
         return told or (self.kept is not None and self.kept.problem is not None) or self._differs is not None
 
+    @property
+    def is_known(self) -> bool:
+        """Whether anything of it has been read."""
+        return bool(self._stretches)
+
     @cached_property
     def acts(self) -> Sequence[tuple[Act, str]]:
         """What was done, oldest first, and who tells of it."""

@@ -2,9 +2,9 @@
 
 import time
 from bisect import bisect_left
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any, Final, cast
 
@@ -15,9 +15,11 @@ from gateway.client import Batch, ConnectionState
 from gateway.wire.component import ChannelInfo, ComponentInfo
 from gateway.wire.robot import Clock, Description, GuardInfo
 from gateway.wire.stop import StopInfo
+from server_gui.core.archive.happened import Happened
 from server_gui.core.archive.recorded_predictions import Said
 from server_gui.core.cloud.tape import Rows, Tape
 from server_gui.core.desk.desk import Desk, Shown
+from server_gui.core.desk.flags import Flag, FlagKind
 from server_gui.core.desk.station import Station
 from server_gui.core.desk.ticks import drawable, nullable
 from server_gui.core.follow.events import Described, LinkChanged, Telemetry
@@ -33,6 +35,23 @@ LEAD_NS: Final = 12_000_000_000  # of the past that are shown after a jump
 LATE_S: Final = 0.5  # a frame that took longer does not make the recording jump
 SPEEDS: Final = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
 NOT_PREDICTED: Final = "nothing was said then: gwrms predict --session says it now"
+FAULTS: Final = ("fault", "fault reaction active")
+# CiA 402-2, "state coding", as a gateway numbers them: recordings hold numbers, and no robot need be there.
+DRIVE_STATES: Final = {
+    str(number): word
+    for number, word in enumerate(
+        (
+            "not ready to switch on",
+            "switch on disabled",
+            "ready to switch on",
+            "switched on",
+            "operation enabled",
+            "quick stop active",
+            "fault reaction active",
+            "fault",
+        )
+    )
+}
 KINDS: Final = {"cell_0": "insole", "force": "insole", "tilt_forward": "imu", "position": "joint"}
 
 
@@ -61,6 +80,10 @@ class PlayedRobot(Robot):
     row_ns: int | None = None  # UTC of the newest row
     stamp_ns: int | None = None  # and on the robot's clock
     rows_per_s: float = 0.0
+    is_recording: bool = True
+
+    def now_s(self) -> float:
+        return self.shown_ns / 1e9
 
     def age_s(self, now_ns: int | None = None) -> float | None:  # noqa: ARG002 - a recording has its own now
         return None if self.row_ns is None else max(0, self.shown_ns - self.row_ns) / 1e9
@@ -70,6 +93,19 @@ class PlayedRobot(Robot):
 
     def rate_hz(self, now_ns: int | None = None) -> float:  # noqa: ARG002 - a recording has its own now
         return self.rows_per_s
+
+    def judge(self) -> None:
+        """What each component was then, as far as its channels tell: nobody has recorded more."""
+        described = () if self.description is None else self.description.channels
+        held = {info.component for info in described if self.values.get(info.name) is not None}
+        for part in self.parts.values():
+            state, problem = "ok", None
+            if self.word(f"{part.name}.state") in FAULTS:
+                code = self.values.get(f"{part.name}.error_code")
+                state, problem = "fault", "" if code is None else f"error code 0x{int(code):04X}"
+            elif part.name not in held and part.kind != "device":
+                state, problem = "lost", "the recording has no value of it here"
+            self.parts[part.name] = replace(part, state=state, problem=problem)
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,6 +150,7 @@ class Playback:
         self._robot = PlayedRobot()
         self._words: Mapping[str, dict[str, str]] = {}
         self._recall: Recall = nothing_said
+        self.happened = Happened(read, deliver)
         self._said: dict[str, Said] = {}  # the newest of each task
         self._pieces: dict[int, Piece] = {}
         self._reading: int | None = None
@@ -129,7 +166,7 @@ class Playback:
     ) -> None:
         """Show this one from its beginning; `words` are those of the channels that are states."""
         self.close()
-        self.tape, self._words, self._recall = tape, words, recall
+        self.tape, self._words, self._recall = tape, _words(tape, words), recall
         station = Station(
             tape.session.robot, "a recording", cast("Commands", NoRobot()), self._deliver, self.desk.news
         )
@@ -137,6 +174,7 @@ class Playback:
         station.take([LinkChanged(ConnectionState.CONNECTED, None, time.monotonic_ns())])
         self.desk.stations = [station]
         self.desk.select(station)
+        self.happened.open(tape, _words(tape, words))
         self.seek(tape.first_ns)
 
     def close(self) -> None:
@@ -225,8 +263,18 @@ class Playback:
             return
         columns = {name: nullable(column) for name, column in rows.columns.items()}
         batch = Batch(rows.stamps_ns.tolist(), columns, 0, 0, 0, 1, time.monotonic_ns())
-        self.desk.stations[0].take([Telemetry(1, batch, None)])
+        station = self.desk.stations[0]
+        station.take([Telemetry(1, batch, None)])
+        station.flags.add(*self._flags(rows))
         self._robot.row_ns, self._robot.stamp_ns = int(rows.utc_ns[-1]), int(rows.stamps_ns[-1])
+        self._robot.judge()
+
+    def _flags(self, rows: Rows) -> Iterator[Flag]:
+        """Yield what happened meanwhile, on the clock of the rows."""
+        behind_ns = int(rows.stamps_ns[-1] - rows.utc_ns[-1])
+        for flag in self.happened.flags.between(int(rows.utc_ns[0]), int(rows.utc_ns[-1]) + 1):
+            if flag.kind not in (FlagKind.FAULT, FlagKind.STOP):  # these the rows tell themselves
+                yield replace(flag, at_ns=flag.at_ns + behind_ns)
 
     # --- what is read
 
@@ -264,6 +312,13 @@ def _rate(tape: Tape) -> float:
     """Rows a second, as far as the store knows."""
     seconds = tape.session.length.total_seconds()
     return tape.session.rows / seconds if seconds else 0.0
+
+
+def _words(tape: Tape, told: Mapping[str, dict[str, str]]) -> dict[str, dict[str, str]]:
+    """Those that are told, and those of drives."""
+    joints = [name.rpartition(".")[0] for name in tape.units if name.endswith(".position")]
+    usual = {f"{joint}.state": DRIVE_STATES for joint in joints if f"{joint}.state" in tape.units}
+    return usual | dict(told)
 
 
 def _description(tape: Tape, jumps: int, words: Mapping[str, dict[str, str]]) -> Description:

@@ -93,16 +93,20 @@ class Tape:
         ends = utc_ns(session.first), utc_ns(session.last)
         return cls(session, units, events, *ends, recorded, settings)
 
-    def read(self, begin_ns: int, end_ns: int) -> Rows:
-        """Return the rows from `begin_ns` up to before `end_ns`; blocks. Raises as `open`."""
+    def read(self, begin_ns: int, end_ns: int, channels: Sequence[str] | None = None) -> Rows:
+        """Return the rows from `begin_ns` up to before `end_ns`; blocks. Raises as `open`.
+
+        Of `channels` alone, if given.
+        """
+        names = [*self.units] if channels is None else [*channels]
         try:
-            return self._read(begin_ns, end_ns)
+            return self._read(begin_ns, end_ns, names)
         except (SpoolUnusable, StoreError):  # what waited may have gone to the store, and old files
             _, self._recorded = _look(self._settings, self.session)
-            return self._read(begin_ns, end_ns)
+            return self._read(begin_ns, end_ns, names)
 
-    def _read(self, begin_ns: int, end_ns: int) -> Rows:
-        found = self._recorded.telemetry([*self.units], as_time(begin_ns), as_time(end_ns))
+    def _read(self, begin_ns: int, end_ns: int, names: list[str]) -> Rows:
+        found = self._recorded.telemetry(names, as_time(begin_ns), as_time(end_ns))
         return Rows.joined([_rows(table) for table in found])
 
 

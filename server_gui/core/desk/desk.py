@@ -31,12 +31,26 @@ class Desk:
         self.selected: Station | None = None
         self.news = News()
         self.shown = Shown()
-        self.recording = Recording(By.NOBODY, None, lambda call: call(), self.news)
+        self._recording = Recording(By.NOBODY, None, lambda call: call(), self.news)
         self.pins = Pins()
         self.on_select: list[Callable[[Station | None], None]] = []
 
     def __iter__(self) -> Iterator[Station]:
         return iter(self.stations)
+
+    @property
+    def recording(self) -> Recording:
+        """What is recorded of the robots; what is marked there is flagged at each of them."""
+        return self._recording
+
+    @recording.setter
+    def recording(self, recording: Recording) -> None:
+        self._recording = recording
+        recording.on_mark.append(self._marked)
+
+    def _marked(self, text: str) -> None:
+        for station in self.stations:
+            station.flag(text)
 
     def add(self, station: Station) -> None:
         """Another robot; the first is selected."""
@@ -44,6 +58,12 @@ class Desk:
         station.neighbours = self.stations
         if self.selected is None:
             self.select(station)
+
+    def remove(self, station: Station) -> None:
+        """Look at it no more; another one is selected where it was."""
+        self.stations.remove(station)
+        if self.selected is station:
+            self.select(self.stations[0] if self.stations else None)
 
     def select(self, station: Station | None) -> None:
         """Look at another robot. Staged edits belong to their robot and stay with it."""

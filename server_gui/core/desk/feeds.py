@@ -67,7 +67,7 @@ class Feeds:
         self._tell_predictions = tell_predictions
         self._stop = stop
         self._robots: dict[str, Address] = {}
-        self._tasks: list[concurrent.futures.Future[None]] = []  # that follow them where no collector does
+        self._tasks: dict[str, concurrent.futures.Future[None]] = {}  # what follows each
         self._tried_s = 0.0
         self._ending = concurrent.futures.ThreadPoolExecutor(1, "ending")
         self._collector, self._why = self._collect()
@@ -119,14 +119,23 @@ class Feeds:
         """Another robot, from now on."""
         self._robots[name] = address
         if self._collector is not None:
-            self._tasks.append(self._collector.follow(name, address))
+            self._tasks[name] = self._collector.follow(name, address)
         else:
             feed = Feed(address, [functools.partial(self._shown, name)], self._following)
-            self._tasks.append(self.network.run(feed.run()))
+            self._tasks[name] = self.network.run(feed.run())
+
+    def leave(self, name: str) -> None:
+        """Follow a robot no more; its recording ends."""
+        del self._robots[name]
+        task = self._tasks.pop(name)
+        if self._collector is not None:
+            self._collector.leave(name)
+        else:
+            task.cancel()
 
     def look(self, recording: Recording) -> None:
         """Now and then: see how it goes, and record where nobody does any more."""
-        for task in self._tasks:
+        for task in self._tasks.values():
             if task.done() and not task.cancelled():
                 task.result()  # it ends only by a mistake of ours, which must not stay unseen
         if self._collector is not None:
@@ -171,9 +180,9 @@ class Feeds:
             return
         collector.__enter__()
         self._collector = collector  # what the feeds of before still tell is dropped from now on
-        for task in self._tasks:
+        for task in self._tasks.values():
             task.cancel()
-        self._tasks = [collector.follow(name, address) for name, address in self._robots.items()]
+        self._tasks = {name: collector.follow(name, address) for name, address in self._robots.items()}
         self._end_showing_only()
         recording.taken_over(collector)
 
@@ -208,4 +217,5 @@ def shown_and_recorded(shown: FollowSettings, recorder: RecordingSettings) -> Fo
         look_s=shown.look_s,
         resources_s=min(recorder.resources_s, RESOURCES_S),
         journal_s=shown.journal_s,
+        buses_s=shown.buses_s,
     )

@@ -48,3 +48,9 @@ def _newest_strike(events: Iterable[GaitEvent], leg: Leg) -> GaitEvent | None:
         if event.leg is leg and event.kind is EventKind.HEEL_STRIKE:
             found = event
     return found
+
+
+def apart(one: float, other: float) -> float:
+    """Return how far two places in a stride are apart (%): it is round."""
+    between = abs(one - other) % 100.0
+    return min(between, 100.0 - between)

@@ -72,6 +72,7 @@ class Recording:
         self.why = why
         self.report: CollectorReport | None = None
         self.problem: str | None = None  # why nobody can be asked
+        self.on_mark: list[Callable[[str], None]] = []  # told when an instant was marked
         self._keeper = keeper
         self._deliver = deliver
         self._news = news
@@ -125,6 +126,8 @@ class Recording:
 
     def mark(self, text: str) -> None:
         """Mark this instant in every robot's recording."""
+        for told in self.on_mark if self._keeper is not None else ():
+            told(text)
         self._ask(lambda keeper: keeper.mark(text), lambda count: f"marked in {_robots(count)}: {text}")
 
     def upload(self) -> None:

@@ -49,6 +49,14 @@ class Rings:
         self._write(stamps_ns, {name: column[-self.rows :] for name, column in columns.items()})
         self.newest_ns = stamps_ns[-1]
 
+    def seconds(self, stamp_ns: int) -> float:
+        """Return where an instant of the robot's clock is on the axis of `times`."""
+        return (stamp_ns - self._base_ns) / 1e9
+
+    def stamp_ns(self, seconds: float) -> int:
+        """Return which instant of the robot's clock is there."""
+        return self._base_ns + round(seconds * 1e9)
+
     def times(self, seconds: float) -> Floats:
         """Times of the rows of the last `seconds`, s since the first row. The ring's own: do not keep it."""
         times = self._span(self._times)

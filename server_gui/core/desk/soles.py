@@ -16,6 +16,10 @@ NAMES: Final = {3: "insole-3", 8: "insole-8", 16: "insole-16", 18: "insole-18", 
 ORDER: Final = "in their order: the robot does not say where they are, and no layout that ships has so many"
 
 
+SIDES: Final = ("left", "right")
+LEAST_N: Final = 20.0  # of both feet: with less nobody stands on them
+
+
 @dataclass(frozen=True, slots=True)
 class Sole:
     """One foot: how many cells, where each is (None: nobody knows), and in words how that is known."""
@@ -39,6 +43,35 @@ def sole(robot: Robot, side: str) -> Sole:
     cells = cells_of(count, right=side == "right")
     source = ORDER if cells is None else f"placed as {NAMES[count]}: the robot does not say where they are"
     return Sole(count, cells, f"{count} cells {source}")
+
+
+@dataclass(frozen=True, slots=True)
+class Load:
+    """What one foot carries: N, its share of both (0–1), and in words why that is not known."""
+
+    force: float | None
+    share: float | None
+    problem: str = ""
+
+
+def loads(robot: Robot) -> dict[str, Load]:
+    """Return what each foot carries; a share only where both are known, and something is carried."""
+    forces = {side: robot.values.get(f"{side}_insole.force") for side in SIDES}
+    known = [force for force in forces.values() if force is not None]
+    total = sum(known) if len(known) == len(SIDES) else 0.0
+    return {
+        side: Load(
+            force, force / total if force is not None and total >= LEAST_N else None, _problem(robot, side)
+        )
+        for side, force in forces.items()
+    }
+
+
+def _problem(robot: Robot, side: str) -> str:
+    part = robot.parts.get(f"{side}_insole")
+    if part is None:
+        return "no insole"
+    return "" if part.state == "ok" else f"insole {part.state}"
 
 
 def cells_of(count: int, *, right: bool) -> tuple[Cell, ...] | None:

@@ -16,7 +16,14 @@ from gateway.wire.parameter import ParameterInfo, Stored, Written
 from gateway.wire.resource import ResourceSnapshot
 from gateway.wire.robot import Description
 from gateway.wire.stop import Stopped
+from server_gui.core.alarms.alarm import Alarms
+from server_gui.core.alarms.found import Facts, any_enabled
+from server_gui.core.alarms.found import alarms as found
+from server_gui.core.alarms.marks import Mark
+from server_gui.core.alarms.texts import Kind, check_of
+from server_gui.core.alarms.worst import worst
 from server_gui.core.audit.journal import Audit
+from server_gui.core.desk.flags import Flag, FlagKind, Flags, StateWatch, of_journal
 from server_gui.core.desk.rings import Rings
 from server_gui.core.follow.events import (
     Costs,
@@ -41,7 +48,7 @@ from server_gui.core.tuning.edits import Change, Edits
 from server_gui.core.tuning.flash import Flash
 from server_gui.core.tuning.lease import LeaseState
 from server_gui.core.tuning.link import LEASE_S
-from server_gui.core.tuning.stop import StopProgress
+from server_gui.core.tuning.stop import StopProgress, StopState
 from server_gui.core.tuning.writing import WriteProgress, WriteState
 
 WATCH_NS: Final = 200_000_000  # between looks for news
@@ -51,12 +58,23 @@ OVERDUE_S: Final = 2.0  # after a trial's end its values are looked at again
 class Station:
     """`take` brings what has come, the others ask; `deliver` brings answers into the window's thread."""
 
-    def __init__(self, name: str, address: str, commands: Commands, deliver: Deliver, news: News) -> None:
+    def __init__(
+        self,
+        name: str,
+        address: str,
+        commands: Commands,
+        deliver: Deliver,
+        news: News,
+        *,
+        is_named: bool = False,
+    ) -> None:
         self.name = name
+        self.is_named = is_named  # by the user, who is to find that name everywhere
         self.address = address
         self.neighbours: Sequence[Station] = ()  # the robots of the desk, this one among them
         self.robot = Robot()
         self.rings = Rings()
+        self.flags = Flags()  # on the robot's clock, as the rows of `rings`
         self.processing = RobotProcessing()
         self.processes: ResourceSnapshot | None = None  # the newest look with a process table
         self.processes_at_ns: int | None = None
@@ -72,8 +90,10 @@ class Station:
         self._commands = commands
         self._deliver = deliver
         self.news = news
+        self._alarms = Alarms()
         self._watch = RobotNews(self.tell)
         self._watched_ns = 0
+        self._states = StateWatch()
 
     @property
     def called(self) -> str:
@@ -83,11 +103,14 @@ class Station:
     @property
     def has_twin(self) -> bool:
         """Whether another robot of the desk calls itself so too."""
-        return any(other is not self and other.called == self.called for other in self.neighbours)
+        others = (other for other in self.neighbours if other is not self)
+        return any(self.called == (other.name if other.is_named else other.called) for other in others)
 
     @property
     def title(self) -> str:
-        """What the robot is called, and where it is, where another one is called so too."""
+        """The user's name for it; else what it calls itself, and where it is, where another is called so."""
+        if self.is_named:
+            return self.name
         return f"{self.called} at {self.address}" if self.has_twin else self.called
 
     @property
@@ -106,9 +129,28 @@ class Station:
         """Whether what is known of the robot is how it is now."""
         return self.is_linked and not self.robot.is_stale()
 
+    @property
+    def alarms(self) -> Alarms:
+        """What is wrong with it, as of now."""
+        facts = Facts(self.robot, self.stopping, self.address, self.audit.entries)
+        if self.stopping.was_ended and any_enabled(self.robot) and self.is_live:
+            self.stopping.was_ended = False
+        self._alarms.look(found(facts), self.robot.now_s(), self.rings.newest_ns)
+        return self._alarms
+
+    @property
+    def mark(self) -> Mark:
+        """How it is, in one mark and word: the same wherever it is shown."""
+        return worst(self.robot, self.alarms)
+
     def tell(self, kind: NewsKind, text: str) -> None:
         """Note something about this robot."""
         self.news.add(kind, self.title, text)
+
+    def flag(self, text: str) -> None:
+        """Flag this instant, which somebody has marked."""
+        if self.rings.newest_ns is not None:
+            self.flags.add(Flag(self.rings.newest_ns, text or "mark", FlagKind.MARK))
 
     # --- what has come
 
@@ -124,11 +166,18 @@ class Station:
             match event:
                 case Telemetry():
                     self.rings.take(event.batch.stamps_ns, event.batch.columns)
+                    self.flags.add(
+                        *self._states.take(event.batch.stamps_ns, event.batch.columns, self.robot.state_words)
+                    )
                     self.flash.clock = event.clock
+                    self._show_stop(event)
                 case Looked():
                     self.flash.look(event.quality.quality, event.at_ns)
                 case Journalled():
                     self.audit.take(event.journal.entries)
+                    self.stopping.read(event.journal.entries)
+                    if before is not None:
+                        self.flags.add(*of_journal(event.journal.entries, before.boot_id))
                 case Described():
                     self._described(event.description, before)
                 case Costs():
@@ -141,14 +190,17 @@ class Station:
         if now_ns - self._watched_ns >= WATCH_NS:
             self._watched_ns = now_ns
             self._watch.look(self.robot)
+            self.alarms  # noqa: B018 - seen now, so that it is known since when
             self.end_trial_if_over(now_ns)
 
     def _described(self, description: Description, before: Description | None) -> None:
         if before is not None and before.boot_id != description.boot_id:
             self.rings.clear()
+            self.flags.clear()
+            self._states = StateWatch()
             self.tell(NewsKind.STATE, "the robot's computer has started anew")
-        self.stopping.held = description.stop.held
-        if self.has_twin and (before is None or before.robot != description.robot):
+        self.stopping.described(description.stop.held, description.stop.reason)
+        if self.has_twin and not self.is_named and (before is None or before.robot != description.robot):
             self.tell(
                 NewsKind.WARNING, "another robot is called so too: give one another [robot] name in its file"
             )
@@ -192,11 +244,28 @@ class Station:
 
     def _stopped(self, number: int, stopped: Stopped) -> None:
         self.stopping.answered(number, stopped)
-        self.tell(NewsKind.STOP, self.stopping.text)
+        self._tell_stop()
 
     def _stop_failed(self, number: int, error: Exception) -> None:
         self.stopping.failed(number, str(error))
-        self.tell(NewsKind.STOP, self.stopping.text)
+        self._tell_stop()
+
+    def _tell_stop(self) -> None:
+        not_stopped = self.stopping.state is StopState.NOT_CONFIRMED
+        self.tell(NewsKind.NOT_STOPPED if not_stopped else NewsKind.STOP, self.stopping.text)
+
+    def _show_stop(self, event: Telemetry) -> None:
+        """What the drives' states show of a STOP that goes on."""
+        if self.stopping.at_ns is None or self.stopping.state is StopState.IDLE:
+            return
+        stamps_ns, columns = event.batch.stamps_ns, event.batch.columns
+        words = {
+            joint: [self.robot.word_of(channel, value) for value in columns[channel]]
+            for joint in self.robot.names("joint")
+            if joint not in self.stopping.proofs and (channel := f"{joint}.state") in columns
+        }
+        if event.clock is not None:
+            self.stopping.show(stamps_ns, words, event.clock.offset_ns)
 
     def reset(self) -> None:
         """End a held stop; enables nothing."""
@@ -204,7 +273,13 @@ class Station:
         def done(held: bool, problems: dict[str, str]) -> None:
             self.stopping.was_reset(held)
             said = "; ".join(f"{name}: {why}" for name, why in problems.items())
-            self.tell(NewsKind.STOP, f"stop still held: {said}" if held else "stop reset, every drive is off")
+            after = f"; {said}" if said else ""
+            self.tell(
+                NewsKind.STOP,
+                f"stop still held: {said}"
+                if held
+                else f"stop reset, every drive is off{after}; {check_of(Kind.RESET)}",
+            )
 
         self._ask(
             self._commands.reset(),

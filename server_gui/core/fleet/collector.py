@@ -150,6 +150,10 @@ class Collector:
         """Another robot, from now on."""
         return self._do(lambda: self._follow(robot, address))
 
+    def leave(self, robot: str) -> "concurrent.futures.Future[None]":
+        """Follow a robot no more; its recording ends."""
+        return self._do(lambda: self._fleet.leave(robot))
+
     def mark(self, text: str) -> "concurrent.futures.Future[int]":
         """Mark this instant in the recording of every robot; in how many that is on the disk."""
         return self.network.run(self._mark(text))

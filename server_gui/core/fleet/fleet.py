@@ -79,13 +79,17 @@ class Fleet:
         self._notes = notes
         self._worn = worn
         self._members: dict[str, Member] = {}
-        self._joining: asyncio.Queue[Member] = asyncio.Queue()
+        self._left: dict[str, Member] = {}  # that are not followed any more
+        self._joining: asyncio.Queue[tuple[str, Member]] = asyncio.Queue()
+        self._following_tasks: dict[str, asyncio.Task[None]] = {}
 
     async def run(self) -> None:
         """Follow all of them, and who joins, until cancelled."""
         async with asyncio.TaskGroup() as group:
             while True:
-                group.create_task((await self._joining.get()).run())
+                robot, member = await self._joining.get()
+                if self._members.get(robot) is member:  # not left before it was followed
+                    self._following_tasks[robot] = group.create_task(member.run())
 
     def follow(self, robot: str, address: Address) -> None:
         """Another robot, from now on."""
@@ -93,11 +97,23 @@ class Fleet:
         others = [functools.partial(subscriber, robot) for subscriber in self.subscribers]
         member = Member(robot, address, self._following, keeping, others)
         self._members = self._members | {robot: member}
-        self._joining.put_nowait(member)
+        self._joining.put_nowait((robot, member))
+
+    def leave(self, robot: str) -> None:
+        """Follow a robot no more; its session ends."""
+        member = self._members.get(robot)
+        if member is None:
+            return
+        self._left[robot] = member
+        self._members = {name: one for name, one in self._members.items() if name != robot}
+        task = self._following_tasks.pop(robot, None)
+        if task is not None:
+            task.cancel()
+        self._recorder.end(robot)
 
     def session(self, robot: str) -> str:
         """Return what a robot's recording that goes on is called."""
-        return self._members[robot].session
+        return (self._members.get(robot) or self._left[robot]).session
 
     def report(self) -> dict[str, LinkReport]:
         """Return how each robot's link does now."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import msgspec
 
 from gateway.client import Batch, ClockOffset, ConnectionState
+from gateway.wire.bus import BusInfo
 from gateway.wire.component import Snapshot
 from gateway.wire.control import JournalEntries, SignedHead
 from gateway.wire.cost import GatewayCost
@@ -67,6 +68,14 @@ class Resources:
 
 
 @dataclass(frozen=True, slots=True)
+class BusesSeen:
+    """The robot's buses as they were at `at_ns`; None: its gateway is too old to tell."""
+
+    buses: tuple[BusInfo, ...] | None
+    at_ns: int
+
+
+@dataclass(frozen=True, slots=True)
 class Journalled:
     """The newest entries of the robot's journal, oldest first; most have come before.
 
@@ -97,7 +106,7 @@ class Refused(Failed):
     """The robot sent what cannot be kept: it was told to nobody."""
 
 
-Event = LinkChanged | Described | Telemetry | Looked | Resources | Costs | Journalled | Failed
+Event = LinkChanged | Described | Telemetry | Looked | Resources | Costs | BusesSeen | Journalled | Failed
 
 
 def replaced(event: Telemetry, stamps_ns: list[int], columns: dict[str, list[float | None]]) -> Telemetry:

@@ -28,6 +28,7 @@ from gateway.wire.control import SignedHead
 from gateway.wire.resource import ResourceSnapshotParams
 from gateway.wire.robot import Description
 from server_gui.core.follow.events import (
+    BusesSeen,
     Described,
     Event,
     Failed,
@@ -47,6 +48,7 @@ ONCE: Final = math.inf  # a period: once on every link
 AGAIN_S: Final = 5.0  # before a look that failed is tried again
 DEPTH: Final = 8192  # notifications; more than one read of the socket can bring
 WHOLE_JOURNAL: Final = 1000  # entries; as many as a gateway gives at once
+METHOD_NOT_FOUND: Final = -32601  # JSON-RPC 2.0 §5.1: a gateway of before
 COMPUTER: Final = "resource"  # the component whose channels are the robot's computer
 
 
@@ -64,6 +66,7 @@ class FollowSettings(Struct, frozen=True):
     resources: ResourceSnapshotParams = ResourceSnapshotParams(limit=8)
     resources_s: float = 1.0
     journal_s: float | None = None  # None: it is not asked for
+    buses_s: float | None = None  # likewise
 
 
 class Feed:
@@ -140,6 +143,8 @@ class Feed:
             group.create_task(self._repeat(following.resources_s, self._resources))
             if following.journal_s is not None:
                 group.create_task(self._repeat(following.journal_s, self._journal))
+            if following.buses_s is not None:
+                group.create_task(self._repeat_buses(following.buses_s))
 
     def _admit(self, event: Event) -> None:
         """Tell what the robot has sent, where it may be kept; raises `Unfit` where not."""
@@ -177,6 +182,22 @@ class Feed:
         snapshot = await self._client.resources(self._following.resources)
         link = self._client.link
         self._admit(Resources(snapshot, link.clock.round_trip_ns, time.monotonic_ns(), link.received_bytes))
+
+    async def _repeat_buses(self, period_s: float) -> None:
+        """As long as the robot can be asked: a gateway of before does not know how."""
+        while True:
+            try:
+                seen = await self._client.buses()
+            except RemoteError as error:
+                self._tell(BusesSeen(None, time.monotonic_ns()))
+                if error.code == METHOD_NOT_FOUND:
+                    return
+                self._tell(Failed("a look at its buses", str(error)))
+            except (CallTimeout, ProtocolError) as error:
+                self._tell(Failed("a look at its buses", str(error)))
+            else:
+                self._tell(BusesSeen(tuple(seen.buses), time.monotonic_ns()))
+            await asyncio.sleep(period_s)
 
     async def _journal(self) -> None:
         """Tell the newest entries when there are new ones, without a hole as far as the robot has them."""

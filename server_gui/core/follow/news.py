@@ -1,12 +1,16 @@
-"""What happened, to any robot, newest first and bounded."""
+"""What happened, to any robot, newest first and bounded; what repeats is one item, faults go last."""
 
 import collections
+import dataclasses
+import re
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import Enum
 from typing import Final
 
 KEPT: Final = 500
+AGAIN_S: Final = 60.0  # within which the same is a repeat
 
 
 class NewsKind(Enum):
@@ -16,35 +20,72 @@ class NewsKind(Enum):
     STATE = "STATE"
     WARNING = "WARN"
     FAULT = "FAULT"
+    LOST = "LOST"
+    STALE = "STALE"
     PARAMETER = "PARAM"
     STOP = "STOP"
+    NOT_STOPPED = "NOT STOPPED"
     CONTROL = "CONTROL"
+
+
+GRAVE: Final = frozenset({NewsKind.FAULT, NewsKind.STOP, NewsKind.NOT_STOPPED})
+DONE: Final = frozenset(
+    {NewsKind.PARAMETER, NewsKind.STOP, NewsKind.NOT_STOPPED, NewsKind.CONTROL}
+)  # by people
 
 
 @dataclass(frozen=True, slots=True)
 class Item:
-    """One thing that happened at `utc_s`."""
+    """One thing that happened, at `utc_s` the last and at `first_s` the first of `count` times."""
 
     utc_s: float
     kind: NewsKind
     robot: str
     text: str
+    count: int = 1
+    first_s: float | None = None
+
+    @property
+    def key(self) -> tuple[NewsKind, str, str]:
+        """What repeats of it have in common: everything but the numbers in it."""
+        return self.kind, self.robot, _NUMBER.sub("#", self.text)
 
 
 class News:
-    """The newest `KEPT`; `revision` rises with each."""
+    """The newest `KEPT`, of which faults and stops go last; `revision` rises with each."""
 
     def __init__(self) -> None:
-        self.items: collections.deque[Item] = collections.deque(maxlen=KEPT)
+        self.items: collections.deque[Item] = collections.deque()
         self.revision = 0
 
     def add(self, kind: NewsKind, robot: str, text: str) -> None:
-        """Note something; the same of the same robot twice in a row is noted once."""
-        if self.items and (self.items[0].kind, self.items[0].robot, self.items[0].text) == (
-            kind,
-            robot,
-            text,
-        ):
+        """Note something; what is told again within a minute is counted, what has not changed is not told."""
+        item = Item(time.time(), kind, robot, text)
+        if self.items and (self.items[0].key[:2], self.items[0].text) == (item.key[:2], text):
             return
-        self.items.appendleft(Item(time.time(), kind, robot, text))
+        before = None if kind in DONE else next(self._lately(item), None)
+        if before is not None:
+            self.items.remove(before)
+            first_s = before.utc_s if before.first_s is None else before.first_s
+            item = dataclasses.replace(item, count=before.count + 1, first_s=first_s)
+        self.items.appendleft(item)
+        if len(self.items) > KEPT:
+            self._forget_one()
         self.revision += 1
+
+    def _lately(self, item: Item) -> Iterator[Item]:
+        for known in self.items:
+            if item.utc_s - known.utc_s > AGAIN_S:
+                return
+            if known.key == item.key:
+                yield known
+
+    def _forget_one(self) -> None:
+        lightly = (place for place in range(len(self.items) - 1, -1, -1) if not self._is_grave(place))
+        del self.items[next(lightly, len(self.items) - 1)]
+
+    def _is_grave(self, place: int) -> bool:
+        return self.items[place].kind in GRAVE
+
+
+_NUMBER: Final = re.compile(r"\b\d+(\.\d+)?(?= ?(?:s|ms|%|°)(?:\W|$))")

@@ -2,14 +2,17 @@
 
 import collections
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from gateway.client import ConnectionState
+from gateway.wire.bus import BusInfo
 from gateway.wire.component import QualityInfo
 from gateway.wire.parameter import ParameterValue
 from gateway.wire.resource import ResourceSnapshot
 from gateway.wire.robot import Description
 from server_gui.core.follow.events import (
+    BusesSeen,
     Described,
     Event,
     Failed,
@@ -63,7 +66,10 @@ class Robot:
     parameters_at_ns: int | None = None
     resources: ResourceSnapshot | None = None
     resources_at_ns: int | None = None
+    buses: tuple[BusInfo, ...] | None = None  # None: not known
+    buses_at_ns: int | None = None
     last_failure: Failed | None = None
+    is_recording: bool = False  # then there is nobody whose state could be good
     _newest_ns: int | None = None  # when the newest row was taken, on our clock
     _arrivals: collections.deque[tuple[int, int]] = field(
         default_factory=lambda: collections.deque(maxlen=4096)
@@ -81,6 +87,8 @@ class Robot:
             case Resources():
                 self.resources, self.resources_at_ns = event.snapshot, event.at_ns
                 self.link.round_trip_ns = event.round_trip_ns
+            case BusesSeen():
+                self.buses, self.buses_at_ns = event.buses, event.at_ns
             case LinkChanged():
                 self._link_changed(event)
             case Described():
@@ -107,6 +115,10 @@ class Robot:
         recent = sum(rows for at_ns, rows in self._arrivals if now_ns - at_ns <= RATE_WINDOW_NS)
         return recent / (RATE_WINDOW_NS / 1e9)
 
+    def now_s(self) -> float:
+        """Return the instant that is shown, UTC."""
+        return time.time()
+
     def names(self, kind: str) -> list[str]:
         """Return the components of one kind, in the robot's order."""
         return [part.name for part in self.parts.values() if part.kind == kind]
@@ -117,11 +129,19 @@ class Robot:
 
     def word(self, channel: str) -> str | None:
         """Return a state's word, None where there is none."""
-        value = self.values.get(channel)
+        return self.word_of(channel, self.values.get(channel))
+
+    def word_of(self, channel: str, value: float | None) -> str | None:
+        """Return the word of a state's number, None where there is none."""
         words = self._words.get(channel)
         if value is None or words is None:
             return None
         return words.get(str(int(value)), str(int(value)))
+
+    @property
+    def state_words(self) -> Mapping[str, Mapping[str, str]]:
+        """What the numbers of each channel that is a state mean."""
+        return self._words
 
     # --- what events do
 

@@ -14,6 +14,12 @@ LINK_WORDS: Final = {
     ConnectionState.WAITING: "no link",
     ConnectionState.CLOSED: "closed",
 }
+KINDS: Final = {
+    "ok": NewsKind.STATE,
+    "fault": NewsKind.FAULT,
+    "lost": NewsKind.LOST,
+    "stale": NewsKind.STALE,
+}
 
 
 class RobotNews:
@@ -52,7 +58,7 @@ class RobotNews:
             before = self._parts.get(part.name, "ok")
             if part.state != before:
                 why = f": {part.problem}" if part.problem else ""
-                kind = {"ok": NewsKind.STATE, "fault": NewsKind.FAULT}.get(part.state, NewsKind.WARNING)
+                kind = KINDS.get(part.state, NewsKind.WARNING)
                 self._tell(kind, f"{part.name} {part.state}{why}")
             self._parts[part.name] = part.state
 

@@ -19,7 +19,7 @@ from server_gui.core.follow.validation import Validator
 
 LEASE_S: Final = 300.0  # the longest that a robot gives; every write begins it anew
 PROCESSES_S: Final = 1.0  # between looks at the process table, while it is shown
-PROCESSES: Final = ResourceSnapshotParams(include=["disk", "network", "thermal"])
+PROCESSES: Final = ResourceSnapshotParams(include=["disk", "network", "thermal", "cmdline"])
 
 
 class Link:

@@ -1,10 +1,15 @@
 """What became of a STOP: sent, then confirmed by every drive, or NOT CONFIRMED. Silence is never success."""
 
 import time
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from enum import Enum
+from typing import Any
 
 from gateway.wire.stop import Stopped
+
+ENABLED = "operation enabled"
+HELD_BY = frozenset({"stop", "stop still held"})  # entries of the journal
 
 
 class StopState(Enum):
@@ -16,20 +21,41 @@ class StopState(Enum):
     NOT_CONFIRMED = "NOT CONFIRMED"
 
 
+@dataclass(frozen=True, slots=True)
+class Proof:
+    """A drive's first state that is not enabled, and how long after the STOP it came; 0: it was so before."""
+
+    after_ms: float
+    state: str
+
+
 @dataclass(slots=True)
 class StopProgress:
-    """One robot's latest STOP; a newer one counts, whatever an older one is answered with."""
+    """One robot's latest STOP; a newer one counts, whatever an older one is answered with.
+
+    A held stop may be somebody else's: the robot's journal tells of it.
+    """
 
     state: StopState = StopState.IDLE
     text: str = ""
+    why: str = ""  # it is not confirmed
     held: bool = False
+    reason: str = ""  # of the one that is held
+    was_ended: bool = False  # by a reset, since when nothing was enabled
     at_ns: int | None = None
+    since_s: float | None = None  # UTC: of this state, as far as is known
+    answered_ms: float | None = None
     number: int = 0
+    drives: int = 0  # that have confirmed it
+    proofs: dict[str, Proof] = field(default_factory=dict)  # drive → what its state channel has shown
+    _entry: int = 0  # of the journal: the newest that was read
 
     def sent(self) -> int:
         """Note that a STOP has gone out, and return its number."""
         self.number += 1
         self.state, self.text, self.at_ns = StopState.SENT, "STOP sent …", time.monotonic_ns()
+        self.why, self.since_s, self.answered_ms, self.was_ended = "", time.time(), None, False
+        self.proofs = {}
         return self.number
 
     def answered(self, number: int, stopped: Stopped) -> None:
@@ -37,13 +63,17 @@ class StopProgress:
         if number != self.number:
             return
         self.held = stopped.held
+        if self.at_ns is not None:
+            self.answered_ms = (time.monotonic_ns() - self.at_ns) / 1e6
         outcomes = stopped.drives | {f"controller {name}": said for name, said in stopped.controllers.items()}
         missing = [f"{name} {said}" for name, said in outcomes.items() if said != "confirmed"]
         if missing or not stopped.drives:
             self._not_confirmed(", ".join(missing) or "no drive answered")
         else:
-            self.state = StopState.CONFIRMED
-            self.text = f"STOP confirmed by all {len(stopped.drives)} drives"
+            self.state, self.drives = StopState.CONFIRMED, len(stopped.drives)
+            self.text = (
+                f"STOP confirmed by all {len(stopped.drives)} drives in {self.answered_ms or 0:.0f} ms"
+            )
 
     def failed(self, number: int, reason: str) -> None:
         """Nobody answered: consider the robot not stopped."""
@@ -54,8 +84,91 @@ class StopProgress:
         """A held stop was ended, or not."""
         self.held = held
         if not held:
-            self.state, self.text = StopState.IDLE, ""
+            self.state, self.text, self.why, self.reason = StopState.IDLE, "", "", ""
+            self.was_ended, self.since_s = True, time.time()
+
+    # --- what the robot shows meanwhile
+
+    def described(self, held: bool, reason: str | None) -> None:
+        """What the robot says of itself on every new link."""
+        self.held, self.reason = held, (reason or "") if held else ""
+
+    def read(self, entries: Iterable[Mapping[str, Any]]) -> None:
+        """Take the newest entries of the robot's journal, oldest first: others stop and reset it too."""
+        for entry in entries:
+            number, what = entry.get("n"), entry.get("what")
+            if not isinstance(number, int) or number <= self._entry:
+                continue
+            self._entry = number
+            if what in HELD_BY:
+                self._holds(entry)
+            elif what == "reset":
+                held = bool(entry.get("held"))
+                if self.held and not held and self.state is not StopState.SENT:
+                    self.was_reset(held=False)
+
+    def show(
+        self, stamps_ns: Sequence[int], columns: Mapping[str, Sequence[str | None]], offset_ns: int
+    ) -> None:
+        """Take what drives' states were, in words; `offset_ns` is the robot's clock minus ours."""
+        if self.at_ns is None or self.state is StopState.IDLE:
+            return
+        for drive, words in columns.items():
+            if drive not in self.proofs:
+                self._prove(drive, stamps_ns, words, offset_ns, self.at_ns)
+
+    def _prove(
+        self, drive: str, stamps_ns: Sequence[int], words: Sequence[str | None], offset_ns: int, at_ns: int
+    ) -> None:
+        for stamp_ns, word in zip(stamps_ns, words, strict=True):
+            after_ms = (stamp_ns - offset_ns - at_ns) / 1e6
+            if after_ms >= 0.0 and word is not None and word != ENABLED:
+                self.proofs[drive] = Proof(after_ms, word)
+                return
+
+    @property
+    def proof(self) -> str:
+        """What each drive's own state has shown since: `left knee: switch on disabled after 34 ms`."""
+        if not self.proofs:
+            return ""
+        slowest = max(proof.after_ms for proof in self.proofs.values())
+        by_state: dict[str, list[str]] = {}
+        for drive, proof in self.proofs.items():
+            by_state.setdefault(proof.state, []).append(drive)
+        if len(by_state) == 1:
+            (state,) = by_state
+            return f"seen in their states: all {len(self.proofs)} {state} within {slowest:.0f} ms"
+        told = (f"{_listed(drives)} {state}" for state, drives in by_state.items())
+        return f"seen in their states within {slowest:.0f} ms: {'; '.join(told)}"
+
+    @property
+    def proof_lines(self) -> list[str]:
+        """The same, a line a drive."""
+        return [
+            f"{_listed([drive])}: {proof.state} after {proof.after_ms:.0f} ms"
+            for drive, proof in self.proofs.items()
+        ]
+
+    @property
+    def said(self) -> str:
+        """How the stop that is held came about."""
+        own = self.text.removeprefix("STOP ") if self.state is StopState.CONFIRMED else ""
+        return "; ".join(filter(None, (own, self.reason))) or "it is held until it is reset"
+
+    def _holds(self, entry: Mapping[str, Any]) -> None:
+        who, reason = entry.get("who"), entry.get("reason")
+        said = " ".join(filter(None, (str(reason or ""), f"by {who}" if who else "")))
+        if not self.held or not self.reason:
+            self.reason = said
+        if not self.held:
+            utc_ns = entry.get("utc_ns")
+            self.since_s = utc_ns / 1e9 if isinstance(utc_ns, int) else time.time()
+        self.held, self.was_ended = True, False
 
     def _not_confirmed(self, why: str) -> None:
-        self.state = StopState.NOT_CONFIRMED
+        self.state, self.why = StopState.NOT_CONFIRMED, why
         self.text = f"STOP NOT CONFIRMED: {why}. Use the hardware stop"
+
+
+def _listed(names: Iterable[str]) -> str:
+    return ", ".join(name.replace("_", " ") for name in names)

@@ -51,5 +51,5 @@ def objection(device: Storable, robot: Robot, trial: Trial | None) -> str | None
     moved = [name for name in device.components if name in joints] or joints
     powered = [name for name in moved if robot.word(f"{name}.state") in ENERGISED]
     if powered:
-        return f"{', '.join(powered)} under power: a device may be deaf while it stores, so stop it first"
+        return f"{', '.join(powered)} under power: a device may not answer while it stores, so stop it first"
     return None

@@ -12,9 +12,9 @@ from gateway.wire.method import Number
 from gateway.wire.parameter import ParameterInfo
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
-from server_gui.core.tuning.edits import unit_of
+from server_gui.core.tuning.edits import refusal, unit_of
 from server_gui.core.tuning.flash import RULE
-from server_gui.views.parameters.tree import exact
+from server_gui.views.parameters.tree import brief
 from server_gui.views.widgets.card import Card, set_text
 from server_gui.views.widgets.elided import ElidedLabel
 from server_gui.views.widgets.plain import PlainLabel, set_tip
@@ -175,16 +175,21 @@ def _round(value: float, span: float, scale: float, unit: Unit) -> float:
 
 def _facts(station: Station, info: ParameterInfo, unit: Unit, current: Number | None) -> str:
     held = station.robot.parameters.get(info.name)
-    robot = "–" if current is None else f"{unit.editable(current)} {unit.symbol}".rstrip()
-    step = "" if info.max_step is None else f" · one write moves it by at most {unit.text(info.max_step)}"
+    robot = "–" if current is None else f"{brief(unit, current)} {unit.symbol}".rstrip()
+    step = "" if info.max_step is None else f" · one write moves it by at most {brief(unit, info.max_step)}"
     live = "may be changed while it moves" if info.live else "only while its drive is at rest"
+    staged = station.edits.staged.get(info.name)
     problem = (
-        station.writing.rows.get(info.name) or info.problem or (held.problem if held is not None else None)
+        (None if staged is None else refusal(staged.value, current, info, unit))
+        or station.writing.rows.get(info.name)
+        or info.problem
+        or (held.problem if held is not None else None)
     )
     said = f"\n✕ {problem}" if problem else ""
     stored = f"stored: {'yes' if station.is_stored(info.name) else 'unknown'}"
-    default = "" if info.default is None else f" · default {unit.editable(info.default)}"
+    default = "" if info.default is None else f" · default {brief(unit, info.default)}"
     row = None if station.file is None else station.file.rows.get(info.name)
-    file = "" if row is None or row.file is None else f" · file {unit.editable(row.file)}"
-    limits = f" · from {exact(unit, info.min) or '–'} to {exact(unit, info.max) or '–'}"
+    file = "" if row is None or row.file is None else f" · file {brief(unit, row.file)}"
+    low, high = ("–" if end is None else brief(unit, end) for end in (info.min, info.max))
+    limits = f" · from {low} to {high}"
     return f"robot {robot}{limits}{default}{file} · {stored} · {live}{step} · object {info.object}{said}"

@@ -25,12 +25,14 @@ class Filter(QSortFilterProxyModel):
         self._names: frozenset[str] | None = None
         self.setRecursiveFilteringEnabled(True)
 
-    def show(self, words: str, names: Iterable[str] | None) -> None:
-        """Show what has all words, and is one of `names`."""
-        wanted = None if names is None else frozenset(names)
-        if (words.lower().split(), wanted) != (self._words, self._names):
-            self._words, self._names = words.lower().split(), wanted
-            self.invalidate()
+    def show(self, words: str, names: Iterable[str] | None) -> bool:
+        """Show what has all words, and is one of `names`; whether that is something else than before."""
+        wanted = words.lower().split(), None if names is None else frozenset(names)
+        if wanted == (self._words, self._names):
+            return False
+        self._words, self._names = wanted
+        self.invalidate()
+        return True
 
     def filterAcceptsRow(self, row: int, parent: Index) -> bool:
         index = self.sourceModel().index(row, 0, parent)

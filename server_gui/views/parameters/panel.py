@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QAction, QKeySequence, QShortcut
+from PySide6.QtGui import QAction
 from PySide6.QtWidgets import (
     QGridLayout,
     QMenu,
@@ -116,6 +116,12 @@ class ParametersPanel(QWidget):
             self.review.show_changes(station.difference(self._desk.shown.units))
             self.pages.setCurrentWidget(self.review)
 
+    def find_parameter(self) -> None:
+        """Let words be typed that filter the parameters."""
+        self.pages.setCurrentIndex(0)
+        self.filters.words.setFocus(Qt.FocusReason.ShortcutFocusReason)
+        self.filters.words.selectAll()
+
     def open_file(self, path: Path) -> None:
         """Compare with a file from now on; nothing is staged and nothing is sent."""
         station = self._desk.selected
@@ -161,6 +167,8 @@ class ParametersPanel(QWidget):
         self.undo.setToolTip("Stages the inverse of the latest write, to be reviewed and written")
         self.review_button = QPushButton("Review …")
         self.review_button.setObjectName("primary")
+        self.review_button.setShortcut("Ctrl+Return")
+        self.undo.setShortcut("Ctrl+Z")
         self._compare, self._save = QPushButton("Compare …"), QPushButton("Save …")
         self._compare.setToolTip(
             "Compare with a .toml or .dcf file, and load edits from it. Nothing is written"
@@ -197,7 +205,6 @@ class ParametersPanel(QWidget):
         return self.more
 
     def _connect(self) -> None:
-        QShortcut(QKeySequence.StandardKey.Find, self, self.filters.words.setFocus)
         self.filters.changed.connect(self._filter)
         self.tree.typed.connect(self.stage_text)
         self.tree.chosen.connect(self.detail.choose)
@@ -218,11 +225,18 @@ class ParametersPanel(QWidget):
         self.review.back.connect(lambda: self.pages.setCurrentIndex(0))
         self.review.write.connect(self._write)
         self._compare.clicked.connect(lambda: ask_open(self, "Compare with", ("toml", "dcf"), self.open_file))
-        self._save.clicked.connect(lambda: ask_save(self, "Save parameters", "toml", self.save_file))
+        self._save.clicked.connect(
+            lambda: ask_save(self, "Save parameters", "toml", self.save_file, self._title)
+        )
         self.store_button.clicked.connect(self._begin_store)
         self.storing.back.connect(lambda: self.pages.setCurrentIndex(0))
         self.storing.store.connect(self._store)
         self._desk.on_select.append(self._selected)
+
+    @property
+    def _title(self) -> str:
+        """What the robot is called."""
+        return "parameters" if self._desk.selected is None else self._desk.selected.title
 
     # --- what people do
 
@@ -276,7 +290,7 @@ class ParametersPanel(QWidget):
     # --- what is shown
 
     def _filter(self) -> None:
-        self.tree.filter.show(self.filters.words.text(), self.filters.refresh())
+        self.tree.show_only(self.filters.words.text(), self.filters.refresh())
 
     def _refresh_review(self, station: Station) -> None:
         now = station.difference(self._desk.shown.units)
@@ -285,8 +299,14 @@ class ParametersPanel(QWidget):
         if not now:
             self.pages.setCurrentIndex(0)
 
+    def _refused(self, station: Station | None) -> str:
+        """What of the staged the robot would refuse, as it stands now."""
+        changes = () if station is None else station.difference(self._desk.shown.units)
+        said = [f"{change.name}: {change.problem}" for change in changes if change.problem]
+        return "\n".join(said)
+
     def _refresh_banner(self, station: Station | None, staged: int) -> None:
-        text, tone = _banner(station, staged, self._problem)
+        text, tone = _banner(station, staged, self._problem or self._refused(station))
         if (self.banner.text(), self.banner.property("tone")) != (text, tone):
             self.banner.setText(text)
             self.banner.setProperty("tone", tone)
@@ -305,7 +325,7 @@ def _close_file(station: Station) -> None:
 def _banner(station: Station | None, staged: int, problem: str) -> tuple[str, str]:
     """What matters most now, and how it is meant."""
     if station is None:
-        return "No robot chosen: there is nothing to change.", "good"
+        return "No robot chosen: there is nothing to change.", "plain"
     if problem:
         return problem, "bad"
     writing = station.writing
@@ -316,5 +336,7 @@ def _banner(station: Station | None, staged: int, problem: str) -> tuple[str, st
     if staged:
         return f"{staged} staged · nothing of it has been sent to the robot", "warn"
     if not station.known:
-        return "This robot lets no parameter be changed, or has not said which yet.", "good"
-    return writing.text or "Double-click a value in the column New to change it.", "good"
+        return "This robot lets no parameter be changed, or has not said which yet.", "plain"
+    if writing.text:
+        return writing.text, "good"
+    return "Double-click a value in the column New to change it.", "plain"

@@ -1,6 +1,7 @@
 """The parameters by component: held, staged, unit, range, default, the file's, stored, what came of it."""
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Iterable
 from typing import Any, Final
 
 from PySide6.QtCore import QModelIndex, QPersistentModelIndex, Qt, Signal
@@ -20,7 +21,7 @@ from gateway.units import Unit
 from gateway.wire.parameter import ParameterInfo
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
-from server_gui.core.tuning.edits import unit_of
+from server_gui.core.tuning.edits import refusal, unit_of
 from server_gui.core.tuning.flash import RULE
 from server_gui.views.parameters.filter import NAME_ROLE, Filter
 from server_gui.views.theme import Theme
@@ -29,7 +30,9 @@ from server_gui.views.widgets.plain import set_tip
 Index = QModelIndex | QPersistentModelIndex
 TITLES: Final = ("Parameter", "Robot", "New", "Unit", "Range", "Default", "File", "Stored", "")
 NAME, ROBOT, NEW, UNIT, RANGE, DEFAULT, FILE, STORED, SAID = range(len(TITLES))
-IF_ROOM: Final = (FILE, RANGE, STORED, DEFAULT)  # shown while they fit; the chosen one's card has them all
+IF_ROOM: Final = (FILE, RANGE, DEFAULT, STORED)  # shown while they fit; the chosen one's card has them all
+REFUSED: Final = "✕ limit"  # the robot would refuse what is staged
+WRONG: Final = ("✕", REFUSED, "⚠ changed")
 NAME_PX: Final = 130  # that a name has at least
 
 
@@ -71,6 +74,9 @@ class ParameterTree(QTreeView):
         self._rows: dict[str, list[QStandardItem]] = {}
         self._shape: tuple[object, ...] = ()
         self._fitted: tuple[object, ...] = ()
+        self._closed: set[str] = set()  # groups, by people
+        self._looked_at: str | None = None  # the parameter that was chosen last, also while it is left out
+        self._filtering = False
         self._model = QStandardItemModel()
         self._model.setHorizontalHeaderLabels(TITLES)
         self.filter = Filter()
@@ -89,6 +95,8 @@ class ParameterTree(QTreeView):
         delegate.typed.connect(self.typed)
         self.setItemDelegateForColumn(NEW, delegate)
         self.selectionModel().currentChanged.connect(self._chosen)
+        self.collapsed.connect(lambda index: self._note_group(index, closed=True))
+        self.expanded.connect(lambda index: self._note_group(index, closed=False))
         pin = QAction("Pin or unpin", self)
         pin.setShortcut("Ctrl+P")
         pin.setShortcutContext(Qt.ShortcutContext.WidgetShortcut)
@@ -116,6 +124,14 @@ class ParameterTree(QTreeView):
             self._fitted = shape, file
             self._show_columns()
 
+    def show_only(self, words: str, names: Iterable[str] | None) -> None:
+        """Show what has all words and is one of `names`, its groups open; who chose one finds it chosen."""
+        self._filtering = True
+        if self.filter.show(words, names):
+            self._open_groups(everything=bool(words) or names is not None)
+            self._choose_again()
+        self._filtering = False
+
     def select_name(self, name: str) -> None:
         """Choose a parameter."""
         if name in self._rows:
@@ -138,11 +154,32 @@ class ParameterTree(QTreeView):
                 groups[info.component] = self._group(info.component)
             self._rows[name] = self._row(name, info)
             groups[info.component].appendRow(self._rows[name])
-        self.expandAll()
-        for row in range(self._model.rowCount()):
-            self.setFirstColumnSpanned(row, QModelIndex(), True)
+        self._open_groups(everything=False)
         if before is not None:
             self.select_name(before)
+
+    def _open_groups(self, *, everything: bool) -> None:
+        """Those that people have closed stay so, unless everything is to be seen."""
+        closed = set() if everything else self._closed
+        self._filtering = True
+        for row in range(self.filter.rowCount()):
+            index = self.filter.index(row, NAME)
+            self.setFirstColumnSpanned(row, QModelIndex(), True)
+            self.setExpanded(index, index.data() not in closed)
+        self._filtering = False
+
+    def _choose_again(self) -> None:
+        """A row that was left out has given its place to another one, which nobody has chosen."""
+        if self._looked_at is None:
+            return
+        known = self._rows.get(self._looked_at)
+        index = QModelIndex() if known is None else self.filter.mapFromSource(known[NEW].index())
+        if index.row() != self.currentIndex().row() or index.parent() != self.currentIndex().parent():
+            self.setCurrentIndex(index)
+
+    def _note_group(self, index: QModelIndex, *, closed: bool) -> None:
+        if not self._filtering:
+            (self._closed.add if closed else self._closed.discard)(str(index.data()))
 
     def _group(self, component: str) -> QStandardItem:
         item = QStandardItem(component.replace("_", " "))
@@ -177,14 +214,19 @@ class ParameterTree(QTreeView):
         value = None if held is None else held.value
         elsewhere = staged is not None and staged.base != value
         on_trial = station.writing.trial is not None and name in station.writing.trial.values
+        refused = None if staged is None else refusal(staged.value, value, info, unit)
         problem = (
-            info.problem or (held.problem if held is not None else None) or station.writing.rows.get(name)
+            refused
+            or info.problem
+            or (held.problem if held is not None else None)
+            or station.writing.rows.get(name)
         )
         _set(items[ROBOT], "–" if value is None else brief(unit, value))
         _set(items[NEW], "" if staged is None else unit.editable(staged.value))
         said = next(
             word
             for word, so in (
+                (REFUSED, refused),
                 ("⚠ changed", elsewhere),
                 ("●", staged),
                 ("◔ trial", on_trial),
@@ -195,11 +237,13 @@ class ParameterTree(QTreeView):
         )
         if items[SAID].text() != said:
             items[SAID].setText(said)
-            items[SAID].setForeground(self._theme.colour("bad" if said in ("✕", "⚠ changed") else "warn"))
+            items[SAID].setForeground(self._theme.colour("bad" if said in WRONG else "warn"))
+            items[NEW].setForeground(self._theme.colour("bad" if refused else "text"))
             colour = self._theme.colour("staged") if staged is not None else None
             for item in items:
                 item.setData(colour, Qt.ItemDataRole.BackgroundRole)
-        set_tip(items[SAID], problem or "")
+        for item in (items[NEW], items[SAID]):
+            set_tip(item, problem or "")
 
     def _refresh_facts(
         self, station: Station, name: str, info: ParameterInfo, pinned: frozenset[str]
@@ -231,7 +275,8 @@ class ParameterTree(QTreeView):
 
     def _chosen(self, current: QModelIndex, before: QModelIndex) -> None:
         name = current.siblingAtColumn(NAME).data(NAME_ROLE)
-        if isinstance(name, str):
+        if isinstance(name, str) and not self._filtering:
+            self._looked_at = name
             self.chosen.emit(name)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -267,8 +312,16 @@ def range_text(info: ParameterInfo, unit: Unit) -> str:
 
 
 def brief(unit: Unit, value: float) -> str:
-    """Return six digits, for a narrow column; editing and tooltips have them all."""
-    return f"{value * unit.scale:.6g}"
+    """Return four digits, and a decimal place more than its unit is read with, where they are not zeros.
+
+    Editing and tooltips have them all.
+    """
+    shown = value * unit.scale
+    if shown == 0.0 or not math.isfinite(shown):
+        return f"{abs(shown):g}"
+    places = max(unit.digits + 1, 3 - math.floor(math.log10(abs(shown))))
+    text = f"{shown:.{places}f}"
+    return text.rstrip("0").rstrip(".") if "." in text else text
 
 
 def exact(unit: Unit, value: float | None) -> str:

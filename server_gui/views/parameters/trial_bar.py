@@ -12,7 +12,10 @@ from server_gui.views.widgets.plain import PlainLabel
 
 
 class TrialBar(QFrame):
-    """Hidden while nothing is on trial. `keep` and `take_back` are what people decide."""
+    """Hidden while nothing is on trial. `keep` and `take_back` are what people decide.
+
+    The window has one of the parameters' panel, and one above its tabs for when that is not in sight.
+    """
 
     keep = Signal()
     take_back = Signal()
@@ -42,11 +45,11 @@ class TrialBar(QFrame):
         everything.addLayout(row)
         self.hide()
 
-    def refresh(self) -> None:
-        """Count down."""
+    def refresh(self, *, shown: bool = True) -> None:
+        """Count down; `shown`: it is to be seen while there is a trial."""
         station = self._desk.selected
         trial = None if station is None else station.writing.trial
-        self.setVisible(trial is not None)
+        self.setVisible(trial is not None and shown)
         if station is None or trial is None:
             return
         left_s = trial.left_s()

@@ -93,6 +93,9 @@ class LabelBar(QWidget):
         self.text.addItems([*ACTIVITIES, *INSTANTS])
         self.text.setCurrentText("walk")
         self.text.setAccessibleName("Label: one of these, or any other word")
+        field = self.text.lineEdit()
+        if field is not None:
+            field.setAccessibleName(self.text.accessibleName())
         self.give, self.take_back = QPushButton("Label span"), QPushButton("Take back")
         self.give.setObjectName("primary")
         self.give.setToolTip("Say that robot and wearer did this in the chosen span")

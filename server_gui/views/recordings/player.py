@@ -16,11 +16,12 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from gateway.plain import plain
 from server_gui.core.archive.archive import Archive
 from server_gui.core.archive.playback import SPEEDS
 from server_gui.core.cloud.actions import FORMATS, export
 from server_gui.core.cloud.selection import Choice
-from server_gui.core.cloud.tape import as_time
+from server_gui.core.cloud.tape import Tape, as_time
 from server_gui.views.overview import Overview
 from server_gui.views.predictions import status
 from server_gui.views.recordings.label_bar import LabelBar
@@ -45,6 +46,7 @@ class Player(QWidget):
         self._archive = archive
         self._playback = archive.playback
         self._frame = 0
+        self._told: object = None  # which recording and journal have been told of
         self.overview = Overview(self._playback.desk, theme)
         self._views = (self.overview, Signals(self._playback.desk, theme))
         self._stack = QStackedWidget()
@@ -52,10 +54,13 @@ class Player(QWidget):
             self._stack.addWidget(Scrolled(view))
         self.banner = PlainLabel()
         self.banner.setObjectName("banner")
+        self.banner.setWordWrap(True)
         self.banner.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self.timeline = Timeline(theme)
         self.timeline.moved.connect(self._playback.seek)
         self.timeline.toggled.connect(self._toggle)
+        self.timeline.turned.connect(self._turn)
+        self._flagged = -1  # revision of what is shown
         self.labels = LabelBar(archive.labels, self.timeline, theme)
         everything = QVBoxLayout(self)
         everything.setContentsMargins(8, 8, 8, 8)
@@ -120,8 +125,13 @@ class Player(QWidget):
             menu.addAction(f"{kind.upper()} …").triggered.connect(lambda _=False, kind=kind: self._ask(kind))
         self.export.setMenu(menu)
         self.export.setToolTip("The chosen span, or all of it, as a file; made in the background")
+        self.events = QPushButton("Events")
+        self.events.setToolTip("What happened in it; choose one to see its instant")
+        happened = QMenu(self.events)
+        happened.aboutToShow.connect(lambda: self._list_events(happened))
+        self.events.setMenu(happened)
         row = QHBoxLayout()
-        for widget in (self.play, self._speed, self.place):
+        for widget in (self.play, self._speed, self.events, self.place):
             row.addWidget(widget)
         row.addStretch(1)
         row.addWidget(self.export)
@@ -140,8 +150,39 @@ class Player(QWidget):
         if self.play.text() != text:
             self.play.setText(text)
         since, length = ((at - tape.first_ns) / SECOND_NS for at in (playback.position_ns, tape.last_ns))
-        set_text(self.place, f"{clock_text(since, 1)} of {clock_text(length, 1)}")
+        happened = playback.happened
+        known = f" · events not known: {happened.problem}" if happened.problem else ""
+        looking = " · looking for events …" if happened.is_looking else known
+        set_text(self.place, f"{clock_text(since, 1)} of {clock_text(length, 1)}{looking}")
+        self.events.setEnabled(bool(len(happened.flags)))
+        self._refresh_flags(tape)
         self.labels.refresh(tape)
+
+    def _refresh_flags(self, tape: Tape) -> None:
+        journals, happened = self._archive.journals, self._playback.happened
+        journals.look()
+        kept = journals.found.by_robot.get(tape.session.robot)
+        seen = (tape, journals.revision)
+        if seen != self._told and kept is not None:
+            self._told = seen
+            happened.tell(entry for stretch in kept.stretches for entry in stretch)
+        if happened.flags.revision != self._flagged:
+            self._flagged = happened.flags.revision
+            self.timeline.show_flags(tuple(happened.flags))
+
+    def _list_events(self, menu: QMenu) -> None:
+        tape = self._playback.tape
+        menu.clear()
+        for flag in self._playback.happened.flags if tape is not None else ():
+            at = clock_text((flag.at_ns - tape.first_ns) / SECOND_NS, 1) if tape is not None else ""
+            text = plain(f"{at}  {flag.kind.value}: {flag.text}").replace("&", "&&")
+            menu.addAction(text).triggered.connect(lambda _=False, flag=flag: self._playback.seek(flag.at_ns))
+
+    def _turn(self, way: int) -> None:
+        happened, at_ns = self._playback.happened, self._playback.position_ns
+        flag = happened.next(at_ns) if way > 0 else happened.last(at_ns)
+        if flag is not None:
+            self._playback.seek(flag.at_ns)
 
     def _title(self) -> str:
         playback, tape = self._playback, self._playback.tape
@@ -173,7 +214,9 @@ class Player(QWidget):
         self.left.emit()
 
     def _ask(self, kind: str) -> None:
-        ask_save(self, f"Export as {kind.upper()}", kind, lambda file: self.export_to(kind, file))
+        tape = self._playback.tape
+        name = "recording" if tape is None else tape.session.session
+        ask_save(self, f"Export as {kind.upper()}", kind, lambda file: self.export_to(kind, file), name)
 
     def export_to(self, kind: str, file: Path) -> None:
         """Export the chosen span, or all of it, in the background."""

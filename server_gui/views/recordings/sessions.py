@@ -43,7 +43,7 @@ class SessionModel(RowsModel[Session]):
     """A row a session."""
 
     def __init__(self, theme: Theme) -> None:
-        super().__init__(TITLES, lambda session: (session.robot, session.session))
+        super().__init__(TITLES, lambda session: (session.robot, session.session), NUMBERS | {0})
         self._theme = theme
 
     def data(self, index: Index, role: int = 0) -> Any:

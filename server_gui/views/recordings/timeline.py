@@ -1,8 +1,8 @@
 """The whole of a recording as a bar: where it is played, what happened when, its labels, the chosen span."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
-from typing import Any, Final
+from typing import Final
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPen
@@ -10,9 +10,12 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from ml.store.labels import Label, utc_ns
 from server_gui.core.cloud.tape import Tape
+from server_gui.core.desk.flags import Flag
 from server_gui.core.recording.batching import EventKind
 from server_gui.views.marks import Mark, draw
 from server_gui.views.theme import Theme
+from server_gui.views.widgets.cursors import FLAGS
+from server_gui.views.widgets.plain import set_tip
 
 SECOND_NS: Final = 1_000_000_000
 STEPS: Final = {
@@ -24,8 +27,14 @@ STEPS: Final = {
 TICKS_S: Final = (1, 2, 5, 10, 30, 60, 120, 300, 600, 1800, 3600, 7200, 14400, 43200, 86400)
 # Paul Tol's light scheme, for labels: no two of them alike to those who see fewer colours.
 HUES: Final = ("#77aadd", "#ee8866", "#eedd88", "#ffaabb", "#99ddff", "#44bb99", "#bbcc33", "#aaaa00")
-MARKER: Final = Mark("diamond", "accent", "marker")
 MISSING: Final = Mark("triangle", "warn", "something is missing")
+
+
+TIP: Final = (
+    "Click or drag to jump; Shift and drag to choose a span.\n"
+    "Arrows: 1 s, Page: 10 s, Home, End; N: next event, with Shift the one before; I and O: the span "
+    "begins, ends here; Space: play"
+)
 
 
 class Timeline(QWidget):
@@ -34,6 +43,7 @@ class Timeline(QWidget):
     moved = Signal(object)
     chosen = Signal(object, object)
     toggled = Signal()
+    turned = Signal(int)  # to the next event, or the one before
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -41,15 +51,14 @@ class Timeline(QWidget):
         self._tape: Tape | None = None
         self._position_ns = 0
         self._labels: Sequence[Label] = ()
+        self._flags: Sequence[Flag] = ()
         self._dragged_from_ns: int | None = None
         self.span_ns: tuple[int, int] | None = None
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setAccessibleName("Time of the recording")
-        self.setToolTip(
-            "Click or drag to jump; Shift and drag to choose a span.\n"
-            "Arrows: 1 s, Page: 10 s, Home, End; I and O: the span begins, ends here; Space: play"
-        )
+        self.setToolTip(TIP)
+        self.setMouseTracking(True)
         theme.changed.connect(self.updateGeometry)
 
     def sizeHint(self) -> QSize:
@@ -57,7 +66,7 @@ class Timeline(QWidget):
 
     def show_tape(self, tape: Tape) -> None:
         """Show another recording."""
-        self._tape, self._labels, self.span_ns = tape, (), None
+        self._tape, self._labels, self._flags, self.span_ns = tape, (), (), None
         self.show_position(tape.first_ns)
 
     def show_position(self, position_ns: int) -> None:
@@ -70,6 +79,11 @@ class Timeline(QWidget):
     def show_labels(self, labels: Sequence[Label]) -> None:
         """Show its labels."""
         self._labels = labels
+        self.update()
+
+    def show_flags(self, flags: Sequence[Flag]) -> None:
+        """Show what happened when."""
+        self._flags = flags
         self.update()
 
     def choose(self, begin_ns: int, end_ns: int) -> None:
@@ -99,12 +113,15 @@ class Timeline(QWidget):
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         if self._tape is not None and event.button() is Qt.MouseButton.LeftButton:
-            at_ns = self._instant(event.position().x())
+            flag = self._flag_at(event.position())
+            at_ns = self._instant(event.position().x()) if flag is None else flag.at_ns
             shifted = bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier)
             self._dragged_from_ns = at_ns if shifted else None
             self.moved.emit(at_ns)
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        flag = self._flag_at(event.position())
+        set_tip(self, TIP if flag is None else f"{self._since(flag)}  {flag.kind.value}: {flag.text}")
         if self._tape is None or not event.buttons() & Qt.MouseButton.LeftButton:
             return
         at_ns = self._instant(event.position().x())
@@ -114,6 +131,10 @@ class Timeline(QWidget):
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         tape, key = self._tape, Qt.Key(event.key())
+        if key is Qt.Key.Key_N:
+            back = bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier)
+            self.turned.emit(-1 if back else 1)
+            return
         if tape is None or event.modifiers():
             super().keyPressEvent(event)
             return
@@ -147,7 +168,10 @@ class Timeline(QWidget):
         painter.drawRect(bar)
         self._draw_ticks(painter, bar)
         for happened in self._tape.events:
-            self._draw_event(painter, bar, happened)
+            if happened["kind"] != EventKind.MARKER.value:
+                self._draw_mark(painter, bar, MISSING, utc_ns(happened["utc"]))
+        for flag in self._flags:
+            self._draw_mark(painter, bar, FLAGS[flag.kind], flag.at_ns)
         x = self._x(self._position_ns)
         painter.setPen(QPen(self._theme.colour("text"), 2))
         painter.drawLine(QPointF(x, 0), QPointF(x, bar.bottom() + 2))
@@ -184,14 +208,25 @@ class Timeline(QWidget):
             place = QRectF(x - self._theme.px(30), bar.bottom() + 4, self._theme.px(60), self._theme.px(14))
             painter.drawText(place, Qt.AlignmentFlag.AlignCenter, clock_text(tick))
 
-    def _draw_event(self, painter: QPainter, bar: QRectF, happened: Mapping[str, Any]) -> None:
-        mark = MARKER if happened["kind"] == EventKind.MARKER.value else MISSING
+    def _draw_mark(self, painter: QPainter, bar: QRectF, mark: Mark, at_ns: int) -> None:
         side = float(self._theme.px(11))
-        x = self._x(utc_ns(happened["utc"]))
+        x = self._x(at_ns)
         box = QRectF(x - side / 2, bar.top() - side - 1, side, side)
         draw(painter, mark, self._theme.colour(mark.colour), box)
 
     # --- where an instant is
+
+    def _flag_at(self, place: QPointF) -> Flag | None:
+        """What happened is pointed at above the bar."""
+        if place.y() > self._bar().top():
+            return None
+        near = self._theme.px(7)
+        found = ((abs(self._x(flag.at_ns) - place.x()), place_) for place_, flag in enumerate(self._flags))
+        distance, which = min(found, default=(near + 1, 0))
+        return self._flags[which] if distance <= near else None
+
+    def _since(self, flag: Flag) -> str:
+        return clock_text(self._since_s(flag.at_ns), 1)
 
     def _bar(self) -> QRectF:
         px = self._theme.px

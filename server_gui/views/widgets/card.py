@@ -1,10 +1,10 @@
 """A framed piece of the window: a title, a note at the right, and a body."""
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
 
 from server_gui.views.widgets.elided import ElidedLabel
-from server_gui.views.widgets.plain import PlainLabel
+from server_gui.views.widgets.fitted import FittedLabel
 
 
 class Card(QFrame):
@@ -14,9 +14,11 @@ class Card(QFrame):
         super().__init__(parent)
         self.setObjectName("card")
         self.setAccessibleName(title)
-        self._title = PlainLabel(title)
-        self._title.setObjectName("title")
-        self._note = ElidedLabel("note")
+        self._title = ElidedLabel("title")
+        self._title.setText(title)
+        self._title.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Preferred)
+        self._title.setMinimumWidth(1)
+        self._note = FittedLabel("note")
         self._note.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         head = QHBoxLayout()
         head.addWidget(self._title)
@@ -25,21 +27,23 @@ class Card(QFrame):
         self.body.setContentsMargins(0, 0, 0, 0)
         self.body.setSpacing(4)
         everything = QVBoxLayout(self)
-        everything.setContentsMargins(10, 7, 10, 8)
+        everything.setContentsMargins(10, 5, 10, 6)
         everything.setSpacing(4)
         everything.addLayout(head)
         everything.addLayout(self.body, 1)
 
-    def set_title(self, title: str) -> None:
+    def set_title(self, title: str, *, whole: bool = False) -> None:
+        """Set the title; one with numbers is never cut, and so is to be `whole`."""
         set_text(self._title, title)
+        self._title.setMinimumWidth(self._title.sizeHint().width() if whole else 1)
 
     @property
     def note(self) -> str:
         return self._note.text()
 
-    def set_note(self, text: str) -> None:
-        """Set the note at the right of the title."""
-        set_text(self._note, text)
+    def set_note(self, *wordings: str) -> None:
+        """Set the note at the right of the title: what is said in full, and where there is less room."""
+        self._note.say(*wordings)
 
 
 def set_text(label: QLabel, text: str) -> None:

@@ -21,7 +21,7 @@ class ColourBar(QWidget):
         self.setAccessibleName("Colours of the pressure maps")
 
     def sizeHint(self) -> QSize:
-        return QSize(self._theme.px(46), 180)
+        return QSize(self._theme.px(46), 100)
 
     def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)

@@ -1,4 +1,4 @@
-"""A label that ends in … where there is no room, instead of in the middle of a letter."""
+"""A label of a name, which has … in its middle where there is no room; numbers are for `FittedLabel`."""
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QPainter, QPaintEvent
@@ -8,16 +8,17 @@ from server_gui.views.widgets.plain import PlainLabel
 
 
 class ElidedLabel(PlainLabel):
-    """One line of plain text."""
+    """One line of plain text; `mode` says where its … is."""
 
-    def __init__(self, name: str = "") -> None:
+    def __init__(self, name: str = "", mode: Qt.TextElideMode = Qt.TextElideMode.ElideMiddle) -> None:
         super().__init__()
+        self._mode = mode
         self.setObjectName(name)
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
 
     def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)
         room = self.contentsRect()
-        text = self.fontMetrics().elidedText(self.text(), Qt.TextElideMode.ElideRight, room.width())
+        text = self.fontMetrics().elidedText(self.text(), self._mode, room.width())
         painter.drawText(room, self.alignment(), text)
         painter.end()

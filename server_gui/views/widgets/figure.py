@@ -16,6 +16,8 @@ TRUNK, THIGH, SHANK, ANKLE, FOOT = 0.288, 0.245, 0.246, 0.039, 0.152
 HEEL: Final = 0.04  # behind the ankle
 HEAD: Final = 0.065  # radius
 REACH: Final = 1.12  # the drawing's height
+SIDES: Final = ("left", "right")
+JOINTS: Final = ("hip", "knee", "ankle")
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,11 +42,11 @@ class StickFigure(QWidget):
         self._live = False
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-        self.setMinimumSize(130, 150)
+        self.setMinimumSize(130, 120)
         self.setAccessibleName("Posture from the right side")
 
     def sizeHint(self) -> QSize:
-        return QSize(220, 230)
+        return QSize(160, 120)
 
     def show_pose(
         self,
@@ -58,13 +60,25 @@ class StickFigure(QWidget):
         """Draw this; `wrong` names the joints to be ringed, `texts` are each side's angles in words."""
         self._legs, self._tilt, self._wrong, self._live = legs, tilt, wrong, live
         self._texts = texts
+        told = [f"{side} {' '.join(texts[side])}" for side in texts] if live else ["not known now"]
+        wrongs = [f"{name.replace('_', ' ')} not ok" for name in sorted(wrong)]
+        self.setAccessibleDescription(", ".join([*told, *wrongs]))
         self.update()
 
     def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)
         painter.fillRect(self.rect(), self._theme.colour("card"))
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        unit = min(self.height() * 0.94 / REACH, self.width() * 1.25)
+        if not self._is_known():
+            painter.setPen(self._theme.colour("dim"))
+            painter.drawText(self.rect(), Qt.AlignmentFlag.AlignCenter, "posture not known")
+            painter.end()
+            return
+        painter.setFont(self._theme.number_font(0.95))
+        metrics = painter.fontMetrics()
+        beside = self.width() / 2 - metrics.horizontalAdvance(" " * 19) > self.height() * 0.1
+        above = 0 if beside else 3 * metrics.height()  # the words
+        unit = min((self.height() - above) * 0.94 / REACH, self.width() * 1.25)
         lean = self._tilt or 0.0
         chains = {
             side: chain(self._legs.get(side, Pose(None, None, None)), lean) for side in ("left", "right")
@@ -74,20 +88,57 @@ class StickFigure(QWidget):
         hip = QPointF(self.width() / 2, ground - drop * unit)
         painter.setPen(QPen(self._theme.colour("border"), 2))
         painter.drawLine(QPointF(self.width() * 0.06, ground), QPointF(self.width() * 0.94, ground))
-        self._draw_leg(painter, "left", chains["left"], hip, unit)
+        first, last = ("right", "left") if self._is_wrong("left") and not self._is_wrong("right") else SIDES
+        self._draw_leg(painter, first, chains[first], hip, unit)
         self._draw_trunk(painter, hip, lean, unit)
-        self._draw_leg(painter, "right", chains["right"], hip, unit)
+        self._draw_leg(painter, last, chains[last], hip, unit)
+        for side, points in chains.items():
+            self._name_side(painter, side, hip + points[-1] * unit)
+            for joint, point in zip(JOINTS, (QPointF(), *points), strict=False):
+                if f"{side}_{joint}" in self._wrong:
+                    self._name_joint(painter, f"{side} {joint}", hip + point * unit, unit)
         self._draw_angles(painter)
         painter.end()
 
+    def _is_known(self) -> bool:
+        angles = [angle for leg in self._legs.values() for angle in (leg.hip, leg.knee, leg.ankle)]
+        return any(angle is not None for angle in [*angles, self._tilt])
+
+    def _is_wrong(self, side: str) -> bool:
+        return any(joint.startswith(side) for joint in self._wrong)
+
+    def _name_side(self, painter: QPainter, side: str, toe: QPointF) -> None:
+        """Which leg it is, before its toes: colour alone says nothing to some."""
+        painter.setFont(self._theme.text_font(bold=True))
+        painter.setPen(self._theme.colour(side if self._live else "old"))
+        raised = 0 if side == "right" else painter.fontMetrics().height() * 0.7
+        painter.drawText(toe + QPointF(6, 3 - raised), side[0].upper())
+
+    def _name_joint(self, painter: QPainter, name: str, point: QPointF, unit: float) -> None:
+        painter.setFont(self._theme.text_font(bold=True))
+        metrics = painter.fontMetrics()
+        width, height = metrics.horizontalAdvance(name) + 8, metrics.height() + 2
+        left = point.x() - unit * 0.06 - width  # behind the wearer, where no leg swings to
+        box = QRectF(max(0.0, left), point.y() - height / 2, width, height)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(self._theme.colour("card"))
+        painter.drawRoundedRect(box, 3, 3)
+        painter.setPen(self._theme.colour("bad" if self._live else "old"))
+        painter.drawText(box, Qt.AlignmentFlag.AlignCenter, name)
+
     def _draw_angles(self, painter: QPainter) -> None:
-        """Hip, knee and ankle of each side in words: colour alone says nothing to some."""
+        """Hip, knee and ankle of each side in words."""
         painter.setFont(self._theme.number_font(0.95))
         line = painter.fontMetrics().height()
-        for row, (side, texts) in enumerate(self._texts.items()):
-            painter.setPen(self._theme.colour(side if self._live else "old"))
+        rows = [
+            (" ", JOINTS, "dim"),
+            *((side[0].upper(), texts, side) for side, texts in self._texts.items()),
+        ]
+        for row, (head, texts, colour) in enumerate(rows):
+            painter.setPen(self._theme.colour(colour if self._live or colour == "dim" else "old"))
             box = QRectF(0, row * line, self.width(), line)
-            painter.drawText(box, Qt.AlignmentFlag.AlignRight, f"{side[0].upper()} {' '.join(texts)}")
+            said = "".join(f"{text:>6}" for text in texts)
+            painter.drawText(box, Qt.AlignmentFlag.AlignRight, f"{head}{said}")
 
     def _draw_trunk(self, painter: QPainter, hip: QPointF, lean: float, unit: float) -> None:
         colour = self._theme.colour("text" if self._live and self._tilt is not None else "old")

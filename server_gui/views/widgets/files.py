@@ -1,13 +1,17 @@
 """Asks for a file's name without being modal: nothing stands in the way of STOP; says what came of saving."""
 
 import contextlib
+import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Final
 
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFileDialog, QMessageBox, QWidget
 
 from gateway.plain import plain
+
+NO_NAME: Final = r"[^\w.+-]+"  # what no file of any system should be called
 
 
 def ask_open(
@@ -20,11 +24,14 @@ def ask_open(
     return dialog
 
 
-def ask_save(parent: QWidget, title: str, kind: str, done: Callable[[Path], object]) -> QFileDialog:
-    """Ask for a file to be written, and whether one may be overwritten."""
+def ask_save(
+    parent: QWidget, title: str, kind: str, done: Callable[[Path], object], name: str
+) -> QFileDialog:
+    """Ask for a file to be written, `name` at first, and whether one may be overwritten."""
     dialog = _dialog(parent, title, (kind,), lambda path: _unless_there(parent, path, done))
     dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
     dialog.setDefaultSuffix(kind)
+    dialog.selectFile(f"{re.sub(NO_NAME, '-', name)}.{kind}")
     dialog.show()
     return dialog
 

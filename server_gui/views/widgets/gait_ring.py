@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import Final
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPixmap
+from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPaintEvent, QPen, QPixmap
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from server_gui.core.desk.leg_phase import PHASES, LegPhase
@@ -17,6 +17,7 @@ from server_gui.views.theme import Theme
 
 GAP_DEG: Final = 2.4  # between two phases
 SMALL: Final = 0.75  # of the size that text has elsewhere: what is smaller is not read
+READ: Final = 0.85  # of it, for a phase's name
 DIM: Final = 70  # opacity of the phases that are not now, of 255
 
 
@@ -41,16 +42,18 @@ class GaitRing(QWidget):
         self._restyle()
 
     def sizeHint(self) -> QSize:
-        return QSize(230, 230)
+        return self.minimumSize()
 
     def _restyle(self) -> None:
-        side = max(150, self._theme.px(110))
+        side = self._theme.px(112)
         self.setMinimumSize(side, side)
 
     def show_phases(self, phases: Phases, modelled: Phases, word: str, below: str, *, live: bool) -> None:
         """Draw these, by steps and by a model; what is not `live` is grey."""
         self._phases, self._word, self._below, self._live = phases, word, below, live
         self._modelled = modelled
+        told = (f"{leg.value} {_percent(phases[leg] or modelled[leg])}" for leg in Leg)
+        self.setAccessibleDescription(", ".join(filter(None, (word, below, *told))))
         self.update()
 
     def paintEvent(self, event: QPaintEvent) -> None:
@@ -129,20 +132,46 @@ class GaitRing(QWidget):
         size = max(0.45, min(1.6, box.width() / theme.px(140)))
         is_short = size < SMALL
         if is_short:  # fewer words that can be read, rather than all of them
-            size = min(1.7 * size, 1.0)
-        rows = [(self._word, "text" if self._live else "old", 1.25 * size, True)]
-        rows += [(self._below.partition(" · ")[0] if is_short else self._below, "dim", 0.85 * size, False)]
+            size = 1.0
+        word = self._word if self._is_read(self._word, box) else ""
+        rows = [(word, "text" if self._live else "old", 1.5 * size, True)]
+        rows += [("" if is_short else self._below, "dim", 0.95 * size, False)]
         for leg in Leg:
             now = self._phases[leg] or self._modelled[leg]
-            phase = "" if now is None or is_short else f"{now.phase} "
-            said = f"{leg.value[0].upper()}  {phase}{now.percent:.0f} %" if now else ""
-            rows.append((said, leg.value if self._live else "old", 0.85 * size, False))
-        top = box.center().y() - line * 2
+            said = "" if now is None else self._phase_text(leg, now, box.width(), is_short=is_short)
+            rows.append((said, leg.value if self._live else "old", 0.9 * size, False))
+        rows = [row for row in rows if row[0]]
+        top = box.center().y() - line * len(rows) / 2
         for text, colour, factor, bold in rows:
-            font = theme.text_font(factor, bold=bold)
-            painter.setFont(font)
+            spare = 0.0 if is_short else 12.0
+            place = QRectF(box.left() - spare, top, box.width() + 2 * spare, line)
+            painter.setFont(self._fitting(text, factor, place, bold=bold))
             painter.setPen(theme.colour(colour))
-            painter.drawText(
-                QRectF(box.left() - 12, top, box.width() + 24, line), Qt.AlignmentFlag.AlignCenter, text
-            )
+            painter.drawText(place, Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextDontClip, text)
             top += line
+
+    def _phase_text(self, leg: Leg, now: LegPhase, room: float, *, is_short: bool) -> str:
+        """With the phase's name where that has room in letters that are read."""
+        letter = leg.value[0].upper()
+        full = f"{letter}  {now.phase} {now.percent:.0f} %"
+        fits = not is_short and self._width(full) <= room + 24
+        return full if fits else f"{letter}  {now.percent:.0f} %"
+
+    def _is_read(self, text: str, box: QRectF) -> bool:
+        """Whether it has room in letters that are read; it stands above the cards, too."""
+        return self._width(text) <= box.width()
+
+    def _width(self, text: str) -> float:
+        return QFontMetricsF(self._theme.text_font(READ)).horizontalAdvance(text)
+
+    def _fitting(self, text: str, factor: float, place: QRectF, *, bold: bool) -> QFont:
+        """As large as wanted, or as there is room for."""
+        font = self._theme.text_font(factor, bold=bold)
+        width = QFontMetricsF(font).horizontalAdvance(text)
+        if width > place.width() > 0:
+            font.setPointSizeF(0.95 * font.pointSizeF() * place.width() / width)
+        return font
+
+
+def _percent(phase: LegPhase | None) -> str:
+    return "not known" if phase is None else f"{phase.percent:.0f} % of its stride, {phase.phase}"

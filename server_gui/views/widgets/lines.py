@@ -7,8 +7,7 @@ from PySide6.QtWidgets import QGridLayout, QSizePolicy, QWidget
 
 from server_gui.views.predictions import Line
 from server_gui.views.theme import Theme
-from server_gui.views.widgets.card import set_text
-from server_gui.views.widgets.elided import ElidedLabel
+from server_gui.views.widgets.fitted import FittedLabel
 from server_gui.views.widgets.mark import MarkIcon
 from server_gui.views.widgets.plain import set_tip
 
@@ -25,7 +24,7 @@ class Lines(QWidget):
         grid.setHorizontalSpacing(6)
         grid.setVerticalSpacing(1)
         grid.setColumnStretch(1, 1)
-        self._rows = [(MarkIcon(theme, 10), ElidedLabel()) for _ in range(most)]
+        self._rows = [(MarkIcon(theme, 10), FittedLabel()) for _ in range(most)]
         for row, (icon, label) in enumerate(self._rows):
             grid.addWidget(icon, row, 0, Qt.AlignmentFlag.AlignVCenter)
             grid.addWidget(label, row, 1)
@@ -37,12 +36,12 @@ class Lines(QWidget):
 
     def show_lines(self, lines: Sequence[Line]) -> None:
         """Show these."""
-        texts = [f"{line.text} · {line.detail}" if line.detail else line.text for line in lines]
+        tips = ["\n".join(filter(None, (line.wordings[0], line.tip))) for line in lines]
         for place, (icon, label) in enumerate(self._rows):
             known = place < len(lines)
             icon.setVisible(known)
             label.setVisible(known)
             if known:
                 icon.show_mark(lines[place].mark)
-                set_text(label, texts[place])
-        set_tip(self, "\n".join(texts))
+                label.say(*lines[place].wordings)
+        set_tip(self, "\n".join(tips))

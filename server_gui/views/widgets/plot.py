@@ -2,23 +2,42 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import Enum
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 import pyqtgraph as pg
-from PySide6.QtCore import QPointF, QRect, QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QImage, QMouseEvent, QPainter, QPaintEvent
-from PySide6.QtWidgets import QGraphicsItem, QWidget
+from PySide6.QtCore import QEvent, QPointF, QRect, QRectF, QSize, Qt, QTimer, Signal
+from PySide6.QtGui import QColor, QFontMetrics, QImage, QMouseEvent, QPainter, QPaintEvent, QWheelEvent
+from PySide6.QtWidgets import QApplication, QGraphicsItem, QWidget
 
-from server_gui.views.theme import Theme
+from server_gui.core.desk.flags import FlagKind
+from server_gui.views.theme import Look, Theme
 from server_gui.views.widgets import raster
-from server_gui.views.widgets.cursors import Cursors
+from server_gui.views.widgets.cursors import Cursors, Shown
+from server_gui.views.widgets.plain import set_tip
+from server_gui.views.widgets.time_axis import TimeAxis
 
 Floats = npt.NDArray[np.float64]
 SHRINK_FRAMES: Final = 60  # a range that has become too wide is narrowed only now and then
 MARGIN: Final = 0.06
 OLD: Final = 0.35  # opacity of what is not live
+NEAR_PX: Final = 4  # a press and a release no further apart are a click
+NO_DATA: Final = "no data"
+# Of what belongs to no side, dark and light: Okabe & Ito's green and purple, with 4.5 : 1 of contrast.
+PLAIN: Final = {
+    "first": {Look.DARK: "#2dbb8c", Look.LIGHT: "#007a58"},
+    "second": {Look.DARK: "#d895bd", Look.LIGHT: "#95406f"},
+}
+
+
+class Mouse(Enum):
+    """What the mouse does in a plot."""
+
+    NOTHING = "nothing"
+    TIME = "time"  # the wheel zooms time alone, a double click shows all of it again, a click is told
+    ALL = "all"  # wheel, drag and box zoom both axes
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +47,15 @@ class Curve:
     channel: str
     colour: str
     dashed: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class PlacedFlag:
+    """What happened at a time, s until the newest row."""
+
+    at: float
+    kind: FlagKind
+    text: str
 
 
 class Curves(QWidget):
@@ -71,15 +99,21 @@ class Curves(QWidget):
 class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
     """Time runs from −`seconds` to 0; the other axis follows the data, quickly out and slowly in.
 
-    `least` is the smallest range that is shown, so that noise on a still joint stays noise. Where it `zooms`,
-    wheel, drag and box choose a part of the time too, while new rows go on coming.
+    `least` is the smallest range that is shown, so that noise on a still joint stays noise. While part of the
+    time is chosen with the mouse, new rows go on coming.
     """
 
     zoomed = Signal(float, float)  # from, to: s, until the newest row
     moved = Signal(int, float)  # which cursor, where to
+    hovered = Signal(object)  # s until the newest row; None: the pointer has left
+    clicked = Signal()
+    fitted = Signal()  # all of the time is asked for
 
-    def __init__(self, theme: Theme, seconds: float, least: float = 1.0, *, zooms: bool = False) -> None:
-        super().__init__(enableMenu=False)
+    def __init__(
+        self, theme: Theme, seconds: float, least: float = 1.0, mouse: Mouse = Mouse.NOTHING
+    ) -> None:
+        super().__init__(enableMenu=False, axisItems={"bottom": TimeAxis()})
+        self._mouse = mouse
         self._theme = theme
         self._least = least
         self._curves: Sequence[Curve] = ()
@@ -90,18 +124,25 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
         self._at: tuple[float, ...] = ()  # the cursors
         self._active = 0
         self._held: int | None = None  # the cursor that is dragged
+        self._pressed = QPointF()
+        self._hover: float | None = None
+        self._flags: Sequence[PlacedFlag] = ()
+        self._limits: Sequence[float] = ()
+        self._is_blank = False
+        self._click = QTimer(self, singleShot=True)  # until it is no double click
+        self._click.timeout.connect(self.clicked)
         item = self.getPlotItem()
         item.hideButtons()
         item.setContentsMargins(0, 0, 0, 0)
         item.getViewBox().setDefaultPadding(0.0)
-        item.getViewBox().setMouseEnabled(x=zooms, y=True)
+        item.getViewBox().setMouseEnabled(x=mouse is not Mouse.NOTHING, y=mouse is Mouse.ALL)
         item.getViewBox().sigRangeChangedManually.connect(self._zoomed)
         item.getViewBox().sigResized.connect(self._place)
         self._lines = Curves(self.viewport())
         self._marks = Cursors(theme, self.viewport())
-        for name in ("left", "bottom"):
-            item.getAxis(name).setCacheMode(QGraphicsItem.CacheMode.DeviceCoordinateCache)
+        self._cache_axes()
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.viewport().setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.setFrameShape(pg.QtWidgets.QFrame.Shape.NoFrame)
         self.set_seconds(seconds)
         theme.changed.connect(self._restyle)
@@ -109,7 +150,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
 
     def sizeHint(self) -> QSize:
         """As small as a plot may be; layouts give it more."""
-        return QSize(200, 80)
+        return QSize(140, 58)
 
     def set_seconds(self, seconds: float) -> None:
         """Set how much of the past is shown."""
@@ -137,6 +178,19 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
         self._at, self._active = at, active
         self._mark()
 
+    def show_hover(self, at: float | None) -> None:
+        """Show a line at this time (s until the newest row), or none."""
+        self._hover = at
+        self._mark()
+
+    def show_flags(self, flags: Sequence[PlacedFlag]) -> None:
+        """Show what happened when."""
+        self._flags = flags
+
+    def show_limits(self, limits: Sequence[float]) -> None:
+        """Show lines at these values, as far as they are in the range."""
+        self._limits = limits
+
     def set_curves(self, curves: Sequence[Curve]) -> None:
         """Set which lines there are."""
         if list(curves) == list(self._curves):
@@ -158,6 +212,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
             times, columns = times[:end], [values[:end] for values in columns]
         if self.follows and len(times):
             self._follow_new(source, times, columns, scale)
+        self._be_blank(not any(np.isfinite(values).any() for values in columns))
         _, (low, high) = self.getViewBox().viewRange()
         ratio = self.devicePixelRatioF()
         width, height = (max(1, round(side * ratio)) for side in (self._lines.width(), self._lines.height()))
@@ -202,6 +257,14 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
         self._lines.setGeometry(self.mapFromScene(field).boundingRect())
         self._marks.setGeometry(self._lines.geometry())
         self._marks.raise_()
+        self._cache_axes()
+
+    def _cache_axes(self) -> None:
+        """Anew: of an axis that had another length the words at its old end would stay."""
+        for name in ("left", "bottom"):
+            axis = self.getPlotItem().getAxis(name)
+            axis.setCacheMode(QGraphicsItem.CacheMode.NoCache)
+            axis.setCacheMode(QGraphicsItem.CacheMode.DeviceCoordinateCache)
 
     def _zoomed(self, axes: Sequence[bool]) -> None:
         """Somebody has; one axis alone leaves the other as it was."""
@@ -209,45 +272,109 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
         if axes[0]:
             self.zoomed.emit(*self.window_s)
 
-    # --- cursors
+    def _be_blank(self, is_blank: bool) -> None:
+        """Without a value there is nothing that an axis could measure."""
+        if is_blank != self._is_blank:
+            self._is_blank = is_blank
+            self.getPlotItem().getAxis("left").setStyle(showValues=not is_blank)
+
+    # --- the mouse
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
+        self._pressed = event.position()
         self._held = self._marks.near(event.position().x() - self._marks.x())
         if self._held is None:
             super().mousePressEvent(event)
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        if self._held is None:
-            super().mouseMoveEvent(event)
+        if self._held is not None:
+            self.moved.emit(self._held, self._time_at(event.position()))
             return
-        left, right = self.window_s
-        share = (event.position().x() - self._marks.x()) / max(1, self._marks.width())
-        self.moved.emit(self._held, left + min(max(share, 0.0), 1.0) * (right - left))
+        super().mouseMoveEvent(event)
+        self._tell_flag(event)
+        if self._mouse is Mouse.TIME:
+            self.hovered.emit(self._time_at(event.position()))
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         if self._held is None:
             super().mouseReleaseEvent(event)
+            moved = (event.position() - self._pressed).manhattanLength()
+            if self._mouse is Mouse.TIME and event.button() is Qt.MouseButton.LeftButton and moved <= NEAR_PX:
+                self._click.start(QApplication.doubleClickInterval())
         self._held = None
+
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        if self._mouse is Mouse.NOTHING:
+            super().mouseDoubleClickEvent(event)
+            return
+        self._click.stop()
+        self._pressed = QPointF(-100.0, -100.0)  # its release is no click
+        self.fitted.emit()
+
+    def leaveEvent(self, event: QEvent) -> None:
+        super().leaveEvent(event)
+        if self._mouse is Mouse.TIME:
+            self.hovered.emit(None)
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        if self._mouse is Mouse.NOTHING:
+            event.ignore()  # what is around may scroll
+            return
+        super().wheelEvent(event)
+
+    def _time_at(self, place: QPointF) -> float:
+        left, right = self.window_s
+        share = (place.x() - self._marks.x()) / max(1, self._marks.width())
+        return left + min(max(share, 0.0), 1.0) * (right - left)
+
+    def _tell_flag(self, event: QMouseEvent) -> None:
+        place = self._marks.flag_near(event.position().x() - self._marks.x())
+        shown = [flag for flag in self._flags if self._is_in_sight(flag)]
+        set_tip(self, "" if place is None or place >= len(shown) else shown[place].text)
+
+    def _is_in_sight(self, flag: "PlacedFlag") -> bool:
+        left, right = self.window_s
+        return left <= flag.at <= right
 
     def _mark(self) -> None:
         left, right = self.window_s
+        _, (low, high) = self.getViewBox().viewRange()
         box, field = self.getViewBox().rbScaleBox, None
         if box.isVisible():
             place = self.mapFromScene(box.sceneBoundingRect()).boundingRect()
             field = QRectF(place.translated(-self._marks.pos()))
-        self._marks.show_marks(tuple((at - left) / (right - left) for at in self._at), self._active, field)
+
+        def share(at: float) -> float:
+            return (at - left) / (right - left)
+
+        shown = Shown(
+            at=tuple(share(at) for at in self._at),
+            active=self._active,
+            hover=None if self._hover is None else share(self._hover),
+            flags=tuple((share(flag.at), flag.kind) for flag in self._flags if self._is_in_sight(flag)),
+            limits=tuple((high - at) / (high - low) for at in self._limits if low <= at <= high),
+            box=field,
+            words=NO_DATA if self._is_blank else "",
+        )
+        self._marks.show_marks(shown)
 
     def _restyle(self) -> None:
         theme = self._theme
         self.setBackground(theme.colour("card"))
+        room = theme.px(16)  # for what stands beside the ends of the axes
+        self.getPlotItem().layout.setContentsMargins(0, theme.px(6), room, 0)
         for name, width in (("left", 44), ("bottom", None)):
             axis = self.getPlotItem().getAxis(name)
             axis.setPen(theme.colour("border"))
             axis.setTextPen(theme.colour("dim"))
             axis.setTickFont(theme.text_font(0.85))
             axis.setStyle(tickLength=-4)
+            axis.setTickDensity(0.6)
             if width is not None:
                 axis.setWidth(theme.px(width))
+            else:
+                metrics = QFontMetrics(theme.text_font(0.85))
+                axis.set_label_room(metrics.horizontalAdvance("−000 s") + theme.px(6))
         self._lines.set_behind(theme.colour("card"))
         self._inks = raster.Inks(
             tuple(_colour(theme, curve.colour).rgba() for curve in self._curves),
@@ -262,4 +389,6 @@ def css(theme: Theme, name: str) -> str:
 
 
 def _colour(theme: Theme, name: str) -> QColor:
+    if name in PLAIN:
+        return QColor(PLAIN[name][theme.look])
     return QColor(name) if name.startswith("#") else theme.colour(name)

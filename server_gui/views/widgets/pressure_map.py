@@ -50,17 +50,18 @@ class PressureMap(QWidget):
         self._image.setColorTable(colour_table())
         self._trail: collections.deque[Cell | None] = collections.deque(maxlen=TRAIL)
         self._live = False
+        self._words = ""
         self.missing: tuple[int, ...] = ()  # cells without a value
         self._path = outline(self._sign)
         self._template_key: tuple[object, ...] = ()
         self._template_made = QPixmap()
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-        self.setMinimumSize(70, 150)
+        self.setMinimumSize(60, 100)
         self.setAccessibleName(f"Pressure under the {side} foot")
 
     def sizeHint(self) -> QSize:
-        return QSize(100, 230)
+        return QSize(70, 100)
 
     def set_cells(self, cells: tuple[Cell, ...] | None) -> None:
         """Set where the cells are (m), None where nobody knows. A larger foot is drawn as large as this."""
@@ -68,6 +69,13 @@ class PressureMap(QWidget):
         self._cells = None if cells is None else tuple((x / self._size, y / self._size) for x, y in cells)
         self._weights = None if self._cells is None else weights(self._cells)
         self._trail.clear()
+
+    def say(self, words: str) -> None:
+        """Say this across the sole: why nothing is known of it; nothing where that is empty."""
+        if words != self._words:
+            self._words = words
+            self.setAccessibleDescription(words)
+            self.update()
 
     def show_pressures(self, pressures: Sequence[float | None], cop: Cell | None, *, live: bool) -> None:
         """Draw these pressures (Pa, cell after cell) and the centre of pressure (m)."""
@@ -108,7 +116,22 @@ class PressureMap(QWidget):
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         self._to_metres(painter)
         self._draw_trail(painter, 4.0 / scale)
+        painter.resetTransform()
+        self._draw_words(painter)
         painter.end()
+
+    def _draw_words(self, painter: QPainter) -> None:
+        if not self._words:
+            return
+        painter.setFont(self._theme.text_font(bold=True))
+        bounds = painter.boundingRect(
+            self.rect(), Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextWordWrap, self._words
+        )
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(self._theme.colour("card"))
+        painter.drawRoundedRect(bounds.adjusted(-5, -3, 5, 3), 3, 3)
+        painter.setPen(self._theme.colour("bad"))
+        painter.drawText(bounds, Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextWordWrap, self._words)
 
     def _hatch(self) -> QBrush:
         return QBrush(self._theme.colour("old"), Qt.BrushStyle.BDiagPattern)

@@ -1,6 +1,6 @@
 """A table of rows that have a key: a row is changed in its place, and what is chosen stays chosen."""
 
-from collections.abc import Callable, Hashable, Iterable
+from collections.abc import Callable, Container, Hashable, Iterable
 from typing import Any, Final, Generic, TypeVar
 
 from PySide6.QtCore import (
@@ -13,17 +13,28 @@ from PySide6.QtCore import (
 )
 from PySide6.QtWidgets import QAbstractItemView, QTableView
 
+from server_gui.views.widgets.sort_header import SortHeader
+
 Index = QModelIndex | QPersistentModelIndex
 SORT_ROLE: Final = Qt.ItemDataRole.UserRole + 1
 Row = TypeVar("Row")
 
 
 class RowsModel(QAbstractTableModel, Generic[Row]):
-    """`rows` as they were taken the last time; a new one is put at the end. A subclass gives their `data`."""
+    """`rows` as they were taken the last time; a new one is put at the end. A subclass gives their `data`.
 
-    def __init__(self, titles: tuple[str, ...], key: Callable[[Row], Hashable]) -> None:
+    By the columns of `highest_first` people ask for the most, so that the first click gives that.
+    """
+
+    def __init__(
+        self,
+        titles: tuple[str, ...],
+        key: Callable[[Row], Hashable],
+        highest_first: Container[int] = (),
+    ) -> None:
         super().__init__()
         self._titles = titles
+        self._highest_first = highest_first
         self._key = key
         self.rows: list[Row] = []
 
@@ -59,6 +70,9 @@ class RowsModel(QAbstractTableModel, Generic[Row]):
     def headerData(self, section: int, orientation: Qt.Orientation, role: int = 0) -> Any:
         if orientation is Qt.Orientation.Horizontal and role == Qt.ItemDataRole.DisplayRole:
             return self._titles[section]
+        if role == Qt.ItemDataRole.InitialSortOrderRole:
+            down = section in self._highest_first
+            return (Qt.SortOrder.DescendingOrder if down else Qt.SortOrder.AscendingOrder).value
         return None
 
 
@@ -78,6 +92,7 @@ class RowsTable(QTableView):
 
     def __init__(self, model: QSortFilterProxyModel, name: str, column: int) -> None:
         super().__init__()
+        self.setHorizontalHeader(SortHeader(self))
         self.setModel(model)
         self.setSortingEnabled(True)
         self.sortByColumn(column, Qt.SortOrder.DescendingOrder)

@@ -219,6 +219,7 @@ def test_a_bus_nobody_holds_is_closed_and_threads_take_turns_as_before() -> None
     bus = CanBus("main", CanSettings(interface="virtual", channel="closing"))
     user = Recorder()
     for _ in range(3):
+        user.ticks = 0
         bus.hold(user)
         bus.start()
         until(lambda: user.ticks)

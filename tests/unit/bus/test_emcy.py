@@ -2,7 +2,8 @@
 
 import pytest
 
-from drivers.bus.emcy import error_text, parse_emcy
+from drivers.bus.emcy import parse_emcy
+from drivers.error_codes import error_text
 
 MAXON = 0xFB
 

@@ -10,6 +10,8 @@ from typing import Any
 
 import pytest
 
+from gateway.cli import connect
+from gateway.client import Address
 from gateway.main import main
 from tests.fake_robot import JOINTS, FakeRobot, Refusal
 from tests.support.waiting import until
@@ -267,7 +269,18 @@ def test_unreachable_robot_is_a_sentence(command: str, capsys: pytest.CaptureFix
     assert main([command, "--robot", address]) == 1
     captured = capsys.readouterr()
     assert f"no gateway at {address}" in captured.err
+    assert "--robot" not in captured.err
     assert captured.out == ""
+
+
+@pytest.mark.parametrize("command", ["describe", "stop"])
+def test_who_names_no_robot_is_told_how_where_none_answers(
+    command: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with FakeRobot() as gone:
+        monkeypatch.setattr(connect, "USUAL", Address.parse(gone.address))
+    assert main([command]) == 1
+    assert "is it running there? Another one is asked by --robot HOST:PORT" in capsys.readouterr().err
 
 
 def test_stop_is_0_only_when_every_drive_has_confirmed(

@@ -69,6 +69,8 @@ def test_all_pages_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
     ("name", "words"),
     [
         ("predikt", "there is no page 'predikt'; did you mean predict"),
+        ("scenario", "did you mean scenarios? all are listed by gwrms docs"),
+        ("how-to/scenario", "did you mean scenarios? all are listed by gwrms docs"),
         ("zzzz", "there is no page 'zzzz'; all are listed by gwrms docs"),
     ],
 )

@@ -82,7 +82,7 @@ def test_the_terminal_shows_a_process_and_a_problem_as_what_they_are() -> None:
     station.take([*(Resources(look, None, 1) for look in looks), Failed("a look", BAD)])
     console = Console(file=io.StringIO(), width=140, color_system=None)
     for part in (
-        header(station.robot, BAD, WIDE),
+        header(station, BAD, WIDE),
         resources(station, WIDE),
         footer(station, Controls(station), BAD),
     ):

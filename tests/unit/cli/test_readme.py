@@ -7,8 +7,8 @@ import pytest
 
 from gateway import config
 from gateway.main import COMMANDS
-from tests.newcomer.pages import blocks
 from tests.fake_robot import FakeRobot
+from tests.newcomer.pages import blocks
 
 ROOT = Path(__file__).parents[3]
 README = ROOT / "README.md"

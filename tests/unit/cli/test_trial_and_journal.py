@@ -59,7 +59,9 @@ def test_a_trial_that_the_robot_has_ended_is_said(
     robot.overrides["robot.describe"] = lambda _params: robot.describe() | {"trials": []}
     robot.overrides["parameter.revert"] = _ended
     assert main(["set", "--trial", "30", "gait.step_length=0.42", "--robot", robot.address]) == 1
-    assert "taken back: the guard" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "gait.step_length: it was taken back: the guard" in said
+    assert "not on trial" not in said
 
 
 def _ended(_params: object) -> object:

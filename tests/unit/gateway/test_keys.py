@@ -102,7 +102,9 @@ def test_no_older_tls_is_spoken(address: tuple[str, int]) -> None:
         context.wrap_socket(bare)
 
 
-@pytest.mark.parametrize("line", [STOP % b"now", b"GET / HTTP/1.1\r\n\r\n", b"SSH-2.0-x\r\n", b"\0"])
+@pytest.mark.parametrize(
+    "line", [STOP % b"now", b"\x17\x03\x03\x00\x05hello", b"GET / HTTP/1.1\r\n\r\n", b"SSH-2.0-x\r\n", b"\0"]
+)
 def test_to_what_is_no_tls_not_a_byte_is_said_and_nothing_in_it_is_done(
     address: tuple[str, int], come: Connect, line: bytes
 ) -> None:

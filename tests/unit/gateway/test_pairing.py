@@ -1,5 +1,6 @@
 """Pairing, both sides over real sockets: who proves the code is let in, once, and nobody in between."""
 
+import io
 import itertools
 import socket
 import ssl
@@ -15,14 +16,16 @@ from gateway.access import changes
 from gateway.access.folder import AccessFolder
 from gateway.access.known import known_in
 from gateway.access.pairing import Candidate, Pairing, PairingEnded
-from gateway.certificates import KeyProblem, der_of
+from gateway.certificates import KeyProblem, der_of, grouped
 from gateway.client import Address, ClientError, NotPaired, Unreachable, WrongRobot
 from gateway.client import pairing as desk
 from gateway.client.keys import keys_folder, pin_of, server_file
 from gateway.connections.listeners import listen
+from gateway.main import main
 from gateway.wire.pairing import DESK, TRIES, Offer, Reply, new_code, normal, proof
 from gateway.wire.role import Role
 from tests.unit.gateway import keyed as keys
+from tests.unit.gateway import processes
 from tests.unit.gateway.keyed import keyed
 
 CODE = "0123-4567-89AB-CDEF"
@@ -251,3 +254,42 @@ def test_who_is_removed_is_nobody_and_the_table_is_as_before(tmp_path: Path) -> 
     assert [one.name for one in known_in(folder).by_key.values()] == ["eve"]
     with pytest.raises(KeyProblem, match="there is no anna; known are eve"):
         changes.remove(folder, "anna")
+
+
+# The two commands
+
+
+def test_two_commands_let_a_desk_in_and_a_third_sends_it_away(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "desk"))
+    file = tmp_path / "robot.toml"
+    file.write_text('[robot]\nname = "exo-01"\n', encoding="utf-8")
+    options = ("--port", "0", "--name", "anna", "--role", "operator", "--yes")
+    with processes.process(*processes.GATEWAY[:-1], "keys", "pair", str(file), *options) as robot:
+        assert robot.stdout is not None
+        typed = next(line for line in robot.stdout if line.startswith("  gwrms pair")).split()[1:]
+        assert main(typed) == 0
+        assert "anna is let in from now on, as operator." in robot.stdout.read()
+        assert robot.wait() == 0
+    assert "Paired with exo-01: it calls this desk anna, as operator." in capsys.readouterr().out
+    assert main(["keys", "list", str(file)]) == 0
+    listed = capsys.readouterr().out
+    assert f"robot  {grouped(pin_of(Address()) or '')}" in listed
+    assert "anna  operator" in listed
+    assert main(["keys", "revoke", str(file), "anna"]) == 0
+    assert main(["keys", "revoke", str(file), "anna"]) == 1
+    assert "there is no anna" in capsys.readouterr().err
+
+
+def test_without_a_terminal_nobody_is_asked_and_nobody_let_in(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "robot.toml"
+    file.write_text('[robot]\nname = "exo-01"\n', encoding="utf-8")
+    with pytest.raises(SystemExit):
+        main(["keys", "pair", str(file), "--yes"])
+    monkeypatch.setattr("sys.stdin", io.StringIO())
+    assert main(["keys", "pair", str(file), "--port", "0"]) == 1
+    assert "there is no terminal to ask on" in capsys.readouterr().err
+    assert not (tmp_path / "keys").exists()

@@ -19,7 +19,8 @@ from tests.unit.gateway.tuned import drives
 
 VIEWERS = {
     "hello", "clock.read", "robot.describe", "gateway.cost", "resource.snapshot", "resource.overruns",
-    "component.snapshot", "status.snapshot", "stream.start", "stream.stop", "journal.tail", "journal.head",
+    "component.snapshot", "bus.snapshot", "status.snapshot", "stream.start", "stream.stop", "journal.tail",
+    "journal.head",
     "parameter.list", "parameter.read", "robot.stop",
 }  # fmt: skip
 OPERATORS = VIEWERS | {

@@ -163,6 +163,23 @@ def test_the_exit_status_says_what_came_of_all(
     assert len(ElementTree.fromstring(junit.read_bytes()).findall("testsuite")) == 2
 
 
+def test_which_one_is_run_is_said_before_it_is_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "two.toml"
+    file.write_text('title = "Two things"\n', encoding="utf-8")
+    before: list[str] = []
+
+    def run(*_: object) -> Outcome:
+        before.append(capsys.readouterr().out)
+        return Outcome((MET,))
+
+    monkeypatch.setattr(command, "run", run)
+    assert main(["sim", "run", str(file)]) == 0
+    assert before == [f"{file}: Two things\n"]
+    assert "Two things" not in capsys.readouterr().out
+
+
 def test_one_that_cannot_be_run_does_not_keep_the_others_from_it(
     outcomes: list[Outcome], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -175,6 +175,7 @@ def test_the_file_of_vendor_and_product_is_proposed_the_best_first(tmp_path: Pat
 
 def test_the_shipped_files_are_known() -> None:
     assert SHIPPED / "joint_drive.eds" in files([])
+    assert files([SHIPPED]) == files([SHIPPED, SHIPPED]) == files([])
 
 
 # The command

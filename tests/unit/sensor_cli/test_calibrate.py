@@ -121,6 +121,51 @@ def test_silent_insole_is_named(terminal: Terminal, tmp_path: Path, monkeypatch:
         calibrate.main(["insole", str(terminal.path), "--write", str(tmp_path / "x.toml")])
 
 
+@pytest.mark.parametrize(
+    ("cells", "flags", "more", "said"),
+    [
+        (16, 2, [], r"sensor: it sends pressure already and needs no calibration"),
+        (8, 0, [], "frames of 8 cells come, and the layout has 16"),
+        (16, 1, ["--foot", "left"], "frames of the right foot come, not of the left one"),
+    ],
+)
+def test_an_insole_whose_frames_do_not_count_is_told_why(
+    cells: int, flags: int, more: list[str], said: str, terminal: Terminal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    answer(monkeypatch, "")
+    sender = Sender()
+    stream = b"".join(sender.frame([100] * cells, flags=flags) for _ in range(20))
+    with Talking(terminal, stream), pytest.raises(Unavailable, match=said):
+        calibrate.main(["insole", str(terminal.path), *more, "--write", "x.toml"])
+
+
+def test_an_insole_is_found_by_its_table(
+    terminal: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    answer(monkeypatch, "", "")
+    file = tmp_path / "robot.toml"
+    file.write_text(f'[insole.left_insole]\nport = "{terminal.path}"\nlayout = "insole-16"\n')
+    with Talking(terminal, insole_stream(7)), pytest.raises(BadFit):
+        calibrate.main(["insole", f"{file}:left_insole", "--write", str(tmp_path / "x.toml")])
+    assert "tare: 107 107" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ("", r"has no table of the name 'insole', which \[insole.left_insole\] needs"),
+        ("[insole.left_insole]\nprt = 1\n", "prt"),
+        (None, "cannot be read: No such file"),
+    ],
+)
+def test_an_insoles_table_that_cannot_be_used_is_said(content: str | None, said: str, tmp_path: Path) -> None:
+    file = tmp_path / "robot.toml"
+    if content is not None:
+        file.write_text(content)
+    with pytest.raises(SettingsError, match=said):
+        calibrate.main(["insole", f"{file}:left_insole", "--write", "x.toml"])
+
+
 def test_zero_of_an_imu_is_written(
     terminal: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

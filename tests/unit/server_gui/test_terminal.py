@@ -258,7 +258,7 @@ def test_neighbour_stays_within_limits_and_goes_the_right_way(
 def test_state_is_shape_and_word() -> None:
     assert marks.state_text("OPERATION ENABLED").plain == "● operation enabled"
     assert marks.state_text("SWITCH_ON_DISABLED").plain == "○ switch on disabled"
-    assert marks.state_text("something new").plain == "? something new"
+    assert marks.state_text("something new").plain == "▲ something new"
 
 
 def test_sparkline_leaves_a_hole_where_nothing_was() -> None:
@@ -330,7 +330,7 @@ def test_a_fault_is_shown_with_its_error_code(monkeypatch: pytest.MonkeyPatch) -
     station.take([Described(replace(description, channels=[state]))])
     _feed(station, {"left_knee.state": [3.0], "left_knee.error_code": [0x8611]})
     monkeypatch.setattr("time.monotonic_ns", lambda: 1_000_000)
-    assert "■ fault 8611h" in screen(station)
+    assert "■ fault 0x8611" in screen(station)
 
 
 @pytest.mark.parametrize("chosen", [0, 7, 29])
@@ -357,7 +357,7 @@ def test_old_values_say_how_old_they_are(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setattr("time.monotonic_ns", lambda: 3_000_000_000)
     text = screen(station)
     assert "Joints 3.0 s old" in text
-    assert "◌ stale" in text
+    assert "▲ stale" in text
 
 
 def test_missing_value_is_a_dash_and_lost_is_named_with_its_reason() -> None:
@@ -367,7 +367,7 @@ def test_missing_value_is_a_dash_and_lost_is_named_with_its_reason() -> None:
     _feed(station, {"left_knee.position": [None]})
     text = screen(station)
     assert "✕ lost 2.5 s" in text
-    assert "left_knee lost: no heartbeat from node 2" in text
+    assert "lost: left knee: no heartbeat from node 2" in text
 
 
 def test_dropped_link_is_said_before_anything_else() -> None:

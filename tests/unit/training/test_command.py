@@ -78,7 +78,7 @@ def test_a_model_that_another_one_has_overtaken_while_it_was_judged_is_not_promo
     [
         (["running"], 2, "invalid choice: 'running'"),
         (["activity", "--pseudo-labels", "0.3"], 2, "'0.3' is no probability from 0.5 to 1"),
-        (["activity"], 1, "there is no store at"),
+        (["activity"], 1, "nothing has been uploaded to it (gwrms collect --upload)"),
     ],
 )
 def test_what_cannot_be_is_a_sentence(

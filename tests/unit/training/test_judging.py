@@ -132,6 +132,8 @@ def test_different_wearers_stay_different_people() -> None:
     [
         (["P1", "P2"], [], r"wearers or sessions with labels: P1, P2; it takes two to learn"),
         ([], [], "with labels: none"),
+        (["P1"], [], "one to judge by: record more people, label .* SESSION --wearer NAME"),
+        (["P1", "P2", "P3"], ["P1", "P2"], "one to judge by: hold out fewer"),
         (["P1", "P2", "P3"], ["P1", "P2"], "it takes two to learn from and one to judge by"),
         (["P1", "P2", "P3"], ["P9"], "nobody is called 'P9'; there are P1, P2, P3"),
     ],

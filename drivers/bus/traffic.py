@@ -1,0 +1,83 @@
+"""Who talks on a bus: frames a second by kind and node, as CiA 301's pre-defined connection set tells them.
+
+Only of frames that come to us: an interface that filters for us lets no others through.
+"""
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from operator import itemgetter
+
+from drivers.bus.frames import ERROR
+
+LOOK_S = 1.0
+STANDARD = 0x7FF  # the largest id of 11 bits
+OTHER = "other"
+# CiA 301 §7.3.3: function code (id >> 7) → kind; without a node where the low seven bits are 0.
+KINDS = {
+    0: "NMT",
+    1: "EMCY",
+    2: "time",
+    **dict.fromkeys((3, 5, 7, 9), "TPDO"),
+    **dict.fromkeys((4, 6, 8, 10), "RPDO"),
+    11: "SDO answer",
+    12: "SDO request",
+    14: "heartbeat",
+}
+SYNC_ID = 0x080
+_id_of = itemgetter(1)
+
+
+@dataclass(frozen=True, slots=True)
+class Talk:
+    """Frames of one kind; `node_id` is None where they belong to no node."""
+
+    kind: str
+    node_id: int | None
+    frames_per_s: float
+
+
+class Traffic:
+    """Written by the bus's thread, read by any. It counts ids; what they mean is asked once a second."""
+
+    def __init__(self) -> None:
+        self.talks: tuple[Talk, ...] = ()  # of the last second, the most first
+        self._counts: Counter[int] = Counter()
+        self._since_ns: int | None = None
+
+    def opened(self) -> None:
+        """Nothing is known yet."""
+        self.talks, self._counts, self._since_ns = (), Counter(), None
+
+    def take(self, frames: Sequence[tuple[int, int, bytes]]) -> None:
+        """Count frames that came."""
+        self._counts.update(map(_id_of, frames))
+
+    def look(self, now_ns: int) -> None:
+        """Tell of the last second, where that is over."""
+        if self._since_ns is None:
+            self._since_ns, self._counts = now_ns, Counter()
+            return
+        seconds = (now_ns - self._since_ns) / 1e9
+        if seconds >= LOOK_S:
+            counts, self._counts, self._since_ns = self._counts, Counter(), now_ns
+            self.talks = tuple(talks(counts.items(), seconds))
+
+
+def talks(counts: Iterable[tuple[int, int]], seconds: float) -> list[Talk]:
+    """Return what frames with these ids were, the most first; error frames are none."""
+    found: Counter[tuple[str, int | None]] = Counter()
+    for can_id, count in counts:
+        if not can_id & ERROR:
+            found[kind_of(can_id)] += count
+    return [Talk(kind, node_id, count / seconds) for (kind, node_id), count in found.most_common()]
+
+
+def kind_of(can_id: int) -> tuple[str, int | None]:
+    """Return kind and node of an id."""
+    if can_id > STANDARD:
+        return OTHER, None
+    if can_id == SYNC_ID:
+        return "SYNC", None
+    kind, node_id = KINDS.get(can_id >> 7, OTHER), can_id & 0x7F
+    return (kind, node_id or None) if kind != OTHER else (OTHER, None)

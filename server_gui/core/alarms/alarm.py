@@ -1,0 +1,109 @@
+"""An active alarm: what is wrong, where, since when, what the robot did, and what to check."""
+
+import dataclasses
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from server_gui.core.alarms.marks import Mark
+from server_gui.core.alarms.texts import TEXTS, Kind
+
+
+@dataclass(frozen=True, slots=True)
+class Alarm:
+    """One thing that is wrong; `key` stays the same while it lasts.
+
+    `since_s` is UTC, None while only its first sight is known. `channel` is what shows it, `clears` is true
+    where a fault reset may help.
+    """
+
+    kind: Kind
+    subject: str  # a component, a rule, a bus; empty: the robot
+    what: str
+    where: str = ""
+    did: str = ""
+    check: str = ""
+    since_s: float | None = None
+    channel: str | None = None
+    clears: bool = False
+    is_now: bool = True  # else it is what was last known
+
+    @property
+    def key(self) -> tuple[Kind, str]:
+        """What tells it from others."""
+        return self.kind, self.subject
+
+    @property
+    def mark(self) -> Mark:
+        """How it is shown, wherever that is."""
+        return TEXTS[self.kind].mark
+
+    @property
+    def line(self) -> str:
+        """Cause first: `fault: left knee: 0x2310 continuous overcurrent at the output`."""
+        return ": ".join(
+            filter(None, (self.mark.word, self.where or self.subject.replace("_", " "), self.what))
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Active:
+    """An alarm that was seen at `since_s` (UTC) first; `at_ns` is that instant on the axis of the signals."""
+
+    alarm: Alarm
+    since_s: float
+    at_ns: int | None = None
+    is_acknowledged: bool = False
+
+
+class Alarms:
+    """The alarms of one robot, worst first and in each kind the oldest; `revision` rises with each change."""
+
+    def __init__(self) -> None:
+        self.revision = 0
+        self._active: dict[tuple[Kind, str], Active] = {}
+        self._shown: tuple[Active, ...] = ()
+
+    @property
+    def active(self) -> Sequence[Active]:
+        """What lasts, not acknowledged first."""
+        return self._shown
+
+    @property
+    def worst(self) -> Alarm | None:
+        """The worst of the robot itself, acknowledged or not: that it is known does not make it better."""
+        of_robot = (one.alarm for one in self._active.values() if one.alarm.kind not in _NOT_ITS_STATE)
+        return min(of_robot, key=lambda alarm: _RANK[alarm.kind], default=None)
+
+    def look(self, found: Iterable[Alarm], now_s: float, newest_ns: int | None = None) -> None:
+        """Take what is wrong now (UTC); `newest_ns` is the newest row, on the axis of the signals."""
+        before = self._active
+        self._active = {alarm.key: _kept(before.get(alarm.key), alarm, now_s, newest_ns) for alarm in found}
+        if self._active != before:
+            self._changed()
+
+    def acknowledge(self, key: tuple[Kind, str]) -> None:
+        """Somebody has read it; it is shown smaller until it is over."""
+        if key in self._active:
+            self._active[key] = dataclasses.replace(self._active[key], is_acknowledged=True)
+            self._changed()
+
+    def _changed(self) -> None:
+        self.revision += 1
+        self._shown = tuple(sorted(self._active.values(), key=_order))
+
+
+def _kept(before: Active | None, alarm: Alarm, now_s: float, newest_ns: int | None) -> Active:
+    """The same alarm as before, or a new one; what has become worse is to be read again."""
+    if before is None:
+        since_s = now_s if alarm.since_s is None else alarm.since_s
+        at_ns = None if newest_ns is None else newest_ns - round(max(0.0, now_s - since_s) * 1e9)
+        return Active(alarm, since_s, at_ns)
+    return dataclasses.replace(before, alarm=alarm)
+
+
+def _order(one: Active) -> tuple[bool, int, float]:
+    return one.is_acknowledged, _RANK[one.alarm.kind], one.since_s
+
+
+_RANK = {kind: place for place, kind in enumerate(Kind)}
+_NOT_ITS_STATE = frozenset({Kind.RESET})

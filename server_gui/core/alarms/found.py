@@ -1,0 +1,331 @@
+"""From what is known of a robot to its alarms. What is not known is one too."""
+
+import re
+import time
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+from gateway.client import ConnectionState
+from gateway.wire.bus import CLOSED
+from gateway.wire.robot import GuardRuleInfo
+from server_gui.core.alarms.alarm import Alarm
+from server_gui.core.alarms.marks import age_text
+from server_gui.core.alarms.texts import Kind, check_of, error_check, error_text
+from server_gui.core.follow.robot import Part, Robot
+from server_gui.core.tuning.stop import StopProgress, StopState
+
+ENABLED: Final = "operation enabled"
+MOVES: Final = 0.1  # rad/s: what turns faster is not at rest
+SOON_NS: Final = 3_000_000_000  # for so long a link without a row is nothing strange
+_IN_FAULT: Final = ("fault", "fault reaction active")
+_CODE: Final = re.compile(r"0x([0-9A-Fa-f]{4})\b")
+_PREFIX: Final = re.compile(r"^(the drive is in fault: |it reports )")
+# What shows it best, by the code's beginning; else the position.
+_SHOWN_BY: Final = (
+    ("2", ("current", "torque")),
+    ("3", ("voltage", "current")),
+    ("4", ("temperature",)),
+    ("71", ("torque", "current")),
+    ("83", ("torque", "current")),
+    ("84", ("velocity",)),
+    ("86", ("following_error", "target", "position")),
+)
+_KINDS: Final = {
+    "fault": Kind.IMPLAUSIBLE,
+    "lost": Kind.LOST,
+    "stale": Kind.PART_STALE,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Facts:
+    """What alarms are found in; `journal` is the robot's, oldest first."""
+
+    robot: Robot
+    stopping: StopProgress
+    address: str
+    journal: Iterable[Mapping[str, Any]] = ()
+
+
+def alarms(facts: Facts) -> Iterator[Alarm]:
+    """Yield what is wrong now, in no order."""
+    robot = facts.robot
+    yield from _of_stop(robot, facts.stopping)
+    if not robot.is_recording:
+        yield from _of_link(robot, facts.address)
+    for name in robot.names("joint"):
+        yield from _of_drive(robot, name, facts.stopping)
+    for part in robot.parts.values():
+        yield from _of_part(robot, part, facts.stopping)
+    yield from _of_guard(facts)
+    yield from _of_buses(robot)
+
+
+# --- STOP
+
+
+def _of_stop(robot: Robot, stopping: StopProgress) -> Iterator[Alarm]:
+    if stopping.state is StopState.NOT_CONFIRMED:
+        now, moving = _after_unconfirmed(robot), _is_live(robot) and _moving(robot)
+        what = f"still moving: STOP again; {stopping.why}" if moving else stopping.why
+        check = (
+            "use the hardware stop, now" if not _is_live(robot) or _moving(robot) else "STOP again to be sure"
+        )
+        yield Alarm(Kind.NOT_STOPPED, "", what, did=now, check=check, since_s=stopping.since_s)
+    elif stopping.held:
+        yield Alarm(
+            Kind.STOPPED,
+            "",
+            stopping.said,
+            did=_after_stop(robot, stopping),
+            check=check_of(Kind.STOPPED),
+            since_s=stopping.since_s,
+        )
+    elif stopping.was_ended and not any_enabled(robot):
+        yield Alarm(
+            Kind.RESET, "", "every drive is off", check=check_of(Kind.RESET), since_s=stopping.since_s
+        )
+
+
+def _after_stop(robot: Robot, stopping: StopProgress) -> str:
+    """What the drives' states have shown; where not all have shown it, how they are."""
+    shown = set(stopping.proofs) >= set(robot.names("joint")) and not any_enabled(robot)
+    return stopping.proof if shown else "; ".join(filter(None, (stopping.proof, _drives_did(robot))))
+
+
+def _after_unconfirmed(robot: Robot) -> str:
+    """What the robot does after a STOP that nobody has confirmed."""
+    if not _is_live(robot):
+        return "what it does now is not known"
+    moving = _moving(robot)
+    if moving:
+        return f"enabled or moving: {_listed(moving)}"
+    return _drives_did(robot)
+
+
+def any_enabled(robot: Robot) -> bool:
+    """Whether some drive is, as far as is known."""
+    return ENABLED in _words(robot).values()
+
+
+def _moving(robot: Robot) -> list[str]:
+    """Joints whose drive is enabled, or that turn."""
+    words = _words(robot)
+    return [
+        joint
+        for joint in robot.names("joint")
+        if words[joint] == ENABLED or abs(robot.values.get(f"{joint}.velocity") or 0.0) > MOVES
+    ]
+
+
+def _drives_did(robot: Robot) -> str:
+    words = _words(robot)
+    if not words:
+        return ""
+    if not _is_live(robot):
+        return "what its drives do now is not known"
+    enabled = [joint for joint, word in words.items() if word == ENABLED]
+    if None in words.values():
+        return (
+            f"the state of {_listed([joint for joint, word in words.items() if word is None])} is not known"
+        )
+    if enabled:
+        return f"{len(enabled)} of {len(words)} drives are enabled still"
+    states = dict.fromkeys(str(word) for word in words.values())
+    return f"no drive is enabled: {', '.join(_counted(words, state, len(states)) for state in states)}"
+
+
+def _counted(words: Mapping[str, str | None], state: str, states: int) -> str:
+    count = list(words.values()).count(state)
+    return f"all {state}" if states == 1 else f"{count} {state}"
+
+
+def _did(robot: Robot, stopping: StopProgress) -> str:
+    """What the robot did about it, as far as is known."""
+    held = f"STOP is held ({stopping.reason})" if stopping.held and stopping.reason else ""
+    held = held or ("STOP is held" if stopping.held else "")
+    return "; ".join(filter(None, (held, _drives_did(robot))))
+
+
+# --- the link
+
+
+def _of_link(robot: Robot, address: str) -> Iterator[Alarm]:
+    link = robot.link
+    since_s = _utc_s(link.since_ns) if link.since_ns else None
+    shown = f"what is shown is {age_text(robot.age_s())} old" if robot.age_s() is not None else ""
+    if link.state is not ConnectionState.CONNECTED:
+        kind = Kind.NO_LINK if link.links else Kind.NEVER_REACHED
+        what = link.problem or f"{address} does not answer yet"
+        did = "what it does now is not known" + (f"; {shown}" if shown else "")
+        yield Alarm(kind, "", what, did=did, check=check_of(kind), since_s=since_s if link.links else None)
+    elif robot.age_s() is None:
+        what = "linked, but no value has come"
+        yield Alarm(Kind.NO_DATA, "", what, check=check_of(Kind.NO_DATA), since_s=since_s)
+    elif robot.is_stale():
+        since_s = robot.now_s() - (robot.age_s() or 0.0)
+        yield Alarm(
+            Kind.STALE, "", "nothing new comes", did=shown, check=check_of(Kind.STALE), since_s=since_s
+        )
+
+
+# --- drives and sensors
+
+
+def _of_drive(robot: Robot, name: str, stopping: StopProgress) -> Iterator[Alarm]:
+    word, part = robot.word(f"{name}.state"), robot.parts[name]
+    if word not in _IN_FAULT and not (part.state == "fault" and "in fault" in (part.problem or "")):
+        return
+    what, code = _cause(robot, part)
+    yield Alarm(
+        Kind.FAULT,
+        name,
+        what,
+        where=_where(robot, name),
+        did=_did(robot, stopping),
+        check=check_of(Kind.FAULT) if code is None else error_check(code),
+        channel=_channel(robot, name, code),
+        clears=not robot.is_recording,
+        is_now=not robot.is_stale(),
+    )
+
+
+def _cause(robot: Robot, part: Part) -> tuple[str, int | None]:
+    """Why a drive is in fault, and its code: as the robot says, else by the code that the drive tells."""
+    said = _PREFIX.sub("", part.problem or "")
+    found = _CODE.search(said)
+    if found is not None:
+        return said, int(found[1], 16)
+    told = robot.values.get(f"{part.name}.error_code")
+    if told:
+        return error_text(int(told)), int(told)
+    return said or "the drive does not say why", None
+
+
+def _of_part(robot: Robot, part: Part, stopping: StopProgress) -> Iterator[Alarm]:
+    if robot.is_recording:
+        return
+    where, problem = _where(robot, part.name), part.problem or ""
+    kind = _KINDS.get(part.state)
+    channel = _channel(robot, part.name, None)
+    is_now = not robot.is_stale()
+    if part.state == "ok":
+        found = _CODE.search(problem)
+        if problem.startswith("it reports ") and found is not None:
+            check = error_check(int(found[1], 16))
+            what = _PREFIX.sub("", problem)
+            yield Alarm(
+                Kind.REPORTS, part.name, what, where, check=check, channel=channel, clears=True, is_now=is_now
+            )
+        return
+    if part.kind == "joint" and (robot.word(f"{part.name}.state") in _IN_FAULT or "in fault" in problem):
+        return  # told as the drive's fault
+    if kind is None:
+        what = problem or f"the robot says {part.state!r} of it"
+        yield Alarm(Kind.UNKNOWN, part.name, what, where, check=check_of(Kind.UNKNOWN), is_now=is_now)
+        return
+    did = _did(robot, stopping) if part.kind == "joint" else ""
+    since_s = None if part.age_ms is None or not is_now else time.time() - part.age_ms / 1000
+    yield Alarm(
+        kind,
+        part.name,
+        problem or "it does not say why",
+        where,
+        did,
+        check_of(kind, part.kind),
+        since_s if kind is not Kind.IMPLAUSIBLE else None,
+        channel,
+        is_now=is_now,
+    )
+
+
+# --- guard and buses
+
+
+def _of_guard(facts: Facts) -> Iterator[Alarm]:
+    robot, description = facts.robot, facts.robot.description
+    if description is None or not description.guard.configured:
+        return
+    if description.guard.problem is not None and not description.guard.rules:
+        yield Alarm(Kind.BLIND, "guard", description.guard.problem, "the guard", check=check_of(Kind.BLIND))
+    for rule in description.guard.rules:
+        state = robot.word(f"guard.{rule.name}") or rule.state
+        kind = {"tripped": Kind.GUARD, "blind": Kind.BLIND}.get(state)
+        if kind is not None:
+            yield _of_rule(kind, rule, facts)
+
+
+def _of_rule(kind: Kind, rule: GuardRuleInfo, facts: Facts) -> Alarm:
+    why = _told(facts.journal, rule.name) or rule.reason or f"{rule.watch} {rule.limit}"
+    actions = ", ".join(action.replace("_", " ") for action in rule.actions)
+    did = f"the rule's actions: {actions}" if kind is Kind.GUARD and actions else ""
+    drives = _drives_did(facts.robot) if kind is Kind.GUARD else ""
+    on = next((name for name in rule.on if name in facts.robot.parts), None)
+    channel = None if on is None else _channel(facts.robot, on, None, (rule.watch,))
+    did = "; ".join(filter(None, (did, drives)))
+    where = f"rule {rule.name}"
+    return Alarm(kind, f"guard.{rule.name}", why, where, did, check_of(kind), channel=channel)
+
+
+def _told(journal: Iterable[Mapping[str, Any]], rule: str) -> str:
+    """What the guard last wrote of one of its rules."""
+    found = ""
+    for entry in journal:
+        if entry.get("who") == "guard" and entry.get("about") == rule and entry.get("what") == "alarm":
+            found = str(entry.get("reason") or "")
+    return found
+
+
+def _of_buses(robot: Robot) -> Iterator[Alarm]:
+    description = robot.description
+    for bus in () if description is None or robot.is_recording else description.buses:
+        if bus.state == CLOSED and bus.problem is None:
+            continue
+        told = [*bus.findings, *(one for node in bus.nodes for one in node.findings)]
+        what = "; ".join(dict.fromkeys(one.words for one in told)) or bus.problem
+        if what:
+            checks = "; ".join(dict.fromkeys(one.check for one in told)) or check_of(Kind.BUS)
+            # Told once a link: whether it is so still is not known.
+            yield Alarm(Kind.BUS, f"bus.{bus.name}", what, f"bus {bus.name}", check=checks, is_now=False)
+
+
+# --- small things
+
+
+def _where(robot: Robot, name: str) -> str:
+    """`left knee, node 2 on can0`."""
+    spoken = name.replace("_", " ")
+    known = () if robot.description is None else robot.description.components
+    device = next((part.device for part in known if part.name == name), None)
+    if not isinstance(device, dict) or "node_id" not in device:
+        return spoken
+    return f"{spoken}, node {device['node_id']} on {device.get('bus', 'its bus')}"
+
+
+def _channel(robot: Robot, name: str, code: int | None, first: tuple[str, ...] = ()) -> str | None:
+    """The channel that shows what is wrong with a component, of those that the robot has."""
+    known = () if robot.description is None else robot.description.channels
+    names = [channel.name for channel in known if channel.component == name and not channel.enum]
+    told = "" if code is None else f"{code:04X}"
+    wanted = next((shown for begin, shown in _SHOWN_BY if told.startswith(begin)), ()) if told else ()
+    for quantity in (*first, *wanted, "position", "force", "tilt_forward"):
+        if f"{name}.{quantity}" in names:
+            return f"{name}.{quantity}"
+    return names[0] if names else None
+
+
+def _words(robot: Robot) -> dict[str, str | None]:
+    return {joint: robot.word(f"{joint}.state") for joint in robot.names("joint")}
+
+
+def _is_live(robot: Robot) -> bool:
+    return robot.link.state is ConnectionState.CONNECTED and not robot.is_stale()
+
+
+def _listed(names: list[str]) -> str:
+    return ", ".join(name.replace("_", " ") for name in names)
+
+
+def _utc_s(monotonic_ns: int) -> float:
+    return time.time() - (time.monotonic_ns() - monotonic_ns) / 1e9

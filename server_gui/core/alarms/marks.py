@@ -1,0 +1,93 @@
+"""States for the eye: a shape, a colour's name and a word, never one alone. The unknown is never good."""
+
+from dataclasses import dataclass
+from typing import Final
+
+from server_gui.core.follow.news import NewsKind
+from server_gui.core.follow.robot import Robot
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """`shape` is one of the keys of `GLYPHS`, `colour` a name in the palette."""
+
+    shape: str
+    colour: str
+    word: str = ""
+
+
+GLYPHS: Final = {
+    "disc": "●",
+    "ring": "○",
+    "half": "◐",
+    "cross": "✕",
+    "square": "■",
+    "triangle": "▲",
+    "diamond": "◆",
+}
+
+STATES: Final = {
+    "ok": Mark("disc", "good", "ok"),
+    "stale": Mark("triangle", "warn", "stale"),
+    "lost": Mark("cross", "bad", "lost"),
+    "fault": Mark("square", "bad", "fault"),
+    "operation enabled": Mark("disc", "good", "operation enabled"),
+    "switched on": Mark("half", "warn", "switched on"),
+    "ready to switch on": Mark("half", "warn", "ready to switch on"),
+    "switch on disabled": Mark("ring", "dim", "switch on disabled"),
+    "not ready to switch on": Mark("ring", "dim", "not ready"),
+    "quick stop active": Mark("triangle", "warn", "quick stop active"),
+    "fault reaction active": Mark("square", "bad", "fault reaction"),
+}
+
+NEWS: Final = {
+    NewsKind.LINK: Mark("cross", "bad", "LINK"),
+    NewsKind.STATE: Mark("diamond", "accent", "STATE"),
+    NewsKind.WARNING: Mark("triangle", "warn", "WARN"),
+    NewsKind.FAULT: Mark("square", "bad", "FAULT"),
+    NewsKind.LOST: Mark("cross", "bad", "LOST"),
+    NewsKind.STALE: Mark("triangle", "warn", "STALE"),
+    NewsKind.PARAMETER: Mark("disc", "good", "PARAM"),
+    NewsKind.STOP: Mark("triangle", "warn", "STOP"),
+    NewsKind.NOT_STOPPED: Mark("square", "bad", "STOP"),
+    NewsKind.CONTROL: Mark("diamond", "accent", "CONTROL"),
+}
+
+NOT_KNOWN: Final = Mark("ring", "old", "not known")
+
+
+def state_mark(word: str | None) -> Mark:
+    """Return the mark of a component's or drive's state."""
+    return NOT_KNOWN if word is None else STATES.get(word.lower(), Mark("triangle", "warn", word))
+
+
+def drives_mark(robot: Robot) -> Mark:
+    """Return all drives in one: enabled only where every one is, the worst otherwise."""
+    joints = robot.names("joint")
+    if not joints:
+        return Mark("ring", "old", "no drives")
+    if robot.is_stale():
+        return Mark("ring", "old", "drives not known now")
+    words = [robot.word(f"{joint}.state") for joint in joints]
+    for bad in ("fault", "fault reaction active", "quick stop active"):
+        if bad in words:
+            return Mark(STATES[bad].shape, STATES[bad].colour, f"{words.count(bad)} in {bad}")
+    enabled = words.count("operation enabled")
+    if None in words:
+        return Mark("ring", "old", f"{words.count(None)} of {len(joints)} drives not known")
+    if enabled == len(joints):
+        return Mark("disc", "good", "operation enabled")
+    if enabled:
+        return Mark("half", "warn", f"{enabled} of {len(joints)} enabled")
+    return state_mark(words[0]) if len(set(words)) == 1 else Mark("half", "warn", "drives differ")
+
+
+def age_text(age_s: float | None) -> str:
+    """Return an age for people."""
+    if age_s is None:
+        return "no data yet"
+    if age_s < 1.0:
+        return f"{age_s * 1000:.0f} ms"
+    if age_s < 120.0:
+        return f"{age_s:.1f} s"
+    return f"{age_s / 60:.0f} min" if age_s < 7200 else f"{age_s / 3600:.1f} h"

@@ -1,0 +1,123 @@
+"""The table of everything that can be wrong: how it is marked, and what to check."""
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import Final
+
+from drivers.error_codes import error_check, error_text
+from server_gui.core.alarms.marks import Mark
+
+__all__ = ["TEXTS", "Kind", "Text", "check_of", "error_check", "error_text"]
+
+
+class Kind(Enum):
+    """What sort of thing is wrong; the worst comes first."""
+
+    NOT_STOPPED = "STOP NOT CONFIRMED"
+    NEVER_REACHED = "never reached"
+    NO_LINK = "no link"
+    FAULT = "fault"
+    GUARD = "guard tripped"
+    IMPLAUSIBLE = "not to be believed"
+    LOST = "lost"
+    NO_DATA = "no data yet"
+    STALE = "stale"
+    STOPPED = "STOPPED"
+    PART_STALE = "sensor stale"
+    UNKNOWN = "state not known"
+    BUS = "bus"
+    BLIND = "guard blind"
+    REPORTS = "warning"
+    RESET = "stop reset"
+
+
+@dataclass(frozen=True, slots=True)
+class Text:
+    """How a kind is marked, and what to check where nothing better is known."""
+
+    mark: Mark
+    check: str
+
+
+def _text(kind: Kind, shape: str, colour: str, check: str) -> tuple[Kind, Text]:
+    return kind, Text(Mark(shape, colour, kind.value), check)
+
+
+TEXTS: Final = dict(
+    (
+        _text(Kind.NOT_STOPPED, "square", "bad", "use the hardware stop, now"),
+        _text(
+            Kind.NEVER_REACHED,
+            "cross",
+            "bad",
+            "is the robot switched on, its gateway running (gwrms serve), and the address right?",
+        ),
+        _text(
+            Kind.NO_LINK,
+            "cross",
+            "bad",
+            "look at the robot itself; check its power, network and gateway",
+        ),
+        _text(Kind.NO_DATA, "ring", "old", "it takes a few seconds; else look whether its devices answer"),
+        _text(
+            Kind.STALE,
+            "triangle",
+            "warn",
+            "check the network's load, and what keeps the robot's computer busy",
+        ),
+        _text(
+            Kind.FAULT, "square", "bad", "look into the drive's manual; note what the joint did just before"
+        ),
+        _text(
+            Kind.GUARD,
+            "square",
+            "bad",
+            "find out why before the stop is reset; the rule's limit is in its file",
+        ),
+        _text(Kind.IMPLAUSIBLE, "square", "bad", "check the encoder or sensor, and its cable"),
+        _text(Kind.LOST, "cross", "bad", "check its power, its cable and its address"),
+        _text(
+            Kind.STOPPED,
+            "triangle",
+            "warn",
+            "to go on: see that nobody is in danger, “Reset stop…”, then enable the drives "
+            "(gwrms enable, or the robot's controller)",
+        ),
+        _text(Kind.PART_STALE, "triangle", "warn", "check its cable or radio, and its battery"),
+        _text(
+            Kind.UNKNOWN,
+            "ring",
+            "old",
+            "the robot says of it what this window does not know: update the window",
+        ),
+        _text(Kind.BUS, "triangle", "warn", "check termination, wiring, bitrate and load (gwrms describe)"),
+        _text(
+            Kind.BLIND, "triangle", "warn", "the guard does not see what it is to watch: check that component"
+        ),
+        _text(Kind.REPORTS, "triangle", "warn", "look into the device's manual"),
+        _text(
+            Kind.RESET,
+            "ring",
+            "dim",
+            "to go on: enable the drives (gwrms enable, or the robot's controller); nothing moves until then",
+        ),
+    )
+)
+
+# By what sort of component is not there, or silent.
+_CHECKS: Final = {
+    (Kind.LOST, "joint"): "check the drive's power, its CAN cable and its node id",
+    (Kind.LOST, "insole"): "check that it is switched on and charged, its plug or its radio",
+    (Kind.LOST, "imu"): "check its power, its plug and its port",
+    (Kind.PART_STALE, "joint"): "check the drive's CAN cable, and the bus's load and errors (gwrms describe)",
+    (Kind.PART_STALE, "insole"): "check its plug or radio, and its battery",
+    (Kind.PART_STALE, "imu"): "check its plug, its cable and its rate",
+    (Kind.IMPLAUSIBLE, "joint"): "check the encoder and its cable; home the joint again",
+    (Kind.IMPLAUSIBLE, "insole"): "check how it lies in the shoe, and zero it unloaded",
+    (Kind.IMPLAUSIBLE, "imu"): "check that it sits firmly, and its axes",
+}
+
+
+def check_of(kind: Kind, component: str = "") -> str:
+    """What to check, by the kind of component too."""
+    return _CHECKS.get((kind, component), TEXTS[kind].check)

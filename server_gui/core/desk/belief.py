@@ -1,0 +1,75 @@
+"""How far a prediction is to be believed, in words that a wearer's therapist understands."""
+
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from enum import Enum
+from typing import Final
+
+from ml.registry.card import Source
+from ml.serving.trust import Level
+from server_gui.core.desk.station import Station
+from server_gui.core.prediction.current import Recalled, Shown, Told
+from server_gui.core.prediction.state import Quality
+
+QUICK_STOP: Final = "quick stop active"
+SOURCES: Final = {
+    Source.SIMULATED: "learned in the simulator",
+    Source.RECORDED: "learned from recordings",
+    Source.MIXED: "learned from recordings and the simulator",
+}
+
+
+class Worth(Enum):
+    """What it is worth."""
+
+    CHECKED = "checked"  # people have labelled of late what this model was to say
+    UNCHECKED = "not checked"
+    DOUBTFUL = "doubtful"
+
+
+@dataclass(frozen=True, slots=True)
+class Belief:
+    """`wordings` say it, the fullest first."""
+
+    worth: Worth
+    wordings: tuple[str, ...]
+
+
+def belief(told: Told) -> Belief:
+    """Return how far what a model says is to be believed."""
+    if isinstance(told, Recalled):
+        return Belief(Worth.UNCHECKED, (f"said then by the model {told.prediction.model}", "said then"))
+    predicted = told.predicted
+    if predicted.trust.level is Level.DRIFTED:
+        return Belief(Worth.DOUBTFUL, (_drifted(told), "unlike its learning", "do not rely on it"))
+    if predicted.trust.level is Level.UNSURE:
+        return Belief(Worth.DOUBTFUL, ("mostly unsure here: do not rely on it", "mostly unsure"))
+    quality = predicted.quality
+    if quality is None or not quality.labelled:
+        card = predicted.card
+        about = f"{SOURCES[card.source]} {_ago(card.made)}"
+        return Belief(Worth.UNCHECKED, (f"not yet checked on this robot, {about}", "not yet checked"))
+    return Belief(Worth.CHECKED, _checked(quality))
+
+
+def is_stopped(station: Station) -> bool:
+    """Return whether a stop is held or under way: what a robot does then is no sign of anything."""
+    robot = station.robot
+    words = (robot.word(f"{joint}.state") or "" for joint in robot.names("joint"))
+    return station.stopping.held or any(word.lower() == QUICK_STOP for word in words)
+
+
+def _checked(quality: Quality) -> tuple[str, ...]:
+    right = 100 * quality.right / quality.labelled
+    short = f"right {right:.0f} % last week"
+    return f"{short} ({quality.labelled} checked)", short
+
+
+def _drifted(told: Shown) -> str:
+    channels = ", ".join(told.predicted.trust.drifted[:2])
+    return f"unlike what it has learned{f' ({channels})' if channels else ''}: do not rely on it"
+
+
+def _ago(made: datetime) -> str:
+    days = (datetime.now(UTC) - made).days
+    return "today" if days < 1 else "yesterday" if days == 1 else f"{days} days ago"

@@ -1,0 +1,172 @@
+"""What has happened on the axis of time: stops, faults, writes, trials, marks; live or of a recording."""
+
+import bisect
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any, Final
+
+from ml.store.labels import utc_ns
+from server_gui.core.recording.batching import EventKind
+
+Entry = Mapping[str, Any]
+KEPT: Final = 500
+JUST_BEFORE_NS: Final = 200_000_000  # flags of one kind and text so near each other are one
+
+
+class FlagKind(Enum):
+    """What sort of thing happened; the word is shown."""
+
+    STOP = "stop"
+    FAULT = "fault"
+    WRITE = "write"
+    TRIAL = "trial"
+    MARK = "mark"
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Flag:
+    """One thing that happened at `at_ns`, on the clock of the axis that it stands on."""
+
+    at_ns: int
+    text: str
+    kind: FlagKind
+
+
+class Flags:
+    """The newest `KEPT` of one axis, in the order of time; `revision` rises with each change."""
+
+    def __init__(self) -> None:
+        self._flags: list[Flag] = []
+        self.revision = 0
+
+    def __iter__(self) -> Iterator[Flag]:
+        return iter(self._flags)
+
+    def __len__(self) -> int:
+        return len(self._flags)
+
+    def add(self, *flags: Flag) -> None:
+        """Add these; one that is known already, or follows its like at once, is not added again."""
+        for flag in flags:
+            if any(_same(flag, known) for known in self.between(flag.at_ns - JUST_BEFORE_NS, flag.at_ns + 1)):
+                continue
+            bisect.insort(self._flags, flag, key=_at)
+            del self._flags[:-KEPT]
+            self.revision += 1
+
+    def between(self, begin_ns: int, end_ns: int) -> Sequence[Flag]:
+        """Return those from one instant up to before another."""
+        first = bisect.bisect_left(self._flags, begin_ns, key=_at)
+        return self._flags[first : bisect.bisect_left(self._flags, end_ns, key=_at)]
+
+    def clear(self) -> None:
+        """Forget them: the clock has begun anew."""
+        self._flags.clear()
+        self.revision += 1
+
+
+class StateWatch:
+    """Finds in rows where drives fall into a fault, or are stopped; remembers each drive's last state.
+
+    Drives that do so in one row are one flag. `words` are those of the channels that are states: what
+    `robot.describe` tells of them.
+    """
+
+    def __init__(self) -> None:
+        self._last: dict[str, float] = {}
+
+    def take(
+        self,
+        stamps_ns: Sequence[int],
+        columns: Mapping[str, Sequence[float | None]],
+        words: Mapping[str, Mapping[str, str]],
+    ) -> Iterator[Flag]:
+        """Yield what these rows bring."""
+        found: dict[tuple[int, FlagKind], list[str]] = {}
+        for channel in columns.keys() & words.keys():
+            if channel.endswith(".state"):
+                for at_ns, kind in self._turns(stamps_ns, channel, columns[channel], words[channel]):
+                    found.setdefault((at_ns, kind), []).append(_spoken(channel))
+        for (at_ns, kind), joints in sorted(found.items(), key=lambda item: item[0][0]):
+            yield Flag(at_ns, f"{', '.join(sorted(joints))}: {_HOW[kind]}", kind)
+
+    def _turns(
+        self,
+        stamps_ns: Sequence[int],
+        channel: str,
+        column: Sequence[float | None],
+        words: Mapping[str, str],
+    ) -> Iterator[tuple[int, FlagKind]]:
+        before = self._last.get(channel)
+        if before is not None and column.count(before) == len(column):
+            return  # as nearly always
+        for at_ns, value in zip(stamps_ns, column, strict=True):
+            if value is None or value != value or value == before:
+                continue
+            kind = _kind(words.get(str(int(value)), ""))
+            was = None if before is None else _kind(words.get(str(int(before)), ""))
+            if kind is not None and kind is not was and before is not None:
+                yield at_ns, kind
+            before = self._last[channel] = value
+
+
+def of_journal(entries: Iterable[Entry], boot_id: str) -> Iterator[Flag]:
+    """Yield what a robot's journal tells of one boot, on the robot's clock."""
+    for entry in entries:
+        if entry.get("boot_id") == boot_id:
+            yield from _of_entry(entry, "monotonic_ns")
+
+
+def of_recorded_journal(entries: Iterable[Entry]) -> Iterator[Flag]:
+    """Yield what a recorded journal tells, in UTC."""
+    for entry in entries:
+        yield from _of_entry(entry, "utc_ns")
+
+
+def of_marks(events: Iterable[Entry]) -> Iterator[Flag]:
+    """Yield the marks among the events of a recording, in UTC."""
+    for event in events:
+        if event.get("kind") == EventKind.MARKER.value:
+            yield Flag(utc_ns(event["utc"]), str(event.get("text") or "mark"), FlagKind.MARK)
+
+
+def _of_entry(entry: Entry, clock: str) -> Iterator[Flag]:
+    kind, at_ns = _ENTRIES.get(str(entry.get("what"))), entry.get(clock)
+    if kind is not None and isinstance(at_ns, int):
+        trial = kind is FlagKind.WRITE and entry.get("trial_s") is not None
+        yield Flag(at_ns, _said(entry), FlagKind.TRIAL if trial else kind)
+
+
+def _said(entry: Entry) -> str:
+    """Who did what: the parameters of a write, the reason of a stop."""
+    after, what, who = entry.get("after"), str(entry.get("what")), entry.get("who")
+    about = ", ".join(map(str, after)) if isinstance(after, Mapping) else str(entry.get("reason") or "")
+    return " ".join(filter(None, (what, about, f"by {who}" if who else "")))
+
+
+def _kind(word: str) -> FlagKind | None:
+    if "fault" in word.lower():
+        return FlagKind.FAULT
+    return FlagKind.STOP if "quick stop" in word.lower() else None
+
+
+def _spoken(channel: str) -> str:
+    return channel.rpartition(".")[0].replace("_", " ")
+
+
+def _same(flag: Flag, known: Flag) -> bool:
+    return (flag.kind, flag.text) == (known.kind, known.text)
+
+
+def _at(flag: Flag) -> int:
+    return flag.at_ns
+
+
+_HOW: Final = {FlagKind.FAULT: "fault", FlagKind.STOP: "quick stop"}
+_ENTRIES: Final = {
+    "stop": FlagKind.STOP,
+    "write": FlagKind.WRITE,
+    "trial confirmed": FlagKind.TRIAL,
+    "taken back": FlagKind.TRIAL,
+}

@@ -1,0 +1,135 @@
+"""How a robot's CAN buses are: what is an alarm, what a warning, and who talks how much."""
+
+import time
+from dataclasses import dataclass
+from enum import Enum
+from typing import Final
+
+from gateway.client import ConnectionState
+from gateway.wire.bus import CLOSED, BusInfo, NodeInfo
+from server_gui.core.follow.robot import Robot
+
+ACTIVE: Final = "error active"
+OFF: Final = "bus off"
+FULL_PERCENT: Final = 95.0  # of its time: hardly a frame more has room
+BUSY_PERCENT: Final = 80.0  # as the gateway finds it
+MISSING_PERCENT: Final = 1.0  # of a node's PDOs
+OLD_S: Final = 5.0  # what was seen before is not known now
+UNKNOWN: Final = "bus not known"
+
+
+class Level(Enum):
+    """How bad it is; what is not known is none of the others."""
+
+    GOOD = "ok"
+    UNKNOWN = "not known"
+    WARNING = "warning"
+    ALARM = "alarm"
+
+
+ORDER: Final = tuple(Level)
+
+
+@dataclass(frozen=True, slots=True)
+class Talking:
+    """One sender on a bus: its share of the frames that came, and what it sends, the most first."""
+
+    node_id: int | None
+    names: tuple[str, ...]
+    frames_per_s: float
+    share: float  # 0–1
+    kinds: tuple[tuple[str, float], ...]
+
+
+def seen(robot: Robot) -> tuple[BusInfo, ...] | None:
+    """Return the buses as they are now; None where that is not known."""
+    linked = robot.link.state is ConnectionState.CONNECTED
+    if robot.buses is None or robot.buses_at_ns is None or not linked:
+        return None
+    old = time.monotonic_ns() - robot.buses_at_ns > OLD_S * 1e9
+    return None if old else robot.buses
+
+
+def level(bus: BusInfo) -> Level:
+    """Return how bad a bus is."""
+    if bus.state in (CLOSED, OFF) or (bus.load_percent or 0.0) >= FULL_PERCENT:
+        return Level.ALARM
+    if bus.state != ACTIVE or (bus.load_percent or 0.0) >= BUSY_PERCENT or bus.findings or bus.problem:
+        return Level.WARNING
+    return max((node_level(node) for node in bus.nodes), key=ORDER.index, default=Level.GOOD)
+
+
+def node_level(node: NodeInfo) -> Level:
+    """Return how bad a node is."""
+    missing = node.pdos_missing_percent
+    return Level.WARNING if node.findings or (missing or 0.0) >= MISSING_PERCENT else Level.GOOD
+
+
+def load_text(bus: BusInfo) -> str:
+    """Return the share of a bus's time that is taken."""
+    return "–" if bus.load_percent is None else f"{min(bus.load_percent, 100.0):.0f} %"
+
+
+def errors_text(bus: BusInfo) -> str:
+    """Return its error counters in words."""
+    count = "1 error" if bus.error_frames == 1 else f"{bus.error_frames} errors"
+    return count if not bus.bus_offs else f"{count}, {bus.bus_offs} × bus off"
+
+
+def worst(robot: Robot) -> tuple[Level, tuple[str, ...]]:
+    """Return the worst bus in one line, the fullest wording first."""
+    buses = seen(robot)
+    if buses is None:
+        return Level.UNKNOWN, (UNKNOWN, "CAN –")
+    if not buses:
+        return Level.UNKNOWN, ("no CAN bus", "no bus")
+    bus = max(buses, key=lambda one: (ORDER.index(level(one)), one.load_percent or 0.0))
+    load = f"CAN {bus.name} {load_text(bus)}"
+    state = "" if bus.state == ACTIVE else f", {bus.state}"
+    most = next((one for one in talking(bus) if one.names), None)
+    full = () if most is None else (f"{load}, {errors_text(bus)}{state} · most: {_names(most)}",)
+    return level(bus), (
+        *full,
+        f"{load}, {errors_text(bus)}{state}",
+        f"CAN {load_text(bus)}, {errors_text(bus)}",
+    )
+
+
+def alarms(robot: Robot) -> list[tuple[Level, str, str]]:
+    """Return what is wrong with the buses now: how bad, what, and what to check."""
+    found: list[tuple[Level, str, str]] = []
+    for bus in seen(robot) or ():
+        bad = level(bus)
+        if bad is Level.ALARM and (bus.load_percent or 0.0) >= FULL_PERCENT:
+            text = f"bus {bus.name} is full: {load_text(bus)} of its time is taken"
+            found.append((bad, text, "look who sends so much, and send fewer PDOs or SYNC less often"))
+        elif bad in (Level.ALARM, Level.WARNING):
+            first = bus.findings[0] if bus.findings else None
+            text = bus.problem or (first.words if first is not None else bus.state)
+            found.append((bad, f"bus {bus.name}: {text}", "" if first is None else first.check))
+    return found
+
+
+def talking(bus: BusInfo) -> list[Talking]:
+    """Return who talks on a bus, the most first; `node_id` None is what belongs to no node."""
+    names = {node.node_id: tuple(node.components) for node in bus.nodes}
+    total = sum(one.frames_per_s for one in bus.talks)
+    by_node: dict[int | None, dict[str, float]] = {}
+    for one in bus.talks:
+        kinds = by_node.setdefault(one.node_id, {})
+        kinds[one.kind] = kinds.get(one.kind, 0.0) + one.frames_per_s
+    found = [
+        Talking(
+            node_id,
+            names.get(node_id, ()) if node_id is not None else (),
+            rate := sum(kinds.values()),
+            rate / total if total else 0.0,
+            tuple(sorted(kinds.items(), key=lambda item: -item[1])),
+        )
+        for node_id, kinds in by_node.items()
+    ]
+    return sorted(found, key=lambda one: -one.frames_per_s)
+
+
+def _names(one: Talking) -> str:
+    return f"{', '.join(name.replace('_', ' ') for name in one.names)} {100 * one.share:.0f} %"

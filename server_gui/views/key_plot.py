@@ -1,0 +1,132 @@
+"""A plot of the overview: its channels with their values, its limits, and what happened when."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from gateway.units import Unit
+from server_gui.core.desk.desk import Desk
+from server_gui.core.desk.measuring import nearest
+from server_gui.core.desk.station import Station
+from server_gui.views.marks import old_text
+from server_gui.views.theme import Theme
+from server_gui.views.widgets.card import Card
+from server_gui.views.widgets.plot import Curve, Mouse, PlacedFlag, Plot, css
+from server_gui.views.widgets.time_axis import time_text
+from server_gui.views.widgets.wrapped import Wrapped
+
+SECONDS: Final = 10.0
+AT_FLAG: Final = 0.01  # of what is in sight, that the pointer may be beside a flag
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """What is plotted: channels with the colours and words of their curves; `least` range is SI.
+
+    Curves whose channel's component has a parameter `limit` may come no further from 0 than that.
+    """
+
+    title: str
+    si: str
+    least: float
+    curves: tuple[tuple[str, str, str], ...]  # channel, colour, word
+    limit: str = ""
+
+
+class KeyPlot(Card):
+    """Its time is that of all plots beside it."""
+
+    def __init__(self, desk: Desk, theme: Theme, kind: Kind) -> None:
+        super().__init__(kind.title)
+        self._desk = desk
+        self._theme = theme
+        self._kind = kind
+        self.channels = tuple(channel for channel, _, _ in kind.curves)
+        self.legend = Wrapped(f"Values of {kind.title}")
+        self.plot = Plot(theme, SECONDS, self._unit.scale * kind.least, Mouse.TIME)
+        self.plot.set_curves([Curve(channel, colour) for channel, colour, _ in kind.curves])
+        self.plot.setAccessibleName(kind.title)
+        self.plot.setToolTip("Wheel: time · double click: all of it · click: open in Signals")
+        self.body.addWidget(self.legend)
+        self.body.addWidget(self.plot, 1)
+        self._hover: float | None = None
+        theme.changed.connect(self._resize)
+        self._resize()
+
+    def show_hover(self, at: float | None) -> None:
+        """Read the values at this time (s until the newest row), None: the newest."""
+        self._hover = at
+        self.plot.show_hover(at)
+
+    def refresh(self, station: Station, flags: Sequence[PlacedFlag], *, slow: bool) -> None:
+        """Draw the past of the channels."""
+        unit, rings = self._unit, station.rings
+        times = rings.times(SECONDS)
+        columns = [rings.values(name, len(times)) for name in self.channels]
+        live = station.is_live
+        self.plot.show_flags(flags)
+        self.plot.show_limits(
+            [side * limit * unit.scale for limit in self._limits(station) for side in (1, -1)]
+        )
+        self.plot.draw(rings.source, times, columns, live=live, scale=unit.scale)
+        if slow or self._hover is not None:
+            self._say(station, unit, flags, live=live)
+
+    def _say(self, station: Station, unit: Unit, flags: Sequence[PlacedFlag], *, live: bool) -> None:
+        self.set_title(f"{self._kind.title} ({unit.symbol})")
+        values = self._values(station)
+        told = {word: unit.text(value) for (_, _, word), value in zip(self._kind.curves, values, strict=True)}
+        parts = [
+            (css(self._theme, colour), "━", f"{word} {told[word]}") for _, colour, word in self._kind.curves
+        ]
+        limits = self._limits(station)
+        if limits:
+            said = " and ".join(f"±{unit.editable(limit)}" for limit in dict.fromkeys(limits))
+            parts.append((css(self._theme, "bad"), "┅", f"limit {said}"))
+        self.legend.say(parts)
+        self.plot.setAccessibleDescription(
+            ", ".join(f"{word} {text} {unit.symbol}" for word, text in told.items())
+        )
+        self.set_note(*self._when(station, flags, live=live))
+
+    def _when(self, station: Station, flags: Sequence[PlacedFlag], *, live: bool) -> tuple[str, ...]:
+        if self._hover is None:
+            return ("",) if live else old_text(station)
+        at, (left, right) = self._hover, self.plot.window_s
+        close = [flag for flag in flags if abs(flag.at - at) <= AT_FLAG * (right - left)]
+        return tuple(
+            dict.fromkeys(
+                (*(f"{flag.text} · {time_text(round(at, 2))}" for flag in close[:1]), time_text(round(at, 2)))
+            )
+        )
+
+    def _values(self, station: Station) -> list[float | None]:
+        """The newest, or those at the pointer."""
+        if self._hover is None:
+            return [station.robot.values.get(name) for name in self.channels]
+        times = station.rings.times(SECONDS)
+        row = nearest(times, times[-1] + self._hover) if len(times) else None
+        if row is None:
+            return [None] * len(self.channels)
+        found = [station.rings.values(name, len(times))[row] for name in self.channels]
+        return [None if np.isnan(value) else float(value) for value in found]
+
+    def _limits(self, station: Station) -> list[float]:
+        if not self._kind.limit:
+            return []
+        names = [f"{channel.partition('.')[0]}.{self._kind.limit}" for channel in self.channels]
+        held = [station.robot.parameters.get(name) for name in names]
+        return [
+            one.value
+            for one in held
+            if one is not None and one.value is not None and one.unit == self._kind.si
+        ]
+
+    @property
+    def _unit(self) -> Unit:
+        return self._desk.shown.units.unit("", self._kind.si)
+
+    def _resize(self) -> None:
+        self.plot.setMinimumHeight(self._theme.px(58))

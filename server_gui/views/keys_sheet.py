@@ -1,0 +1,120 @@
+"""Every key of the window, on a sheet over the tabs: STOP stays in sight beside it."""
+
+from typing import Final
+
+from PySide6.QtCore import QEvent, QObject, Qt
+from PySide6.QtGui import QKeySequence, QShortcut
+from PySide6.QtWidgets import QFrame, QGridLayout, QPushButton, QScrollArea, QVBoxLayout, QWidget
+
+from server_gui.views.theme import Theme
+from server_gui.views.widgets.plain import PlainLabel
+
+# What a key is pressed for, by where it holds. A test compares the first three groups with the window's own.
+KEYS: Final[dict[str, dict[str, str]]] = {
+    "Everywhere": {
+        "F12": "STOP the robot that is looked at",
+        "Ctrl+Space": "STOP the robot that is looked at",
+        "Ctrl+1": "Look at the first robot; up to Ctrl+9",
+        "Alt+O": "Overview; Alt with the underlined letter opens each tab",
+        "Ctrl+F": "Filter the parameters",
+        "F9": "Hide the panels, or show them again",
+        "F1": "What the manual says of this",
+        "?": "This sheet, and away with it",
+    },
+    "Parameters": {
+        "Ctrl+P": "Pin the chosen parameter, or no more",
+        "F2": "Type a new value for the chosen one",
+        "Ctrl+Return": "Review what is staged",
+        "Ctrl+Z": "Stage the inverse of the latest write",
+        "Ctrl+K": "Keep what is on trial",
+        "Ctrl+T": "Take back what is on trial",
+        "Esc": "Back from the review",
+    },
+    "Signals": {
+        "Ctrl+Shift+P": "Pause the view, or let it go on",
+        "Ctrl++": "See less of the time",
+        "Ctrl+-": "See more of the time",
+        "Ctrl+0": "Fit: the range follows the data again",
+        "Ctrl+Left": "Earlier",
+        "Ctrl+Right": "Later",
+        "Ctrl+D": "Two cursors; A or B chooses one, the arrows move it",
+        "Ctrl+Up": "To the event before",
+        "Ctrl+Down": "To the next event",
+        "Ctrl+E": "Save as CSV",
+    },
+    "A recording": {
+        "Space": "Play or pause",
+        "← →": "1 s back or on; Page: 10 s; Home, End",
+        "N": "To the next event; with Shift to the one before",
+        "I, O": "The span begins, ends here",
+        "Del": "Take back the chosen label",
+    },
+    "Tables and lists": {
+        "Tab": "From one control to the next; with Shift back",
+        "Arrows": "From row to row; in a tree → opens and ← closes",
+        "Return": "On a table's titles, which Tab leads to: ← → chooses one, Return sorts by it",
+        "Space": "Tick a channel; press a button",
+    },
+}
+
+
+class KeysSheet(QFrame):
+    """Over `below`, as large as there is room; `turn` shows it or puts it away."""
+
+    def __init__(self, theme: Theme, below: QWidget) -> None:
+        super().__init__(below)
+        self._theme = theme
+        self._below = below
+        self.setObjectName("card")
+        self.setAccessibleName("Keys")
+        words = QWidget()
+        words.setObjectName("page")
+        grid = QGridLayout(words)
+        grid.setColumnStretch(1, 1)
+        row = 0
+        for group, keys in KEYS.items():
+            row = _fill(grid, row, group, keys)
+        grid.setRowStretch(row, 1)
+        scrolled = QScrollArea()
+        scrolled.setWidgetResizable(True)
+        scrolled.setWidget(words)
+        scrolled.setAccessibleName("Keys")
+        self.close_button = QPushButton("Close")
+        self.close_button.clicked.connect(self.turn)
+        everything = QVBoxLayout(self)
+        everything.addWidget(scrolled, 1)
+        everything.addWidget(self.close_button, 0, Qt.AlignmentFlag.AlignRight)
+        away = QShortcut(QKeySequence(Qt.Key.Key_Escape), self, self.turn)
+        away.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
+        below.installEventFilter(self)
+        self.hide()
+
+    def turn(self) -> None:
+        """Show it, or put it away."""
+        self.setVisible(self.isHidden())
+        if self.isVisible():
+            self._fit()
+            self.raise_()
+            self.close_button.setFocus()
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        if event.type() == QEvent.Type.Resize and self.isVisible():
+            self._fit()
+        return False
+
+    def _fit(self) -> None:
+        room = self._below.rect().adjusted(8, 8, -8, -8)
+        width = min(room.width(), self._theme.px(560))
+        self.setGeometry(room.x() + (room.width() - width) // 2, room.y(), width, room.height())
+
+
+def _fill(grid: QGridLayout, row: int, group: str, keys: dict[str, str]) -> int:
+    title = PlainLabel(group)
+    title.setObjectName("title")
+    grid.addWidget(title, row, 0, 1, 2)
+    for place, (key, what) in enumerate(keys.items(), row + 1):
+        words = PlainLabel(what)
+        words.setWordWrap(True)
+        grid.addWidget(PlainLabel(key), place, 0)
+        grid.addWidget(words, place, 1)
+    return row + 1 + len(keys)

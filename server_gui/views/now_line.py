@@ -1,0 +1,156 @@
+"""The overview's first line: drives, activity with how far to believe it, and what is on trial."""
+
+from typing import Final
+
+from PySide6.QtCore import QSize, Qt
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QFrame, QGridLayout, QHBoxLayout, QPushButton, QSizePolicy, QVBoxLayout, QWidget
+
+from server_gui.core.desk.desk import Desk
+from server_gui.core.desk.station import Station
+from server_gui.core.tuning.edits import unit_of
+from server_gui.core.tuning.writing import Trial
+from server_gui.views.marks import Mark, drives_mark
+from server_gui.views.predictions import activity
+from server_gui.views.theme import Theme
+from server_gui.views.widgets.fitted import FittedLabel
+from server_gui.views.widgets.mark import MarkIcon
+from server_gui.views.widgets.plain import set_tip
+
+A_FACT: Final = 230  # wide at least, at text of 100 %, where several stand beside each other
+ON_TRIAL: Final = Mark("half", "warn", "on trial")
+
+
+class Fact(QWidget):
+    """A mark, what it says in large letters, and a line below."""
+
+    def __init__(self, theme: Theme, name: str) -> None:
+        super().__init__()
+        self._theme = theme
+        self.setAccessibleName(name)
+        self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
+        self._icon, self.main, self.detail = MarkIcon(theme, 13), FittedLabel("title"), FittedLabel("dim")
+        words = QVBoxLayout()
+        words.setSpacing(0)
+        words.addWidget(self.main)
+        words.addWidget(self.detail)
+        self.row = QHBoxLayout(self)
+        self.row.setContentsMargins(0, 0, 0, 0)
+        self.row.setSpacing(8)
+        self.row.addWidget(self._icon)
+        self.row.addLayout(words, 1)
+        theme.changed.connect(self._restyle)
+        self._restyle()
+
+    def say(self, mark: Mark, main: tuple[str, ...], detail: tuple[str, ...], tip: str = "") -> None:
+        """Say this; of each the fullest wording first."""
+        self._icon.show_mark(mark)
+        self.main.say(*main)
+        self.detail.say(*detail)
+        self.setAccessibleDescription(f"{main[0]}, {detail[0]}")
+        set_tip(self, "\n".join(filter(None, (main[0], detail[0], tip))))
+
+    def _restyle(self) -> None:
+        self.main.setFont(self._theme.text_font(1.15, bold=True))
+        self.detail.setFont(self._theme.text_font())
+
+
+class NowLine(QFrame):
+    """Facts beside each other, or below each other where there is less room."""
+
+    def __init__(self, desk: Desk, theme: Theme) -> None:
+        super().__init__()
+        self._desk = desk
+        self._theme = theme
+        self.setObjectName("card")
+        self.setAccessibleName("What is so now")
+        self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
+        self.drives, self.activity = Fact(theme, "Drives"), Fact(theme, "Activity")
+        self.trial = Fact(theme, "Trial")
+        self.trial.setParent(self)  # also while it has no place, so that it is no window of its own
+        self.keep, self.take_back = QPushButton("Keep"), QPushButton("Take back")
+        self.keep.setObjectName("primary")
+        self.keep.setToolTip("What is on trial stays")
+        self.take_back.setToolTip("The values from before are in force again")
+        self.keep.clicked.connect(lambda: desk.selected.keep_trial() if desk.selected else None)
+        self.take_back.clicked.connect(lambda: desk.selected.end_trial() if desk.selected else None)
+        self.trial.row.addWidget(self.take_back)
+        self.trial.row.addWidget(self.keep)
+        self._grid = QGridLayout(self)
+        self._grid.setContentsMargins(10, 6, 10, 6)
+        self._grid.setHorizontalSpacing(18)
+        self._placed: tuple[int, bool] = (0, False)
+        self._arrange(2, on_trial=False)
+
+    def minimumSizeHint(self) -> QSize:
+        return QSize(self._theme.px(150), super().minimumSizeHint().height())
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._fit(on_trial=self._placed[1])
+
+    def refresh(self) -> None:
+        """Show how it is now."""
+        station = self._desk.selected
+        trial = None if station is None else station.writing.trial
+        self._fit(on_trial=trial is not None)
+        if station is None:
+            return
+        self.drives.say(*_drives(station))
+        line = activity(station)
+        gait = station.processing.derived().gait
+        walks = station.is_live and gait.walking and gait.cadence_spm is not None
+        cadence = f"  {gait.cadence_spm:.0f} steps/min" if walks else ""
+        details = tuple(dict.fromkeys((line.detail, line.short or line.detail)))
+        self.activity.say(line.mark, (f"{line.text}{cadence}", line.text), details, line.tip)
+        if trial is not None:
+            self._show_trial(station, trial)
+
+    def _show_trial(self, station: Station, trial: Trial) -> None:
+        left_s = trial.left_s()
+        ends = f"taken back in {left_s:.0f} s" if left_s else "its time is over: reading …"
+        changes = _changes(station, trial, self._desk)
+        count = f"{len(changes)} values" if len(changes) > 1 else changes[0]
+        self.trial.say(
+            ON_TRIAL, (f"On trial: {', '.join(changes)}", f"On trial: {count}", "On trial"), (ends,)
+        )
+
+    def _fit(self, *, on_trial: bool) -> None:
+        columns = min(max(self.width() // self._theme.px(A_FACT), 1), 2 + on_trial)
+        self._arrange(columns, on_trial=on_trial)
+
+    def _arrange(self, columns: int, *, on_trial: bool) -> None:
+        if (columns, on_trial) == self._placed:
+            return
+        self._placed = columns, on_trial
+        facts = [self.drives, self.activity, *([self.trial] if on_trial else [])]
+        for place, fact in enumerate(facts):
+            row, column = divmod(place, columns)
+            is_last = place == len(facts) - 1
+            span = columns - column if is_last else 1
+            self._grid.addWidget(fact, row, column, 1, span, Qt.AlignmentFlag.AlignVCenter)
+        self.trial.setVisible(on_trial)
+        for column in range(3):
+            self._grid.setColumnStretch(column, 1 if column < columns else 0)
+
+
+def _drives(station: Station) -> tuple[Mark, tuple[str, ...], tuple[str, ...]]:
+    joints = station.robot.names("joint")
+    if not station.is_live:
+        return Mark("ring", "old", "not known"), ("Drives not known now",), (f"– of {len(joints)} enabled",)
+    mark = drives_mark(station.robot)
+    enabled = sum(station.robot.word(f"{joint}.state") == "operation enabled" for joint in joints)
+    count = f"{enabled} of {len(joints)} enabled"
+    return mark, (mark.word.capitalize(),), (count,)
+
+
+def _changes(station: Station, trial: Trial, desk: Desk) -> list[str]:
+    said = []
+    for name, value in trial.values.items():
+        info = station.known.get(name)
+        unit = unit_of(name, "" if info is None else info.unit, desk.shown.units)
+        before = trial.before.get(name)
+        old = "?" if before is None else unit.editable(before)
+        short = name.replace("_", " ").replace(".", " ")
+        said.append(f"{short} {old} → {unit.editable(value)} {unit.symbol}".rstrip())
+    return said

@@ -1,0 +1,57 @@
+"""A label that says less where there is less room: no number is ever cut, the last wording stays whole."""
+
+from PySide6.QtCore import QSize
+from PySide6.QtGui import QPainter, QPaintEvent
+from PySide6.QtWidgets import QSizePolicy
+
+from server_gui.views.widgets.plain import PlainLabel
+
+
+class FittedLabel(PlainLabel):
+    """One line of plain text; `say` brings its wordings, the fullest first."""
+
+    def __init__(self, name: str = "", text: str = "") -> None:
+        super().__init__()
+        self.setObjectName(name)
+        self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Preferred)
+        self._wordings: tuple[str, ...] = ("",)
+        self.say(text)
+
+    def say(self, *wordings: str) -> None:
+        """Say the first of these that has room, else the last."""
+        if wordings != self._wordings:
+            self._wordings = wordings
+            self.setText(wordings[0])
+            self.setAccessibleName(wordings[0])
+            self.updateGeometry()
+            self.update()
+
+    @property
+    def shown(self) -> str:
+        """The wording that is drawn."""
+        room = self.contentsRect().width()
+        return next((text for text in self._wordings if self._width(text) <= room), self._wordings[-1])
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether what is drawn has room."""
+        return self._width(self.shown) <= self.contentsRect().width()
+
+    def sizeHint(self) -> QSize:
+        return self._size(self._width(self._wordings[0]))
+
+    def minimumSizeHint(self) -> QSize:
+        return self._size(min(self._width(text) for text in self._wordings))
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        painter.drawText(self.contentsRect(), self.alignment(), self.shown)
+        painter.end()
+
+    def _width(self, text: str) -> int:
+        return self.fontMetrics().horizontalAdvance(text)
+
+    def _size(self, width: int) -> QSize:
+        margins = self.contentsMargins()
+        sides = margins.left() + margins.right()
+        return QSize(width + sides, self.fontMetrics().height() + margins.top() + margins.bottom())

@@ -1,0 +1,43 @@
+"""The axis of time below a plot: seconds until now, each with its unit."""
+
+from collections.abc import Sequence
+from typing import Final
+
+import pyqtgraph as pg
+from PySide6.QtCore import QRectF
+
+STEPS_S: Final = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0, 300.0, 600.0)
+
+
+class TimeAxis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph has no types
+    """Its last place is now."""
+
+    def __init__(self) -> None:
+        self._label_px = 50
+        super().__init__("bottom")
+        self.setStyle(hideOverlappingLabels=False)  # else those at its ends are left out
+
+    def set_label_room(self, pixels: int) -> None:
+        """Set how wide a place is, with the space around it."""
+        self._label_px = pixels
+        self.picture = None
+        self.update()
+
+    def boundingRect(self) -> QRectF:
+        """With room for the words at its ends."""
+        box = QRectF(super().boundingRect())
+        return box.adjusted(-self._label_px, 0, self._label_px, 0)
+
+    def tickSpacing(self, low: float, high: float, size: float) -> list[tuple[float, float]]:
+        """Return how far places are apart: as near as there is room for what stands there."""
+        least = (high - low) * self._label_px / max(size, 1.0)
+        return [(next((step for step in STEPS_S if step >= least), STEPS_S[-1]), 0.0)]
+
+    def tickStrings(self, values: Sequence[float], scale: float, spacing: float) -> list[str]:
+        """Return what stands at these places."""
+        return [time_text(value) for value in values]
+
+
+def time_text(seconds: float) -> str:
+    """Return a time until the newest row in words."""
+    return "now" if abs(seconds) < 1e-9 else f"{seconds:.6g} s".replace("-", "−")

@@ -1,0 +1,169 @@
+"""What no picture of the window may show: green for the unknown, half a number, a control out of reach."""
+
+import re
+from collections.abc import Iterator
+
+from PySide6.QtCore import QModelIndex, Qt
+from PySide6.QtGui import QColor, QFontMetrics
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QAbstractItemView,
+    QAbstractScrollArea,
+    QApplication,
+    QLabel,
+    QScrollArea,
+    QTabBar,
+    QTableView,
+    QWidget,
+)
+
+from server_gui.views.main_window import MainWindow
+from server_gui.views.robots_panel import RobotCard
+from server_gui.views.theme import Theme
+from server_gui.views.widgets.elided import ElidedLabel
+from server_gui.views.widgets.fitted import FittedLabel
+from server_gui.views.widgets.mark import MarkIcon
+
+DIGIT = re.compile(r"\d")
+QTS_OWN = ("qt_", "ScrollLeftButton", "ScrollRightButton")  # parts of other controls
+
+
+def seen(window: QWidget) -> Iterator[QWidget]:
+    """Everything of which something is on the screen."""
+    for widget in window.findChildren(QWidget):
+        if widget.isVisible() and not widget.visibleRegion().isEmpty():
+            yield widget
+
+
+def green(window: QWidget, theme: Theme) -> list[str]:
+    """Everything that is drawn as good."""
+    good = theme.colour("good")
+    found = [
+        f"{_path(one)}: {one.accessibleName()}"
+        for one in seen(window)
+        if isinstance(one, MarkIcon) and one._mark.colour == "good"
+    ]
+    found += [
+        f"{_path(one)}: {one.text()}"
+        for one in seen(window)
+        if isinstance(one, QLabel) and one.property("tone") == "good"
+    ]
+    for view in seen(window):
+        if isinstance(view, QTableView):
+            for row, column in _cells(view):
+                index = view.model().index(row, column)
+                ink = index.data(Qt.ItemDataRole.ForegroundRole)
+                if ink is not None and QColor(ink) == good:
+                    found.append(f"{_path(view)}: {index.data()}")
+    return found
+
+
+def halved_numbers(window: QWidget) -> list[str]:
+    """Every number of which a digit is missing for want of room."""
+    found = []
+    for widget in seen(window):
+        if isinstance(widget, QLabel) and _has_number(widget) and _is_cut(widget):
+            found.append(f"{_path(widget)}: {widget.text()}")
+        if isinstance(widget, FittedLabel) and DIGIT.search(widget.shown) and not widget.is_whole:
+            found.append(f"{_path(widget)}: {widget.shown}")
+        if isinstance(widget, QAbstractButton) and DIGIT.search(widget.text()):
+            whole = widget.width() >= widget.fontMetrics().horizontalAdvance(widget.text())
+            found += [] if whole else [f"{_path(widget)}: {widget.text()}"]
+        if isinstance(widget, QTableView):
+            found += _halved_cells(widget)
+    return found
+
+
+def out_of_reach(window: MainWindow) -> list[str]:
+    """Every control that is not whole on the screen, and to which nothing scrolls."""
+    found = []
+    for widget in window.findChildren(QWidget):
+        if not widget.isVisible() or not widget.focusPolicy() & Qt.FocusPolicy.TabFocus:
+            continue
+        corners = (widget.rect().topLeft(), widget.rect().bottomRight())
+        inside = all(window.rect().contains(widget.mapTo(window, corner)) for corner in corners)
+        if not inside and not _is_scrolled(widget) and not _is_behind(widget):
+            found.append(f"{_path(widget)} at {widget.mapTo(window, corners[0]).toTuple()}")
+    return found
+
+
+def nameless(window: QWidget) -> list[str]:
+    """Every place where Tab stops without a word of what it is."""
+    found = []
+    for widget in window.findChildren(QWidget):
+        if not widget.isVisible() or not widget.isEnabled():
+            continue
+        if not widget.focusPolicy() & Qt.FocusPolicy.TabFocus or widget.objectName().startswith(QTS_OWN):
+            continue
+        text = widget.text() if isinstance(widget, QAbstractButton) else ""
+        if isinstance(widget, QTabBar) or re.search(r"\w", widget.accessibleName() or text):
+            continue
+        found.append(_path(widget))
+    return found
+
+
+def _has_number(label: QLabel) -> bool:
+    """Names may have digits, too, and are elided in their middle."""
+    is_name = isinstance(label.parentWidget(), RobotCard) and label.objectName() == "title"
+    return bool(DIGIT.search(label.text())) and not is_name
+
+
+def _is_cut(label: QLabel) -> bool:
+    if label.wordWrap() or label.textFormat() is Qt.TextFormat.RichText:
+        return False
+    room, metrics = label.contentsRect().width(), label.fontMetrics()
+    widest = max(metrics.horizontalAdvance(line) for line in label.text().splitlines())
+    if type(label) is ElidedLabel or isinstance(label, ElidedLabel):
+        shown = metrics.elidedText(label.text(), label._mode, room)
+        return DIGIT.findall(shown) != DIGIT.findall(label.text())
+    return type(label).paintEvent is QLabel.paintEvent and widest > room
+
+
+def _halved_cells(view: QTableView) -> Iterator[str]:
+    for row, column in _cells(view):
+        index = view.model().index(row, column)
+        text, font = str(index.data() or ""), index.data(Qt.ItemDataRole.FontRole)
+        right = index.data(Qt.ItemDataRole.TextAlignmentRole)
+        is_number = right is not None and bool(Qt.AlignmentFlag(right) & Qt.AlignmentFlag.AlignRight)
+        metrics = view.fontMetrics() if font is None else QFontMetrics(font)
+        if is_number and metrics.horizontalAdvance(text) > view.columnWidth(column):
+            yield f"{_path(view)}: {text}"
+
+
+def _cells(view: QTableView) -> Iterator[tuple[int, int]]:
+    model = view.model()
+    if model is None:
+        return
+    for row in range(min(model.rowCount(QModelIndex()), 30)):
+        for column in range(model.columnCount(QModelIndex())):
+            if not view.isColumnHidden(column):
+                yield row, column
+
+
+def _is_scrolled(widget: QWidget) -> bool:
+    parent = widget.parentWidget()
+    while parent is not None:
+        if isinstance(parent, QScrollArea | QAbstractItemView | QAbstractScrollArea):
+            return True
+        parent = parent.parentWidget()
+    return False
+
+
+def _is_behind(widget: QWidget) -> bool:
+    """Whether it belongs to a tab that is not in front."""
+    return widget.visibleRegion().isEmpty()
+
+
+def _path(widget: QWidget) -> str:
+    names: list[str] = []
+    one: QWidget | None = widget
+    while one is not None and len(names) < 4:
+        names.append(f"{type(one).__name__}({one.accessibleName() or one.objectName()})")
+        one = one.parentWidget()
+    return " < ".join(names)
+
+
+def settle() -> None:
+    """Let layouts come to rest."""
+    for _ in range(3):
+        QApplication.processEvents()

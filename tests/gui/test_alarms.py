@@ -1,0 +1,229 @@
+"""Active alarms in sight: above the tabs, among the events, on cards; their buttons; robots that go."""
+
+import time
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication, QLabel
+
+from gateway.client import ConnectionState, NotConnected
+from gateway.wire.stop import Reset, Stopped
+from server_gui.core.follow.events import LinkChanged
+from server_gui.core.follow.news import NewsKind
+from server_gui.views.ask import Question
+from server_gui.views.main_window import MainWindow
+from server_gui.views.theme import Theme
+from tests.gui.fakes import Bench, stop_is_whole
+from tests.support.desk import JOINTS, described, looked, telemetry, walking
+
+CAUSE = "0x2310 continuous overcurrent at the output (register: generic, current)"
+WHY = "there is no link to 127.0.0.1:7420 now (127.0.0.1:7420 did not answer hello within 5 s)"
+
+
+def fault(bench: Bench) -> None:
+    """The left knee's drive in fault; the others stopped."""
+    now_ns = time.monotonic_ns()
+    columns: dict[str, list[float | None]] = {f"{joint}.state": [5.0] for joint in JOINTS}
+    columns["left_knee.state"] = [7.0]
+    columns["left_knee.current"] = [9.0]
+    bench.station.take([walking(100)])
+    found = looked(state="fault", problem=f"the drive is in fault: {CAUSE}")
+    bench.look_again([telemetry([now_ns + 1], columns, now_ns), found])
+
+
+def settle(window: MainWindow, bench: Bench) -> None:
+    """Frames, and Qt's layouts within layouts."""
+    bench.draw(window)
+    for _ in range(10):
+        QApplication.processEvents()
+
+
+def question(window: MainWindow) -> Question:
+    (found,) = (one for one in window.findChildren(Question) if one.isVisible())
+    return found
+
+
+def is_whole(label: QLabel) -> bool:
+    """Whether all of its text has room in it."""
+    needs = label.fontMetrics().boundingRect(
+        0, 0, label.width(), 10_000, Qt.TextFlag.TextWordWrap.value, label.text()
+    )
+    return needs.height() <= label.height() and needs.width() <= label.width()
+
+
+def test_the_strip_takes_no_height_while_nothing_is_wrong(window: MainWindow, bench: Bench) -> None:
+    bench.station.take([walking(100), looked()])
+    window.alarms.refresh()
+    assert window.alarms.isHidden()
+
+
+def test_a_fault_is_the_same_on_strip_card_header_and_events(window: MainWindow, bench: Bench) -> None:
+    fault(bench)
+    bench.draw(window)
+    mark = bench.station.mark
+    assert (mark.shape, mark.colour, mark.word) == ("square", "bad", "fault")
+    assert window.alarms.texts[0].startswith(f"fault: left knee: {CAUSE}\nsince ")
+    assert "→ check that the joint moves freely" in window.alarms.texts[0]
+    assert window.robots.cards[0].texts[1] == f"fault: left knee: {CAUSE}"
+    assert "1 alarm: fault" in window.header._chips["warnings"].toolTip() or CAUSE in (
+        window.header._chips["warnings"].toolTip()
+    )
+    assert window.events.pinned[0].mark == mark
+
+
+def test_an_active_alarm_stays_above_whatever_else_happens_and_is_chosen(
+    window: MainWindow, bench: Bench
+) -> None:
+    fault(bench)
+    for number in range(600):
+        bench.desk.news.add(NewsKind.STALE, "exo-01", f"right_insole {number} stale")
+    window.events.words.setText("nothing that there is")
+    bench.draw(window)
+    assert window.events.lines == window.events.pinned
+    assert f"left knee: {CAUSE}" in [line.text for line in window.events.lines]
+
+
+def test_events_are_chosen_by_kind_and_word(window: MainWindow, bench: Bench) -> None:
+    bench.desk.news.add(NewsKind.STALE, "exo-01", "right_insole stale")
+    bench.desk.news.add(NewsKind.STOP, "exo-01", "STOP confirmed")
+    bench.draw(window)
+    window.events.kinds.setCurrentText("Faults and stops")
+    assert [line.text for line in window.events.lines[len(window.events.pinned) :]] == ["STOP confirmed"]
+    window.events.kinds.setCurrentText("Everything")
+    window.events.words.setText("insole")
+    assert [line.text for line in window.events.lines[len(window.events.pinned) :]] == ["right_insole stale"]
+
+
+def test_a_fault_is_cleared_after_a_question_and_enables_nothing(window: MainWindow, bench: Bench) -> None:
+    fault(bench)
+    bench.draw(window)
+    window.alarms.rows[0].clear.click()
+    assert bench.first.named("reset") == [], "nothing is done before it is answered"
+    asked = question(window)
+    assert QApplication.activeModalWidget() is None, "STOP would be out of reach"
+    assert "None is enabled" in asked.words.text()
+    asked.act.click()
+    assert [name for name, _ in bench.first.asked if name != "show_processes"] == ["reset"]
+
+
+def test_a_question_names_the_drives_that_lose_their_torque(window: MainWindow, bench: Bench) -> None:
+    fault(bench)
+    now_ns = time.monotonic_ns()
+    bench.station.take([telemetry([now_ns + 2], {"right_hip.state": [4.0]}, now_ns)])
+    bench.draw(window)
+    window.alarms.rows[0].clear.click()
+    assert "STILL ENABLED, and without torque then: right hip" in question(window).words.text()
+
+
+def test_the_signal_of_a_fault_is_shown_around_its_instant(window: MainWindow, bench: Bench) -> None:
+    fault(bench)
+    bench.draw(window)
+    window.alarms.rows[0].show_signal.click()
+    assert window.tabs.currentIndex() == 1
+    assert window.signals.chosen == ["left_knee.current"]
+    assert window.signals.pause.isChecked()
+    left, right = window.signals.plots[0].plot.window_s
+    assert -8.0 < left <= -5.0
+    assert right <= 0.0
+
+
+def test_what_is_acknowledged_is_one_line_until_it_is_over(window: MainWindow, bench: Bench) -> None:
+    fault(bench)
+    bench.draw(window)
+    window.alarms.rows[0].acknowledge.click()
+    (text,) = (text for text in window.alarms.texts if CAUSE in text)
+    assert text.startswith("fault: left knee: ")
+    assert text.endswith("acknowledged)")
+
+
+@pytest.mark.parametrize(
+    ("width", "height", "scale"), [(1024, 700, 1.0), (1366, 768, 1.5), (1920, 1080, 1.0)]
+)
+def test_a_stop_that_is_not_confirmed_is_whole_with_its_reason(
+    window: MainWindow, bench: Bench, theme: Theme, width: int, height: int, scale: float
+) -> None:
+    theme.set(scale=scale)
+    window.resize(width, height)
+    bench.station.stop("test")
+    bench.first.fail(NotConnected(WHY))
+    settle(window, bench)
+    settle(window, bench)
+    row = window.alarms.rows[0]
+    assert row.headline.text().startswith("STOP NOT CONFIRMED: ")
+    assert row.headline.text().endswith(WHY)
+    assert is_whole(row.headline)
+    assert is_whole(row.details)
+    assert row.visibleRegion().boundingRect().size() == row.size()
+    assert stop_is_whole(window)
+
+
+def test_the_result_of_a_stop_leaves_the_alarms_in_sight(window: MainWindow, bench: Bench) -> None:
+    fault(bench)
+    bench.station.stop("test")
+    bench.first.answer(Stopped(dict.fromkeys(JOINTS, "confirmed"), held=True))
+    bench.draw(window)
+    assert window.header.outcome_text == "STOP confirmed"
+    assert window.header._chips["warnings"].isVisible()
+    assert len(window.alarms.texts) == 2
+
+
+def test_a_held_stop_is_reset_after_a_question_about_that_robot(window: MainWindow, bench: Bench) -> None:
+    bench.station.stop("test")
+    bench.first.answer(Stopped(dict.fromkeys(JOINTS, "confirmed"), held=True))
+    bench.draw(window)
+    window.header.reset_button.click()
+    asked = question(window)
+    assert "exo-01" in asked.windowTitle()
+    bench.desk.select(bench.add("other", 7421))
+    asked.act.click()
+    assert len(bench.first.named("reset")) == 1, "another robot was reset"
+    bench.first.answer(Reset(dict.fromkeys(JOINTS, "switch on disabled"), {}, held=False))
+    bench.desk.select(bench.station)
+    now_ns = time.monotonic_ns()
+    off: dict[str, list[float | None]] = {f"{joint}.state": [5.0] for joint in JOINTS}
+    bench.station.take([telemetry([now_ns + 1], off, now_ns)])
+    window.alarms.refresh()
+    assert any("to go on: enable the drives" in text for text in window.alarms.texts)
+
+
+def test_a_question_that_is_not_answered_does_nothing(window: MainWindow, bench: Bench) -> None:
+    bench.station.stopping.held = True
+    bench.draw(window)
+    window.header.reset_button.click()
+    QTest.keyClick(question(window), Qt.Key.Key_Escape)
+    assert bench.first.named("reset") == []
+
+
+def test_each_stop_names_its_robot_and_all_says_all(window: MainWindow, bench: Bench) -> None:
+    other = bench.add("a-robot-with-quite-a-long-name-of-its-own", 7421)
+    other.is_named = True
+    other.take([described()])
+    settle(window, bench)
+    first, second = window.robots.cards
+    assert first.stop.text() == "STOP  exo-01"
+    assert second.stop.text().startswith("STOP  a-robot")
+    assert second.stop.accessibleName() == "STOP a-robot-with-quite-a-long-name-of-its-own"
+    assert window.robots.all_stop.text() == "STOP  ALL"
+
+
+def test_a_robot_is_removed_after_a_question(window: MainWindow, bench: Bench) -> None:
+    other = bench.add("exo-02", 7421)
+    bench.draw(window)
+    removed: list[object] = []
+    window.removed.connect(removed.append)
+    window.robots.cards[1].remove.click()
+    assert "Nothing of it is stopped" in question(window).words.text()
+    question(window).act.click()
+    assert removed == [other]
+    bench.desk.remove(other)
+    bench.draw(window)
+    assert [card.station for card in window.robots.cards] == [bench.station]
+
+
+def test_alarms_of_two_robots_are_named(window: MainWindow, bench: Bench) -> None:
+    fault(bench)
+    other = bench.add("exo-02", 7421)
+    other.take([LinkChanged(ConnectionState.WAITING, "gone", time.monotonic_ns())])
+    bench.draw(window)
+    assert [text.partition(" · ")[0] for text in window.alarms.texts] == ["exo-01", "exo-02"]

@@ -1,0 +1,79 @@
+"""The bus's view: a full bus is an alarm, what is not known is said so, and the last line names the worst."""
+
+import time
+from collections.abc import Iterator
+
+import pytest
+from msgspec.structs import replace
+
+from gateway.wire.bus import BusInfo, NodeInfo, TalkInfo
+from server_gui.core.follow.events import BusesSeen
+from server_gui.views.bus_health import NOT_NOW, TOO_OLD, BusHealthView
+from server_gui.views.main_window import MainWindow
+from server_gui.views.theme import Theme
+from tests.gui.fakes import Bench, destroy
+
+NODE = NodeInfo(2, ["left_knee"], 0.44, 12.0, 88, 3, 0, 0.0)
+TALKS = [TalkInfo("TPDO", 2, 900.0), TalkInfo("SYNC", None, 100.0)]
+BUS = BusInfo("main", "error active", 1_000_000, 41.2, 1010.0, 4, 0, 1, 0, [NODE], None, [], TALKS)
+
+
+@pytest.fixture
+def view(theme: Theme, bench: Bench) -> Iterator[BusHealthView]:
+    made = BusHealthView(bench.desk, theme)
+    made.resize(900, 500)
+    made.show()
+    yield made
+    destroy(made)
+
+
+def show(view: BusHealthView, bench: Bench, *buses: BusInfo) -> None:
+    bench.station.take([BusesSeen(buses, time.monotonic_ns())])
+    view._frame = 0
+    view.refresh()
+
+
+def row(view: BusHealthView, place: int) -> list[str]:
+    table = view.cards[0].table
+    items = [table.item(place, column) for column in range(table.columnCount())]
+    return ["" if item is None else item.text() for item in items]
+
+
+def test_load_counters_and_who_talks_stand_there(view: BusHealthView, bench: Bench) -> None:
+    show(view, bench, BUS)
+    assert view.cards[0].load.text() == "41 % of 1 Mbit/s"
+    assert view.cards[0]._counters.accessibleDescription().startswith("1010 frames/s, 4 error frames")
+    assert row(view, 0) == ["2", "left knee", "90 %", "900", "TPDO 900/s", "0.4 / 12.0 ms", "3", "0.0 %"]
+    assert row(view, 1)[:4] == ["no node", "", "10 %", "100"]
+    assert not view.said.isVisible()
+
+
+def test_a_full_bus_is_an_alarm(view: BusHealthView, bench: Bench) -> None:
+    show(view, bench, replace(BUS, load_percent=100.0))
+    assert view.said.text().startswith("ALARM: bus main is full: 100 % of its time is taken · check: ")
+    assert view.said.property("tone") == "bad"
+    assert view.cards[0]._icon.accessibleName() == "ALARM"
+    show(view, bench, BUS)
+    assert not view.said.isVisible()
+    assert view.cards[0]._icon.accessibleName() == "ok"
+
+
+def test_what_is_not_known_is_no_card_and_no_zero(view: BusHealthView, bench: Bench) -> None:
+    view.refresh()
+    assert view.said.text() == NOT_NOW
+    show(view, bench, BUS)
+    bench.station.take([BusesSeen(None, time.monotonic_ns())])
+    view._frame = 0
+    view.refresh()
+    assert view.said.text() == TOO_OLD
+    assert not view.cards[0].isVisible()
+
+
+def test_the_last_line_has_the_worst_bus(window: MainWindow, bench: Bench) -> None:
+    bench.draw(window)
+    assert window._bar.bus.text() == "bus not known"
+    assert window._bar.computer.text() == "CPU – · memory –"
+    bench.station.take([BusesSeen((replace(BUS, load_percent=100.0),), time.monotonic_ns())])
+    bench.draw(window)
+    assert window._bar.bus.text() == "CAN main 100 %, 4 errors · most: left knee 90 %"
+    assert window._bar._bus_icon.accessibleName() == "ALARM"

@@ -1,0 +1,181 @@
+"""The overview's plots: one time, limits, flags, a pointer over all; the wheel zooms time, not for good."""
+
+import time
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtGui import QWheelEvent
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication
+
+from server_gui.core.desk.flags import Flag, FlagKind
+from server_gui.views.key_plot import SECONDS, KeyPlot
+from server_gui.views.main_window import MainWindow
+from server_gui.views.overview import Overview
+from server_gui.views.theme import Theme
+from tests.gui.fakes import Bench, destroy
+from tests.gui.running import wait
+from tests.support.desk import looked, telemetry, walking
+
+HOUR_S = 3600.0
+
+
+@pytest.fixture
+def overview(theme: Theme, bench: Bench) -> Iterator[Overview]:
+    bench.station.take([walking(1200, -HOUR_S), looked()])
+    made = Overview(bench.desk, theme)
+    made.resize(1100, 800)
+    made.show()
+    draw(made)
+    yield made
+    destroy(made)
+
+
+def draw(overview: Overview) -> None:
+    QApplication.processEvents()
+    overview._read_s = 0.0
+    overview.refresh()
+    QApplication.processEvents()
+
+
+def wheel(plot: KeyPlot, steps: int) -> None:
+    """Turn the wheel over the middle of a plot's field."""
+    viewport = plot.plot.viewport()
+    at = QPointF(plot.plot._lines.geometry().center())
+    turned = QWheelEvent(
+        at,
+        QPointF(viewport.mapToGlobal(at.toPoint())),
+        QPoint(),
+        QPoint(0, 120 * steps),
+        Qt.MouseButton.NoButton,
+        Qt.KeyboardModifier.NoModifier,
+        Qt.ScrollPhase.NoScrollPhase,
+        False,
+    )
+    QApplication.sendEvent(viewport, turned)
+
+
+def ranges(overview: Overview) -> list[tuple[tuple[float, float], tuple[float, float]]]:
+    views = [plot.plot.getViewBox().viewRange() for plot in overview._plots]
+    return [((round(x[0], 6), round(x[1], 6)), (y[0], y[1])) for x, y in views]
+
+
+def test_the_wheel_zooms_the_time_of_all_plots_and_nothing_else(overview: Overview, bench: Bench) -> None:
+    before = ranges(overview)
+    wheel(overview._plots[0], 2)
+    draw(overview)
+    after = ranges(overview)
+    assert after[0][0] != before[0][0]
+    assert len({time_range for time_range, _ in after}) == 1, "all have the same time"
+    assert [values for _, values in after] == [values for _, values in before]
+    assert all(plot.plot.follows for plot in overview._plots), "the range goes on following the data"
+
+
+def test_a_double_click_shows_all_of_the_time_again_as_does_another_robot(
+    overview: Overview, bench: Bench
+) -> None:
+    plot = overview._plots[1]
+    opened: list[object] = []
+    overview.opened.connect(opened.append)
+    wheel(plot, 3)
+    QTest.mouseDClick(
+        plot.plot.viewport(), Qt.MouseButton.LeftButton, pos=plot.plot._lines.geometry().center()
+    )
+    assert {time_range for time_range, _ in ranges(overview)} == {(-SECONDS, 0.0)}
+    assert not plot.plot._click.isActive(), "it is no click"
+    wheel(plot, 3)
+    bench.desk.select(bench.add("exo-02", 7421))
+    draw(overview)
+    assert {time_range for time_range, _ in ranges(overview)} == {(-SECONDS, 0.0)}
+    assert opened == []
+
+
+def test_a_click_opens_the_channels_in_signals(window: MainWindow, bench: Bench) -> None:
+    bench.station.take([walking(300, -HOUR_S)])
+    bench.draw(window)
+    plot = window.overview._plots[0]
+    QTest.mouseClick(
+        plot.plot.viewport(), Qt.MouseButton.LeftButton, pos=plot.plot._lines.geometry().center()
+    )
+    assert window.tabs.currentIndex() == 0, "it may become a double click"
+    wait(lambda: window.tabs.currentIndex() == 1, "opened")
+    assert window.signals.chosen == ["left_knee.position", "right_knee.position"]
+
+
+def test_each_curve_is_named_with_its_value_in_the_legend(overview: Overview) -> None:
+    angle, torque, tilt = (plot.legend for plot in overview._plots)
+    assert angle.accessibleDescription().startswith("left ")
+    assert "right" in angle.accessibleDescription()
+    assert torque.accessibleDescription().endswith("limit ±80")
+    assert "forward 2.9" in tilt.accessibleDescription()
+    assert "sideways –" in tilt.accessibleDescription()
+
+
+def test_a_limit_is_a_line_where_it_is_in_sight(overview: Overview, bench: Bench) -> None:
+    torque = overview._plots[1]
+    assert len(torque.plot._marks._shown.limits) == 0
+    newest_ns = bench.station.rings.newest_ns or 0
+    stamps_ns = [newest_ns + (row + 1) * 10_000_000 for row in range(50)]
+    received_ns = time.monotonic_ns() + round(HOUR_S * 1e9)
+    columns: dict[str, list[float | None]] = {"left_knee.torque": [90.0] * 50}
+    bench.station.take([telemetry(stamps_ns, columns, received_ns)])
+    draw(overview)
+    draw(overview)
+    shares: list[float] = list(torque.plot._marks._shown.limits)
+    assert len(shares) == 1
+    assert 0.0 < shares[0] < 0.5
+
+
+def test_what_happened_is_flagged_in_every_plot_at_its_instant(overview: Overview, bench: Bench) -> None:
+    newest_ns = bench.station.rings.newest_ns or 0
+    bench.station.flags.add(Flag(newest_ns - 5 * 10**9, "stop F12 by jkim", FlagKind.STOP))
+    bench.station.flags.add(Flag(newest_ns - 60 * 10**9, "long ago", FlagKind.WRITE))
+    draw(overview)
+    draw(overview)
+    for plot in overview._plots:
+        ((share, kind),) = plot.plot._marks._shown.flags
+        assert share == pytest.approx(0.5, abs=0.01)
+        assert kind is FlagKind.STOP
+    overview._hover(-5.0)
+    draw(overview)
+    assert overview._plots[2].note == "stop F12 by jkim · −5 s"
+
+
+def test_the_pointer_reads_every_plot_at_one_time(overview: Overview, bench: Bench) -> None:
+    plot = overview._plots[0]
+    QTest.mouseMove(plot.plot.viewport(), plot.plot._lines.geometry().center())
+    QApplication.processEvents()
+    overview._hover(-4.0)
+    draw(overview)
+    assert all(one.plot._marks._shown.hover is not None for one in overview._plots)
+    times = bench.station.rings.times(SECONDS)
+    row = int(np.argmin(np.abs(times - (times[-1] - 4.0))))
+    value = float(np.degrees(bench.station.rings.values("left_knee.position", len(times))[row]))
+    assert f"left {value:.1f}" in plot.legend.accessibleDescription()
+    assert plot.note == "−4 s"
+    overview._hover(None)
+    draw(overview)
+    assert plot.note == ""
+
+
+def test_a_plot_without_data_says_so_and_has_no_numbers(theme: Theme, bench: Bench) -> None:
+    made = Overview(bench.desk, theme)
+    made.resize(1100, 800)
+    made.show()
+    draw(made)
+    for plot in made._plots:
+        assert plot.plot._marks._shown.words == "no data"
+        assert not plot.plot.getPlotItem().getAxis("left").style["showValues"]
+    bench.station.take([walking(300, -HOUR_S)])
+    draw(made)
+    draw(made)
+    assert made._plots[0].plot._marks._shown.words == ""
+    assert made._plots[0].plot.getPlotItem().getAxis("left").style["showValues"]
+    destroy(made)
+
+
+def test_times_have_their_unit(overview: Overview) -> None:
+    axis = overview._plots[0].plot.getPlotItem().getAxis("bottom")
+    assert axis.tickStrings([-10.0, -2.5, 0.0], 1.0, 2.0) == ["−10 s", "−2.5 s", "now"]

@@ -1,0 +1,273 @@
+"""What is wrong with a robot: its cause, since when, what to check; the unknown is never good."""
+
+import time
+from collections.abc import Callable
+
+import pytest
+from msgspec.structs import replace
+
+from drivers.error_codes import error_check
+from gateway.client import ConnectionState, NotConnected
+from gateway.wire.component import Snapshot
+from gateway.wire.control import JournalEntries
+from gateway.wire.robot import GuardInfo, GuardRuleInfo
+from gateway.wire.stop import Reset, Stopped
+from server_gui.core.alarms.marks import STATES
+from server_gui.core.alarms.texts import TEXTS, Kind
+from server_gui.core.desk.desk import Desk
+from server_gui.core.desk.station import Station
+from server_gui.core.follow.events import Described, Event, Journalled, LinkChanged, Looked
+from server_gui.core.follow.news import News, NewsKind
+from tests.support.desk import JOINTS, Bench, described, looked, telemetry, walking
+
+CAUSE = "0x2310 continuous overcurrent at the output (register: generic, current)"
+ALL = Stopped(dict.fromkeys(JOINTS, "confirmed"), held=True)
+
+
+@pytest.fixture
+def bench() -> Bench:
+    made = Bench(Desk())
+    made.add("exo-01").take([described(), walking(50), looked()])
+    return made
+
+
+def states(number: float, **others: float) -> Event:
+    """A row, just now, with every drive in this state but these."""
+    now_ns = time.monotonic_ns()
+    columns: dict[str, list[float | None]] = {
+        f"{joint}.state": [others.get(joint, number)] for joint in JOINTS
+    }
+    return telemetry([now_ns], columns, now_ns)
+
+
+def kinds(station: Station) -> list[Kind]:
+    return [one.alarm.kind for one in station.alarms.active]
+
+
+def fault(station: Station) -> None:
+    station.take(
+        [states(5.0, left_knee=7.0), looked(state="fault", problem=f"the drive is in fault: {CAUSE}")]
+    )
+
+
+def test_a_robot_that_is_well_has_no_alarm_and_is_as_its_drives_are(bench: Bench) -> None:
+    assert kinds(bench.station) == []
+    assert bench.station.mark == STATES["operation enabled"]
+
+
+def test_a_fault_says_its_cause_first_where_it_is_what_was_done_and_what_to_check(bench: Bench) -> None:
+    description = described().description
+    components = [
+        replace(part, device={"node_id": 2, "bus": "can0"}) if part.name == "left_knee" else part
+        for part in description.components
+    ]
+    bench.station.take([Described(replace(description, components=components))])
+    fault(bench.station)
+    (one,) = bench.station.alarms.active
+    assert one.alarm.line == f"fault: left knee, node 2 on can0: {CAUSE}"
+    assert one.alarm.check == error_check(0x2310)
+    assert one.alarm.did == "no drive is enabled: 5 quick stop active, 1 fault"
+    assert (one.alarm.channel, one.alarm.clears) == ("left_knee.current", True)
+    assert bench.station.mark == one.alarm.mark == TEXTS[Kind.FAULT].mark
+
+
+def test_a_drive_that_tells_its_code_alone_is_put_into_words(bench: Bench) -> None:
+    now_ns = time.monotonic_ns()
+    columns: dict[str, list[float | None]] = {"left_knee.state": [7.0], "left_knee.error_code": [0x8611]}
+    bench.station.take([telemetry([now_ns], columns, now_ns)])
+    assert bench.station.alarms.active[0].alarm.what == "0x8611 following error too large"
+
+
+def test_an_alarm_keeps_its_beginning_and_ends_with_its_cause(bench: Bench) -> None:
+    fault(bench.station)
+    (before,) = bench.station.alarms.active
+    fault(bench.station)
+    (after,) = bench.station.alarms.active
+    assert (after.since_s, after.at_ns) == (before.since_s, before.at_ns)
+    bench.station.take([walking(10), looked()])
+    assert kinds(bench.station) == []
+
+
+def test_what_is_acknowledged_is_no_better_for_it(bench: Bench) -> None:
+    fault(bench.station)
+    bench.station.alarms.acknowledge((Kind.FAULT, "left_knee"))
+    assert bench.station.alarms.active[0].is_acknowledged
+    assert bench.station.mark.word == "fault"
+
+
+def _link_lost(bench: Bench) -> None:
+    bench.station.take([LinkChanged(ConnectionState.WAITING, "gone", time.monotonic_ns())])
+
+
+def _never_reached(bench: Bench) -> None:
+    lost = LinkChanged(ConnectionState.WAITING, "no gateway", time.monotonic_ns())
+    bench.desk.stations[0] = Station("x", "127.0.0.1:1", bench.first, lambda call: call(), News())
+    bench.station.take([lost])
+
+
+def _no_data(bench: Bench) -> None:
+    bench.desk.stations.clear()
+    bench.add("exo-03").take([described()])
+
+
+def _stale(bench: Bench) -> None:
+    bench.desk.stations.clear()
+    bench.add("exo-03").take([described(), walking(5, age_s=3.0)])
+
+
+@pytest.mark.parametrize(
+    ("happens", "kind"),
+    [
+        (_link_lost, Kind.NO_LINK),
+        (_never_reached, Kind.NEVER_REACHED),
+        (_no_data, Kind.NO_DATA),
+        (_stale, Kind.STALE),
+    ],
+)
+def test_each_way_not_to_know_has_its_own_word_and_none_is_good(
+    bench: Bench, happens: Callable[[Bench], None], kind: Kind
+) -> None:
+    happens(bench)
+    assert kinds(bench.station) == [kind]
+    assert bench.station.mark == TEXTS[kind].mark
+    assert bench.station.mark.colour != "good"
+
+
+def test_no_kind_of_alarm_is_green_and_each_says_what_to_check() -> None:
+    assert set(TEXTS) == set(Kind)
+    assert all(text.mark.colour != "good" and text.check for text in TEXTS.values())
+
+
+def test_a_state_that_this_program_does_not_know_is_not_taken_for_well(bench: Bench) -> None:
+    bench.station.take([looked(state="dozing")])
+    assert kinds(bench.station) == [Kind.UNKNOWN]
+
+
+def test_a_rule_that_has_tripped_says_why_and_what_it_did(bench: Bench) -> None:
+    rule = GuardRuleInfo(
+        "knee_heat",
+        "torque",
+        "above 60 N·m",
+        ["left_knee"],
+        ["quick_stop"],
+        "alarm",
+        "tripped",
+        0,
+        None,
+        1,
+        [],
+    )
+    guard = GuardInfo(configured=True, rules=[rule])
+    entry = {"n": 1, "hash": "x", "who": "guard", "what": "alarm", "about": "knee_heat", "reason": "71 N·m"}
+    bench.station.take([Described(replace(described().description, guard=guard)), walking(5)])
+    bench.station.audit.entries.append(entry)
+    (one,) = bench.station.alarms.active
+    assert (one.alarm.kind, one.alarm.what) == (Kind.GUARD, "71 N·m")
+    assert "quick stop" in one.alarm.did
+    assert one.alarm.channel == "left_knee.torque"
+
+
+# --- STOP
+
+
+def test_a_confirmed_stop_is_proved_drive_by_drive_and_says_how_to_go_on(bench: Bench) -> None:
+    bench.station.stop("test")
+    bench.station.take([states(5.0)])
+    bench.first.answer(ALL)
+    stopping = bench.station.stopping
+    assert set(stopping.proofs) == set(JOINTS)
+    assert all(proof.state == "quick stop active" for proof in stopping.proofs.values())
+    (one,) = bench.station.alarms.active
+    assert one.alarm.kind is Kind.STOPPED
+    assert "all 6 quick stop active within" in one.alarm.did
+    assert "Reset stop…" in one.alarm.check
+
+
+def test_rows_from_before_the_stop_prove_nothing(bench: Bench) -> None:
+    before = states(5.0)
+    bench.station.stop("test")
+    bench.station.take([before])
+    assert bench.station.stopping.proofs == {}
+
+
+def test_a_robot_that_moves_after_an_unconfirmed_stop_is_to_be_stopped_again(bench: Bench) -> None:
+    _link_lost(bench)
+    bench.station.stop("test")
+    bench.first.fail(NotConnected("there is no link"))
+    assert kinds(bench.station) == [Kind.NOT_STOPPED, Kind.NO_LINK]
+    assert "still moving" not in bench.station.alarms.active[0].alarm.line
+    bench.station.take([LinkChanged(ConnectionState.CONNECTED, None, time.monotonic_ns()), walking(10)])
+    assert "still moving: STOP again" in bench.station.alarms.active[0].alarm.line
+    assert bench.station.mark.word == "STOP NOT CONFIRMED"
+
+
+def test_the_result_of_a_stop_does_not_hide_a_fault(bench: Bench) -> None:
+    fault(bench.station)
+    bench.station.stop("test")
+    bench.first.answer(ALL)
+    assert kinds(bench.station) == [Kind.FAULT, Kind.STOPPED]
+
+
+def test_after_a_reset_it_says_how_to_go_on_until_a_drive_is_enabled(bench: Bench) -> None:
+    bench.station.take([states(5.0)])
+    bench.station.stop("test")
+    bench.first.answer(ALL)
+    bench.station.reset()
+    bench.first.answer(Reset(dict.fromkeys(JOINTS, "switch on disabled"), {}, held=False))
+    (one,) = bench.station.alarms.active
+    assert one.alarm.kind is Kind.RESET
+    assert "gwrms enable" in one.alarm.check
+    bench.station.take([states(4.0)])
+    assert kinds(bench.station) == []
+
+
+def test_a_stop_of_somebody_else_is_read_in_the_journal_and_so_is_its_end(bench: Bench) -> None:
+    stop = {"n": 7, "hash": "a", "who": "gwrms stop", "what": "stop", "reason": "door", "utc_ns": 5}
+    bench.station.take([Journalled(JournalEntries([stop], None))])
+    assert bench.station.stopping.held
+    assert "door by gwrms stop" in bench.station.alarms.active[0].alarm.what
+    reset = {"n": 8, "hash": "b", "who": "gwrms reset", "what": "reset", "held": False}
+    bench.station.take([Journalled(JournalEntries([stop, reset], None))])
+    assert not bench.station.stopping.held
+
+
+# --- names and news
+
+
+def test_the_name_that_the_user_gave_is_kept(bench: Bench) -> None:
+    station = Station("walker", "127.0.0.1:1", bench.first, lambda call: call(), News(), is_named=True)
+    station.take([described("simulated-exo")])
+    assert station.title == "walker"
+
+
+def test_sensors_that_come_and_go_do_not_push_a_fault_away() -> None:
+    news = News()
+    news.add(NewsKind.FAULT, "exo", "left_knee fault")
+    for number in range(2000):
+        news.add(NewsKind.STALE, "exo", f"right_insole {number} stale")
+    assert news.items[-1].text == "left_knee fault"
+    assert len(news.items) == 500
+
+
+def test_what_comes_and_goes_is_counted_on_one_line() -> None:
+    news = News()
+    for number in range(5):
+        news.add(NewsKind.STALE, "exo", f"right_insole stale: no frame for 0.{number} s")
+        news.add(NewsKind.STATE, "exo", "right_insole ok")
+    assert [(item.text[:20], item.count) for item in news.items] == [
+        ("right_insole ok", 5),
+        ("right_insole stale: ", 5),
+    ]
+
+
+def test_faults_of_two_nodes_are_not_one() -> None:
+    news = News()
+    for node in (2, 3):
+        news.add(NewsKind.LOST, "exo", f"no heartbeat from node {node}")
+    assert len(news.items) == 2
+
+
+def test_a_look_without_quality_takes_no_alarm_back(bench: Bench) -> None:
+    bench.station.take([looked(state="lost", problem="no heartbeat")])
+    bench.station.take([Looked(Snapshot(0, {}, {}, {}), None, 0)])
+    assert kinds(bench.station) == [Kind.LOST]

@@ -1,0 +1,107 @@
+"""What has happened is found in rows, in the journal and among a recording's events, once each."""
+
+import datetime
+
+import msgspec
+
+from server_gui.core.desk.flags import (
+    Flag,
+    FlagKind,
+    Flags,
+    StateWatch,
+    of_journal,
+    of_marks,
+    of_recorded_journal,
+)
+from server_gui.core.desk.recording import By, Recording
+from server_gui.core.follow.events import Described
+from tests.support.desk import Bench, described, telemetry
+
+WORDS = {
+    name: {"4": "operation enabled", "5": "quick stop active", "7": "fault"}
+    for name in ("left_knee.state", "right_knee.state", "right_hip.state")
+}
+MS = 1_000_000
+
+
+def entry(what: str, at_ns: int, boot_id: str = "b", **more: object) -> dict[str, object]:
+    return {"what": what, "monotonic_ns": at_ns, "utc_ns": 10 * at_ns, "boot_id": boot_id, **more}
+
+
+def test_drives_that_fall_into_a_fault_or_stop_are_flagged_at_their_row() -> None:
+    found = list(
+        StateWatch().take(
+            [10, 20, 30],
+            {
+                "left_knee.state": [4.0, 7.0, 7.0],
+                "right_knee.state": [4.0, None, 5.0],
+                "right_hip.state": [4.0, 4.0, 5.0],
+                "left_knee.position": [0.0, 1.0, 2.0],
+            },
+            WORDS,
+        )
+    )
+    assert found == [
+        Flag(20, "left knee: fault", FlagKind.FAULT),
+        Flag(30, "right hip, right knee: quick stop", FlagKind.STOP),
+    ]
+
+
+def test_a_turn_between_two_batches_is_seen_and_what_was_so_at_first_is_none() -> None:
+    watch = StateWatch()
+    assert list(watch.take([10], {"left_knee.state": [7.0]}, WORDS)) == [], "it did not turn"
+    assert list(watch.take([20], {"left_knee.state": [4.0]}, WORDS)) == []
+    assert list(watch.take([30], {"left_knee.state": [None]}, WORDS)) == []
+    assert [flag.at_ns for flag in watch.take([40], {"left_knee.state": [7.0]}, WORDS)] == [40]
+
+
+def test_the_journal_tells_stops_writes_and_trials_of_this_boot() -> None:
+    entries = [
+        entry("stop", 5, who="jkim", reason="F12"),
+        entry("write", 6, who="jkim", after={"gait.step": 1}),
+        entry("write", 7, after={"a.b": 1}, trial_s=9.0),
+        entry("stop", 8, boot_id="another"),
+        entry("control acquired", 9),
+    ]
+    assert list(of_journal(entries, "b")) == [
+        Flag(5, "stop F12 by jkim", FlagKind.STOP),
+        Flag(6, "write gait.step by jkim", FlagKind.WRITE),
+        Flag(7, "write a.b", FlagKind.TRIAL),
+    ]
+    assert [flag.at_ns for flag in of_recorded_journal(entries)] == [50, 60, 70, 80]
+
+
+def test_marks_of_a_recording_are_flags() -> None:
+    at = datetime.datetime(2026, 11, 23, tzinfo=datetime.UTC)
+    events = [{"kind": "marker", "utc": at, "text": "turns"}, {"kind": "gap", "utc": at, "text": ""}]
+    assert [(flag.text, flag.kind) for flag in of_marks(events)] == [("turns", FlagKind.MARK)]
+
+
+def test_flags_are_in_the_order_of_time_bounded_and_none_is_told_twice() -> None:
+    flags = Flags()
+    for at in (30, 10, 20):
+        flags.add(Flag(at * 1000 * MS, "stop", FlagKind.STOP))
+    flags.add(Flag(30_000 * MS, "stop", FlagKind.STOP), Flag(30_100 * MS, "stop", FlagKind.STOP))
+    assert [flag.at_ns // (1000 * MS) for flag in flags] == [10, 20, 30]
+    assert [flag.at_ns // (1000 * MS) for flag in flags.between(10_001 * MS, 30_000 * MS)] == [20]
+    for number in range(2000):
+        flags.add(Flag(number * 1000 * MS, "write", FlagKind.WRITE))
+    assert len(flags) == 500
+
+
+def test_a_station_flags_what_its_rows_tell_and_what_is_marked(bench: Bench) -> None:
+    station = bench.station
+    station.take([telemetry([10 * MS, 20 * MS], {"left_knee.state": [4.0, 7.0]})])
+    recording = Recording(By.WINDOW, None, lambda call: call(), bench.desk.news)
+    bench.desk.recording = recording
+    for told in recording.on_mark:
+        told("turns")
+    assert [(flag.at_ns // MS, flag.kind) for flag in station.flags] == [
+        (20, FlagKind.FAULT),
+        (20, FlagKind.MARK),
+    ]
+    assert station.rings.seconds(20 * MS) == 0.01
+    assert station.rings.stamp_ns(0.01) == 20 * MS
+    other = described().description
+    station.take([Described(msgspec.structs.replace(other, boot_id="another"))])
+    assert len(station.flags) == 0, "its clock has begun anew"

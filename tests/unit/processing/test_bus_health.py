@@ -1,0 +1,80 @@
+"""How bad a bus is: a full one is an alarm, and one that nobody has looked at is not known."""
+
+import time
+
+import pytest
+from msgspec.structs import replace
+
+from gateway.client import ConnectionState
+from gateway.wire.bus import CLOSED, BusInfo, NodeInfo, TalkInfo
+from gateway.wire.finding import FindingInfo
+from server_gui.core.follow.events import BusesSeen, LinkChanged
+from server_gui.core.follow.robot import Robot
+from server_gui.core.processing.bus_health import Level, alarms, level, seen, talking, worst
+
+NODE = NodeInfo(2, ["left_knee"], 0.44, 12.0, 88, 0, 0, 0.0)
+TALKS = [TalkInfo("TPDO", 2, 900.0), TalkInfo("SYNC", None, 100.0), TalkInfo("heartbeat", 2, 10.0)]
+BUS = BusInfo("main", "error active", 1_000_000, 41.2, 1010.0, 0, 0, 1, 0, [NODE], None, [], TALKS)
+BUSY = FindingInfo(1, "85 % of its time is taken", "send fewer PDOs")
+LOST = FindingInfo(1, "it answers no SDO", "check its cable")
+
+
+def robot(*buses: BusInfo, at_ns: int | None = None) -> Robot:
+    made = Robot()
+    made.apply(LinkChanged(ConnectionState.CONNECTED, None, 0))
+    made.apply(BusesSeen(buses, time.monotonic_ns() if at_ns is None else at_ns))
+    return made
+
+
+@pytest.mark.parametrize(
+    ("bus", "bad"),
+    [
+        (BUS, Level.GOOD),
+        (replace(BUS, load_percent=100.0), Level.ALARM),
+        (replace(BUS, load_percent=104.7), Level.ALARM),
+        (replace(BUS, load_percent=85.0, findings=[BUSY]), Level.WARNING),
+        (replace(BUS, state="error passive"), Level.WARNING),
+        (replace(BUS, state="bus off"), Level.ALARM),
+        (replace(BUS, state=CLOSED, load_percent=None), Level.ALARM),
+        (replace(BUS, nodes=[replace(NODE, findings=[LOST])]), Level.WARNING),
+        (replace(BUS, nodes=[replace(NODE, pdos_missing_percent=20.0)]), Level.WARNING),
+    ],
+)
+def test_a_bus_is_as_bad_as_what_is_worst_of_it(bus: BusInfo, bad: Level) -> None:
+    assert level(bus) is bad
+
+
+def test_a_full_bus_is_an_alarm_that_says_what_to_check() -> None:
+    ((bad, what, check),) = alarms(robot(replace(BUS, load_percent=100.0)))
+    assert bad is Level.ALARM
+    assert what == "bus main is full: 100 % of its time is taken"
+    assert "send fewer PDOs" in check
+    assert alarms(robot(BUS)) == []
+
+
+def test_what_is_old_or_never_came_or_is_of_a_link_that_is_gone_is_not_known() -> None:
+    old = robot(BUS, at_ns=time.monotonic_ns() - 60 * 10**9)
+    gone = robot(BUS)
+    gone.apply(LinkChanged(ConnectionState.WAITING, "no route", 0))
+    too_old = robot()
+    too_old.apply(BusesSeen(None, time.monotonic_ns()))
+    for each in (Robot(), old, gone, too_old):
+        assert seen(each) is None
+        assert worst(each)[0] is Level.UNKNOWN
+        assert "%" not in worst(each)[1][0]
+
+
+def test_the_worst_bus_is_said_with_its_load_its_errors_and_who_talks_most() -> None:
+    full = replace(BUS, name="legs", load_percent=97.0, error_frames=3, bus_offs=2)
+    bad, wordings = worst(robot(BUS, full))
+    assert bad is Level.ALARM
+    assert wordings[0] == "CAN legs 97 %, 3 errors, 2 × bus off · most: left knee 90 %"
+    assert wordings[-1] == "CAN 97 %, 3 errors, 2 × bus off"
+
+
+def test_who_talks_is_told_by_node_and_kind() -> None:
+    knee, nobody = talking(BUS)
+    assert (knee.node_id, knee.names, knee.frames_per_s) == (2, ("left_knee",), 910.0)
+    assert knee.kinds == (("TPDO", 900.0), ("heartbeat", 10.0))
+    assert knee.share == pytest.approx(910 / 1010)
+    assert (nobody.node_id, nobody.kinds) == (None, (("SYNC", 100.0),))
