@@ -3,13 +3,11 @@
 import contextlib
 import os
 import secrets
-import shutil
-import subprocess
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
 from gateway.certificates import NAME, KeyProblem
+from gateway.openssl import piped, run
 
 DAYS: Final = 36_500  # who is no longer trusted is revoked; no clock decides about a stop
 _CURVE: Final = "prime256v1"  # NIST P-256
@@ -73,32 +71,10 @@ def write_file(file: Path, content: bytes, mode: int) -> None:
 
 
 def _made(name: str) -> tuple[bytes, bytes]:
-    """A key and its certificate, both as PEM; through pipes, so that no file is ever readable for others."""
-    program = shutil.which("openssl")
-    if program is None:
-        raise KeyProblem("keys are made by the program openssl, which is not here: apt install openssl")
-    key = _run([program, "ecparam", "-name", _CURVE, "-genkey", "-noout"], b"")
+    """A key and its certificate, both as PEM."""
+    key = run(["ecparam", "-name", _CURVE, "-genkey", "-noout"], b"")
     settings = _EXTENSIONS.format(name=name).encode("ascii")
-    with _piped(settings) as read_settings:
-        command = [program, "req", "-x509", "-new", "-key", "/dev/stdin", "-sha256", "-days", str(DAYS)]
+    with piped(settings) as read_settings:
+        command = ["req", "-x509", "-new", "-key", "/dev/stdin", "-sha256", "-days", str(DAYS)]
         command += ["-config", f"/dev/fd/{read_settings}"]
-        return key, _run(command, key, read_settings)
-
-
-@contextlib.contextmanager
-def _piped(content: bytes) -> Iterator[int]:
-    reader, writer = os.pipe()
-    try:
-        os.write(writer, content)
-        os.close(writer)
-        yield reader
-    finally:
-        os.close(reader)
-
-
-def _run(command: list[str], given: bytes, *descriptors: int) -> bytes:
-    found = subprocess.run(command, input=given, capture_output=True, check=False, pass_fds=descriptors)
-    if found.returncode or not found.stdout:
-        said = found.stderr.decode("utf-8", "replace").strip().splitlines()
-        raise KeyProblem(f"{command[0]} {command[1]} made no key: {said[-1] if said else found.returncode}")
-    return found.stdout
+        return key, run(command, key, read_settings)

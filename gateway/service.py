@@ -182,8 +182,7 @@ class Service:
             )
         session.named = params.client
         who, robot = session.identity, self._config.robot.name
-        by_name = "" if who.name is None else f"{who.name}, "
-        session.who = f"{by_name}{params.client} ({session.peer})"
+        session.who = who.called(session.peer, params.client)
         return Hello(
             framing.PROTOCOL, robot, who.role, self._boot_id, __version__, who.name, roles.refused(who)
         )

@@ -6,6 +6,8 @@ from msgspec import Struct
 
 from gateway.wire.role import Role
 
+SHOWN: Final = 16  # hexadecimal digits of a fingerprint
+
 
 class Peer(Struct, frozen=True):
     """A process of this computer, by the account that it connected as."""
@@ -22,6 +24,21 @@ class Identity(Struct, frozen=True):
     fingerprint: str | None = None
     peer: Peer | None = None
     granted: tuple[str, ...] = ()  # what operators may on this robot beyond their role
+
+    @property
+    def spelled(self) -> str | None:
+        """The name and by what it is known, as the journal has it: `anna [57a5adb29709f45f]`."""
+        if self.name is None:
+            return None
+        known = f"uid {self.peer.uid}" if self.peer is not None else (self.fingerprint or "")[:SHOWN]
+        return f"{self.name} [{known}]"
+
+    def called(self, peer: str, client: str = "") -> str:
+        """Who that is, in the journal: `client` is only what it says of itself, and spells no identity."""
+        said = client.replace("[", "(")
+        if self.spelled is None:
+            return f"{said} ({peer})" if said else peer
+        return f"{self.spelled}, {said} ({peer})" if said else f"{self.spelled} ({peer})"
 
 
 ANYBODY: Final = Identity(Role.MAINTAINER)  # who comes by the loopback, as long as there are no keys

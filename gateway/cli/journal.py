@@ -1,28 +1,44 @@
 """`gwrms journal`: what was done to a robot, by whom, and whether the record of it is whole."""
 
 import argparse
+import dataclasses
 import datetime
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from gateway import config
+from gateway.access.changes import own_fingerprint
+from gateway.access.folder import AccessFolder
+from gateway.certificates import KeyProblem
 from gateway.cli.connect import choose, connect, parser
 from gateway.cli.text import say, say_json, table, warn
-from gateway.records.chain import Broken
+from gateway.client.keys import checked_pin, pins, server_file
 from gateway.records.folder import RecordsFolder
-from gateway.records.reading import verified
+from gateway.records.witness import NOBODY, Judgement, Verdict, judge, objection
+from gateway.wire.control import SignedHead
 
 VERIFY_EPILOG = """Run it on the robot's own computer, or on a copy of journal.jsonl with journal.jsonl.head
-and its older pieces (journal.jsonl.NUMBER) beside it."""
+and its older pieces (journal.jsonl.NUMBER) beside it. It says one of
 
+  intact     every entry is the one that a desk has seen, signed by the robot
+  broken     and at which entry: altered, moved, cut, or another one than a desk has seen
+  unproven   from which entry on: it holds in itself, and nobody else has seen those entries
+
+Whoever is root on the robot can write whatever they like into what no desk has collected yet.
+
+exit status: 0 intact; 1 broken; 2 not there, or usage; 3 unproven"""
+
+STATUS = {Verdict.INTACT: 0, Verdict.BROKEN: 1, Verdict.UNPROVEN: 3}
 _SHOWN_APART = ("n", "utc_ns", "monotonic_ns", "boot_id", "who", "what", "previous", "hash")
 
 
 USAGE = """usage: gwrms journal COMMAND …
 
   tail [-n N]    the robot's newest entries: who did what, when, and what came of it
-  verify PATH    whether every entry of a journal's file is there and unaltered
+  verify PATH    whether every entry of a journal's file is there and unaltered, as desks have seen it
 
 gwrms journal COMMAND --help says more.
 """
@@ -70,44 +86,111 @@ def _plain(value: object) -> str:
 
 def verify(argv: list[str]) -> int:
     """Run `gwrms journal verify`."""
-    made = argparse.ArgumentParser(
-        prog="gwrms journal verify",
-        description="Check every entry of a journal's file. Exit status 0: intact; 1: not; 2: not there.",
-        epilog=VERIFY_EPILOG,
-    )
-    made.add_argument("path", type=Path, help="robot.toml, a records folder, or a journal.jsonl")
-    made.add_argument("--json", action="store_true", help="one JSON object, for machines")
-    arguments = made.parse_args(argv)
+    arguments = _verify_parser().parse_args(argv)
     path = _journal(arguments.path)
     try:
-        count, unseen = _count(path)
-    except FileNotFoundError:
-        warn("journal", f"there is no journal at {path}: name robot.toml, its records folder, or the file")
+        witnesses, problems = _witnesses(arguments)
+        found = judge(path, witnesses, "; ".join(problems) or NOBODY)
+    except FileNotFoundError as error:
+        missing = error.filename if arguments.witness and error.filename else path
+        warn("journal", f"there is no journal at {missing}: name robot.toml, its records folder, or the file")
         return 2
-    except Broken as error:
-        if arguments.json:
-            say_json({"path": str(path), "intact": False, "problem": str(error)})
-        warn("journal", f"{path} is NOT intact: {error}")
-        return 1
+    except KeyProblem as error:
+        warn("journal", str(error))
+        return 2
     if arguments.json:
-        say_json({"path": str(path), "intact": True, "entries": count, "removed": unseen})
-        return 0
-    if count:
-        say(f"{path} is intact: {count} entries, each in its place and unaltered\n")
+        say_json({"path": str(path), "problems": problems, **dataclasses.asdict(found)})
     else:
-        say(f"{path} is empty: nothing in it tells whether there ever was an entry\n")
-    if unseen:
-        say(f"entries 1 to {unseen} could not be seen: the journal says that it has removed them for room\n")
-    return 0
+        _tell(path, found)
+        for problem in problems if found.verdict is not Verdict.UNPROVEN else ():
+            warn("journal", problem)
+    return STATUS[found.verdict]
 
 
-def _count(path: Path) -> tuple[int, int]:
-    """How many entries there are, and how many were before them."""
-    count = unseen = 0
-    for entry in verified(path):
-        unseen = entry["n"] - 1 if count == 0 else unseen
-        count += 1
-    return count, unseen
+def _tell(path: Path, found: Judgement) -> None:
+    at = "" if found.at is None else f" at {found.at}"
+    match found.verdict:
+        case Verdict.INTACT:
+            say(f"{path} is intact: {found.entries} entries, {found.text}\n")
+        case Verdict.BROKEN:
+            warn("journal", f"{path} is BROKEN{at}: {found.text}")
+        case Verdict.UNPROVEN if not found.entries:
+            say(f"{path} is empty, and unproven: nothing in it tells whether there ever was an entry\n")
+        case Verdict.UNPROVEN:
+            say(
+                f"{path} is unproven{at}: its {found.entries} entries follow each other unaltered, but who "
+                f"may write that file can make such a chain; {found.text}\n"
+            )
+    if found.removed:
+        said = "could not be seen: the journal says that it has removed them for room"
+        say(f"entries 1 to {found.removed} {said}\n")
+
+
+def _witnesses(arguments: argparse.Namespace) -> tuple[list[SignedHead], list[str]]:
+    """Those that count, and why others do not."""
+    key, why = _key(arguments)
+    heads: list[SignedHead] = []
+    problems = list(why)
+    for file in arguments.witness:
+        for number, line in enumerate(file.read_bytes().splitlines(), 1):
+            try:
+                head = msgspec.json.decode(line, type=SignedHead)
+            except (ValueError, RecursionError) as error:
+                problems.append(f"{file}, line {number}: {error}")
+                continue
+            said = objection(head, key)
+            if said is None:
+                heads.append(head)
+            else:
+                problems.append(f"{file}, line {number}: {said}")
+    return heads, problems
+
+
+def _key(arguments: argparse.Namespace) -> tuple[str | None, list[str]]:
+    """The fingerprint of the robot's key: as given, the robot's own, or that of the only paired robot."""
+    if arguments.key is not None or not arguments.witness:
+        return arguments.key, []
+    if arguments.path.suffix == ".toml":
+        return own_fingerprint(AccessFolder(config.load(arguments.path).access, {})), []
+    try:
+        known = pins()
+    except (OSError, ValueError) as error:
+        return None, [f"{server_file()} cannot be read: {error}"]
+    return (known.pop(), []) if len(known) == 1 else (None, [])
+
+
+def _verify_parser() -> argparse.ArgumentParser:
+    made = argparse.ArgumentParser(
+        prog="gwrms journal verify",
+        description="Check every entry of a journal, in itself and against what desks have seen of it.",
+        epilog=VERIFY_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    made.add_argument("path", type=Path, help="robot.toml, a records folder, or a journal.jsonl")
+    made.add_argument(
+        "--witness",
+        type=Path,
+        action="append",
+        default=[],
+        metavar="FILE",
+        help="what a desk has kept: gwrms cloud witnesses ROBOT > FILE; again for another desk's",
+    )
+    made.add_argument(
+        "--key",
+        type=_fingerprint,
+        metavar="SHA256",
+        help="of the robot, as pairing showed it (default: of robot.toml, or of the only paired robot)",
+    )
+    made.add_argument("--json", action="store_true", help="one JSON object, for machines")
+    return made
+
+
+def _fingerprint(text: str) -> str:
+    try:
+        return checked_pin("".join(text.split()))
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
 
 
 def _journal(path: Path) -> Path:

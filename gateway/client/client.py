@@ -13,9 +13,11 @@ from gateway.wire.component import COMPONENT_SNAPSHOT, STATUS_SNAPSHOT, Snapshot
 from gateway.wire.control import (
     CONTROL_ACQUIRE,
     CONTROL_RELEASE,
+    JOURNAL_HEAD,
     JOURNAL_TAIL,
     AcquireParams,
     JournalEntries,
+    JournalProof,
     Lease,
     ReleaseParams,
     TailParams,
@@ -241,6 +243,10 @@ class Client:
     async def journal(self, count: int = 20) -> JournalEntries:
         """The newest entries of the robot's journal, oldest first."""
         return await self.link.call(JOURNAL_TAIL, TailParams(count))
+
+    async def journal_head(self) -> JournalProof:
+        """The journal's newest entry, signed by the robot: whoever keeps it can tell if it is rewritten."""
+        return await self.link.call(JOURNAL_HEAD, Params())
 
     @contextlib.asynccontextmanager
     async def writing(self, ttl_s: float = 60.0) -> AsyncIterator[None]:

@@ -66,6 +66,11 @@ def pin_of(address: Address) -> str | None:
     return pin
 
 
+def pins() -> set[str]:
+    """Of all robots that this desk has paired with; raises `OSError` or `ValueError` as the file is."""
+    return {pin for pin, _ in _robots(server_file())}
+
+
 def context_for(address: Address, pin: str) -> "ssl.SSLContext":
     """TLS 1.3 with this desk's key. Whoever answers is held against the pin, and against nothing else.
 

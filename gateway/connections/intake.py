@@ -118,7 +118,7 @@ class Inlet:
         self.socket = connection
         self.peer = peer
         self.identity = identity
-        self.who = peer if identity.name is None else f"{identity.name} ({peer})"  # how the journal calls it
+        self.who = identity.called(peer)  # how the journal calls it
         self.received_bytes = self.unanswered = 0
         self.receiver: Callable[[Heard], object] = bool  # in the loop; set before anything is heard
         self._front = front

@@ -51,7 +51,7 @@ function _shtab_gwrms_using
 end
 
 set -g _shtab_gwrms_commands gateway install-service keys 'keys pair' 'keys list' 'keys revoke' pair check describe snapshot cost bench blame watch top plot get set params 'params save' 'params compare' 'params apply' store restore journal 'journal tail' 'journal verify' stop reset enable completion docs eds scan sensor 'sensor record' 'sensor replay' 'sensor decode' calibrate 'calibrate insole' 'calibrate imu' collect sessions 'sessions ls' 'sessions show' 'sessions gait' 'sessions resources' 'sessions compare' 'sessions export' label train cloud 'cloud ls' 'cloud du' 'cloud verify' 'cloud mend' 'cloud upload' 'cloud download' 'cloud compact' 'cloud retain' 'cloud vacuum' query models 'models ls' 'models show' 'models promote' 'models rollback' 'models history' 'models export' predict gui evaluate demo sim 'sim run' sim-record sim-fault
-set -g _shtab_gwrms_opts_with_value --activity --adapt-from --author --axes --baud --benchmark --bitrate --bus --channels --clear --cluster --component --config --controller --count --data --days --dir --drive --eds --falling --falls --file --foot --for --format --from --grace --held-out --host --imu --include --insole --instead-of --junit --kind --layout --limit --link --look --mark --minutes --model --mounting --name --node-id --notes --on --onnx --operator --out --path --picture --port --pseudo-labels --rate --reason --report --requests --robot --role --run-as --saturation --scale --scenario --schema --script --seconds --seed --serial --session --sort --speed --subject --subjects --table --task --to --trial --truth --url --wearer --who --why --without --write -n
+set -g _shtab_gwrms_opts_with_value --activity --adapt-from --author --axes --baud --benchmark --bitrate --bus --channels --clear --cluster --component --config --consent --controller --count --data --days --dir --drive --eds --falling --falls --file --foot --for --format --from --grace --held-out --host --imu --include --insole --instead-of --junit --key --kind --layout --limit --link --look --mark --minutes --model --mounting --name --node-id --notes --on --onnx --operator --out --path --picture --port --pseudo-labels --rate --reason --report --requests --robot --role --run-as --saturation --scale --scenario --schema --script --seconds --seed --serial --session --sort --speed --subject --subjects --table --task --to --trial --truth --url --wearer --who --why --without --witness --write -n
 
 complete -c gwrms -e
 complete -c gwrms -f
@@ -195,8 +195,10 @@ complete -c gwrms -n '_shtab_gwrms_using journal tail' -s h -l help -d 'show thi
 complete -c gwrms -n '_shtab_gwrms_using journal tail' -l robot -x -d 'the gateway to ask (default 127.0.0.1:7420)'
 complete -c gwrms -n '_shtab_gwrms_using journal tail' -l json -d 'one JSON object a line, for machines'
 complete -c gwrms -n '_shtab_gwrms_using journal tail' -s n -x -d 'how many, at most 1000 (default 20)'
-complete -c gwrms -n '_shtab_gwrms_using journal; and test $_shtab_gwrms_npos -eq 0' -a verify -d 'Check every entry of a journal'"'"'s file. Exit status 0: intact; 1: not; 2: not there.'
+complete -c gwrms -n '_shtab_gwrms_using journal; and test $_shtab_gwrms_npos -eq 0' -a verify -d 'Check every entry of a journal, in itself and against what desks have seen of it.'
 complete -c gwrms -n '_shtab_gwrms_using journal verify' -s h -l help -d 'show this help message and exit'
+complete -c gwrms -n '_shtab_gwrms_using journal verify' -l witness -xka "(__fish_complete_path (commandline -ct))" -d 'what a desk has kept: gwrms cloud witnesses ROBOT > FILE; again for another desk'"'"'s'
+complete -c gwrms -n '_shtab_gwrms_using journal verify' -l key -x -d 'of the robot, as pairing showed it (default: of robot.toml, or of the only paired robot)'
 complete -c gwrms -n '_shtab_gwrms_using journal verify' -l json -d 'one JSON object, for machines'
 complete -c gwrms -n '_shtab_gwrms_using journal verify; and test $_shtab_gwrms_npos -eq 0' -ka "(__fish_complete_path (commandline -ct))" -d 'robot.toml, a records folder, or a journal.jsonl'
 complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a stop -d 'Quick stop on every drive, held until gwrms reset. Needs no lease.'
@@ -278,6 +280,8 @@ complete -c gwrms -n '_shtab_gwrms_using collect' -l config -xka "(__fish_comple
 complete -c gwrms -n '_shtab_gwrms_using collect' -l robot -x -d 'a robot beside those of the file; again for another one'
 complete -c gwrms -n '_shtab_gwrms_using collect' -l operator -x -d 'who records; kept with the sessions'
 complete -c gwrms -n '_shtab_gwrms_using collect' -l notes -x -d 'kept with the sessions'
+complete -c gwrms -n '_shtab_gwrms_using collect' -l wearer -x -d 'who wears the robots, as a pseudonym of the study; gwrms cloud forget finds them by it'
+complete -c gwrms -n '_shtab_gwrms_using collect' -l consent -x -d 'what the wearer has agreed to, and when or where that is'
 complete -c gwrms -n '_shtab_gwrms_using collect' -l status -d 'ask the collector that runs how it goes'
 complete -c gwrms -n '_shtab_gwrms_using collect' -l upload -d 'tell it to upload what waits, now'
 complete -c gwrms -n '_shtab_gwrms_using collect' -l mark -x -d 'tell it to mark this instant in every robot'"'"'s recording'
@@ -486,6 +490,8 @@ complete -c gwrms -n '_shtab_gwrms_using gui' -l config -xka "(__fish_complete_p
 complete -c gwrms -n '_shtab_gwrms_using gui' -l no-record -d 'only show what comes, keep nothing'
 complete -c gwrms -n '_shtab_gwrms_using gui' -l operator -x -d 'who records; kept with the sessions'
 complete -c gwrms -n '_shtab_gwrms_using gui' -l notes -x -d 'kept with the sessions'
+complete -c gwrms -n '_shtab_gwrms_using gui' -l wearer -x -d 'who wears the robots, as a pseudonym of the study; gwrms cloud forget finds them by it'
+complete -c gwrms -n '_shtab_gwrms_using gui' -l consent -x -d 'what the wearer has agreed to, and when or where that is'
 complete -c gwrms -n '_shtab_gwrms_using gui' -l look -xka "dark light" -d 'colours; kept for the next time'
 complete -c gwrms -n '_shtab_gwrms_using gui' -l scale -xka "80 81 82 83 84 85 86 87 88 89 90 91 92 93 94 95 96 97 98 99 100 101 102 103 104 105 106 107 108 109 110 111 112 113 114 115 116 117 118 119 120 121 122 123 124 125 126 127 128 129 130 131 132 133 134 135 136 137 138 139 140 141 142 143 144 145 146 147 148 149 150 151 152 153 154 155 156 157 158 159 160 161 162 163 164 165 166 167 168 169 170 171 172 173 174 175 176 177 178 179 180 181 182 183 184 185 186 187 188 189 190 191 192 193 194 195 196 197 198 199 200" -d 'size of all text, %'
 complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a evaluate -d 'How well predictions hold for people, real or simulated, whom no model has seen.'

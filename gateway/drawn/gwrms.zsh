@@ -82,7 +82,7 @@ _shtab_gwrms_cloud_commands() {
 _shtab_gwrms_journal_commands() {
   local _commands=(
     tail:'The newest entries: who did what, when, and what came of it. WHO is the program, by the name that'
-    verify:'Check every entry of a journal'"'"'s file. Exit status 0: intact; 1: not; 2: not there.'
+    verify:'Check every entry of a journal, in itself and against what desks have seen of it.'
   )
   _describe 'gwrms journal commands' _commands
 }
@@ -346,6 +346,8 @@ _shtab_gwrms_collect_options=(
   "*--robot[a robot beside those of the file\; again for another one]:NAME=HOST:PORT:"
   "--operator[who records\; kept with the sessions]:WHO:"
   "--notes[kept with the sessions]:TEXT:"
+  "--wearer[who wears the robots, as a pseudonym of the study\; gwrms cloud forget finds them by it]:ID:"
+  "--consent[what the wearer has agreed to, and when or where that is]:TEXT:"
   "--status[ask the collector that runs how it goes]"
   "--upload[tell it to upload what waits, now]"
   "--mark[tell it to mark this instant in every robot\'s recording]:TEXT:"
@@ -465,6 +467,8 @@ _shtab_gwrms_gui_options=(
   "--no-record[only show what comes, keep nothing]"
   "--operator[who records\; kept with the sessions]:WHO:"
   "--notes[kept with the sessions]:TEXT:"
+  "--wearer[who wears the robots, as a pseudonym of the study\; gwrms cloud forget finds them by it]:ID:"
+  "--consent[what the wearer has agreed to, and when or where that is]:TEXT:"
   "--look[colours\; kept for the next time]:look:(dark light)"
   "--scale[size of all text, \%]:80…200:(80 81 82 83 84 85 86 87 88 89 90 91 92 93 94 95 96 97 98 99 100 101 102 103 104 105 106 107 108 109 110 111 112 113 114 115 116 117 118 119 120 121 122 123 124 125 126 127 128 129 130 131 132 133 134 135 136 137 138 139 140 141 142 143 144 145 146 147 148 149 150 151 152 153 154 155 156 157 158 159 160 161 162 163 164 165 166 167 168 169 170 171 172 173 174 175 176 177 178 179 180 181 182 183 184 185 186 187 188 189 190 191 192 193 194 195 196 197 198 199 200)"
 )
@@ -503,6 +507,8 @@ _shtab_gwrms_journal_tail_defaults_added=0
 
 _shtab_gwrms_journal_verify_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
+  "*--witness[what a desk has kept\: gwrms cloud witnesses ROBOT \> FILE\; again for another desk\'s]:FILE:_files"
+  "--key[of the robot, as pairing showed it (default\: of robot.toml, or of the only paired robot)]:SHA256:"
   "--json[one JSON object, for machines]"
   ":robot.toml, a records folder, or a journal.jsonl:_files"
 )

@@ -26,7 +26,11 @@ class Head(msgspec.Struct, frozen=True):
 
 
 class Broken(ValueError):
-    """The chain does not hold; the message says where."""
+    """The chain does not hold; the message says where, and `at` the first line that is wrong."""
+
+    def __init__(self, text: str, at: int | None = None) -> None:
+        super().__init__(text)
+        self.at = at
 
 
 def line(head: Head, fields: Mapping[str, Any]) -> tuple[bytes, Head]:
@@ -46,14 +50,15 @@ def check(number: int, previous: str | None, data: bytes) -> tuple[Head, dict[st
     body, found, rest = data.rpartition(_HASH)
     digest = hashlib.sha256(body).hexdigest()
     if not found or rest != digest.encode() + _END:
-        raise Broken(f"line {number} was altered: its hash does not fit")
+        raise Broken(f"line {number} was altered: its hash does not fit", number)
     try:
         fields = msgspec.json.decode(data, type=dict[str, Any])
         head, follows = Head(fields["n"], digest), (fields["n"], fields["previous"]) == (number, previous)
     except (*UNDECODABLE, KeyError) as error:
-        raise Broken(f"line {number} is no entry: {error}") from error
+        raise Broken(f"line {number} is no entry: {error}", number) from error
     if previous is not None and not follows:
-        raise Broken(f"line {number} does not follow the line before it: lines were removed, added or moved")
+        text = f"line {number} does not follow the line before it: lines were removed, added or moved"
+        raise Broken(text, number)
     return head, fields
 
 
@@ -70,12 +75,13 @@ def verify(lines: Iterable[bytes], head: Head | None, begin: Head | None = None)
     reached = head is None or head.n == 0
     for number, data in enumerate(lines, now.n + 1):
         if not data.endswith(b"\n"):
-            raise Broken(f"line {number} is cut: it has no end")
+            raise Broken(f"line {number} is cut: it has no end", number)
         now, fields = check(number, now.hash, data[:-1])
         if head is not None and now.n == head.n:
             if now.hash != head.hash:
-                raise Broken(f"line {number} is not the one that was written there: the head says another")
+                text = f"line {number} is not the one that was written there: the head says another"
+                raise Broken(text, number)
             reached = True
         yield fields
     if not reached and head is not None:
-        raise Broken(f"lines are missing at the end: {head.n} were written, {now.n} are there")
+        raise Broken(f"lines are missing at the end: {head.n} were written, {now.n} are there", now.n + 1)

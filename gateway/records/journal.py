@@ -12,11 +12,11 @@ import os
 import queue
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, BinaryIO, Final
+from typing import Any, BinaryIO, Final, TypeVar
 
 import msgspec
 
@@ -30,6 +30,8 @@ from gateway.records.reading import SHORTENED, read_verified
 __all__ = ["Entry", "Journal", "Share", "Sizes", "Tail", "TooMany", "head_file", "read_head", "read_verified"]
 
 log = logging.getLogger(__name__)
+
+Found = TypeVar("Found")
 
 AT_ONCE: Final = 256  # entries that become durable together
 _CLOSED: Final = "the journal is closed, the gateway is ending"
@@ -45,7 +47,7 @@ class Sizes:
 
 @dataclass(slots=True)
 class _Waiting:
-    """An entry; or, without fields, somebody who wants to know the number of the newest."""
+    """An entry; or, without fields, somebody who wants to know the newest one."""
 
     fields: Entry | None
     future: "Future[Any]" = field(default_factory=Future)
@@ -90,8 +92,17 @@ class Journal:
     def tail(self, count: int) -> "Future[Tail]":
         """The newest entries, also those that are being written now; reading delays no other entry."""
         found: Future[Tail] = Future()
-        newest: Future[int] = self._submit(_Waiting(None))
-        newest.add_done_callback(lambda newest: self._begin_reading(count, newest, found))
+        newest: Future[Head] = self._submit(_Waiting(None))
+        newest.add_done_callback(
+            lambda newest: self._begin_reading(lambda: self._read(count, newest.result().n), found)
+        )
+        return found
+
+    def with_head(self, work: Callable[[Head], Found]) -> "Future[Found]":
+        """What `work` makes of the newest entry, in the thread that reads; it delays no entry either."""
+        found: Future[Found] = Future()
+        newest: Future[Head] = self._submit(_Waiting(None))
+        newest.add_done_callback(lambda newest: self._begin_reading(lambda: work(newest.result()), found))
         return found
 
     def close(self) -> None:
@@ -261,7 +272,7 @@ class Journal:
             error = OSError(getattr(failure, "errno", None), f"{self.path} cannot be read: {failure}")
         for one in asking:
             if error is None:
-                one.future.set_result(self._head.n)
+                one.future.set_result(self._head)
             else:
                 one.future.set_exception(error)
 
@@ -363,10 +374,10 @@ class Journal:
 
     # In the reader's thread.
 
-    def _begin_reading(self, count: int, newest: "Future[int]", found: "Future[Tail]") -> None:
+    def _begin_reading(self, work: Callable[[], Found], found: "Future[Found]") -> None:
         """In whichever thread has found out up to where it may be read."""
         try:
-            reading = self._reader.submit(self._read, count, newest.result())
+            reading = self._reader.submit(work)
         except Exception as error:  # noqa: BLE001 - it belongs to who asks
             found.set_exception(error if isinstance(error, OSError) else OSError(None, _CLOSED))
         else:
@@ -379,7 +390,7 @@ class Journal:
             raise OSError(None, f"{self.path} is damaged: {error}") from error
 
 
-def _pass_on(reading: "Future[Tail]", found: "Future[Tail]") -> None:
+def _pass_on(reading: "Future[Found]", found: "Future[Found]") -> None:
     error = reading.exception()
     if error is None:
         found.set_result(reading.result())

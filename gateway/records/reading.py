@@ -32,7 +32,7 @@ def verified(journal: Path) -> Iterator[Entry]:
     with contextlib.ExitStack() as opened:
         files = _open_all(journal, opened)
         if not files and head is not None and head.n:
-            raise Broken(f"{journal} is missing: {head.n} entries were written")
+            raise Broken(f"{journal} is missing: {head.n} entries were written", 1)
         if not files:
             raise FileNotFoundError(f"{journal} is not there")
         begin = _before(files[0])
@@ -85,7 +85,9 @@ def _check_removed(begin: Head, removed: Head) -> None:
     if begin.n > removed.n:
         raise Broken(
             f"lines 1 to {begin.n} are missing, and the journal does not say that it removed them: "
-            "put its older pieces (journal.jsonl.NUMBER) beside it"
+            "put its older pieces (journal.jsonl.NUMBER) beside it",
+            1,
         )
     if begin.n and begin.n == removed.n and begin.hash != removed.hash:
-        raise Broken(f"line {begin.n + 1} does not follow the line that was removed before it")
+        text = f"line {begin.n + 1} does not follow the line that was removed before it"
+        raise Broken(text, begin.n + 1)

@@ -41,6 +41,27 @@ class JournalEntries(Struct, frozen=True):
     cut: str | None = None
 
 
+class SignedHead(Struct, frozen=True):
+    """The journal's newest entry, signed by the robot: who keeps this can tell whether it was rewritten.
+
+    `certificate` is the robot's (PEM), `signature` ECDSA over SHA-256 (DER, base64).
+    """
+
+    robot: str
+    n: int
+    hash: str
+    utc_ns: int
+    certificate: str
+    signature: str
+
+
+class JournalProof(Struct, frozen=True):
+    """Result of `journal.head`; without a `head`, `unsigned` says why."""
+
+    head: SignedHead | None = None
+    unsigned: str | None = None
+
+
 class RecordsInfo(Struct, frozen=True):
     """Where the journal is kept, and why it cannot be written."""
 
@@ -53,4 +74,5 @@ CONTROL_RELEASE = Method(
     "control.release", ReleaseParams, Done, module="control", needs_lease=True, role=Role.OPERATOR
 )
 JOURNAL_TAIL = Method("journal.tail", TailParams, JournalEntries, module="control", role=Role.VIEWER)
-METHODS = (CONTROL_ACQUIRE, CONTROL_RELEASE, JOURNAL_TAIL)
+JOURNAL_HEAD = Method("journal.head", Params, JournalProof, module="control", role=Role.VIEWER)
+METHODS = (CONTROL_ACQUIRE, CONTROL_RELEASE, JOURNAL_TAIL, JOURNAL_HEAD)

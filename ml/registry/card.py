@@ -92,10 +92,14 @@ class Card(Struct, frozen=True, kw_only=True):
 
 def content_id(card: Card) -> str:
     """The name of a model with these files and this card, but for when it was made."""
+    return f"{card.task}-{digest(card)[:12]}"
+
+
+def digest(card: Card) -> str:
+    """SHA-256 of the same: with the checksums of its files, it is the whole model's."""
     fields = msgspec.to_builtins(card)
     content = {name: value for name, value in fields.items() if name not in _NOT_CONTENT}
-    digest = hashlib.sha256(msgspec.json.encode(content, order="sorted")).hexdigest()
-    return f"{card.task}-{digest[:12]}"
+    return hashlib.sha256(msgspec.json.encode(content, order="sorted")).hexdigest()
 
 
 def encoded(card: Card) -> bytes:

@@ -8,14 +8,14 @@ import hashlib
 from collections.abc import Iterator, Set
 from functools import partial
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import msgspec
 
 from ml.errors import Overtaken, UnusableModel
-from ml.registry.card import Card, checked_name, content_id, decoded, encoded
+from ml.registry.card import Card, checked_name, content_id, decoded, digest, encoded
 from ml.registry.code import features_hash
-from ml.registry.pointers import EVERY_ROBOT, Pointer, Pointers, Target
+from ml.registry.pointers import EVERY_ROBOT, Pointer, Pointers, Sign, Target
 from ml.registry.pointers import FOLDER as SERVING
 from ml.robot.learned import Learned
 from ml.store import Store, upkeep
@@ -27,11 +27,23 @@ SKOPS: Final = "model.skops"
 SHIPPED: Final = Path(__file__).parents[1] / "shipped"  # models that come with GWRMS, laid out as in a store
 
 
-class Registry:
-    """The models under a store's URL, and those that come with GWRMS; for one thread at a time."""
+class Serving(NamedTuple):
+    """The model that serves; `pointer` is who said so for `robot` ("": all), `None`: it came with GWRMS."""
 
-    def __init__(self, store_url: str, shipped: Path = SHIPPED) -> None:
+    model: str
+    robot: str = ""
+    pointer: Pointer | None = None
+
+
+class Registry:
+    """The models under a store's URL, and those that come with GWRMS; for one thread at a time.
+
+    What is promoted or rolled back is signed by `sign`, where there is one.
+    """
+
+    def __init__(self, store_url: str, shipped: Path = SHIPPED, *, sign: Sign | None = None) -> None:
         self.url = store_url
+        self._sign = sign
         self._objects = Objects(store_url)
         self._shipped = Objects(shipped.as_uri()) if shipped.is_dir() else None
         self._known: dict[str, Card] = {}  # a card never changes
@@ -126,7 +138,12 @@ class Registry:
     # --- which one serves
 
     def serving(self, task: str, robot: str = "", channels: Set[str] | None = None) -> str | None:
-        """The model that serves a robot: promoted for it, else for all, else one that comes with GWRMS.
+        """The model that serves a robot, as `served_to`."""
+        found = self.served_to(task, robot, channels)
+        return None if found is None else found.model
+
+    def served_to(self, task: str, robot: str = "", channels: Set[str] | None = None) -> Serving | None:
+        """What serves a robot: promoted for it, else for all, else one that comes with GWRMS.
 
         With `channels` only a model that needs no other; without them, none that comes with GWRMS.
 
@@ -137,13 +154,15 @@ class Registry:
         for whose in dict.fromkeys((robot, "")):
             now = Pointers(self._objects, task, whose).newest()
             if now and now.model and (channels is None or channels >= set(self.card(now.model).channels)):
-                return now.model
+                return Serving(now.model, whose, now)
         fitting = [
             card
             for card in map(self.card, _ids(self._shipped))
             if card.task == task and channels is not None and channels >= set(card.channels)
         ]
-        return max(fitting, key=lambda card: (len(card.channels), card.made)).id if fitting else None
+        if not fitting:
+            return None
+        return Serving(max(fitting, key=lambda card: (len(card.channels), card.made)).id)
 
     def promote(self, model: str, robot: str = "", *, who: str, why: str, over: str | None = None) -> Pointer:
         """Let a model serve one robot, or all that have no model of their own.
@@ -160,11 +179,11 @@ class Registry:
             for name in (*card.sha256, CARD):
                 self._create(model, name, self.file(model, name))
         check = partial(self._check_serves, card, robot, over)
-        pointers, every = (Pointers(self._objects, card.task, whose) for whose in (robot, ""))
+        pointers, every = (self._pointers(card.task, whose) for whose in (robot, ""))
         if over is None or not robot:
-            return pointers.promote(model, who, why, check)
+            return pointers.promote(model, who, why, check, digest(card))
         own, before = pointers.newest(), every.newest()
-        done = pointers.promote(model, who, why, check)
+        done = pointers.promote(model, who, why, check, digest(card))
         stood = done == own or (own is not None and own.model and own.model == over)
         if not stood and every.newest() != before:  # which does not take our number
             self._withdraw(pointers, done, over, every.newest())
@@ -201,7 +220,8 @@ class Registry:
                 f"{task}: going back leads to {target.model or 'no model of its own'} by now, not to "
                 f"{to or 'none'}: somebody changed what serves; look, and say it again"
             )
-        return Pointers(self._objects, task, robot).roll_back(target, who, why)
+        content = digest(self.card(target.model)) if target.model else ""
+        return self._pointers(task, robot).roll_back(target, who, why, content)
 
     def before(self, task: str, robot: str = "") -> str:
         """The model that a rollback leads to, or none ("").
@@ -228,6 +248,9 @@ class Registry:
 
     # --- inside
 
+    def _pointers(self, task: str, robot: str) -> Pointers:
+        return Pointers(self._objects, task, robot, self._sign)
+
     def _target(self, task: str, robot: str) -> Target:
         target = Pointers(self._objects, task, robot).target()
         if target.model:
@@ -249,7 +272,9 @@ class Registry:
         """Take back what was promoted while what serves every robot changed; raises `Overtaken`."""
         target = pointers.target()
         if pointers.newest() == done:  # else somebody has taken its place already
-            pointers.roll_back(target, done.who, f"withdrawn: {over or 'nothing'} did not serve any more")
+            content = digest(self.card(target.model)) if target.model else ""
+            why = f"withdrawn: {over or 'nothing'} did not serve any more"
+            pointers.roll_back(target, done.who, why, content)
         raise Overtaken(
             f"{done.model} was to serve in the place of {over or 'nothing'}, and "
             f"{(now and now.model) or 'nothing'} serves every robot by now: train again, or "

@@ -124,6 +124,8 @@ SESSIONS: Final = Table(
             field("operator", pa.string()),
             field("notes", pa.string()),
             *_ORIGIN,
+            field("wearer", pa.string()),
+            field("consent", pa.string()),
         ]
     ),
     indexed=5,
@@ -175,6 +177,7 @@ JOURNAL: Final = Table(
             field("n", pa.int64()),
             *(field(name, pa.string()) for name in ("hash", "who", "what", "entry")),  # entry: JSON, whole
             *_ORIGIN,
+            field("witness", pa.string()),  # JSON: the same as the robot signed it, where it has
         ]
     ),
     indexed=3,

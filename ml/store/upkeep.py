@@ -169,7 +169,7 @@ def retain(
                     filter=pyarrow.dataset.field("utc") < before
                 )
                 continue
-            went[location] = _again(store, location, functools.partial(_retain, store, location, before))
+            went[location] = again(store, location, functools.partial(_retain, store, location, before))
     return went
 
 
@@ -185,7 +185,7 @@ def _retain(store: Store, location: str, before: datetime) -> int:
     return int(found["num_deleted_rows"] or 0)
 
 
-def _again(store: Store, location: str, work: Callable[[], Done]) -> Done:
+def again(store: Store, location: str, work: Callable[[], Done]) -> Done:
     """Do it, and again where others have changed the table meanwhile, which undoes it."""
     for _ in range(ATTEMPTS):
         with contextlib.suppress(CommitFailedError):
@@ -244,7 +244,7 @@ def vacuum(
         with translated(f"{store.url}/{location} cannot be cleaned"):
             versions = sorted(kept.get(location, []))
             work = functools.partial(_vacuum, store, location, grace, versions, dry_run=dry_run)
-            gone += _again(store, location, work)
+            gone += again(store, location, work)
     return gone
 
 
@@ -287,7 +287,7 @@ def _compactable(store: Store, table: Table) -> Iterator[Compacted]:
 
 def _compact(store: Store, location: str) -> Compacted:
     with translated(f"{store.url}/{location} cannot be compacted"), alone(store, location):
-        return _again(store, location, functools.partial(_put_together, store, location))
+        return again(store, location, functools.partial(_put_together, store, location))
 
 
 def _put_together(store: Store, location: str) -> Compacted:

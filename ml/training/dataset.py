@@ -117,7 +117,7 @@ def _part(ask: Ask) -> Part:
     if not known.any():
         raise UnusableData("nobody has said what robot or wearer did in it (gwrms label)")
     regression = any(each.label == REGRESSION for each in labels)
-    who = _wearer(labels)
+    who = _wearer(labels, _recorded_wearer(store, ask))
     whole = Part(
         ask, who or ask.session, regression, found, truth, source, stamps_ns, ranges, named=bool(who)
     )
@@ -210,9 +210,14 @@ def _truth(recipe: Recipe, said: Sequence[Said], stamps_ns: Instants) -> tuple[n
     return folded, np.where(np.isin(names, list(task.fold)), sources, NOBODY)
 
 
-def _wearer(labels: Sequence[Label]) -> str:
+def _recorded_wearer(store: Store, ask: Ask) -> str:
+    """Who was said to wear the robot when it was recorded."""
+    return "".join(row.get("wearer") or "" for row in newest(_rows(store, SESSIONS, ask)))
+
+
+def _wearer(labels: Sequence[Label], recorded: str) -> str:
     """Who it is, however that was spelled; "" where nobody says."""
-    names = sorted({name for each in labels if (name := wearer(each.label))})
+    names = sorted({name for each in labels if (name := wearer(each.label))} | ({recorded} - {""}))
     people = {who for name in names if (who := person(name))}
     if len(people) > 1:
         raise UnusableData(f"it has labels of several wearers: {', '.join(names)}; take all but one back")

@@ -6,9 +6,11 @@ from typing import Final
 from gateway.cli.connect import choose
 from ml.store.private import private_files
 from server_gui.cli.cloud_contents import du, ls, verify
+from server_gui.cli.cloud_forget import forget
 from server_gui.cli.cloud_maintenance import compact, retain, vacuum
 from server_gui.cli.cloud_mend import mend
 from server_gui.cli.cloud_transfer import download, upload
+from server_gui.cli.cloud_witnesses import witnesses
 
 USAGE = """usage: gwrms cloud COMMAND [URL] [--config server.toml]
 
@@ -21,6 +23,8 @@ USAGE = """usage: gwrms cloud COMMAND [URL] [--config server.toml]
   compact     put small files together
   retain      remove what is older than so many days
   vacuum      delete files that no newer version needs
+  forget      everything of one wearer, for good
+  witnesses   what this desk has seen of a robot's journal, to prove it by
 
 URL is file:///folder or s3://bucket/prefix; without it, the store of the server's file. Keys come from the
 AWS environment or profile alone. gwrms cloud COMMAND --help says more.
@@ -35,6 +39,8 @@ COMMANDS: Final[dict[str, Callable[[list[str]], int]]] = {
     "compact": compact,
     "retain": retain,
     "vacuum": vacuum,
+    "forget": forget,
+    "witnesses": witnesses,
 }
 
 

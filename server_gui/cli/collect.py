@@ -16,10 +16,12 @@ from gateway.amounts import NONE, age, size
 from gateway.cli.text import say, table, warn
 from gateway.plain import json_plain, plain
 from ml.store.private import private_files
+from server_gui.cli.worn import add_worn, worn
 from server_gui.core.fleet.collector import Collector, CollectorReport
 from server_gui.core.fleet.control_socket import ask, why_not_uploaded
 from server_gui.core.fleet.link_statistics import LinkReport
 from server_gui.core.prediction.state import WITHIN_DAYS, Figures, PredictingState, TaskReport
+from server_gui.core.recording.records import Worn
 from server_gui.core.settings.server_file import ServerSettings, SettingsError, add_robots, default_file, load
 from server_gui.core.threads.supervision import BEAT_S
 from server_gui.processes.ending import Ended, Ending
@@ -95,7 +97,7 @@ def main(argv: list[str]) -> int:
     if not settings.robots:
         file = arguments.config or default_file()
         raise SettingsError(f"no robot is named: write it into [robots] of {file}, or --robot NAME=HOST:PORT")
-    return _collect(settings, arguments.operator, arguments.notes)
+    return _collect(settings, arguments.operator, arguments.notes, worn(arguments))
 
 
 def _mark(spool: Path, text: str) -> int:
@@ -107,10 +109,11 @@ def _mark(spool: Path, text: str) -> int:
     return 0
 
 
-def _collect(settings: ServerSettings, operator: str, notes: str) -> int:
+def _collect(settings: ServerSettings, operator: str, notes: str, worn: Worn) -> int:
     _log_to_stderr()
     gc.freeze()  # what was loaded so far lives as long as the process, and there is much of it
-    with Ending() as ending, contextlib.suppress(Ended), Collector(settings, operator, notes) as collector:
+    collecting = Collector(settings, operator, notes, worn=worn)
+    with Ending() as ending, contextlib.suppress(Ended), collecting as collector:
         names = ", ".join(settings.robots)
         log.info("recording %s into %s, for the store %s", names, settings.recorder.spool, settings.store.url)
         while True:
@@ -263,6 +266,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--operator", default="", metavar="WHO", help="who records; kept with the sessions")
     parser.add_argument("--notes", default="", metavar="TEXT", help="kept with the sessions")
+    add_worn(parser)
     asking = parser.add_mutually_exclusive_group()
     asking.add_argument("--status", action="store_true", help="ask the collector that runs how it goes")
     asking.add_argument("--upload", action="store_true", help="tell it to upload what waits, now")

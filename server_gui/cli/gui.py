@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 
 from ml.store.private import private_files
+from server_gui.cli.worn import add_worn, worn
 from server_gui.core.settings.server_file import add_robots, default_file, load, name_of
 from server_gui.qt_needs import check, prefer_x
 
@@ -37,7 +38,7 @@ def main(argv: list[str]) -> int:
 
     look = None if arguments.look is None else Look(arguments.look)
     scale = None if arguments.scale is None else arguments.scale / 100
-    record = None if arguments.no_record else Record(arguments.operator, arguments.notes)
+    record = None if arguments.no_record else Record(arguments.operator, arguments.notes, worn(arguments))
     return run(settings, look, scale, record=record, file=arguments.config or default_file())
 
 
@@ -61,6 +62,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--no-record", action="store_true", help="only show what comes, keep nothing")
     parser.add_argument("--operator", default="", metavar="WHO", help="who records; kept with the sessions")
     parser.add_argument("--notes", default="", metavar="TEXT", help="kept with the sessions")
+    add_worn(parser)
     parser.add_argument("--look", choices=("dark", "light"), help="colours; kept for the next time")
     parser.add_argument(
         "--scale", type=int, choices=range(80, 201), metavar="80…200", help="size of all text, %%"

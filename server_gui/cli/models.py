@@ -22,6 +22,7 @@ from server_gui.cli.cloud_options import add_url, parser, url, when
 from server_gui.cli.models_show import told
 from server_gui.core.models.catalogue import Serving, open_registry, why_it_cannot_serve
 from server_gui.core.models.names import EVERY
+from server_gui.core.settings.promoters import UNSIGNED, own_line
 from server_gui.core.settings.server_file import load
 
 USAGE: Final = """usage: gwrms models COMMAND [--config server.toml] [--url URL] [--json]
@@ -31,6 +32,7 @@ USAGE: Final = """usage: gwrms models COMMAND [--config server.toml] [--url URL]
   promote MODEL  let it serve every robot, or with --robot one
   rollback TASK  let that serve again which did before
   history TASK   what has served, who said so, and why
+  key            this desk's own, with which it signs what it promotes
   export MODEL   a model as ONNX, for other programs
 
 A model's name may be cut off where it is unique. gwrms models COMMAND --help says more.
@@ -44,6 +46,9 @@ examples
   gwrms models promote gait_phase-77aa --robot exo-01 --why "adapted to Ada's walk\""""
 ROLLBACK_EPILOG: Final = """Said again, it goes back further. Before the first model of a robot's own serves
 that for all robots, and before the first of these what comes with GWRMS."""
+KEY_EPILOG: Final = """Whoever may promote models by which a rule stops robots stands with that line in
+[promoters] of the server's file, on every computer that records these robots."""
+SHIPPED: Final = f"where no other does ({UNSIGNED})"
 NOTHING: Final = "nothing"  # that serves
 
 
@@ -60,7 +65,7 @@ def ls(argv: list[str]) -> int:
     arguments = made.parse_args(argv)
     registry = _registry(arguments)
     cards, damaged = registry.entries(arguments.task), registry.damaged()
-    serving = Serving.of(registry)
+    serving = Serving.of(registry, load(arguments.config).promoters)
     if arguments.json:
         say_json({"models": [_fields(card, serving) for card in cards], "damaged": damaged})
     else:
@@ -81,13 +86,14 @@ def _row(card: Card, serving: Serving) -> tuple[str, ...]:
         when(card.made),
         f"{age_days(card):.0f}",
         judged,
-        "where no other does" if shipped else ", ".join(serving.whom.get(card.id, ())) or NONE,
+        SHIPPED if shipped else serving.told(card.id) or NONE,
     )
 
 
 def _fields(card: Card, serving: Serving) -> dict[str, Any]:
     fields: dict[str, Any] = msgspec.to_builtins(card)
     more = {"shipped": card.id in serving.shipped, "serves": serving.whom.get(card.id, [])}
+    more["signed"] = serving.signed.get(card.id, [])
     return fields | more | {"age_days": round(age_days(card), 2)}
 
 
@@ -99,12 +105,12 @@ def show(argv: list[str]) -> int:
     registry = _registry(arguments)
     card = registry.card(_named(registry, arguments.model))
     problem = why_it_cannot_serve(registry, card.id)
-    serving = Serving.of(registry)
+    serving = Serving.of(registry, load(arguments.config).promoters)
     if arguments.json:
         say_json(_fields(card, serving) | {"problem": problem})
     else:
-        whom, shipped = serving.whom.get(card.id, []), card.id in serving.shipped
-        say("\n".join(told(card, whom, problem, shipped=shipped)))
+        whom = SHIPPED if card.id in serving.shipped else serving.told(card.id)
+        say("\n".join(told(card, whom, problem, shipped=card.id in serving.shipped)))
     return 1 if problem else 0
 
 
@@ -148,6 +154,10 @@ def _tell(arguments: argparse.Namespace, task: str, now: Pointer) -> int:
         whom = arguments.robot or EVERY
         gone = f"no {'own ' if arguments.robot else ''}model serves {whom} any more"
         say(f"{task}: {now.model} serves {whom}\n" if now.model else f"{task}: {gone}\n")
+    if now.model and not now.signature:
+        warn(
+            "models", f"{UNSIGNED}, so no rule stops a robot by it: gwrms models key makes a key, then again"
+        )
     return 0
 
 
@@ -161,8 +171,26 @@ def history(argv: list[str]) -> int:
     if arguments.json:
         say_json(found)
     else:
-        rows = [(when(now.utc), now.model or NONE, now.who, now.why) for now in found]
+        rows = [(when(now.utc), now.model or NONE, _by(now), now.why) for now in found]
         say(table(("SINCE (UTC)", "MODEL", "BY", "WHY"), rows))
+    return 0
+
+
+def _by(now: Pointer) -> str:
+    return now.who if now.signature else f"{now.who} ({UNSIGNED})"
+
+
+def key(argv: list[str]) -> int:
+    """Run `gwrms models key`."""
+    made = parser(
+        "models key", "This desk's key, made where there is none: a line for [promoters].", KEY_EPILOG
+    )
+    arguments = made.parse_args(argv)
+    name, fingerprint = own_line()
+    if arguments.json:
+        say_json({"name": name, "key": fingerprint})
+    else:
+        say(f'"{name}" = "{fingerprint}"\n')
     return 0
 
 
@@ -191,6 +219,7 @@ COMMANDS: Final[dict[str, Callable[[list[str]], int]]] = {
     "promote": promote,
     "rollback": rollback,
     "history": history,
+    "key": key,
     "export": export,
 }
 

@@ -12,7 +12,7 @@ SHOWN: Final = 6  # sessions by name; the rest is counted
 UNKNOWN: Final = "unknown"
 
 
-def told(card: Card, serves: Sequence[str], problem: str, *, shipped: bool) -> Iterator[str]:
+def told(card: Card, serves: str, problem: str, *, shipped: bool) -> Iterator[str]:
     """Lines for `gwrms models show`."""
     facts = {
         "task": card.task,
@@ -21,7 +21,7 @@ def told(card: Card, serves: Sequence[str], problem: str, *, shipped: bool) -> I
         "made": f"{when(card.made)} UTC, {age_days(card):.1f} days ago",
         "from": f"{card.source.value}{', comes with GWRMS' if shipped else ''}",
         "for": card.robot or "every robot with these channels",
-        "serves": "where no other does" if shipped else ", ".join(serves) or "nobody",
+        "serves": serves or "nobody",
         "adapted from": card.parent,
         "learned from": _sessions(card.learned),
         "never saw": _sessions(card.held_out),

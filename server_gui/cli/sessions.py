@@ -160,6 +160,8 @@ def _told(
         "telemetry": f"{_length(session)}, {session.rows} rows{_stored(session)}",
         alone: f"{recorded.waiting} of these rows" if recorded.waiting else "",
         "operator": session.operator,
+        "wearer": session.wearer,
+        "consent": session.consent,
         "notes": session.notes,
         "configuration": session.configuration_hash,
         "software": ", ".join(f"{name} {version}" for name, version in session.versions.items()),

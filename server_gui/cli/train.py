@@ -19,6 +19,7 @@ from ml.training.training import Trained, told, train
 from server_gui.cli.cloud_options import add_url, parser, url
 from server_gui.cli.models import NOTHING
 from server_gui.core.models.training import Progress
+from server_gui.core.settings.promoters import desk_signature
 
 FIGURES: Final = ("macro_f1", "accuracy", "rmse_percent", "abstained", "stepping_where_none_steps")
 EPILOG: Final = """It learns from every session with labels (gwrms label). A quarter of the wearers, by a
@@ -54,7 +55,7 @@ def main(argv: list[str]) -> int:
         arguments.pseudo_labels,
         arguments.adapt_from,
     )
-    registry = Registry(url(arguments))
+    registry = Registry(url(arguments), sign=desk_signature())
     trained = train(registry, wish, arguments.cluster, _teller(arguments))
     model = registry.publish(trained.learned.state(), trained.card)
     promoted, overtaken = _promoted(registry, model, trained, arguments)

@@ -83,14 +83,14 @@ def _split(world: World, parts: Sequence[Part], held: Set[str]) -> Split:
 _really_create: Final = Pointers._create
 
 
-def _create(self: Pointers, world: World, number: int, pointer: Pointer) -> bool:
+def _create(self: Pointers, world: World, pointer: Pointer) -> Pointer | None:
     """Just before somebody's pointer is written, somebody else may be faster."""
     meanwhile, world.classes.meanwhile = world.classes.meanwhile, None
     if meanwhile is not None:
         meanwhile()
-    done = _really_create(self, number, pointer)
-    if done:
-        world.classes.written.append((self._path(number), pointer.who, pointer.model))
+    done = _really_create(self, pointer)
+    if done is not None:
+        world.classes.written.append((self._path(pointer.number), pointer.who, pointer.model))
     return done
 
 

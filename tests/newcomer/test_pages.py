@@ -35,6 +35,12 @@ NOT_TYPED: Final[Mapping[str, tuple[str, ...]]] = {
     ),
     "how-to/pair.md": ("root", "a person on the robot, with its code", "two computers", "root"),
     "how-to/predict.md": ("recordings of others, of some hundred megabytes",),
+    "how-to/privacy.md": (
+        "a wearer",
+        "root, and an empty disk",
+        "a bucket of one's own",
+        "recordings of a wearer that are never brought back",
+    ),
     "how-to/record.md": ("root, and systemd",),
     "how-to/release.md": ("a clone to build, and the package index", "a remote that takes the tag"),
     "how-to/run-as-a-service.md": ("root, and systemd",),

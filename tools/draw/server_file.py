@@ -44,11 +44,15 @@ models say of each robot is recorded too.""",
         "Without such a table there are none. Try a rule before it may stop a robot.",
     ),
 )
+_PROMOTERS: Final = """## `[promoters]`
+
+Whose models a rule may stop a robot by: NAME = "SHA-256", the line that `gwrms models key` says on
+their desk. Without it, no rule stops a robot ([who promoted it](models.md#who-promoted-it))."""
 
 
 def draw() -> str:
     """The page."""
-    return "\n\n".join([_HEAD, *_sections()]) + "\n"
+    return "\n\n".join([_HEAD, *_sections(), _PROMOTERS]) + "\n"
 
 
 def _sections() -> Iterator[str]:

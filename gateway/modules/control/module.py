@@ -18,14 +18,17 @@ from gateway.modules.stop.stop_control import StopControl
 from gateway.process.futures import then
 from gateway.records.journal import Journal, Share
 from gateway.records.records import Records
+from gateway.records.signing import HeadSigner
 from gateway.wire.bus import BusInfo
 from gateway.wire.component import ChannelInfo, ComponentInfo
 from gateway.wire.control import (
     CONTROL_ACQUIRE,
     CONTROL_RELEASE,
+    JOURNAL_HEAD,
     JOURNAL_TAIL,
     AcquireParams,
     JournalEntries,
+    JournalProof,
     Lease,
     RecordsInfo,
     ReleaseParams,
@@ -92,11 +95,13 @@ class ControlModule:
         self._component = cast("ComponentModule", context.needs["component"])
         self._leases = Leases(context.loop, self._lease_changed)
         self._awake: set[str] = set()  # why the bus is kept, clients or not
+        self._signer = HeadSigner(AccessFolder(context.config.access), context.config.robot.name)
         self.armed: Callable[[str], bool] = lambda _name: False  # the guard's, where there is one
         self.handlers = Handlers(
             on(CONTROL_ACQUIRE, self._acquire),
             on(CONTROL_RELEASE, self._release),
             on(JOURNAL_TAIL, self._tail),
+            on(JOURNAL_HEAD, self._head),
             on(PARAMETER_LIST, self._list),
             on(PARAMETER_READ, self._read),
             on(PARAMETER_WRITE, self._write),
@@ -189,6 +194,9 @@ class ControlModule:
 
     def _tail(self, _session: "Session", params: TailParams) -> "Future[JournalEntries]":
         return then(self._records.journal.tail(params.n), lambda tail: JournalEntries(*tail))
+
+    def _head(self, _session: "Session", _params: Params) -> "Future[JournalProof]":
+        return self._records.journal.with_head(self._signer.proof)
 
     def _list(self, _session: "Session", params: ParameterParams) -> ParameterValues:
         return self._tuning.listed(params.names)

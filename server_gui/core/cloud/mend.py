@@ -153,7 +153,12 @@ def mend(store: Again, spool: Spool, plan: Plan, advance: Callable[[int], object
     return Mended(plan.files, brought, problems)
 
 
-def accept(store: Store, spool: Spool, expect: Callable[[int], AbstractContextManager[Advance]]) -> None:
+def accept(
+    store: Store,
+    spool: Spool,
+    expect: Callable[[int], AbstractContextManager[Advance]],
+    why: str = "what was missing of it was accepted",
+) -> None:
     """Count what is there as what was sent; what was said before is kept beside.
 
     Raises:
@@ -171,9 +176,7 @@ def accept(store: Store, spool: Spool, expect: Callable[[int], AbstractContextMa
     if len(whole) < len(receipts):
         _rewrite(spool.folder / RECEIPTS, whole)
     for (writer, number), parts in sorted(proof.wrong.items()):
-        spool.receipts.add(
-            Receipt(writer, number, store.url, parts, ("what was missing of it was accepted",))
-        )
+        spool.receipts.add(Receipt(writer, number, store.url, parts, (why,)))
     for number in verify.nowhere(spool.folder, whole):
         spool.receipts.add(Receipt(spool.id, number, store.url, (), ("that it is nowhere was accepted",)))
 

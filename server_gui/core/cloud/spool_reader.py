@@ -147,6 +147,12 @@ def batch(spool: Path, number: int) -> Batch:
     return Batch(writer(spool, number), number, robots, tables)
 
 
+def named(spool: Path, number: int) -> set[tuple[str, str]]:
+    """Return the sessions, with their robots, of which a batch has anything."""
+    told = {(each.fields.get("robot"), each.fields.get("session")) for _, each in _records(spool, number)}
+    return {*_read(spool, number, "SELECT DISTINCT robot, session FROM run"), *told}
+
+
 def _records(spool: Path, batch: int) -> list[tuple[int, Record]]:
     """With their numbers; without those that are damaged."""
     found = _read(spool, batch, "SELECT rowid, * FROM record ORDER BY rowid")  # older ones have no checksums

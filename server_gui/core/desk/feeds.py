@@ -25,6 +25,7 @@ from server_gui.core.follow.network import Network
 from server_gui.core.follow.news import News
 from server_gui.core.prediction.service import PredictionService
 from server_gui.core.recording.errors import SpoolUnusable
+from server_gui.core.recording.records import NOBODY, Worn
 from server_gui.core.settings.server_file import RecordingSettings, ServerSettings
 from server_gui.core.threads.answers import Deliver
 from server_gui.core.threads.supervision import ThreadWatch
@@ -40,6 +41,7 @@ class Record:
 
     operator: str = ""
     notes: str = ""
+    worn: Worn = NOBODY
 
 
 class Feeds:
@@ -155,7 +157,14 @@ class Feeds:
         operator, notes = self._record.operator, self._record.notes
         try:
             return Collector(
-                nobody, operator, notes, following, [self._kept], self._tell_predictions, self._stop
+                nobody,
+                operator,
+                notes,
+                following,
+                [self._kept],
+                self._tell_predictions,
+                self._stop,
+                self._record.worn,
             ), ""
         except SpoolUnusable as error:
             return None, str(error)

@@ -26,6 +26,7 @@ from server_gui.core.follow.network import Network
 from server_gui.core.prediction.state import PredictingState
 from server_gui.core.recording.compaction import Compaction
 from server_gui.core.recording.recorder import Recorder, RecorderSettings, RecorderState
+from server_gui.core.recording.records import NOBODY, Worn
 from server_gui.core.recording.rows import Record
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.uploader import Uploader, UploaderState
@@ -80,6 +81,7 @@ class Collector:
         subscribers: Iterable[Subscriber] = (),
         tell_predictions: TellPredictions | None = None,
         stop: StopRobot | None = None,
+        worn: Worn = NOBODY,
     ) -> None:
         self.hangs = False
         self._disk = concurrent.futures.ThreadPoolExecutor(1, "disk")
@@ -92,7 +94,7 @@ class Collector:
         compacting = None if every_s is None else Compaction(store.url, self._spool.folder, every_s)
         self._uploader = Uploader(self._spool, lambda: connect(store), self._wanted, compacting)
         self._recorder = Recorder(self._spool, settings=RecorderSettings(batch_s=recorder.batch_s))
-        self._fleet = Fleet(following or whole(recorder), self._recorder, operator, notes)
+        self._fleet = Fleet(following or whole(recorder), self._recorder, operator, notes, worn)
         self._stop_links = StopLinks(self.network, settings.rules if stop is None else ())
         self._prediction = (
             RecordedPrediction(

@@ -15,6 +15,7 @@ from server_gui.core.fleet.robot_recording import RobotRecording
 from server_gui.core.follow.events import Event
 from server_gui.core.follow.feed import Feed, FollowSettings, Tell
 from server_gui.core.recording.recorder import Recorder
+from server_gui.core.recording.records import NOBODY, Worn
 
 log = logging.getLogger(__name__)
 
@@ -67,7 +68,12 @@ class Fleet:
     """
 
     def __init__(
-        self, following: FollowSettings, recorder: Recorder, operator: str = "", notes: str = ""
+        self,
+        following: FollowSettings,
+        recorder: Recorder,
+        operator: str = "",
+        notes: str = "",
+        worn: Worn = NOBODY,
     ) -> None:
         self.subscribers: list[Subscriber] = []  # of the robots that join from now on
         self._following = following
@@ -75,6 +81,7 @@ class Fleet:
         self._operator = operator
         self._notes = notes
         self.is_paused = False  # nothing is recorded, until somebody wants it
+        self._worn = worn
         self._members: dict[str, Member] = {}
         self._left: dict[str, Member] = {}  # that are not followed any more
         self._joining: asyncio.Queue[tuple[str, Member]] = asyncio.Queue()
@@ -90,7 +97,7 @@ class Fleet:
 
     def follow(self, robot: str, address: Address) -> None:
         """Another robot, from now on."""
-        keeping = RobotRecording(robot, self._recorder, self._operator, self._notes)
+        keeping = RobotRecording(robot, self._recorder, self._operator, self._notes, self._worn)
         if self.is_paused:
             keeping.pause()
         others = [functools.partial(subscriber, robot) for subscriber in self.subscribers]

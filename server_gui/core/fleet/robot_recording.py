@@ -19,7 +19,7 @@ from server_gui.core.follow.events import (
 )
 from server_gui.core.recording.batching import EventKind
 from server_gui.core.recording.recorder import Recorder
-from server_gui.core.recording.records import Facts
+from server_gui.core.recording.records import NOBODY, Facts, Worn
 
 
 class RobotRecording:
@@ -29,13 +29,16 @@ class RobotRecording:
     same; `pause` ends it, `go_on` begins another. Of what comes between, only the robot's journal is kept.
     """
 
-    def __init__(self, robot: str, recorder: Recorder, operator: str = "", notes: str = "") -> None:
+    def __init__(
+        self, robot: str, recorder: Recorder, operator: str = "", notes: str = "", worn: Worn = NOBODY
+    ) -> None:
         self.session = ""
         self.began_s: float | None = None  # UTC: that session
         self.notes = notes
         self._robot = robot
         self._recorder = recorder
         self._operator = operator
+        self._worn = worn
         self._facts = Facts()
         self._same: tuple[str | None, ...] = ()  # boot, configuration and software of this session
         self._linked = False
@@ -69,7 +72,7 @@ class RobotRecording:
                 if not isinstance(event.snapshot.kernel, msgspec.UnsetType):
                     self._learn(versions=self._facts.versions | session_facts.kernel(event.snapshot.kernel))
             case Journalled():
-                self._recorder.journal(self._robot, event.journal.entries)
+                self._recorder.journal(self._robot, event.journal.entries, event.head)
             case Described():
                 self._described(event.description)
             case Looked() if event.parameters is not None and not self._facts.parameters:
@@ -82,7 +85,7 @@ class RobotRecording:
 
     def _described(self, description: Description) -> None:
         self._recorder.describe(self._robot, description)
-        found = session_facts.facts(description, self._operator, self.notes)
+        found = session_facts.facts(description, self._operator, self.notes, self._worn)
         same = (description.boot_id, found.configuration_hash, description.version)
         if same != self._same:
             self._same, self._facts = same, found

@@ -9,10 +9,10 @@ from msgspec.structs import replace
 from gateway.wire.framing import PROTOCOL
 from gateway.wire.resource import KernelFacts
 from gateway.wire.robot import Description
-from server_gui.core.recording.records import Facts
+from server_gui.core.recording.records import NOBODY, Facts, Worn
 
 
-def facts(description: Description, operator: str, notes: str) -> Facts:
+def facts(description: Description, operator: str, notes: str, worn: Worn = NOBODY) -> Facts:
     """Return what a session can begin with; parameters' values and the robot's kernel become known later."""
     return Facts(
         configuration_hash=configuration_hash(description),
@@ -20,6 +20,7 @@ def facts(description: Description, operator: str, notes: str) -> Facts:
         versions=versions(description),
         operator=operator,
         notes=notes,
+        worn=worn,
     )
 
 

@@ -8,7 +8,7 @@ import msgspec
 from gateway.client import Batch, ClockOffset, ConnectionState
 from gateway.wire.bus import BusInfo
 from gateway.wire.component import Snapshot
-from gateway.wire.control import JournalEntries
+from gateway.wire.control import JournalEntries, SignedHead
 from gateway.wire.cost import GatewayCost
 from gateway.wire.parameter import ParameterValues
 from gateway.wire.resource import ResourceSnapshot
@@ -79,9 +79,13 @@ class BusesSeen:
 
 @dataclass(frozen=True, slots=True)
 class Journalled:
-    """The newest entries of the robot's journal, oldest first; most have come before."""
+    """The newest entries of the robot's journal, oldest first; most have come before.
+
+    `head` is one of them as the robot has signed it, where it has a key.
+    """
 
     journal: JournalEntries
+    head: SignedHead | None = None
 
 
 @dataclass(frozen=True, slots=True)

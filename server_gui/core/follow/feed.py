@@ -9,6 +9,7 @@ from typing import Any, Final
 
 from msgspec import Struct
 
+from gateway.certificates import KeyProblem
 from gateway.client import (
     Address,
     CallTimeout,
@@ -18,11 +19,13 @@ from gateway.client import (
     LinkLost,
     LinkSettings,
     NotConnected,
+    NotPaired,
     ProtocolError,
     RemoteError,
     WrongRobot,
 )
 from gateway.client.backoff import Backoff
+from gateway.wire.control import SignedHead
 from gateway.wire.resource import ResourceSnapshotParams
 from gateway.wire.robot import Description
 from server_gui.core.follow.events import (
@@ -38,6 +41,7 @@ from server_gui.core.follow.events import (
     Telemetry,
 )
 from server_gui.core.follow.validation import Unfit, Validator, journal
+from server_gui.core.follow.witnessing import signed_head
 
 Tell = Callable[[Event], None]
 
@@ -76,6 +80,7 @@ class Feed:
     def __init__(self, address: Address, subscribers: Sequence[Tell], following: FollowSettings) -> None:
         self._subscribers = subscribers
         self._following = following
+        self._address = address
         self._client = Client(address, LinkSettings(client=following.client), self._link_changed)
         self._backoff = Backoff()
         self._arriving = Validator()
@@ -204,8 +209,19 @@ class Feed:
         if found.entries and found.entries[0]["n"] > self._newest_entry["n"] + 1:
             found = await self._client.journal(WHOLE_JOURNAL)
         if found.entries and found.entries[-1] != self._newest_entry:
-            self._admit(Journalled(found))
+            head = await self._signed_head()
+            if head is not None and head.n > found.entries[-1]["n"]:
+                found = await self._client.journal(WHOLE_JOURNAL)
+            self._admit(Journalled(found, head))
             self._newest_entry = found.entries[-1]
+
+    async def _signed_head(self) -> SignedHead | None:
+        """Without it the journal is kept all the same."""
+        try:
+            return await signed_head(self._client, self._address)
+        except (Unfit, KeyProblem, NotPaired) as error:
+            self._tell(Refused("its journal is not witnessed", str(error)))
+            return None
 
     async def _repeat(self, period_s: float, look: Callable[[], Awaitable[None]]) -> None:
         while True:

@@ -12,6 +12,7 @@ import msgspec
 
 from gateway.client import Batch, ProtocolError
 from gateway.plain import LONGEST_NAME, NAME_SIGNS, ROBOT_SIGNS, is_name, is_robot_name
+from gateway.wire.control import SignedHead
 from gateway.wire.robot import Description
 from server_gui.core.follow.events import Described, Event, Journalled, Looked, Resources, Telemetry
 
@@ -65,6 +66,8 @@ class Validator:
                 _sound("its components' quality", event.quality, MOST_BYTES[Looked])
             case Journalled():
                 journal(event.journal.entries)
+                if event.head is not None:
+                    _head(event.head, event.journal.entries)
             case _:
                 pass
 
@@ -158,6 +161,14 @@ def journal(entries: Sequence[Mapping[str, Any]]) -> None:
     before = 0
     for entry in entries:
         before = _entry(entry, before)
+
+
+def _head(head: SignedHead, entries: Sequence[Mapping[str, Any]]) -> None:
+    """Refuse what a robot has signed where it has just shown another entry in that place."""
+    found = next((entry["hash"] for entry in entries if entry["n"] == head.n), head.hash)
+    if found != head.hash:
+        raise Unfit(f"it has signed another entry {head.n} of its journal than it shows")
+    _sound("what it has signed of its journal", head, ENTRY_BYTES)
 
 
 def _entry(entry: Mapping[str, Any], before: int) -> int:

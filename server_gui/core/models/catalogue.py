@@ -4,32 +4,51 @@ from collections.abc import Callable, Iterator, Mapping, Set
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
+from types import MappingProxyType
 from typing import Self
 from urllib.parse import urlsplit
 
 from ml.errors import UnusableModel
 from ml.registry.card import Card
+from ml.registry.pointers import Pointer
 from ml.registry.registry import Registry
 from ml.store import StoreError
 from ml.store.url import checked_url
 from server_gui.core.models.names import EVERY, model_names
 from server_gui.core.prediction.state import Quality
 from server_gui.core.prediction.track_record import TrackRecord
+from server_gui.core.settings.promoters import UNSIGNED, desk_signature, signer
 
 
 @dataclass(frozen=True, slots=True)
 class Serving:
-    """Whom each model serves that was promoted, and which came with GWRMS."""
+    """Whom each model serves that was promoted, who has signed each of that, and which came with GWRMS."""
 
     whom: Mapping[str, list[str]]
     shipped: frozenset[str]
+    signed: Mapping[str, list[str]]
 
     @classmethod
-    def of(cls, registry: Registry) -> Self:
+    def of(cls, registry: Registry, promoters: Mapping[str, str] = MappingProxyType({})) -> Self:
         whom: dict[str, list[str]] = {}
-        for _, robot, now in registry.served():
+        signed: dict[str, list[str]] = {}
+        for task, robot, now in registry.served():
             whom.setdefault(now.model, []).append(robot or EVERY)
-        return cls(whom, registry.shipped())
+            signed.setdefault(now.model, []).append(_signer(registry, task, robot, now, promoters))
+        return cls(whom, registry.shipped(), signed)
+
+    def told(self, model: str) -> str:
+        """Return whom a model serves, each with who has signed that."""
+        pairs = zip(self.whom.get(model, ()), self.signed.get(model, ()), strict=True)
+        return ", ".join(f"{whom} ({signed})" for whom, signed in pairs)
+
+
+def _signer(registry: Registry, task: str, robot: str, now: Pointer, promoters: Mapping[str, str]) -> str:
+    """A signature that does not hold is none."""
+    try:
+        return signer(now, task, robot, registry.card(now.model), promoters)
+    except UnusableModel:
+        return UNSIGNED
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +95,7 @@ def open_registry(url: str, *, given: bool = True) -> Registry:
     place = checked_url(url)
     if given and place.startswith("file://") and not Path(urlsplit(place).path).is_dir():
         raise StoreError(f"there is no store at {place}")
-    return Registry(place)
+    return Registry(place, sign=desk_signature())
 
 
 def why_it_cannot_serve(registry: Registry, model: str) -> str:

@@ -9,13 +9,16 @@ import math
 import time
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final, Self
 
 from ml.errors import UnusableModel
 from ml.registry.card import Card, check_robot
+from ml.registry.pointers import Pointer
 from ml.robot.learned import Learned
 from ml.robot.task import TASKS
 from ml.store import StoreError
+from server_gui.core.settings.promoters import objection
 from server_gui.core.threads.polling import Polling
 from server_gui.core.threads.supervision import Worker
 
@@ -27,29 +30,34 @@ log = logging.getLogger(__name__)
 BREAK_OFF_S: Final = 20.0  # longer than it takes to import what models need, in a window 7 s of a core
 RETRY_S: Final = 600.0  # between attempts to load what was refused, while nothing of it has changed
 
+NOBODY: Final[Mapping[str, str]] = MappingProxyType({})
+
 Key = tuple[str, str]  # robot and task
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Model:
-    """A model in use."""
+    """A model in use; `objection` says why no rule may stop a robot by what it says."""
 
     card: Card
     learned: Learned
+    objection: str | None = None
 
 
 class ModelLoader:
     """The models of every robot that `robot` named; use it as a context manager, which ends its thread."""
 
-    def __init__(self, store_url: str, poll_s: float) -> None:
+    def __init__(self, store_url: str, poll_s: float, promoters: Mapping[str, str] = NOBODY) -> None:
+        """`promoters` are the fingerprints of those by whose models rules may stop robots, by name."""
         self.models: Mapping[Key, Model] = {}  # replaced as a whole, for any thread
         self.why: Mapping[Key, str] = {}  # no model, or not the newest, serves a robot; likewise
         self.problems: Mapping[Key, str] = {}  # those of `why` that are something wrong
         self.problem: str | None = None  # why nobody knows what serves
         self._url = store_url
+        self._promoters = promoters
         self._registry: Registry | None = None
         self._robots: dict[str, dict[str, str]] = {}  # units by channel
-        self._loaded: dict[str, Model] = {}
+        self._loaded: dict[str, tuple[Card, Learned]] = {}
         self._refused: dict[str, str] = {}  # models, and why; until something changes
         self._chosen_for: Mapping[str, dict[str, str]] = {}  # the robots at the newest look
         self._seen: Any = None  # what should serve then, and the files of what was refused
@@ -96,7 +104,7 @@ class ModelLoader:
 
     def _update(self, registry: "Registry") -> None:
         robots = self._robots
-        served = [(task, robot, pointer.model) for task, robot, pointer in registry.served()]
+        served = list(registry.served())
         anew = (served, self._files(registry, served)) != self._seen or time.monotonic() >= self._retry_s
         if anew:
             self._refused = {}
@@ -116,35 +124,38 @@ class ModelLoader:
         self._chosen_for, self._seen = robots, (served, self._files(registry, served))
         self._retry_s = time.monotonic() + RETRY_S if problems else math.inf
 
-    def _files(self, registry: "Registry", served: Iterable[tuple[str, str, str]]) -> object:
+    def _files(self, registry: "Registry", served: Iterable[tuple[str, str, Pointer]]) -> object:
         """Those of the models that should serve where something is wrong: written anew, they may be right."""
         wrong = {task for _, task in self.problems}
-        return {model: registry.files(model) for task, _, model in served if task in wrong}
+        return {now.model: registry.files(now.model) for task, _, now in served if task in wrong}
 
     def _choose(
         self, registry: "Registry", key: Key, units: Mapping[str, str], models: dict[Key, Model]
     ) -> bool:
         """Let that model serve which should; False where there is none."""
         robot, task = key
-        found = registry.serving(task, robot, set(units))
+        found = registry.served_to(task, robot, set(units))
         if found is None:
             models.pop(key, None)
             return False
-        model = self._load(registry, found)
-        if key in models and models[key].card.id != found:
-            log.info("%s: %s is served by %s from now on", robot, task, found)
-        check_robot(model.card, robot, units)
-        models[key] = model
+        card, learned = self._load(registry, found.model)
+        check_robot(card, robot, units)
+        model = Model(card, learned, objection(found.pointer, task, found.robot, card, self._promoters))
+        before = models.get(key)
+        if before is not None and before.card.id != card.id:
+            log.info("%s: %s is served by %s from now on", robot, task, card.id)
+        if before is None or (before.learned, before.objection) != (learned, model.objection):
+            models[key] = model
         return True
 
-    def _load(self, registry: "Registry", name: str) -> Model:
+    def _load(self, registry: "Registry", name: str) -> tuple[Card, Learned]:
         """A model, loaded once; one that was refused is not asked for again."""
         if name in self._refused:
             raise UnusableModel(self._refused[name])
         if name not in self._loaded:
             try:
                 card, state = registry.load(name)
-                self._loaded[name] = Model(card, Learned.restored(state))
+                self._loaded[name] = card, Learned.restored(state)
             except UnusableModel as error:
                 self._refused[name] = str(error)
                 raise

@@ -7,7 +7,7 @@ from ml.registry.card import Card
 from ml.serving.predictor import Prediction
 from ml.serving.trust import Trust
 from server_gui.core.prediction.state import Quality
-from server_gui.core.settings.prediction import RuleSettings
+from server_gui.core.settings.prediction import Action, RuleSettings
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,12 +30,18 @@ class Predicted:
 
 @dataclass(frozen=True, slots=True)
 class Ruled:
-    """A rule begins (or ends) to hold with this prediction."""
+    """A rule begins (or ends) to hold with this prediction; `objection` says why it stops no robot."""
 
     robot: str
     rule: RuleSettings
     began: bool
     cause: Predicted
+    objection: str | None = None
+
+    @property
+    def stops(self) -> bool:
+        """Whether the robot is to be stopped now."""
+        return self.began and self.rule.action is Action.STOP and self.objection is None
 
     @property
     def text(self) -> str:
@@ -44,7 +50,10 @@ class Ruled:
         after = "" if took_ns is None else f", {took_ns / 1e6:.0f} ms after the sample"
         said = f"{self.cause.prediction.label} {self.cause.prediction.probability:.2f}"
         what = f"rule {self.rule.name} ({self.rule.action.value})"
-        return f"{what} holds: {said}{after}" if self.began else f"{what} is over: {said}"
+        if not self.began:
+            return f"{what} is over: {said}"
+        refused = self.rule.action is Action.STOP and self.objection is not None
+        return f"{what} holds: {said}{after}" + (f"; NOT STOPPED, {self.objection}" if refused else "")
 
 
 @dataclass(frozen=True, slots=True)

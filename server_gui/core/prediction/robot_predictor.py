@@ -73,7 +73,7 @@ class Watched:
             )
             for rule in self._rules:
                 if (began := rule.take(prediction)) is not None:
-                    yield Ruled(robot, rule.settings, began, self.newest)
+                    yield Ruled(robot, rule.settings, began, self.newest, self.model.objection)
             yield self.newest
 
 

@@ -45,7 +45,7 @@ class PredictionService:
         self._settings = settings
         self._tell = tell
         self._stop = stop
-        self._serving = ModelLoader(settings.store.url, settings.prediction.poll_s)
+        self._serving = ModelLoader(settings.store.url, settings.prediction.poll_s, settings.promoters)
         self._tracking = TrackRecordUpdates(
             settings.store.url, lambda: {robot for robot, _ in self._serving.models}
         )
@@ -87,6 +87,7 @@ class PredictionService:
         """How it goes now; from any thread."""
         problems = [one for one in (self._serving.problem, self._tracking.problem) if one is not None]
         problems += [f"{robot}: {task}: {why}" for (robot, task), why in self._serving.problems.items()]
+        problems += self._powerless()
         robots = {robot: _reports(known) for robot, known in self._robots.copy().items()}
         return PredictingState(
             robots,
@@ -95,6 +96,17 @@ class PredictionService:
             self._judged,
             self._skipped + self._inbox.lost,
         )
+
+    def _powerless(self) -> Iterator[str]:
+        """Where a rule is to stop a robot, and may not by the model that serves."""
+        for (robot, task), model in self._serving.models.items():
+            stops = (
+                rule
+                for rule in self._settings.rules
+                if rule.action is Action.STOP and rule.task == task and rule.concerns(robot)
+            )
+            for rule in stops if model.objection is not None else ():
+                yield f"{robot}: rule {rule.name} CANNOT STOP IT: {model.objection}"
 
     # --- the thread that predicts
 
@@ -114,7 +126,7 @@ class PredictionService:
             self._worker.beat()
             news = self._judge(model, due)
             for one in news:
-                if self._stop and isinstance(one, Ruled) and one.began and one.rule.action is Action.STOP:
+                if self._stop and isinstance(one, Ruled) and one.stops:
                     self._stop(one)
             if news:
                 self._tell(news)

@@ -11,6 +11,7 @@ from enum import Enum
 from typing import Any, Final, NamedTuple, Self
 
 from gateway.client import Batch
+from gateway.wire.control import SignedHead
 from gateway.wire.resource import ResourceSnapshot
 from gateway.wire.robot import Description
 from ml.store.tables import EVENTS, LABELS, SESSIONS, TABLES, TELEMETRY
@@ -182,11 +183,10 @@ class Recorder:
         """Keep a look at the robot's computer."""
         return self._put(robot, 1, functools.partial(self._robots.resources, robot, Moment.now(), snapshot))
 
-    def journal(self, robot: str, entries: Sequence[Entry]) -> int:
-        """Keep what is new in a tail of the robot's journal."""
-        return self._put(
-            robot, len(entries), functools.partial(self._robots.journal, robot, entries, Moment.now())
-        )
+    def journal(self, robot: str, entries: Sequence[Entry], head: SignedHead | None = None) -> int:
+        """Keep what is new in a tail of the robot's journal; `head` is one of them as the robot signed it."""
+        work = functools.partial(self._robots.journal, robot, entries, Moment.now(), head)
+        return self._put(robot, len(entries), work)
 
     def refused(self, robot: str, what: str, why: str) -> int:
         """Keep that the robot sent what cannot be kept, once for each `what`."""

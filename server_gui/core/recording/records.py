@@ -8,11 +8,22 @@ from typing import Any, Final
 
 import msgspec
 
+from gateway.wire.control import SignedHead
 from gateway.wire.resource import ResourceSnapshot
 from ml.store.labels import Label
 from server_gui.core.recording.rows import Record
 
 MORE: Final = ("disk", "network", "thermal", "throttling", "kernel")  # of a snapshot, in one column
+
+
+class Worn(msgspec.Struct, frozen=True):
+    """Who wears the robot, by whatever name the study gives them, and what they have agreed to."""
+
+    wearer: str = ""
+    consent: str = ""
+
+
+NOBODY: Final = Worn()
 
 
 class Facts(msgspec.Struct, frozen=True):
@@ -27,6 +38,7 @@ class Facts(msgspec.Struct, frozen=True):
     versions: dict[str, str] = {}
     operator: str = ""
     notes: str = ""
+    worn: Worn = NOBODY
 
 
 class Session(msgspec.Struct, frozen=True):
@@ -53,6 +65,8 @@ class Session(msgspec.Struct, frozen=True):
             "versions": _json(facts.versions),
             "operator": facts.operator,
             "notes": facts.notes,
+            "wearer": facts.worn.wearer,
+            "consent": facts.worn.consent,
         }
         return Record("sessions", fields)
 
@@ -99,8 +113,11 @@ def resources(robot: str, session: str, utc_ns: int, snapshot: ResourceSnapshot)
     return Record("resources", fields)
 
 
-def journal(robot: str, entry: Mapping[str, Any]) -> Record:
-    """Return a row of `journal`: one entry of the robot's own journal, whole, with its hash."""
+def journal(robot: str, entry: Mapping[str, Any], head: SignedHead | None = None) -> Record:
+    """Return a row of `journal`: one entry of the robot's own journal, whole, with its hash.
+
+    `head` is the same as the robot has signed it.
+    """
     fields = {
         "robot": robot,
         "utc": entry.get("utc_ns"),
@@ -109,6 +126,7 @@ def journal(robot: str, entry: Mapping[str, Any]) -> Record:
         "who": entry.get("who"),
         "what": entry.get("what"),
         "entry": _json(dict(entry)),
+        "witness": None if head is None else _json(msgspec.to_builtins(head)),
     }
     return Record("journal", fields)
 

@@ -3,6 +3,7 @@
 import logging
 from collections.abc import Iterable, Mapping, Sequence
 
+from gateway.wire.control import SignedHead
 from gateway.wire.resource import ResourceSnapshot
 from gateway.wire.robot import Description
 from ml.store.tables import PREDICTIONS
@@ -32,6 +33,7 @@ class Robots:
             str, tuple[str, int | None]
         ] = {}  # each one's last session, and its clock's UTC at 0
         self._names: dict[str, str] = {}  # what each robot calls itself
+        self._signed: dict[str, str] = {}  # the hash of the newest entry that each has signed
         self._told: set[tuple[str, str]] = set()  # robot and problem: each is said once
 
     def runs(self) -> list[Run]:
@@ -121,8 +123,10 @@ class Robots:
         known = self.known(robot)
         return [records.resources(robot, known.session, known.clock.recorded_ns(now), snapshot)]
 
-    def journal(self, robot: str, entries: Sequence[Entry], now: Moment) -> list[Record]:
-        """Return what is new in a tail of the robot's journal.
+    def journal(
+        self, robot: str, entries: Sequence[Entry], now: Moment, head: SignedHead | None = None
+    ) -> list[Record]:
+        """Return what is new in a tail of the robot's journal; `head` stands with the entry that it is of.
 
         Raises:
             Unfit: it is no journal; what is recorded of it stays as it was.
@@ -131,12 +135,26 @@ class Robots:
         validation.journal(entries)
         new = news(entries, self.heads.get(robot))
         found = [records.journal(robot, entry) for entry in new.entries]
+        found += self._witnessed(robot, entries, found, head)
         if entries:
             self.heads[robot] = JournalHead(entries[-1]["n"], entries[-1]["hash"])
         if new.missing:
             text = f"{new.missing} entries of the robot's journal were never seen"
             found.append(self.known(robot).now(EventKind.JOURNAL_GAP, text, now, missing=new.missing))
         return found
+
+    def _witnessed(
+        self, robot: str, entries: Sequence[Entry], found: list[Record], head: SignedHead | None
+    ) -> list[Record]:
+        """Put the head to its entry, which is kept once more where it was already."""
+        signed = [records.journal(robot, entry, head) for entry in entries if head and entry["n"] == head.n]
+        if head is None or not signed:
+            return []
+        known, self._signed[robot] = self._signed.get(robot), head.hash
+        if head.n in (new := [record.fields["n"] for record in found]):
+            found[new.index(head.n)] = signed[0]
+            return []
+        return [] if known == head.hash else signed
 
     def forget(self, robot: str, kept: Mapping[str, JournalHead]) -> None:
         """Up to where the robot's journal is recorded is what was kept before, or unknown."""

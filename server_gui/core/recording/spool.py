@@ -18,7 +18,7 @@ from ml.store.precedence import opened_us
 from server_gui.core.recording.errors import Damaged, NotKept, SpoolUnusable
 from server_gui.core.recording.receipts import LOST, RECEIPTS, Altered, Receipt, Receipts
 from server_gui.core.recording.rows import JournalHead, Record, Run
-from server_gui.core.recording.segment import Segment
+from server_gui.core.recording.segment import SUFFIXES, Segment
 from server_gui.core.recording.spool_files import (
     Files,
     Kept,
@@ -191,6 +191,19 @@ class Spool:
 
         """
         self._files.rename(number, Kept.UPLOADED)
+
+    def drop(self, number: int) -> None:
+        """Remove a second copy, before room is needed.
+
+        Raises:
+            SpoolUnusable: it is still there.
+
+        """
+        with writing(self.folder):
+            for suffix in reversed(SUFFIXES):
+                file = self._files.path(number, Kept.UPLOADED)
+                file.with_name(f"{file.name}{suffix}").unlink(missing_ok=True)
+            durable.synchronise([self.folder / "id"])
 
     def set_aside(self, number: int) -> Path:
         """Set aside a segment that cannot be read, so that those after it are uploaded; return its file."""

@@ -19,5 +19,6 @@ def schema() -> Schema:
         "recorder": ref(RecordingSettings),
         "prediction": ref(PredictionSettings),
         "rules": {"type": "array", "items": ref(RuleSettings)},
+        "promoters": named({"type": "string", "pattern": "^[0-9a-fA-F ]{64,}$"}),
     }
     return document("server.toml", properties, [], defs)

@@ -124,6 +124,7 @@ class ServerSettings(Struct, frozen=True):
     recorder: RecordingSettings = field(default_factory=RecordingSettings)
     prediction: PredictionSettings = field(default_factory=PredictionSettings)
     rules: tuple[RuleSettings, ...] = ()
+    promoters: dict[str, str] = {}
 
 
 @dataclass(frozen=True, slots=True)
@@ -208,6 +209,7 @@ class _Reading:
             msgspec.structs.replace(recorder, spool=folder / recorder.spool.expanduser()),
             self._table("prediction", document, PredictionSettings),
             self._rules(document.get("rules", [])),
+            self._promoters(document.get("promoters", {})),
         )
 
     def _table(self, name: str, document: dict[str, Any], kind: type[Table]) -> Table:
@@ -230,6 +232,22 @@ class _Reading:
         numbered = enumerate(entries, 1)
         made = (self._decoding.struct(f"[[rules]] number {at}", one, RuleSettings) for at, one in numbered)
         return tuple(rule for rule in made if rule is not None)
+
+    def _promoters(self, table: Any) -> dict[str, str]:
+        """`[promoters]`: fingerprints of keys by whose these are."""
+        if not isinstance(table, dict):
+            self._decoding.complain(
+                "[promoters]", "", 'is a table of names: write anna = "SHA-256 of her key"'
+            )
+            return {}
+        found: dict[str, str] = {}
+        for name, key in table.items():
+            try:
+                found[name] = checked_pin("".join(str(key).split()))
+            except ValueError:
+                text = "is the SHA-256 of a key, 64 hexadecimal digits: gwrms models key says it, on its desk"
+                self._decoding.complain("[promoters]", name, text)
+        return found
 
     def robots(self, table: Any) -> dict[str, RobotSettings]:
         """`[robots]`, each with an address of its own."""
@@ -281,6 +299,9 @@ def _unlikely(settings: ServerSettings) -> Iterator[Finding]:
         if rule.action is Action.STOP and rule.at_least < _LIKELY:
             text = f"{rule.at_least:g} stops a robot on what is more likely not so"
             yield warning(where, "at_least", text)
+        if rule.action is Action.STOP and not settings.promoters:
+            text = "stops nothing: [promoters] names nobody whose models it may believe (gwrms docs predict)"
+            yield warning(where, "action", text)
 
 
 def _path(_kind: type, value: Any) -> Path:

@@ -97,7 +97,7 @@ class Recording:
 
 @contextlib.contextmanager
 def recording(
-    folder: Path, robots: Mapping[str, str], following: FollowSettings = FOLLOWING, **facts: str
+    folder: Path, robots: Mapping[str, str], following: FollowSettings = FOLLOWING, **facts: Any
 ) -> Iterator[Recording]:
     """Follow these robots (name → address) and record them into `folder`."""
     shown: list[tuple[str, Event]] = []

@@ -116,7 +116,7 @@ def test_rows_that_are_lost_and_no_event_tells_are_in_the_exit_status(
     class Lossy(contextlib.AbstractContextManager["Lossy"]):
         hangs = False
 
-        def __init__(self, *_: object) -> None:
+        def __init__(self, *_: object, **_named: object) -> None:
             self.untold = untold
 
         def __exit__(self, *_: object) -> None:

@@ -12,17 +12,22 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from gateway.access.folder import AccessFolder
+from gateway.access.identity import ANYBODY, Identity, Peer
 from gateway.access.known import known_in
-from gateway.certificates import KeyProblem
+from gateway.certificates import KeyProblem, der_of, fingerprint
 from gateway.connections import handshakes
 from gateway.connections.listeners import listen
 from gateway.connections.tls import RECORD, TlsStream, context_of
 from gateway.daemon import Daemon
 from gateway.key_making import make
+from gateway.records.witness import objection
+from gateway.wire.control import SignedHead
 from gateway.wire.limits import HANDSHAKES, HANDSHAKES_WAITING
+from gateway.wire.role import Role
 from tests.support.waiting import WAIT_S, until
 from tests.unit.gateway import keyed as keys
 from tests.unit.gateway import processes
@@ -62,7 +67,27 @@ def test_who_has_a_key_is_who_it_belongs_to_whatever_they_say(come: Connect, nam
     assert (hello["identity"], hello["role"]) == (name, name)
     assert client.call("robot.stop", reason="enough")["held"] is True
     who = client.call("journal.tail", n=1)["entries"][0]["who"]
-    assert who.startswith(f"{name}, maintainer (127.0.0.1:")
+    known = fingerprint(der_of(keys.pair(name)[1].read_bytes()))
+    assert who.startswith(f"{name} [{known[:16]}], maintainer (127.0.0.1:")
+
+
+def test_a_name_that_a_client_gives_itself_spells_no_identity() -> None:
+    forged = "anna [57a5adb29709f45f], gwrms set"
+    assert ANYBODY.called("127.0.0.1:5", forged) == "anna (57a5adb29709f45f], gwrms set (127.0.0.1:5)"
+    anna = Identity(Role.VIEWER, "anna", "57a5adb29709f45f" * 4)
+    assert anna.called("[::1]:5", "ben [1]") == "anna [57a5adb29709f45f], ben (1] ([::1]:5)"
+    assert anna.called("[::1]:5") == "anna [57a5adb29709f45f] ([::1]:5)"
+    assert Identity(Role.VIEWER, "lab", peer=Peer(1000, 100)).called("@") == "lab [uid 1000] (@)"
+
+
+def test_the_journals_head_is_signed_by_the_key_that_was_paired(come: Connect) -> None:
+    client = come("viewer")
+    client.call("robot.stop", reason="enough")
+    entry = client.call("journal.tail", n=1)["entries"][0]
+    head = msgspec.convert(client.call("journal.head")["head"], SignedHead)
+    assert head.n >= entry["n"]
+    assert objection(head, fingerprint(der_of(keys.pair(keys.ROBOT)[1].read_bytes()))) is None
+    assert "another robot" in str(objection(head, "0" * 64))
 
 
 def test_who_is_unknown_or_has_no_key_is_not_let_in(come: Connect) -> None:

@@ -20,6 +20,7 @@ from tests.unit.gateway.tuned import drives
 VIEWERS = {
     "hello", "clock.read", "robot.describe", "gateway.cost", "resource.snapshot", "resource.overruns",
     "component.snapshot", "bus.snapshot", "status.snapshot", "stream.start", "stream.stop", "journal.tail",
+    "journal.head",
     "parameter.list", "parameter.read", "robot.stop",
 }  # fmt: skip
 OPERATORS = VIEWERS | {

@@ -1,6 +1,7 @@
 """What a robot's feed tells of its hips, a model that serves it, and what is predicted of that."""
 
 import asyncio
+import base64
 import itertools
 import threading
 import time
@@ -12,10 +13,13 @@ from typing import Any
 
 from msgspec.structs import replace
 
+from gateway import signatures
+from gateway.certificates import der_of, fingerprint
 from gateway.client import Batch, ClockOffset
 from gateway.wire.component import ChannelInfo
 from ml.registry.card import Card, Source
 from ml.registry.code import features_hash, versions
+from ml.registry.pointers import Sign
 from ml.registry.registry import Registry
 from ml.robot.learned import Learned
 from server_gui.core.follow.events import Described, Telemetry
@@ -25,6 +29,7 @@ from server_gui.core.settings.prediction import PredictionSettings, RuleSettings
 from server_gui.core.settings.server_file import ServerSettings, StoreSettings
 from tests.fake_robot import FakeRobot
 from tests.support.waiting import until
+from tests.unit.gateway import keyed as keys
 from tests.unit.ml.serving.small import CHANNELS, MS, STEP_MS, Floats, hips, learned
 from tests.unit.recording.robots import description
 
@@ -56,10 +61,27 @@ def walking() -> Iterator[Telemetry]:
         yield from telemetry(rows, begin_ns=minute * len(rows) * STEP_MS * MS)
 
 
-def publish(url: str, model: Learned | None = None, robot: str = "", **changes: Any) -> str:
-    """A model that serves from now on."""
+def signature(whose: str) -> Sign:
+    """What signs with somebody's key."""
+    key, certificate = keys.pair(whose)
+
+    def sign(message: bytes) -> tuple[str, str]:
+        return certificate.read_text(), base64.b64encode(signatures.sign(key, message)).decode()
+
+    return sign
+
+
+def promoters(*names: str) -> dict[str, str]:
+    """By whose models rules may stop robots."""
+    return {name: fingerprint(der_of(keys.pair(name)[1].read_bytes())) for name in names}
+
+
+def publish(
+    url: str, model: Learned | None = None, robot: str = "", by: str | None = None, **changes: Any
+) -> str:
+    """A model that serves from now on; signed, where it is promoted `by` somebody."""
     model = model or learned()
-    registry = Registry(url)
+    registry = Registry(url, sign=None if by is None else signature(by))
     name = registry.publish(model.state(), card(model, **changes))
     registry.promote(name, robot, who="tester", why="a test")
     return name

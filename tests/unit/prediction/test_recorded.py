@@ -28,7 +28,7 @@ from server_gui.core.settings.server_file import (
 from server_gui.terminal.predictions import replay_told
 from tests.support import waiting
 from tests.support.waiting import WAIT_S
-from tests.unit.prediction.robots import SteadyRobot, publish
+from tests.unit.prediction.robots import SteadyRobot, promoters, publish
 
 ENOUGH = 30  # decisions
 WALKING = RuleSettings("activity", "walk", 0.8, for_ms=200, action=Action.STOP)
@@ -48,6 +48,7 @@ def server(robot: SteadyRobot, tmp_path: Path, folder_url: str) -> ServerSetting
         RecordingSettings(spool=tmp_path / "spool", batch_s=1.0),
         PredictionSettings(poll_s=1.0),
         (WALKING,),
+        promoters("anna"),
     )
 
 
@@ -72,7 +73,7 @@ def says(report: CollectorReport) -> str | None:
 def test_what_is_predicted_is_kept_with_the_recording_and_comes_again_from_it(
     server: ServerSettings, robot: SteadyRobot, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    model = publish(server.store.url)
+    model = publish(server.store.url, by="anna")
     with Collector(server) as collector:
         report = until(
             collector,

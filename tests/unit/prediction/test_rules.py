@@ -7,13 +7,23 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
+from ml.registry.registry import Registry
 from ml.robot.task import ABNORMAL, TASKS, UNKNOWN
 from ml.serving.predictor import Prediction
 from server_gui.core.prediction import robot_predictor
 from server_gui.core.prediction.rules import Rule
 from server_gui.core.settings.prediction import EVERY_MS, Action, RuleSettings
 from tests.unit.ml.serving.small import MS, hips
-from tests.unit.prediction.robots import ROBOT, predicting, publish, served, settings, telemetry
+from tests.unit.prediction.robots import (
+    ROBOT,
+    predicting,
+    promoters,
+    publish,
+    served,
+    settings,
+    signature,
+    telemetry,
+)
 
 NEAR_FALL = RuleSettings("falling", "near_fall", at_least=0.9, for_ms=60, release=0.5)
 EVERY_MS_HERE = 40
@@ -72,10 +82,11 @@ def test_a_rule_stops_its_robot_once_and_before_anything_is_told(
     folder_url: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(robot_predictor, "LATE_NS", 3_600_000 * MS)
-    publish(folder_url)
+    publish(folder_url, by="anna")
     walking = RuleSettings("activity", "walk", 0.9, for_ms=300, robot="exo-*", action=Action.STOP)
     alarm = RuleSettings("activity", "stand", 0.9)
-    with predicting(settings(folder_url, walking, alarm)) as (one, heard):
+    known = replace(settings(folder_url, walking, alarm), promoters=promoters("anna"))
+    with predicting(known) as (one, heard):
         for robot in (ROBOT, "other"):
             served(one, heard, robot)
             for event in telemetry(np.concatenate([hips(4, walks=False), hips(4, walks=True, begin_s=4)])):
@@ -88,3 +99,40 @@ def test_a_rule_stops_its_robot_once_and_before_anything_is_told(
     here = [(ruled.rule.label, ruled.began) for ruled in heard.ruled() if ruled.robot == ROBOT]
     assert here == [("stand", True), ("stand", False), ("walk", True)]
     assert [ruled.began for ruled in heard.ruled() if ruled.robot == "other"] == [True, False]
+
+
+@pytest.mark.parametrize(
+    ("by", "why"), [(None, "is unsigned: tester had no key"), ("ben", "which is none of [promoters]")]
+)
+def test_a_rule_stops_no_robot_by_a_model_of_somebody_who_has_no_right_to(
+    folder_url: str, monkeypatch: pytest.MonkeyPatch, by: str | None, why: str
+) -> None:
+    """It is said before anything happens, and when it does; the model serves for display all the same."""
+    monkeypatch.setattr(robot_predictor, "LATE_NS", 3_600_000 * MS)
+    publish(folder_url, by=by)
+    walking = RuleSettings("activity", "walk", 0.9, for_ms=300, action=Action.STOP)
+    known = replace(settings(folder_url, walking), promoters=promoters("anna"))
+    with predicting(known) as (one, heard):
+        served(one, heard, ROBOT)
+        (problem,) = one.state.problems
+        for event in telemetry(hips(4, walks=True)):
+            one.take(ROBOT, event)
+        heard.until(heard.ruled)
+    assert problem.startswith(f"{ROBOT}: rule {walking.name} CANNOT STOP IT: ")
+    assert why in problem
+    (ruled,) = heard.ruled()
+    assert f"NOT STOPPED, {ruled.objection}" in ruled.text
+    assert heard.stops == []
+
+
+def test_a_model_that_serves_unsigned_is_signed_by_promoting_it_again(
+    folder_url: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    name = publish(folder_url)
+    walking = RuleSettings("activity", "walk", 0.9, action=Action.STOP)
+    known = replace(settings(folder_url, walking), promoters=promoters("anna"))
+    with predicting(known) as (one, heard):
+        served(one, heard, ROBOT)
+        assert one.state.problems
+        Registry(folder_url, sign=signature("anna")).promote(name, who="anna", why="it is good")
+        heard.until(lambda: not one.state.problems)

@@ -142,3 +142,17 @@ def relabel(store: Store, spool: Path, label: Label) -> None:
         opened.freeze()
         for batch in opened.waiting():
             send(opened, batch, store)
+
+
+def test_a_wearer_who_was_named_when_it_was_recorded_is_known_without_a_label(
+    folder_url: str, spool: Path
+) -> None:
+    named = replace(day("s", 1), recorded_wearer="p 03")
+    assert had(folder_url, spool, named).group == "p3"
+
+
+def test_a_label_and_a_recording_that_name_two_wearers_are_refused(folder_url: str, spool: Path) -> None:
+    named = replace(day("s", 1, wearer="P04"), recorded_wearer="P03")
+    assert (
+        why(folder_url, spool, named) == "it has labels of several wearers: P03, P04; take all but one back"
+    )

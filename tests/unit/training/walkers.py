@@ -13,7 +13,7 @@ from ml.robot.groups import GROUPS, unit
 from ml.store import Store
 from ml.store.labels import WEARER, Label, Source
 from server_gui.core.recording import records
-from server_gui.core.recording.records import Facts
+from server_gui.core.recording.records import Facts, Worn
 from server_gui.core.recording.rows import Layout, Record, Run
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.upload import send
@@ -36,7 +36,8 @@ class Made:
     said: Sequence[Said]
     channels: tuple[str, ...] = CHANNELS
     units: dict[str, str] | None = None
-    wearer: str = ""
+    wearer: str = ""  # as a label says
+    recorded_wearer: str = ""
     robot: str = "exo"
 
 
@@ -73,7 +74,8 @@ def _run(made: Made, began: int) -> Run:
 
 def _records(made: Made, began: int) -> list[Record]:
     ended = began + len(made.values) * S // HZ
-    session = records.Session(made.robot, made.session, began, Facts(units=_units(made)), ended)
+    facts = Facts(units=_units(made), worn=Worn(made.recorded_wearer))
+    session = records.Session(made.robot, made.session, began, facts, ended)
     found = [session.record()]
     for begin, end, name, source in made.said:
         first, last = (began + round(second * 1000) * 10**6 for second in (begin, end))

@@ -1,0 +1,130 @@
+"""`gwrms cloud forget`: everything of one wearer out of spool and store, for good, with a proof."""
+
+import argparse
+import functools
+from collections.abc import Sequence
+
+from gateway.amounts import counted
+from gateway.cli.connect import ask
+from gateway.cli.text import say, say_json, warn
+from ml.registry.registry import Registry
+from ml.store import Store, StoreError, UnsafeStore
+from ml.store.forgetting import Name
+from server_gui.cli.cloud_options import add_url, parser, progress, reach, spool
+from server_gui.core.cloud import forget as forgetting
+from server_gui.core.cloud.forget import CannotForget, Plan
+from server_gui.core.recording.errors import RecordingError
+from server_gui.core.recording.spool import Spool
+
+WHAT = (
+    "Remove a wearer's sessions: rows, labels, predictions, of every version; and prove that they are gone."
+)
+EPILOG = """A wearer's are the sessions that were recorded with --wearer, or labelled with one; P01, p01 and
+"P01 " are one. End every collector that writes to this store first. What waits in the spool is uploaded, rows
+are deleted from all tables but the robots' own journals (who operated them, and nothing of a wearer), files
+that only older versions need are deleted at once, and second copies in the spool with rows of theirs too.
+An event in the recording says that it was done, and names the wearer by a hash alone. Then every file is
+read again.
+
+Versions that models name keep what was in them: with such it is refused, and --unpin lets these
+versions go. A model that learned from these sessions stays, and is named. Not known here, and yours to
+remove: exported files, copies of the store, backups, spools of other servers, and old versions that a
+bucket itself keeps.
+
+Interrupted, the same command goes on. Exit status 0: gone, as is proven; 1: something is left, or was not
+removed, and it says what; 2: not looked."""
+
+
+def forget(argv: list[str]) -> int:
+    """Run `gwrms cloud forget`."""
+    made = parser("cloud forget", WHAT, EPILOG)
+    add_url(made)
+    made.add_argument("--wearer", required=True, metavar="ID", help="who is to be forgotten")
+    made.add_argument("--dry-run", action="store_true", help="say what would be removed, and do nothing")
+    made.add_argument("--unpin", action="store_true", help="let go of versions that models name")
+    made.add_argument(
+        "--alone", action="store_true", help="no other server runs: for a store that keeps no two apart"
+    )
+    made.add_argument("--yes", action="store_true", help="do not ask")
+    arguments = made.parse_args(argv)
+    try:
+        return _forget(arguments)
+    except CannotForget as error:
+        warn("cloud", str(error))
+        return 1
+    except (StoreError, RecordingError) as error:
+        warn("cloud", str(error))
+        return 2
+
+
+def _forget(arguments: argparse.Namespace) -> int:
+    store, folder = reach(arguments), spool(arguments)
+    learned = functools.partial(_learned, store)
+    if arguments.dry_run:
+        return _tell(arguments, forgetting.plan(store, folder, arguments.wearer, learned), [])
+    if not (store.about.several_writers or arguments.alone):
+        raise UnsafeStore(f"{store.url} is for one writer alone: end that server, and say --alone")
+    looking = functools.partial(progress, "looking")
+    with Spool(folder) as opened:
+        known = forgetting.plan(store, folder, arguments.wearer, learned)
+        _check_pins(arguments, known)
+        _say(arguments, known)
+        if not known.sessions or not ask(_question(store, known), yes=arguments.yes):
+            return 1
+        forgetting.upload(store, opened, arguments.wearer, looking)
+        known = forgetting.plan(store, folder, arguments.wearer, learned)
+        left = forgetting.forget(store, opened, known, arguments.wearer, looking)
+    return _tell(arguments, known, left)
+
+
+def _check_pins(arguments: argparse.Namespace, known: Plan) -> None:
+    if known.pins and not arguments.unpin:
+        names = "; ".join(f"version {pin.version} of {pin.location} for {pin.by}" for pin in known.pins)
+        raise CannotForget(
+            f"nothing was removed: rows of theirs are kept in {names}. With --unpin these versions go, and "
+            "the models cannot be learned again from the same rows"
+        )
+
+
+def _learned(store: Store, sessions: Sequence[Name]) -> Sequence[str]:
+    """Which models have learned from, or were judged by, one of these."""
+    names = {session for _, session in sessions}
+    return [card.id for card in Registry(store.url).entries() if names & {*card.learned, *card.held_out}]
+
+
+def _question(store: Store, known: Plan) -> str:
+    sessions, rows = counted(len(known.sessions), "session"), counted(sum(known.rows.values()), "row")
+    return f"remove {sessions} with {rows} of {store.url} for good?"
+
+
+def _say(arguments: argparse.Namespace, known: Plan) -> None:
+    """What there is of them."""
+    if arguments.json:
+        return
+    if not known.sessions:
+        warn("cloud", f"nothing here says that {arguments.wearer!r} has worn a robot (gwrms label --wearer)")
+    say("".join(f"{session} of {robot}\n" for robot, session in known.sessions))
+    say("".join(f"{location}: {rows} rows\n" for location, rows in known.rows.items()))
+    if known.waiting:
+        batches = counted(known.waiting, "batch", "batches")
+        say(f"{batches} of the spool may have more, and go to the store first\n")
+    for pin in known.pins:
+        say(f"kept for {pin.by}: {pin.location}, version {pin.version}\n")
+    for model in known.learned:
+        say(f"learned from these sessions, and stays: {model}\n")
+
+
+def _tell(arguments: argparse.Namespace, known: Plan, left: Sequence[str]) -> int:
+    if arguments.json:
+        removed = not (arguments.dry_run or left)
+        say_json(
+            {"plan": known, "removed": removed, "left": left, "sha256": forgetting.digest(arguments.wearer)}
+        )
+    elif arguments.dry_run:
+        _say(arguments, known)
+    else:
+        for problem in left:
+            warn("cloud", problem)
+        if not left:
+            say("gone: no file of this store or of this spool has a row of theirs\n")
+    return 1 if left or not known.sessions else 0

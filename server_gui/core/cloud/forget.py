@@ -1,0 +1,191 @@
+"""A wearer forgotten: their sessions out of spool and store, with a proof that nothing of them is left.
+
+What waits is uploaded first, so that all of it is in one place. Interrupted anywhere, it is called again.
+"""
+
+import hashlib
+import time
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import msgspec
+
+from ml.store import Store, durable, forgetting, upkeep
+from ml.store.forgetting import Name, Worn
+from ml.store.labels import person
+from ml.store.tables import EVENTS, LABELS, SESSIONS
+from ml.store.upkeep import Pin
+from server_gui.core.cloud import mend, spool_reader
+from server_gui.core.cloud.counting import Advance
+from server_gui.core.recording.batching import EventKind
+from server_gui.core.recording.rows import Record
+from server_gui.core.recording.spool import Spool
+from server_gui.core.recording.upload import send
+
+Expect = Callable[[int], AbstractContextManager[Advance]]
+_BEGUN: Final = "forgetting.json"  # in the spool, while it goes on
+MADE: Final = "removed with a wearer who is forgotten"  # what new receipts say of these rows
+
+
+class CannotForget(Exception):
+    """Nothing was removed; says why, and what to do."""
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What there is of somebody: sessions, rows in the store by location, and what else has some of them."""
+
+    sessions: Sequence[Name]
+    rows: Mapping[str, int]
+    waiting: int  # batches of the spool that are uploaded first
+    copies: Sequence[int]  # second copies of the spool with rows of theirs
+    aside: Sequence[Path]  # files of the spool that were set aside, which nobody can look into
+    pins: Sequence[Pin]  # versions that models name, with rows of theirs
+    learned: Sequence[str]  # models
+
+
+def plan(store: Store, spool: Path, name: str, learned: Callable[[Sequence[Name]], Sequence[str]]) -> Plan:
+    """Look; nothing is changed. `learned` says which models have learned from sessions.
+
+    Raises:
+        CannotForget: the name is none, or a session is somebody else's, too.
+        StoreError, SpoolUnusable: it could not be looked.
+
+    """
+    if not person(name):
+        raise CannotForget(f"{name!r} is nobody's name")
+    found = _worn(store, spool, name)
+    if found.shared:
+        shared = ", ".join(f"{session} of {robot}" for robot, session in found.shared)
+        raise CannotForget(
+            f"somebody else is said to have worn the robot in {shared}, too: take the wrong label back first "
+            "(gwrms label --ls)"
+        )
+    names = sorted({*found.sessions, *_begun(spool, name)})
+    return Plan(
+        names,
+        forgetting.counted(store, names),
+        sum(not spool_reader.is_empty(spool, number) for number in spool_reader.waiting(spool)),
+        [
+            number
+            for number in spool_reader.uploaded(spool)
+            if not spool_reader.named(spool, number).isdisjoint(names)
+        ],
+        [file for _, file in spool_reader.damaged(spool)],
+        forgetting.pinned(store, names),
+        learned(names),
+    )
+
+
+def _worn(store: Store, spool: Path, name: str) -> Worn:
+    stored = (forgetting.told(store, table) for table in (SESSIONS, LABELS))
+    here = (spool_reader.rows(spool, table) for table in (SESSIONS, LABELS))
+    sessions, labels = ([*there, *mine] for there, mine in zip(stored, here, strict=True))
+    return forgetting.worn(sessions, labels, name)
+
+
+def upload(store: Store, spool: Spool, name: str, expect: Expect) -> None:
+    """Bring what waits into the store, and see that it is whole: what is missing later is known to be theirs.
+
+    Where it was begun before, that was seen then.
+
+    Raises:
+        CannotForget: it is not.
+        StoreError, Damaged: it could not be brought.
+
+    """
+    for number in spool.waiting():
+        send(spool, number, store)
+    if _begun(spool.folder, name):
+        return
+    found = mend.plan(store, spool, expect)
+    if found.files or found.batches or found.lost:
+        raise CannotForget("rows of others are missing in the store already: gwrms cloud mend comes first")
+
+
+def forget(store: Store, spool: Spool, known: Plan, name: str, expect: Expect) -> list[str]:
+    """Remove everything of the plan, tell it in the recording, and prove it; what is left, in words.
+
+    Raises:
+        StoreError: it is not known what was removed; call it again.
+
+    """
+    _begin(spool.folder, known, name)
+    for named in known.pins:
+        upkeep.unpin(store, named.location, named.version, named.by)
+    for number in known.copies:
+        spool.drop(number)
+    forgetting.delete(store, known.sessions)
+    mend.accept(store, spool, expect, MADE)
+    _tell(store, spool, known, name)
+    left = proof(store, spool.folder, known)
+    (spool.folder / _BEGUN).unlink()
+    return left
+
+
+def proof(store: Store, spool: Path, known: Plan) -> list[str]:
+    """Look again, into every file of store and spool; what is left of it, in words."""
+    wanted = set(known.sessions)
+    found = [f"{store.url}/{path} has rows of theirs" for path in forgetting.left(store, known.sessions)]
+    found += (
+        f"batch {number} of the spool {spool} has rows of theirs"
+        for number in spool_reader.kept(spool)
+        if wanted & spool_reader.named(spool, number)
+    )
+    unknown = "was set aside, and whether it has rows of theirs is unknown: look, or remove it"
+    found += (f"{file} {unknown}" for file in known.aside)
+    return found
+
+
+class _Begun(msgspec.Struct, frozen=True):
+    """What is being removed, for whoever goes on: when the tables do not tell it any more."""
+
+    wearer_sha256: str
+    sessions: list[Name]
+
+
+def _begin(folder: Path, known: Plan, name: str) -> None:
+    data = msgspec.json.encode(_Begun(digest(name), list(known.sessions)))
+    (folder / _BEGUN).unlink(missing_ok=True)
+    durable.create(folder / _BEGUN, data)
+
+
+def _begun(folder: Path, name: str) -> list[Name]:
+    """The sessions of somebody whom an interrupted command was to forget."""
+    try:
+        found = msgspec.json.decode((folder / _BEGUN).read_bytes(), type=_Begun)
+    except (OSError, msgspec.MsgspecError):
+        return []
+    return found.sessions if found.wearer_sha256 == digest(name) else []
+
+
+def digest(name: str) -> str:
+    """By what the event names somebody: whoever knows the name can see that it was them."""
+    return hashlib.sha256(f"gwrms wearer {person(name)}".encode()).hexdigest()
+
+
+def _tell(store: Store, spool: Spool, known: Plan, name: str) -> None:
+    """An event in the recording of each robot."""
+    if not known.sessions:
+        return
+    spool.append([], [_event(robot, known, name) for robot in sorted({robot for robot, _ in known.sessions})])
+    spool.freeze()
+    for number in spool.waiting():
+        send(spool, number, store)
+
+
+def _event(robot: str, known: Plan, name: str) -> Record:
+    count = sum(one == robot for one, _ in known.sessions)
+    data = {"wearer_sha256": digest(name), "sessions": count, "rows": dict(known.rows)}
+    fields = {
+        "robot": robot,
+        "session": "",
+        "utc": time.time_ns(),
+        "kind": EventKind.FORGOTTEN.value,
+        "text": f"{count} sessions of a wearer were removed for good, with all that is known of them",
+        "data": msgspec.json.encode(data).decode(),
+    }
+    return Record(EVENTS.name, fields)
