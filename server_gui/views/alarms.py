@@ -72,7 +72,9 @@ class AlarmRow(QFrame):
         alarm = one.alarm
         self._icon.show_mark(alarm.mark)
         self._tone(alarm.mark.colour)
-        headline = " · ".join(filter(None, (station.title if named else "", alarm.line)))
+        headline = " · ".join(
+            filter(None, (station.title if named else "", alarm.line if is_open else alarm.brief))
+        )
         more = [] if alarm.is_now else ["last known"]
         more += ["acknowledged"] if one.is_acknowledged else []
         headline += f" ({', '.join(more)})" if more else ""

@@ -21,7 +21,7 @@ from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.elided import ElidedLabel
 from server_gui.views.widgets.mark import MarkIcon
-from server_gui.views.widgets.plain import PlainLabel
+from server_gui.views.widgets.plain import PlainLabel, set_tip
 from server_gui.views.widgets.stop_button import StopButton
 from server_gui.views.widgets.whole import WholeLabel
 
@@ -74,7 +74,8 @@ class RobotCard(QFrame):
         self.stop.name(station.title)
         self.remove.setAccessibleName(f"Remove {station.title}")
         worst = station.alarms.worst
-        set_text(self._state, mark.word if worst is None else worst.line)
+        set_text(self._state, mark.word if worst is None else worst.brief)
+        set_tip(self._state, "" if worst is None else worst.line)
         age = age_text(robot.age_s())
         live = "" if robot.is_stale() else f" · {robot.rate_hz():.0f} Hz"
         set_text(self._link, f"{age}{' old' if robot.age_s() is not None else ''}{live}")

@@ -40,9 +40,16 @@ class Alarm:
     @property
     def line(self) -> str:
         """Cause first: `fault: left knee: 0x2310 continuous overcurrent at the output`."""
-        return ": ".join(
-            filter(None, (self.mark.word, self.where or self.subject.replace("_", " "), self.what))
-        )
+        return self._said(self.what)
+
+    @property
+    def brief(self) -> str:
+        """The line where there is little room: of several reasons the first, and that there are more."""
+        first, more, _ = self.what.partition("; ")
+        return self._said(f"{first} …" if more else first)
+
+    def _said(self, what: str) -> str:
+        return ": ".join(filter(None, (self.mark.word, self.where or self.subject.replace("_", " "), what)))
 
 
 @dataclass(frozen=True, slots=True)
