@@ -14,6 +14,7 @@ from typing import Any, Final
 from tests.support.waiting import until
 
 ANSWER_S: Final = 30.0
+MOST_TURNS: Final = 12
 
 
 @dataclass
@@ -58,10 +59,13 @@ class Hand:
         x, y = self.where(name)
         self.xdotool("mousemove", str(x), str(y))
 
-    def reach(self, name: str) -> None:
-        """Turn the wheel until it is in sight."""
-        if not self.can_see(name):
-            self.wheel("Views")
+    def reach(self, name: str) -> bool:
+        """Turn the wheel over the tab until it is in sight, as long as that changes anything."""
+        for _ in range(MOST_TURNS):
+            if self.can_see(name):
+                return True
+            self.wheel("page")
+        return False
 
     def reveal(self, name: str, panel: str) -> None:
         """Where a panel stands behind another, bring it to the front."""
@@ -114,9 +118,7 @@ class Hand:
 
 
 @contextmanager
-def opened(
-    display: str, folder: Path, pictures: Path, arguments: Sequence[str]
-) -> Iterator[Hand]:
+def opened(display: str, folder: Path, pictures: Path, arguments: Sequence[str]) -> Iterator[Hand]:
     """`gwrms ARGUMENTS` on a display, with a home of its own in `folder`."""
     folder.mkdir(parents=True, exist_ok=True)
     pictures.mkdir(parents=True, exist_ok=True)

@@ -137,9 +137,11 @@ def _cells(view: QAbstractItemView) -> Iterator[Place]:
     root = view.rootIndex()
     stack = [model.index(row, 0, root) for row in range(model.rowCount(root))]
     for first in stack:
-        stack += [model.index(row, 0, first) for row in range(model.rowCount(first))] if not isinstance(
-            view, QTableView
-        ) else []
+        stack += (
+            [model.index(row, 0, first) for row in range(model.rowCount(first))]
+            if not isinstance(view, QTableView)
+            else []
+        )
         for column in range(model.columnCount(first.parent())):
             index = first.siblingAtColumn(column)
             area = view.visualRect(index) & port.rect()
