@@ -1,4 +1,4 @@
-"""`python -m tests.gui.walks FOLDER [WALK …] [--screen 1366x768] [--scale 100] [--look dark]`: walks, with a picture a moment."""
+"""`python -m tests.gui.walks FOLDER [WALK …]`: walks, with a picture of each moment in FOLDER."""
 
 import argparse
 import sys

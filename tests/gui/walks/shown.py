@@ -1,4 +1,4 @@
-"""`python -m tests.gui.walks.shown SOCKET ARGUMENTS`: `gwrms ARGUMENTS`, and answers where on the screen what stands.
+"""`python -m tests.gui.walks.shown SOCKET ARGUMENTS`: `gwrms ARGUMENTS`, which tells where what stands.
 
 It answers only about what is visible, in lines of JSON at SOCKET, and does nothing to the window itself.
 """

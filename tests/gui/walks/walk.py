@@ -1,4 +1,4 @@
-"""A newcomer's bench: the simulated robot as processes, a network to it that can be cut, and the window on it."""
+"""A newcomer's bench: a simulated robot, a network to it that can be cut, and the window on it."""
 
 import contextlib
 from collections.abc import Iterator

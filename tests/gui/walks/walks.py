@@ -95,7 +95,7 @@ def tuning(bench: Bench) -> None:
     """A value beyond the limit is marked; one within it is tried, seen without panels too, and taken back."""
     hand = bench.hand
     stage(hand, "step length", "4000")
-    hand.sees("⚠")
+    hand.sees("above the largest allowed")
     hand.keep("refused")
     stage(hand, "step length", NEW_STEP)
     hand.click("Review …")
@@ -174,7 +174,7 @@ def store_and_learning(bench: Bench) -> None:
 
 
 def replay(bench: Bench) -> None:
-    """A recording is played in the views of a robot, and says so; STOP is that of the robot which is there."""
+    """A recording is played in the views of a robot, and says so; STOP is that of the live one."""
     hand = bench.hand
     hand.click("Recordings")
     hand.sees("Ada", within_s=AGAIN_S)
@@ -246,7 +246,7 @@ def stage(hand: Hand, words: str, value: str) -> None:
 
 
 WALKS: Final[dict[str, tuple[Moment, ...]]] = {
-    "integrator": (alive, one_glance, stopped, link_cut, two_robots, keys),
+    "integrator": (alive, keys, one_glance, stopped, link_cut, two_robots),
     "bench-tester": (alive, tuning, drive_fault, insole_lost, bus_in_trouble),
     "developer": (alive, signals, resources, replay, store_and_learning),
 }
