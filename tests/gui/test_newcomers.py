@@ -95,3 +95,13 @@ def test_a_card_stays_small_however_much_is_wrong(window: MainWindow, bench: Ben
     card = window.robots.cards[0]
     assert card.texts[1].endswith("0x2310 …")
     assert MANY in window.alarms.texts[0]
+
+
+def test_stop_names_the_robot_that_was_chosen_with_the_next_frame(window: MainWindow, bench: Bench) -> None:
+    bench.station.take([walking(100), looked()])
+    second = bench.add("exo-02", 7421)
+    bench.draw(window)
+    for station in (second, bench.station, second):
+        bench.desk.select(station)
+        window.refresh()
+        assert window.header.stop.accessibleName() == f"STOP {station.title}"
