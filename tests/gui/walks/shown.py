@@ -107,7 +107,7 @@ def _answer(asked: dict[str, Any]) -> object:
         case {"texts": _}:
             return texts()
         case {"places": _}:
-            return [(text, *area.getRect()) for text, area in places() if text]
+            return [(text, area.x(), area.y()) for text, area in places() if text]
         case {"broken": _}:
             return broken()
         case {"focus": _}:

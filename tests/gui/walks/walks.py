@@ -1,5 +1,6 @@
 """The three walks: what integrator, bench tester and developer do and expect to see, moment by moment."""
 
+import time
 from collections.abc import Callable
 from typing import Final
 
@@ -177,8 +178,9 @@ def replay(bench: Bench) -> None:
     """A recording is played in the views of a robot, and says so; STOP is that of the live one."""
     hand = bench.hand
     hand.click("Recordings")
-    hand.sees("Ada", within_s=AGAIN_S)
-    hand.click("Ada")
+    today = time.strftime("%Y-%m-%d")
+    hand.sees(today, within_s=AGAIN_S)
+    hand.click(today)
     hand.click("Play")
     hand.sees("PLAYBACK, not live", within_s=AGAIN_S)
     hand.keep("replay")
@@ -200,7 +202,7 @@ def resources(bench: Bench) -> None:
     """Who uses the computer, sorted by a click."""
     hand = bench.hand
     hand.click("Resources")
-    hand.sees("PID")
+    hand.sees("processes")
     hand.keep("resources")
     hand.click("Audit")
     hand.sees("by")
