@@ -99,7 +99,7 @@ def tuning(bench: Bench) -> None:
     hand.sees("above the largest allowed")
     hand.keep("refused")
     stage(hand, "step length", NEW_STEP)
-    hand.click("Review …")
+    hand.click("Review 1 …")
     hand.sees("Try it for")
     hand.keep("review")
     hand.click("Try it for")
@@ -142,7 +142,8 @@ def insole_lost(bench: Bench) -> None:
     hand = bench.hand
     bench.robot.break_("sensor_unplugged", "left_insole")
     hand.sees("lost: left insole")
-    hand.sees("L", "–")
+    hand.sees("left insole lost")
+    hand.misses("LEFT  0 N")
     hand.keep("insole")
     bench.robot.mend()
     hand.misses("lost: left insole", within_s=AGAIN_S)
@@ -216,7 +217,8 @@ def keys(bench: Bench) -> None:
     hand.key("question")
     hand.sees("Ctrl+F")
     hand.keep("keys")
-    hand.click("Close", place=-1)
+    hand.key("question")
+    hand.misses("What the manual says of this")
 
 
 def walks_again(bench: Bench) -> None:
