@@ -11,6 +11,7 @@ from gateway.client import NotConnected
 from server_gui.views.main_window import MainWindow
 from server_gui.views.parameters.panel import ParametersPanel
 from server_gui.views.parameters.tree import NAME, NEW
+from server_gui.views.predictions import lines
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.figure import Pose, StickFigure
 from server_gui.views.widgets.time_axis import LAST, NOW
@@ -105,3 +106,11 @@ def test_stop_names_the_robot_that_was_chosen_with_the_next_frame(window: MainWi
         bench.desk.select(station)
         window.refresh()
         assert window.header.stop.accessibleName() == f"STOP {station.title}"
+
+
+def test_a_device_in_trouble_has_one_colour_and_word_everywhere(bench: Bench) -> None:
+    bench.station.take([walking(100), looked(state="stale", problem="no new sample for 0.7 s")])
+    (alarm,) = (one.alarm for one in bench.station.alarms.active)
+    (line,) = (line for line in lines(bench.station) if "left knee" in line.text)
+    assert line.mark == alarm.mark
+    assert line.text == f"left knee: {alarm.mark.word}"

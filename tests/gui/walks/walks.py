@@ -142,7 +142,7 @@ def insole_lost(bench: Bench) -> None:
     hand = bench.hand
     bench.robot.break_("sensor_unplugged", "left_insole")
     hand.sees("lost: left insole")
-    hand.sees("left insole lost")
+    hand.sees("left insole: lost")
     hand.misses("LEFT  0 N")
     hand.keep("insole")
     bench.robot.mend()
