@@ -54,7 +54,7 @@ def places() -> Iterator[Place]:
         elif isinstance(widget, QAbstractItemView):
             yield widget.accessibleName(), area
             yield from _cells(widget)
-        else:
+        elif widget.isEnabled():  # nobody clicks what is grey
             for name in _names(widget):
                 yield name, area
 
