@@ -327,6 +327,8 @@ def _stop(station: Station, joint: str) -> Cell:
     proof = stopping.proofs.get(joint)
     if proof is not None:
         said = f"{proof.after_ms:.0f} ms" if proof.after_ms > 0 else "before"
+        if station.robot.word(f"{joint}.state") == ENABLED:
+            return Cell("no more", "dim", None, f"it was, {said} after the latest STOP; enabled again since")
         return Cell(said, "good" if station.is_live else "old", None, f"{proof.state}, {said} after the STOP")
     if stopping.state is StopState.IDLE:
         return Cell(NONE, "dim", None, "no stop was sent since the window began")

@@ -8,6 +8,8 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
 from gateway.client import NotConnected
+from server_gui.core.tuning.stop import Proof
+from server_gui.views.joint_table import STOP, JointModel
 from server_gui.views.main_window import MainWindow
 from server_gui.views.parameters.panel import ParametersPanel
 from server_gui.views.parameters.tree import NAME, NEW
@@ -16,7 +18,8 @@ from server_gui.views.theme import Theme
 from server_gui.views.widgets.figure import Pose, StickFigure
 from server_gui.views.widgets.time_axis import LAST, NOW
 from tests.gui.fakes import Bench, destroy
-from tests.support.desk import looked, walking
+from tests.gui.running import wait
+from tests.support.desk import JOINTS, looked, walking
 
 ANGLES = {side: ["+16°", "+43°", "-13°"] for side in ("left", "right")}
 OLD_S = 70.0
@@ -63,12 +66,17 @@ def test_no_angle_beside_the_figure_is_cut(theme: Theme, width: int) -> None:
 
 
 def test_what_is_old_looks_old_and_is_not_called_now(window: MainWindow, bench: Bench) -> None:
-    bench.station.take([walking(200), looked()])
-    bench.draw(window)
     overview = window.overview
+
+    def is_live() -> bool:
+        bench.look_again([walking(200), looked()])
+        overview._read_s = 0.0
+        bench.draw(window)
+        return {label.property("tone") for label in overview._loads.values()} == {""}
+
+    wait(is_live, "looked live")
     axis = overview._plots[0].plot.getPlotItem().getAxis("bottom")
     assert axis.tickStrings([0.0], 1.0, 1.0) == [NOW]
-    assert "old" not in {label.property("tone") for label in overview._loads.values()}
     live = overview._plots[0].legend.text()
     bench.look_again([walking(200, age_s=OLD_S), looked()])
     overview._read_s = 0.0
@@ -114,3 +122,14 @@ def test_a_device_in_trouble_has_one_colour_and_word_everywhere(bench: Bench) ->
     (line,) = (line for line in lines(bench.station) if "left knee" in line.text)
     assert line.mark == alarm.mark
     assert line.text == f"left knee: {alarm.mark.word}"
+
+
+def test_a_drive_that_is_enabled_again_has_no_proof_of_an_old_stop(theme: Theme, bench: Bench) -> None:
+    bench.station.take([walking(200), looked()])
+    bench.station.stopping.proofs = {joint: Proof(26.0, "quick stop active") for joint in JOINTS}
+    model = JointModel(bench.desk, theme)
+    model.refresh()
+    words = {str(bench.station.robot.word(f"{joint}.state")) for joint in JOINTS}
+    assert words == {"operation enabled"}
+    shown = [model.index(row, STOP).data() for row in range(model.rowCount())]
+    assert set(shown) == {"no more"}
