@@ -41,8 +41,7 @@ def test_a_robot_that_is_gone_says_so_and_how_old_its_data_are(window: MainWindo
     bench.look_again([LinkChanged(ConnectionState.WAITING, why, time.monotonic_ns())])
     bench.draw(window)
     card = window.robots.cards[0]
-    assert card.texts[:2] == ("exo-01", "no link: nothing came from 127.0.0.1:7420 for 3.0 s …")
-    assert why in card._state.toolTip()
+    assert card.texts[:2] == ("exo-01", f"no link: {why}")
     assert re.fullmatch(r"7\d\.\d s old", card.texts[2])
     assert f"no link: {why}" in bench.desk.news.items[0].text
 
