@@ -10,11 +10,11 @@ from typing import Self
 class SlowNetwork:
     """Relays every connection to a port of this computer, each piece later by `delay_s`."""
 
-    def __init__(self, target: int, delay_s: float) -> None:
+    def __init__(self, target: int, delay_s: float, port: int = 0) -> None:
         self.delay_s = delay_s
         self.carried = 0  # bytes, both ways
         self._target = target
-        self._listener = socket.create_server(("127.0.0.1", 0))
+        self._listener = socket.create_server(("127.0.0.1", port))
         self.port: int = self._listener.getsockname()[1]
         self._lock = threading.Lock()
         self._sockets: list[socket.socket] = []  # closed at the end, when no thread uses them any more

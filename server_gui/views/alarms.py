@@ -71,7 +71,8 @@ class AlarmRow(Choosable):
         alarm = one.alarm
         self._icon.show_mark(alarm.mark)
         self._tone(alarm.mark.colour)
-        headline = " · ".join(filter(None, (station.title if station and named else "", alarm.line)))
+        line = alarm.line if is_open else alarm.brief
+        headline = " · ".join(filter(None, (station.title if station and named else "", line)))
         more = [] if alarm.is_now else ["last known"]
         more += ["acknowledged"] if one.is_acknowledged else []
         headline += f" ({', '.join(more)})" if more else ""

@@ -328,6 +328,8 @@ def _stop(station: Station, joint: str) -> Cell:
     stopping = station.stopping
     proof = stopping.proofs.get(joint)
     if proof is not None:
+        if station.robot.word(f"{joint}.state") == ENABLED:
+            return Cell("no more", "dim", None, f"{proof.text} since the latest STOP; enabled again since")
         return Cell(proof.when, "good" if station.is_live else "old", None, f"{proof.text} since the STOP")
     if stopping.state is StopState.IDLE:
         return Cell(NONE, "dim", None, "no stop was sent since the window began")

@@ -78,8 +78,10 @@ class KeyPlot(Card):
         self.set_title(f"{self._kind.title} ({unit.symbol})")
         values = self._values(station)
         told = {word: unit.text(value) for (_, _, word), value in zip(self._kind.curves, values, strict=True)}
+        inks = [colour if live else "old" for _, colour, _ in self._kind.curves]
         parts = [
-            (css(self._theme, colour), "━", f"{word} {told[word]}") for _, colour, word in self._kind.curves
+            (css(self._theme, ink), "━", f"{word} {told[word]}")
+            for ink, (_, _, word) in zip(inks, self._kind.curves, strict=True)
         ]
         limits = _limit_texts(self._limits(station), unit)
         if limits:

@@ -96,6 +96,7 @@ class MainWindow(QMainWindow):
         self.kept = settings
         desk.pins.take(settings.value("pinned"))
         self._frame = 0
+        self._named: Station | None = None  # the robot of header and panels
         self._is_arranged = False  # the panels, which may wait for the window to be shown
         self.setWindowTitle("GWRMS")
         self.resize(USUAL.boundedTo(self.screen().availableSize()))
@@ -167,8 +168,9 @@ class MainWindow(QMainWindow):
         shown = self._desk.selected is not None or self.tabs.currentIndex() >= self._live
         if shown:
             self._views[self.tabs.currentIndex()].refresh()
-        if self._frame % SLOW:
-            return
+        selected, self._named = self._named, self._desk.selected
+        if self._frame % SLOW and selected is self._named:
+            return  # STOP names at once whom it stops
         self._pages.setCurrentIndex(1 if shown else 0)
         self.header.refresh()
         self.alarms.refresh()

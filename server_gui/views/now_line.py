@@ -99,7 +99,9 @@ class NowLine(QFrame):
         self.drives.say(*_drives(station))
         line = activity(station)
         gait = station.processing.derived().gait
-        walks = station.is_live and gait.walking and gait.cadence_spm is not None
+        walks = (
+            station.is_live and line.mark.word != "stopped" and gait.walking and gait.cadence_spm is not None
+        )
         cadence = f"  {gait.cadence_spm:.0f} steps/min" if walks else ""
         details = tuple(dict.fromkeys((line.detail, line.short or line.detail)))
         self.activity.say(line.mark, (f"{line.text}{cadence}", line.text), details, line.tip)

@@ -20,7 +20,7 @@ from server_gui.views.marks import age_text, old_text
 from server_gui.views.now_line import NowLine
 from server_gui.views.predictions import activity, lines, model_phases
 from server_gui.views.theme import Theme
-from server_gui.views.widgets.card import Card
+from server_gui.views.widgets.card import Card, set_tone
 from server_gui.views.widgets.colour_bar import ColourBar
 from server_gui.views.widgets.figure import Pose, StickFigure
 from server_gui.views.widgets.fitted import FittedLabel
@@ -234,6 +234,7 @@ class Overview(QWidget):
                 self._maps[side].set_cells(known.cells)
             wordings = _load_texts(side, carried[side], force)
             self._loads[side].say(*wordings)
+            set_tone(self._loads[side], "" if live else "old")
             share = carried[side].share
             said = "–" if share is None else f"{100 * share:.0f} %"
             value = f"{wordings[0]}, {said} of the load" if live else "not known now"

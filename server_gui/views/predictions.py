@@ -111,10 +111,12 @@ def lines(station: Station) -> Iterator[Line]:
         )
     for rule in predictions.rules:
         yield Line(Mark("triangle", "warn", "rule"), f"Rule {rule.rule.action.value}", rule.text)
+    told = {one.alarm.subject: one.alarm.mark for one in station.alarms.active}
     for part in station.robot.not_ok():
         why = part.problem or "no reason known"
         name = part.name.replace("_", " ")
-        yield Line(Mark("square", "bad", part.state), f"{name} {part.state}", why, "", why)
+        mark = told.get(part.name) or Mark("square", "bad", part.state)  # the same as everywhere
+        yield Line(mark, f"{name}: {mark.word}", why, "", why)
 
 
 def model_phases(station: Station) -> dict[Leg, LegPhase | None]:

@@ -78,7 +78,8 @@ class RobotCard(Choosable):
         self.stop.name(station.title)
         self.remove.setAccessibleName(f"Remove {station.title}")
         worst = station.alarms.worst
-        set_text(self._state, mark.word if worst is None else worst.line)
+        set_text(self._state, mark.word if worst is None else worst.brief)
+        set_tip(self._state, "" if worst is None else worst.line)
         age = f"{age_text(robot.age_s())}{' old' if robot.age_s() is not None else ''}"
         live = "" if robot.is_stale() else f" · {robot.rate_hz():.0f} Hz"
         self._link.say(*dict.fromkeys((f"{age}{live}", age)))

@@ -43,6 +43,7 @@ from server_gui.views.widgets.plot import PlacedFlag
 Floats = npt.NDArray[np.float64]
 MOST_CURVES: Final = 24
 NARROW, LIST = 700, 150  # wide, at text of 100 %: tools in two rows; the channels at least
+GONE: Final = "Live: that instant is gone from here, see Recordings"
 AROUND_S: Final = 5.0  # that are shown before and after an event
 SLOW: Final = 5  # frames between two looks at what people read
 SPANS_S: Final = (2, 5, 10, 30, 60, 100)
@@ -78,6 +79,7 @@ class Signals(QWidget):
         self._frozen: Frozen | None = None
         self._frame = 0
         self._jumped_ns: int | None = None  # on the robot's clock
+        self._is_gone = False  # the instant that was asked for last
         self._exported = ""  # what came of the latest export
         self._at = [0.0, 0.0]  # the cursors, s until the newest row
         self._active = 0
@@ -164,7 +166,9 @@ class Signals(QWidget):
         """Choose these, and stand still with the seconds around an instant of the robot's clock in sight."""
         self.choose(names)
         self.pause.setChecked(False)  # else it would be what was seen before
-        self.show_at(at_ns)
+        if not self.show_at(at_ns):
+            self.pause.setChecked(False)  # nothing else is shown in its place as if it were that
+            self._is_gone, self._frame = True, 0
 
     def save_csv(self, path: Path) -> None:
         """Save what is on screen, in SI units, a row a time."""
@@ -347,7 +351,7 @@ class Signals(QWidget):
             plot.plot.set_seconds(float(SPANS_S[place]))
 
     def _paused(self, on: bool) -> None:
-        self._frozen, self._jumped_ns = None, None
+        self._frozen, self._jumped_ns, self._is_gone = None, None, False
         if on and self._desk.selected is not None:
             self._freeze(self._desk.selected)
 
@@ -506,6 +510,8 @@ class Signals(QWidget):
         many = f" · {more} more are not drawn: {MOST_CURVES} at a time" if more > 0 else ""
         if self._frozen is not None:
             return f"Paused, data go on{many}"
+        if self._is_gone:
+            return GONE
         if station.robot.age_s() is None:
             return f"no data yet{many}"
         if station.robot.is_stale():

@@ -124,6 +124,7 @@ QFrame#card {{ background: {card}; border: 1px solid {border}; border-radius: 6p
 QFrame#card[selected="true"] {{ border: 1px solid {accent}; border-left: 3px solid {accent}; }}
 QLabel, QCheckBox {{ background: transparent; }}
 QLabel#dim, QLabel#note {{ color: {dim}; }}
+QLabel#title[tone="old"] {{ color: {old}; }}
 QLabel#title {{ font-weight: bold; }}
 QLabel#brand {{ color: {accent}; padding-right: 8px; }}
 QLabel#banner {{ background: {staged}; border: 1px solid {warn}; border-radius: 4px; padding: 5px 8px; }}

@@ -192,7 +192,7 @@ def test_rules_that_hold_and_devices_in_trouble_stand_beside(window: MainWindow,
     assert [text.partition(" · ")[0] for text in texts] == [
         "Balance: Fall 97 %",
         "Rule alarm",
-        "left knee fault",
+        "left knee: not to be believed",  # the word of its alarm
     ]
     assert texts[2].endswith("i²t at 83 %")
 

@@ -132,6 +132,18 @@ def test_one_jumps_from_event_to_event_and_every_plot_shows_them(signals: Signal
     assert not signals.show_at(newest_ns - 3_600_000_000_000), "what is gone by now was shown"
 
 
+def test_an_instant_that_is_gone_is_not_shown_as_another_one(signals: Signals, bench: Bench) -> None:
+    newest_ns = bench.station.rings.newest_ns
+    assert newest_ns is not None
+    signals.show_around(("left_knee.position",), newest_ns - 3_600_000_000_000)
+    signals.refresh()
+    assert not signals.pause.isChecked()
+    assert "gone from here" in signals.said.text()
+    signals.show_around(("left_knee.position",), newest_ns - 1_000_000_000)
+    signals.refresh()
+    assert "gone" not in signals.said.text()
+
+
 def test_a_channel_is_listed_in_the_unit_that_it_is_drawn_in(signals: Signals) -> None:
     titles = {str(item.text(0)) for item in signals._items()}
     assert {"position  °", "torque  N·m", "cell 0  kPa"} <= titles

@@ -3,9 +3,12 @@
 import dataclasses
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Final
 
 from server_gui.core.alarms.marks import Mark
 from server_gui.core.alarms.texts import TEXTS, Kind
+
+SHORT: Final = 100  # letters that have room on a card
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,9 +43,16 @@ class Alarm:
     @property
     def line(self) -> str:
         """Cause first: `fault: left knee: 0x2310 continuous overcurrent at the output`."""
-        return ": ".join(
-            filter(None, (self.mark.word, self.where or self.subject.replace("_", " "), self.what))
-        )
+        return self._said(self.what)
+
+    @property
+    def brief(self) -> str:
+        """The line where there is little room: of several reasons the first, and that there are more."""
+        first, more, _ = self.what.partition("; ")
+        return self._said(f"{first} …" if more and len(self.what) > SHORT else self.what)
+
+    def _said(self, what: str) -> str:
+        return ": ".join(filter(None, (self.mark.word, self.where or self.subject.replace("_", " "), what)))
 
 
 @dataclass(frozen=True, slots=True)

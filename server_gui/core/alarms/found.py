@@ -68,7 +68,7 @@ def alarms(facts: Facts) -> Iterator[Alarm]:
 def _of_stop(robot: Robot, stopping: StopProgress) -> Iterator[Alarm]:
     if stopping.state is StopState.NOT_CONFIRMED:
         now, moving = _after_unconfirmed(robot), _is_live(robot) and _moving(robot)
-        what = f"still moving: STOP again; {stopping.why}" if moving else stopping.why
+        what = f"still moving: STOP again; the STOP before failed: {stopping.why}" if moving else stopping.why
         check = (
             "use the hardware stop, now" if not _is_live(robot) or _moving(robot) else "STOP again to be sure"
         )

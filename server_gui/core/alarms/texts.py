@@ -26,7 +26,7 @@ class Kind(Enum):
     BUS_FAILS = "bus fails"
     NOT_RECORDED = "not recorded"
     STOPPED = "STOPPED"
-    PART_STALE = "sensor stale"
+    PART_STALE = "component stale"
     UNKNOWN = "state not known"
     BUS = "bus"
     BLIND = "guard blind"
@@ -94,7 +94,7 @@ TEXTS: Final = dict(
             "to go on: see that nobody is in danger, “Reset stop…”, then enable the drives "
             "(gwrms enable, or the robot's controller)",
         ),
-        _text(Kind.PART_STALE, "triangle", "warn", "check its cable or radio, and its battery"),
+        _text(Kind.PART_STALE, "triangle", "warn", "check its power, and its cable or radio"),
         _text(
             Kind.UNKNOWN,
             "ring",

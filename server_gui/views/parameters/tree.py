@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable
 from typing import Any, Final
 
 from PySide6.QtCore import QModelIndex, QPersistentModelIndex, Qt, Signal
-from PySide6.QtGui import QAction, QResizeEvent, QStandardItem, QStandardItemModel
+from PySide6.QtGui import QAction, QKeyEvent, QResizeEvent, QStandardItem, QStandardItemModel
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QHeaderView,
@@ -33,6 +33,7 @@ NAME, ROBOT, NEW, UNIT, RANGE, DEFAULT, FILE, STORED, SAID = range(len(TITLES))
 IF_ROOM: Final = (FILE, RANGE, DEFAULT, STORED)  # shown while they fit; the chosen one's card has them all
 REFUSED: Final = "✕ limit"  # the robot would refuse what is staged
 WRONG: Final = ("✕", REFUSED, "⚠ changed")
+BEGINS: Final = "0123456789+-.,"  # a number
 NAME_PX: Final = 110  # that a name has at least
 
 
@@ -278,6 +279,14 @@ class ParameterTree(QTreeView):
         if isinstance(name, str) and not self._filtering:
             self._looked_at = name
             self.chosen.emit(name)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Edits the row's new value, whichever of its cells was clicked."""
+        current = self.currentIndex()
+        begins = event.key() == Qt.Key.Key_F2 or (event.text() and event.text() in BEGINS)
+        if begins and current.column() != NEW and isinstance(current.data(NAME_ROLE), str):
+            self.setCurrentIndex(current.siblingAtColumn(NEW))
+        super().keyPressEvent(event)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)

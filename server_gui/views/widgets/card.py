@@ -50,3 +50,10 @@ def set_text(label: QLabel, text: str) -> None:
     """Change a label only where it says something else: that is cheaper than to draw it again."""
     if label.text() != text:
         label.setText(text)
+
+
+def set_tone(label: QLabel, tone: str) -> None:
+    """Change the colour of a label, by its name in the style sheet, only where it is another."""
+    if label.property("tone") != tone:
+        label.setProperty("tone", tone)
+        label.style().polish(label)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
+from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from server_gui.views.theme import Theme
@@ -18,6 +18,7 @@ HEAD: Final = 0.065  # radius
 REACH: Final = 1.12  # the drawing's height
 SIDES: Final = ("left", "right")
 JOINTS: Final = ("hip", "knee", "ankle")
+ANGLES_SIZES: Final = (0.95, 0.85, 0.75, 0.65, 0.55, 0.45)  # of the text's
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,17 +129,25 @@ class StickFigure(QWidget):
 
     def _draw_angles(self, painter: QPainter) -> None:
         """Hip, knee and ankle of each side in words."""
-        painter.setFont(self._theme.number_font(0.95))
-        line = painter.fontMetrics().height()
         rows = [
             (" ", JOINTS, "dim"),
             *((side[0].upper(), texts, side) for side, texts in self._texts.items()),
         ]
-        for row, (head, texts, colour) in enumerate(rows):
+        said = [f"{head}{''.join(f'{text:>6}' for text in texts)}" for head, texts, _ in rows]
+        painter.setFont(self._font_for(said))
+        line = painter.fontMetrics().height()
+        for row, (_, _, colour) in enumerate(rows):
             painter.setPen(self._theme.colour(colour if self._live or colour == "dim" else "old"))
             box = QRectF(0, row * line, self.width(), line)
-            said = "".join(f"{text:>6}" for text in texts)
-            painter.drawText(box, Qt.AlignmentFlag.AlignRight, f"{head}{said}")
+            painter.drawText(box, Qt.AlignmentFlag.AlignRight, said[row])
+
+    def _font_for(self, lines: Sequence[str]) -> QFont:
+        """The usual one, or as much smaller as it takes for every number to be whole."""
+        for factor in ANGLES_SIZES:
+            font = self._theme.number_font(factor)
+            if max(map(QFontMetricsF(font).horizontalAdvance, lines)) < self.width():
+                break
+        return font
 
     def _draw_trunk(self, painter: QPainter, hip: QPointF, lean: float, unit: float) -> None:
         colour = self._theme.colour("text" if self._live and self._tilt is not None else "old")

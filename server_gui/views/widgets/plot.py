@@ -215,6 +215,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
         view = raster.View(right - left, low / scale, high / scale, width, height)
         drawn = self._lines.strip.draw(source, view, times, columns, self._inks)
         self._lines.show_strip(drawn, live=live)
+        self.getPlotItem().getAxis("bottom").set_live(live=live)
         self._mark()
 
     def follow_again(self) -> None:

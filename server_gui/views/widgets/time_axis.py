@@ -7,13 +7,16 @@ import pyqtgraph as pg
 from PySide6.QtCore import QRectF
 
 STEPS_S: Final = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0, 300.0, 600.0)
+NOW: Final = "now"
+LAST: Final = "last"
 
 
 class TimeAxis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph has no types
-    """Its last place is now."""
+    """Its last place is now, or where nothing comes any more the last that came."""
 
     def __init__(self) -> None:
         self._label_px = 50
+        self._live = True
         super().__init__("bottom")
         self.setStyle(hideOverlappingLabels=False)  # else those at its ends are left out
 
@@ -22,6 +25,13 @@ class TimeAxis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph has no types
         self._label_px = pixels
         self.picture = None
         self.update()
+
+    def set_live(self, *, live: bool) -> None:
+        """Set whether the newest row is of now."""
+        if live != self._live:
+            self._live = live
+            self.picture = None
+            self.update()
 
     def boundingRect(self) -> QRectF:
         """With room for the words at its ends."""
@@ -35,9 +45,10 @@ class TimeAxis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph has no types
 
     def tickStrings(self, values: Sequence[float], scale: float, spacing: float) -> list[str]:
         """Return what stands at these places."""
-        return [time_text(value) for value in values]
+        said = [time_text(value) for value in values]
+        return said if self._live else [LAST if text == NOW else text for text in said]
 
 
 def time_text(seconds: float) -> str:
     """Return a time until the newest row in words."""
-    return "now" if abs(seconds) < 1e-9 else f"{seconds:.6g} s".replace("-", "−")
+    return NOW if abs(seconds) < 1e-9 else f"{seconds:.6g} s".replace("-", "−")

@@ -1,0 +1,50 @@
+"""`python -m tests.gui.walks FOLDER [WALK …]`: walks, with a picture of each moment in FOLDER."""
+
+import argparse
+import sys
+import tempfile
+import traceback
+from collections.abc import Sequence
+from pathlib import Path
+
+from tests.gui.walks.walk import Screen, bench
+from tests.gui.walks.walks import WALKS, Moment
+
+
+def walk(moments: Sequence[Moment], screen: Screen, pictures: Path) -> list[str]:
+    """What went wrong: moments that did not show what they must, and rules that a picture breaks."""
+    found = []
+    with (
+        tempfile.TemporaryDirectory(prefix="gwrms-walk-") as folder,
+        bench(screen, Path(folder), pictures) as there,
+    ):
+        for moment in moments:
+            try:
+                moment(there)
+            except (AssertionError, ConnectionError):
+                found.append(f"{moment.__name__}: {traceback.format_exc(limit=-4)}")
+                there.hand.keep(f"{moment.__name__}-failed")
+        found += there.hand.wrong
+    return found
+
+
+def main() -> int:
+    """Walk, and say what was wrong."""
+    parser = argparse.ArgumentParser(prog="python -m tests.gui.walks")
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("walks", nargs="*", metavar="WALK", choices=(*WALKS, []), default=[])
+    parser.add_argument("--screen", default="1366x768")
+    parser.add_argument("--scale", type=int, default=100)
+    parser.add_argument("--look", choices=("dark", "light"), default="dark")
+    asked = parser.parse_args()
+    width, _, height = asked.screen.partition("x")
+    screen = Screen(int(width), int(height), asked.scale, asked.look)
+    wrong = []
+    for name in asked.walks or WALKS:
+        wrong += [f"{name}: {one}" for one in walk(WALKS[name], screen, asked.folder / screen.name / name)]
+    sys.stdout.write("\n".join((*wrong, f"{len(wrong)} wrong", "")))
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
