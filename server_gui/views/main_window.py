@@ -184,7 +184,7 @@ class MainWindow(QMainWindow):
 
     def show_signals(self, globs: Sequence[str]) -> None:
         """Begin with these channels in sight."""
-        self.signals.usual = globs
+        self.signals.channels.usual = globs
         self.tabs.setCurrentIndex(self._views.index(self.signals))
 
     def show_around(self, station: Station, channel: str, at_ns: int) -> None:

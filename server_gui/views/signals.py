@@ -2,7 +2,6 @@
 
 import csv
 import datetime
-import fnmatch
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,17 +18,15 @@ from PySide6.QtWidgets import (
     QLineEdit,
     QPushButton,
     QSplitter,
-    QTreeWidget,
-    QTreeWidgetItem,
     QVBoxLayout,
     QWidget,
 )
 
-from gateway.units import Unit, Units
-from gateway.wire.component import ChannelInfo
+from gateway.units import Unit
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.measuring import measure, nearest
 from server_gui.core.desk.station import Station
+from server_gui.views.channel_tree import MOST_CURVES, ChannelTree, channels_of
 from server_gui.views.marks import age_text
 from server_gui.views.measuring import Measuring
 from server_gui.views.theme import Theme
@@ -41,14 +38,11 @@ from server_gui.views.widgets.plain import PlainLabel, set_tip
 from server_gui.views.widgets.plot import PlacedFlag
 
 Floats = npt.NDArray[np.float64]
-MOST_CURVES: Final = 24
 NARROW, LIST = 700, 150  # wide, at text of 100 %: tools in two rows; the channels at least
 GONE: Final = "Live: that instant is gone from here, see Recordings"
 AROUND_S: Final = 5.0  # that are shown before and after an event
 SLOW: Final = 5  # frames between two looks at what people read
 SPANS_S: Final = (2, 5, 10, 30, 60, 100)
-USUAL: Final = ("left_hip.position", "right_hip.position", "left_insole.force", "right_insole.force")
-NAME_ROLE: Final = Qt.ItemDataRole.UserRole + 1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,18 +77,13 @@ class Signals(QWidget):
         self._exported = ""  # what came of the latest export
         self._at = [0.0, 0.0]  # the cursors, s until the newest row
         self._active = 0
-        self._described: tuple[object, ...] = ()
-        self.usual: Sequence[str] = USUAL  # globs of what is ticked before anybody has chosen
         self.setObjectName("page")
-        self.channels = QTreeWidget()
-        self.channels.setHeaderHidden(True)
-        self.channels.setObjectName("framed")
-        self.channels.setAccessibleName("Channels")
+        self.channels = ChannelTree()
         self.channels.itemChanged.connect(self._rebuild)
         self._words = QLineEdit()
         self._words.setPlaceholderText("Filter channels")
         self._words.setAccessibleName("Filter of the channels")
-        self._words.textChanged.connect(self._filter)
+        self._words.textChanged.connect(self.channels.show_only)
         self.measuring = Measuring(theme)
         self.measuring.chosen.connect(lambda cursor: self._move(cursor, self._at[cursor]))
         self.measuring.stepped.connect(self._step)
@@ -128,7 +117,8 @@ class Signals(QWidget):
         station = self._desk.selected
         if station is None:
             return
-        self._list_channels(station)
+        if self.channels.show_channels(station, self._desk.shown.units, self._desk.shown.revision):
+            self._rebuild()
         seconds = float(SPANS_S[self._span.currentIndex()])
         frozen = self._frozen
         times = station.rings.times(seconds) if frozen is None else frozen.times_of(seconds)
@@ -149,17 +139,11 @@ class Signals(QWidget):
     @property
     def chosen(self) -> list[str]:
         """The channels that are ticked, in the robot's order."""
-        return [
-            item.data(0, NAME_ROLE) for item in self._items() if item.checkState(0) is Qt.CheckState.Checked
-        ]
+        return self.channels.chosen
 
     def choose(self, names: Sequence[str]) -> None:
         """Tick exactly these."""
-        self.channels.blockSignals(True)
-        for item in self._items():
-            wanted = item.data(0, NAME_ROLE) in names
-            item.setCheckState(0, Qt.CheckState.Checked if wanted else Qt.CheckState.Unchecked)
-        self.channels.blockSignals(False)
+        self.channels.choose(names)
         self._rebuild()
 
     def show_around(self, names: Sequence[str], at_ns: int) -> None:
@@ -179,7 +163,7 @@ class Signals(QWidget):
         sight = slice(int(np.searchsorted(times, left)), int(np.searchsorted(times, right, "right")))
         names = [name for plot in self.plots for name in plot.channels]
         columns = {name: self._column(station, name, len(times))[sight] for name in names}
-        si = {info.name: info.unit for info in _infos(station)}
+        si = {info.name: info.unit for info in channels_of(station)}
         with path.open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file)
             writer.writerow(["time s", *(f"{name} {si.get(name, '')}".rstrip() for name in columns)])
@@ -274,36 +258,6 @@ class Signals(QWidget):
         begin = max(end - span, -float(SPANS_S[self._span.currentIndex()]))
         self._zoomed(begin, min(begin + span, 0.0))
 
-    def _list_channels(self, station: Station) -> None:
-        infos = _infos(station)
-        described = (station, self._desk.shown.revision, *(info.name for info in infos))
-        if described == self._described:
-            return
-        usual = [info.name for info in infos if any(fnmatch.fnmatchcase(info.name, g) for g in self.usual)]
-        before = self.chosen if self._items() else usual[:MOST_CURVES]
-        self._described = described
-        units = self._desk.shown.units
-        self.channels.blockSignals(True)
-        self.channels.clear()
-        groups: dict[str, QTreeWidgetItem] = {}
-        for info in infos:
-            if info.component not in groups:
-                groups[info.component] = QTreeWidgetItem(self.channels, [info.component.replace("_", " ")])
-                groups[info.component].setFlags(Qt.ItemFlag.ItemIsEnabled)
-            item = QTreeWidgetItem(groups[info.component], [_title(info, units)])
-            item.setData(0, NAME_ROLE, info.name)
-            item.setCheckState(0, Qt.CheckState.Unchecked)
-        self.channels.blockSignals(False)
-        self.choose(before)
-        for item in self._items():
-            if item.checkState(0) is Qt.CheckState.Checked:
-                _open_group(item)
-
-    def _items(self) -> list[QTreeWidgetItem]:
-        tops = [self.channels.topLevelItem(row) for row in range(self.channels.topLevelItemCount())]
-        found = [top.child(row) for top in tops if top is not None for row in range(top.childCount())]
-        return [item for item in found if item is not None]
-
     def _rebuild(self) -> None:
         """A plot for each unit of the chosen channels."""
         for plot in self.plots:
@@ -313,7 +267,7 @@ class Signals(QWidget):
         station = self._desk.selected
         chosen = self.chosen[:MOST_CURVES]
         by_unit: dict[Unit, list[str]] = {}
-        for info in () if station is None else _infos(station):
+        for info in () if station is None else channels_of(station):
             if info.name in chosen:
                 by_unit.setdefault(self._desk.shown.units.unit(info.quantity, info.unit), []).append(
                     info.name
@@ -335,14 +289,6 @@ class Signals(QWidget):
         self.channels.setIndentation(self._theme.px(10))
         self.channels.setMinimumWidth(self._theme.px(LIST))
         self._rebuild()
-
-    def _filter(self, words: str) -> None:
-        wanted = words.lower().split()
-        for item in self._items():
-            name = str(item.data(0, NAME_ROLE))
-            item.setHidden(not all(word in name for word in wanted))
-            if words and not item.isHidden():
-                _open_group(item)
 
     # --- what people do
 
@@ -517,22 +463,3 @@ class Signals(QWidget):
         if station.robot.is_stale():
             return f"STALE, {age_text(station.robot.age_s())} old{many}"
         return f"{station.robot.rate_hz():.0f} rows/s{many}"
-
-
-def _infos(station: Station) -> list[ChannelInfo]:
-    description = station.robot.description
-    return (
-        [] if description is None else [info for info in description.channels if info.component != "resource"]
-    )
-
-
-def _title(info: ChannelInfo, units: Units) -> str:
-    """Return what a channel is called below its component, in the unit that its plot has."""
-    symbol = units.unit(info.quantity, info.unit).symbol
-    return f"{info.quantity.replace('_', ' ')}  {symbol}".rstrip()
-
-
-def _open_group(item: QTreeWidgetItem) -> None:
-    group = item.parent()
-    if group is not None:
-        group.setExpanded(True)

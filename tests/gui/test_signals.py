@@ -8,7 +8,8 @@ import pytest
 
 from gateway.units import Units
 from server_gui.core.desk.flags import Flag, FlagKind
-from server_gui.views.signals import MOST_CURVES, Signals
+from server_gui.views.channel_tree import MOST_CURVES
+from server_gui.views.signals import Signals
 from server_gui.views.theme import Theme
 from tests.gui.fakes import Bench, destroy
 from tests.support.desk import JOINTS, telemetry, walking
@@ -102,7 +103,7 @@ def test_the_range_follows_the_data_until_somebody_zooms(signals: Signals, bench
 
 def test_the_view_begins_with_what_was_asked_for(theme: Theme, bench: Bench) -> None:
     made = Signals(bench.desk, theme)
-    made.usual = ("left_*.torque", "right_hip.velocity")
+    made.channels.usual = ("left_*.torque", "right_hip.velocity")
     made.refresh()  # nobody knows the robot's channels yet
     bench.station.take([walking(300)])
     made.refresh()
@@ -145,6 +146,6 @@ def test_an_instant_that_is_gone_is_not_shown_as_another_one(signals: Signals, b
 
 
 def test_a_channel_is_listed_in_the_unit_that_it_is_drawn_in(signals: Signals) -> None:
-    titles = {str(item.text(0)) for item in signals._items()}
+    titles = {str(item.text(0)) for item in signals.channels.items}
     assert {"position  °", "torque  N·m", "cell 0  kPa"} <= titles
     assert {plot.unit.symbol for plot in signals.plots} <= {"°", "N", "N·m", "kPa"}

@@ -1,0 +1,108 @@
+"""A robot's channels by component, to be ticked; found by words."""
+
+import fnmatch
+from collections.abc import Sequence
+from typing import Final
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QTreeWidget, QTreeWidgetItem
+
+from gateway.units import Units
+from gateway.wire.component import ChannelInfo
+from server_gui.core.desk.station import Station
+
+MOST_CURVES: Final = 24
+USUAL: Final = ("left_hip.position", "right_hip.position", "left_insole.force", "right_insole.force")
+NAME_ROLE: Final = Qt.ItemDataRole.UserRole + 1
+
+
+def channels_of(station: Station) -> list[ChannelInfo]:
+    """Return those that a robot's components have."""
+    description = station.robot.description
+    return (
+        [] if description is None else [info for info in description.channels if info.component != "resource"]
+    )
+
+
+class ChannelTree(QTreeWidget):
+    """`itemChanged` when somebody ticks a channel; not when it is ticked by `choose`."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.usual: Sequence[str] = USUAL  # globs of what is ticked before anybody has chosen
+        self._described: tuple[object, ...] = ()
+        self.setHeaderHidden(True)
+        self.setObjectName("framed")
+        self.setAccessibleName("Channels")
+
+    @property
+    def items(self) -> list[QTreeWidgetItem]:
+        """Every channel, in the robot's order."""
+        tops = [self.topLevelItem(row) for row in range(self.topLevelItemCount())]
+        found = [top.child(row) for top in tops if top is not None for row in range(top.childCount())]
+        return [item for item in found if item is not None]
+
+    @property
+    def chosen(self) -> list[str]:
+        """The channels that are ticked."""
+        return [
+            str(item.data(0, NAME_ROLE)) for item in self.items if item.checkState(0) is Qt.CheckState.Checked
+        ]
+
+    def choose(self, names: Sequence[str]) -> None:
+        """Tick exactly these."""
+        self.blockSignals(True)
+        for item in self.items:
+            wanted = item.data(0, NAME_ROLE) in names
+            item.setCheckState(0, Qt.CheckState.Checked if wanted else Qt.CheckState.Unchecked)
+        self.blockSignals(False)
+
+    def show_channels(self, station: Station, units: Units, revision: int) -> bool:
+        """List a robot's; whether it, or the units by their `revision`, are others than before."""
+        infos = channels_of(station)
+        described = (station, revision, *(info.name for info in infos))
+        if described == self._described:
+            return False
+        usual = [info.name for info in infos if any(fnmatch.fnmatchcase(info.name, g) for g in self.usual)]
+        before = self.chosen if self.items else usual[:MOST_CURVES]
+        self._described = described
+        self._fill(infos, units)
+        self.choose(before)
+        for item in self.items:
+            if item.checkState(0) is Qt.CheckState.Checked:
+                _open_group(item)
+        return True
+
+    def show_only(self, words: str) -> None:
+        """Show only the channels whose names have all of these words."""
+        wanted = words.lower().split()
+        for item in self.items:
+            name = str(item.data(0, NAME_ROLE))
+            item.setHidden(not all(word in name for word in wanted))
+            if words and not item.isHidden():
+                _open_group(item)
+
+    def _fill(self, infos: Sequence[ChannelInfo], units: Units) -> None:
+        self.blockSignals(True)
+        self.clear()
+        groups: dict[str, QTreeWidgetItem] = {}
+        for info in infos:
+            if info.component not in groups:
+                groups[info.component] = QTreeWidgetItem(self, [info.component.replace("_", " ")])
+                groups[info.component].setFlags(Qt.ItemFlag.ItemIsEnabled)
+            item = QTreeWidgetItem(groups[info.component], [_title(info, units)])
+            item.setData(0, NAME_ROLE, info.name)
+            item.setCheckState(0, Qt.CheckState.Unchecked)
+        self.blockSignals(False)
+
+
+def _title(info: ChannelInfo, units: Units) -> str:
+    """Return what a channel is called below its component, in the unit that its plot has."""
+    symbol = units.unit(info.quantity, info.unit).symbol
+    return f"{info.quantity.replace('_', ' ')}  {symbol}".rstrip()
+
+
+def _open_group(item: QTreeWidgetItem) -> None:
+    group = item.parent()
+    if group is not None:
+        group.setExpanded(True)
