@@ -26,6 +26,14 @@ if "PYTEST_XDIST_WORKER" in os.environ:
     import skops.io  # noqa: F401
 
 README = Path(__file__).with_name("README.md")
+# Nothing is lost where these are torn from their neighbours: they share no robot.
+LONG = (
+    "tests/newcomer/test_pages.py",
+    "tests/explore/",
+    "tests/explore_store/",
+    "tests/attack/",
+    "tests/gui/walks/",
+)
 SMOKE = "tests/unit/store/test_store.py"  # of all that is tried on an S3 server too, this always is
 
 
@@ -67,13 +75,33 @@ def pytest_collection() -> Generator[None, object, object]:
         gc.enable()
 
 
-@pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark what waits for the night, before `-m` chooses."""
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> Generator[None, object, object]:
+    """Mark what waits for the night, before `-m` chooses; then the longest tests begin first."""
     marks = table_of_marks()
     for item in items:
         for mark in _marks_of(item, marks):
             item.add_marker(mark)
+    result = yield
+    workers = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
+    if workers > 1:
+        items[:] = longest_first(items, workers)
+    return result
+
+
+def longest_first(items: list[pytest.Item], workers: int) -> list[pytest.Item]:
+    """The items in as many parts as there are workers, each of which begins with its share of the long ones.
+
+    So xdist hands them out at first (`--dist worksteal`); else some would begin when all others have ended.
+    """
+    long = [item for item in items if item.nodeid.startswith(LONG)]
+    short = [item for item in items if not item.nodeid.startswith(LONG)]
+    size = -(-len(short) // workers)
+    return [
+        item
+        for part in range(workers)
+        for item in (*long[part::workers], *short[part * size : (part + 1) * size])
+    ]
 
 
 def _descriptors() -> set[str]:

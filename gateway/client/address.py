@@ -32,7 +32,7 @@ class Address:
             BadAddress: the text is none of these; an empty one may be a variable that was not set.
 
         """
-        if "/" in text or any(map(str.isspace, text)):
+        if "://" in text or any(map(str.isspace, text)):
             raise BadAddress(f"{text!r} is not a robot's address; write HOST:PORT, without more")
         if not text:
             raise BadAddress(f"an address is missing; write HOST:PORT, such as {DEFAULT_HOST}:{DEFAULT_PORT}")

@@ -13,7 +13,7 @@ from gateway.client.link import LinkSettings, OnState
 from gateway.client.subscription import Batch
 from gateway.wire.bus import Buses
 from gateway.wire.component import Snapshot
-from gateway.wire.control import JournalEntries
+from gateway.wire.control import JournalEntries, JournalProof
 from gateway.wire.cost import GatewayCost
 from gateway.wire.parameter import Confirmed, ParameterValues, Reverted, Stored, Written
 from gateway.wire.resource import Overruns, ResourceSnapshot, ResourceSnapshotParams
@@ -197,6 +197,10 @@ class Robot:
     def journal(self, count: int = 20) -> JournalEntries:
         """The newest entries of the robot's journal, oldest first."""
         return self._wait(self._client.journal(count))
+
+    def journal_head(self) -> JournalProof:
+        """The journal's newest entry, signed by the robot: whoever keeps it can tell if it is rewritten."""
+        return self._wait(self._client.journal_head())
 
     def stop(self, reason: str) -> Stopped:
         """Quick stop on every drive. Not a safety-rated stop; look at what each drive confirmed."""

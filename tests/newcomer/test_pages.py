@@ -33,7 +33,13 @@ NOT_TYPED: Final[Mapping[str, tuple[str, ...]]] = {
     "how-to/measure-the-cost.md": (
         "a control loop on the robot's computer, which the simulated robot has not",
     ),
-    "how-to/pair.md": ("root", "a person on the robot, with its code", "two computers", "root"),
+    "how-to/pair.md": (
+        "root",
+        "a person on the robot, with its code",
+        "two computers",
+        "root",
+        "ssh, and root there",
+    ),
     "how-to/predict.md": ("recordings of others, of some hundred megabytes",),
     "how-to/privacy.md": (
         "a wearer",

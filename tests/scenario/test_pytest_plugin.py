@@ -21,7 +21,7 @@ truth = "wearer.activity"
 is = "stand"
 at_s = 0.1
 """
-FAILS = HOLDS.replace("It stands", "It swims").replace('is = "stand"', 'is = "swim"')
+FAILS = HOLDS.replace("It stands", "It sits").replace('is = "stand"', 'is = "sit"')
 TEST = "def test_of_python() -> None:\n    pass\n"
 # The computer was too slow, whatever it is.
 ALWAYS_SLOW = """\
@@ -84,8 +84,8 @@ def test_what_fails_is_told_without_a_traceback(folder: Path) -> None:
     put(folder, "fails", FAILS)
     put(folder, "wrong", "colour = 1")
     said = run(folder, "--gwrms", "scenarios", "--continue-on-collection-errors", status=1)
-    assert "FAILED scenarios/fails.toml::It swims" in said
-    assert "true wearer.activity is 'swim' at 0.1 s" in said
+    assert "FAILED scenarios/fails.toml::It sits" in said
+    assert "true wearer.activity is 'sit' at 0.1 s" in said
     assert "wearer.activity was 'stand' at 0.10 s" in said
     assert "Traceback" not in said
     assert "[colour]: is not known" in said

@@ -36,7 +36,7 @@ within_s = [0, 60]
 
 [[expect]]
 truth = "gait.state"
-is = "asleep"
+is = "held"
 within_s = [1, 2]
 
 [[expect]]
@@ -78,8 +78,8 @@ def test_what_is_not_as_expected_is_told_and_the_exit_status_is_1(tmp_path: Path
     told = {expected: seen.strip() for expected, seen in zip(lines[0:8:2], lines[1:8:2], strict=True)}
     told = {line.replace("  ?     ", "  FAILED"): seen for line, seen in told.items()}
     assert [line.split()[0] for line in told] == ["ok", "FAILED", "FAILED", "FAILED"]
-    asleep = told["  FAILED  true gait.state is 'asleep' once between 1 and 2 s"]
-    assert re.fullmatch(r"gait.state was 'running' from 1.\d\d to 2.00 s", asleep)
+    held = told["  FAILED  true gait.state is 'held' once between 1 and 2 s"]
+    assert re.fullmatch(r"gait.state was 'running' from 1.\d\d to 2.00 s", held)
     elbow = told["  FAILED  left_elbow is 'ok' once between 0 and 3 s"]
     assert elbow == "there is no component left_elbow"
     position = told["  FAILED  left_knee.position at least 10 always between 0 and 4 s"]
@@ -93,7 +93,7 @@ def test_a_failure_while_the_computer_had_no_time_is_inconclusive_and_the_exit_s
     tmp_path: Path,
 ) -> None:
     file = tmp_path / "never.toml"
-    file.write_text('[[expect]]\ntruth = "gait.state"\nis = "asleep"\nwithin_s = [0, 6]\n', encoding="utf-8")
+    file.write_text('[[expect]]\ntruth = "gait.state"\nis = "held"\nwithin_s = [0, 6]\n', encoding="utf-8")
     command = [sys.executable, "-P", "-m", "gateway.main", "sim", "run", str(file)]
     with subprocess.Popen([*command, "--dir", str(tmp_path)], stdout=subprocess.PIPE, text=True) as running:
         until(lambda: answers(tmp_path), "the robot runs")
@@ -140,7 +140,7 @@ def test_a_wrong_file_keeps_the_others_from_running(tmp_path: Path) -> None:
     wrong.write_text('[[at]]\ntime_s = 1\nfault = "node_list"\n', encoding="utf-8")
     done = run(FOLDER / "drive_fault.toml", wrong)
     assert (done.returncode, done.stdout) == (2, "")
-    assert "wrong.toml: [[at]] number 1 fault: there is no fault 'node_list'; did you mean" in done.stderr
+    assert "wrong.toml: [[at]] number 1 fault: there is no fault 'node_list': did you mean" in done.stderr
 
 
 def test_a_run_that_is_terminated_leaves_no_gateway_behind(tmp_path: Path) -> None:
