@@ -125,8 +125,9 @@ class Signals(QWidget):
         source = station.rings.source if frozen is None else frozen
         for plot in self.plots:
             found = [self._column(station, name, len(times)) for name in plot.channels]
-            live = frozen is not None or not station.robot.is_stale()
-            plot.plot.draw(source, times, found, live=live, scale=plot.unit.scale)
+            paused = frozen is not None
+            live = paused or not station.robot.is_stale()
+            plot.plot.draw(source, times, found, live=live, scale=plot.unit.scale, paused=paused)
         self._frame += 1
         if self._frame % SLOW == 1:
             set_text(self.said, self._state(station) + self._exported)

@@ -14,6 +14,7 @@ from PySide6.QtWidgets import QApplication
 
 from server_gui.core.desk.desk import Desk
 from server_gui.views.main_window import USUAL, MainWindow
+from server_gui.views.parameters.panel import ParametersPanel
 from server_gui.views.theme import Look, Theme
 from tests.gui.archives import (  # noqa: F401  # fixtures, for every test here
     archive,
@@ -24,7 +25,7 @@ from tests.gui.archives import (  # noqa: F401  # fixtures, for every test here
     whole,
 )
 from tests.gui.fakes import Bench, destroy
-from tests.support.desk import described
+from tests.support.desk import described, looked
 
 
 def _quiet(kind: QtMsgType, _context: object, text: str) -> None:
@@ -84,5 +85,17 @@ def window(qt: QApplication, theme: Theme, bench: Bench, tmp_path: Path) -> Iter
     made.resize(USUAL)  # the screen of no display is small
     made.show()
     bench.draw(made)
+    yield made
+    destroy(made)
+
+
+@pytest.fixture
+def panel(theme: Theme, bench: Bench) -> Iterator[ParametersPanel]:
+    """The panel of a robot whose parameters have been read."""
+    bench.station.take([looked()])
+    made = ParametersPanel(bench.desk, theme)
+    made.resize(420, 900)
+    made.show()
+    made.refresh()
     yield made
     destroy(made)

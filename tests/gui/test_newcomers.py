@@ -1,7 +1,5 @@
 """What newcomers who walked through the window ran into."""
 
-from collections.abc import Iterator
-
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
@@ -26,17 +24,6 @@ OLD_S = 70.0
 MANY = (
     "overcurrent, 0x2310; its position jumped by 8.7° within 50 ms; 11 % of its PDOs are missing (for 60 s)"
 )
-
-
-@pytest.fixture
-def panel(theme: Theme, bench: Bench) -> Iterator[ParametersPanel]:
-    bench.station.take([looked()])
-    made = ParametersPanel(bench.desk, theme)
-    made.resize(420, 900)
-    made.show()
-    made.refresh()
-    yield made
-    destroy(made)
 
 
 @pytest.mark.parametrize("typed", ["430", "F2"])

@@ -1,7 +1,5 @@
 """Parameters: what is written is exactly the difference shown, and nobody is overwritten unseen."""
 
-from collections.abc import Iterator
-
 import pytest
 from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtGui import QWheelEvent
@@ -15,22 +13,9 @@ from gateway.wire.parameter import Confirmed, Reverted, Written
 from server_gui.views.parameters.panel import ParametersPanel
 from server_gui.views.parameters.review import SETTLE_MS
 from server_gui.views.parameters.tree import NAME, NEW, ROBOT, SAID, TITLES
-from server_gui.views.theme import Theme
-from tests.gui.fakes import Bench, destroy
+from tests.gui.fakes import Bench
 from tests.gui.running import wait
 from tests.support.desk import HELD, described, looked
-
-
-@pytest.fixture
-def panel(theme: Theme, bench: Bench) -> Iterator[ParametersPanel]:
-    """The panel of a robot whose parameters have been read."""
-    bench.station.take([looked()])
-    made = ParametersPanel(bench.desk, theme)
-    made.resize(420, 900)
-    made.show()
-    made.refresh()
-    yield made
-    destroy(made)
 
 
 def row(panel: ParametersPanel, name: str) -> list[str]:

@@ -11,6 +11,7 @@ from server_gui.core.desk.flags import Flag, FlagKind
 from server_gui.views.channel_tree import MOST_CURVES
 from server_gui.views.signals import Signals
 from server_gui.views.theme import Theme
+from server_gui.views.widgets.time_axis import NOW, PAUSED
 from tests.gui.fakes import Bench, destroy
 from tests.support.desk import JOINTS, telemetry, walking
 
@@ -64,7 +65,11 @@ def test_a_paused_view_stands_still_while_data_go_on(signals: Signals, bench: Be
     signals.save_csv(tmp_path / "after.csv")
     assert (tmp_path / "before.csv").read_bytes() == (tmp_path / "after.csv").read_bytes()
     assert bench.station.rings.values("left_hip.position", 1).tolist() == [9.0]
+    axis = signals.plots[0].plot.getPlotItem().getAxis("bottom")
+    assert axis.tickStrings([0.0], 1.0, 1.0) == [PAUSED], "what stands still was called now"
     signals.pause.setChecked(False)
+    signals.refresh()
+    assert axis.tickStrings([0.0], 1.0, 1.0) == [NOW]
     signals.save_csv(tmp_path / "live.csv")
     assert (tmp_path / "live.csv").read_text().rstrip().endswith(",9.0")
 

@@ -17,7 +17,7 @@ from server_gui.views.theme import Theme
 from server_gui.views.widgets import raster
 from server_gui.views.widgets.cursors import Cursors, Shown
 from server_gui.views.widgets.plain import set_tip
-from server_gui.views.widgets.time_axis import TimeAxis
+from server_gui.views.widgets.time_axis import LAST, NOW, PAUSED, TimeAxis
 
 Floats = npt.NDArray[np.float64]
 SHRINK_FRAMES: Final = 60  # a range that has become too wide is narrowed only now and then
@@ -196,11 +196,18 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
         self._restyle()
 
     def draw(
-        self, source: object, times: Floats, columns: Sequence[Floats], *, live: bool, scale: float = 1.0
+        self,
+        source: object,
+        times: Floats,
+        columns: Sequence[Floats],
+        *,
+        live: bool,
+        scale: float = 1.0,
+        paused: bool = False,
     ) -> None:
         """Draw a column a curve, times `scale`, over the times; grey where not `live`.
 
-        Times (s) rise, the last is now. Rows of one `source` are only ever added.
+        Times (s) rise, the last is now, but where it is `paused`. Rows of one `source` are only ever added.
         """
         (left, right), _ = self.getViewBox().viewRange()
         if len(times) and right < 0.0:
@@ -215,7 +222,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
         view = raster.View(right - left, low / scale, high / scale, width, height)
         drawn = self._lines.strip.draw(source, view, times, columns, self._inks)
         self._lines.show_strip(drawn, live=live)
-        self.getPlotItem().getAxis("bottom").set_live(live=live)
+        self.getPlotItem().getAxis("bottom").set_end(PAUSED if paused else NOW if live else LAST)
         self._mark()
 
     def follow_again(self) -> None:

@@ -9,14 +9,15 @@ from PySide6.QtCore import QRectF
 STEPS_S: Final = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0, 300.0, 600.0)
 NOW: Final = "now"
 LAST: Final = "last"
+PAUSED: Final = "paused"
 
 
 class TimeAxis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph has no types
-    """Its last place is now, or where nothing comes any more the last that came."""
+    """Its last place is now, the last that came where nothing comes any more, or when it was paused."""
 
     def __init__(self) -> None:
         self._label_px = 50
-        self._live = True
+        self._end = NOW
         super().__init__("bottom")
         self.setStyle(hideOverlappingLabels=False)  # else those at its ends are left out
 
@@ -26,10 +27,10 @@ class TimeAxis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph has no types
         self.picture = None
         self.update()
 
-    def set_live(self, *, live: bool) -> None:
-        """Set whether the newest row is of now."""
-        if live != self._live:
-            self._live = live
+    def set_end(self, word: str) -> None:
+        """Set what its last place is called: `NOW`, `LAST` or `PAUSED`."""
+        if word != self._end:
+            self._end = word
             self.picture = None
             self.update()
 
@@ -46,7 +47,7 @@ class TimeAxis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph has no types
     def tickStrings(self, values: Sequence[float], scale: float, spacing: float) -> list[str]:
         """Return what stands at these places."""
         said = [time_text(value) for value in values]
-        return said if self._live else [LAST if text == NOW else text for text in said]
+        return [self._end if text == NOW else text for text in said]
 
 
 def time_text(seconds: float) -> str:
