@@ -10,6 +10,6 @@ if __name__ == "__main__":
         del sys.path[0]
     if HOME not in sys.path:  # a working copy that is the working folder
         sys.path.insert(0, HOME)
-    from gateway.main import main
+    from gwrms.command import main
 
     sys.exit(main())

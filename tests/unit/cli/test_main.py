@@ -34,3 +34,20 @@ def test_a_reader_that_has_left_is_no_mistake_of_ours(command: str) -> None:
         os.close(ours)
     assert "Traceback" not in ended.stderr
     assert "Exception ignored" not in ended.stderr
+
+
+def test_ctrl_c_while_the_command_still_loads_ends_it_without_a_traceback() -> None:
+    pressed = """
+import sys
+class CtrlC:
+    def find_spec(self, name, path, target=None):
+        if name == "gateway.main":
+            raise KeyboardInterrupt
+sys.meta_path.insert(0, CtrlC())
+from gwrms.command import main
+sys.exit(main())
+"""
+    ended = subprocess.run(
+        [sys.executable, "-c", pressed], capture_output=True, text=True, timeout=300, check=False
+    )
+    assert (ended.returncode, ended.stderr) == (130, "")
