@@ -25,7 +25,7 @@ class CanDevice:
 
     def start(self) -> None:
         """Open the bus if nobody else has."""
-        self.node.probes = True
+        self.node.probe()
         self.node.attach(self, self.name)
 
     def stop(self) -> None:
