@@ -10,6 +10,7 @@ from drivers.line import Line, Recognise, unrecognised
 if TYPE_CHECKING:
     import eds
     from drivers.bus.bus import CanBus
+    from drivers.bus.channels import Chosen
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,7 +21,7 @@ class Site:
     buses: "Mapping[str, CanBus]" = field(default_factory=dict)
     lines: dict[str, Line[Any]] = field(default_factory=dict)  # by the ports' paths
     descriptions: "dict[str, eds.Description]" = field(default_factory=dict)  # of CANopen devices, by name
-
+    channels: "Mapping[str, Chosen]" = field(default_factory=dict)  # that the robot's file adds to them
     recognise: Recognise = unrecognised  # what speaks on a line instead of the format that is expected
 
     @property

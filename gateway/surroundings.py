@@ -8,6 +8,7 @@ import os
 import socket
 from collections.abc import Callable, Iterator
 
+from drivers.bus.channels import objection
 from drivers.bus.interfaces.opening import obstacle as bus_obstacle
 from drivers.port import obstacle as port_obstacle
 from gateway.coding import CodingError
@@ -28,6 +29,7 @@ def beside(config: RobotConfig) -> Iterator[Finding]:
     for parameter in resolve(config, robot.descriptions, absent).values():
         if parameter.component not in absent:
             yield from _about_parameter(config, robot, parameter)
+    yield from _about_channels(config, robot)
     yield from _about_controllers(config, robot)
 
 
@@ -52,6 +54,14 @@ def _about_parameter(config: RobotConfig, robot: Robot, parameter: Parameter) ->
         if own is not None and counts is not None and own != counts:
             text = f"{own:g} is beyond {file}, where it is {counts:g}: that counts"
             yield warning(where, key, text)
+
+
+def _about_channels(config: RobotConfig, robot: Robot) -> Iterator[Finding]:
+    for name, one in config.channel.items():
+        description = robot.descriptions.get(name.partition(".")[0])
+        why = None if description is None else objection(one, description)
+        if why is not None:
+            yield Finding(header("channel", name), "object", why)
 
 
 def _about_controllers(config: RobotConfig, robot: Robot) -> Iterator[Finding]:

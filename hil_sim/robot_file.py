@@ -99,6 +99,15 @@ bus = "main"
 node_id = {controller_node}
 eds = "{controller_eds}"
 
+[channel."{controller}.phase"]          # an object of a device or joint that is shown, recorded and watched
+object = "0x2011:0"             # index and sub-index; read by PDO where one brings it, else by SDO
+scale = 0.001                   # value = device's number · scale + offset, in `unit`
+poll_hz = 10                    # how often it is asked for where no PDO brings it
+
+[channel."{controller}.controller_state"]
+object = "0x2010:0"
+words = {{ 0 = "idle", 1 = "starting", 2 = "enabling", 3 = "running", 4 = "held" }}
+
 [stop]                          # what a stop does beside the quick stop of every drive
 timeout_s = 2.5                 # within which it is answered, whatever the drives do
 fallback = []                   # what follows where a quick stop is not confirmed: "disable_voltage" (the

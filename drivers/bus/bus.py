@@ -34,7 +34,10 @@ MAX_UNCLAIMED = 2048  # as many as there are 11-bit identifiers
 class BusUser:
     """What is told when a bus comes, goes, and that time passes: in the bus's thread, never for long."""
 
-    ready = True  # whether it knows which frames it needs
+    @property
+    def ready(self) -> bool:
+        """Whether it knows which frames it needs."""
+        return True
 
     def bus_opened(self) -> None:
         """Frames can come from now on. In the caller's thread where the bus was open already."""

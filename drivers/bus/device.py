@@ -1,7 +1,11 @@
-"""Any other CANopen device: it has parameters and a life, and no channels of its own."""
+"""Any other CANopen device: it has parameters and a life, and the channels that the robot's file gives it."""
+
+import threading
 
 from drivers.bus.bus import CanBus
+from drivers.bus.channels import Chosen, ObjectChannels, channels_of
 from drivers.bus.node import shared_node
+from drivers.bus.pdo import read_tpdos
 from drivers.bus.sdo.channel import SdoChannel
 from drivers.bus.settings import DeviceSettings
 from drivers.component import Kind
@@ -11,26 +15,42 @@ from eds import Description
 
 
 class CanDevice:
-    """One device by its name in the robot's file."""
+    """One device by its name in the robot's file; `chosen` are its objects that are channels."""
 
     kind = Kind.DEVICE
-    channels: tuple[Channel, ...] = ()
 
-    def __init__(self, name: str, settings: DeviceSettings, bus: CanBus, description: Description) -> None:
+    def __init__(
+        self,
+        name: str,
+        settings: DeviceSettings,
+        bus: CanBus,
+        description: Description,
+        chosen: Chosen | None = None,
+    ) -> None:
         """Raises `SettingsError` where another table describes the same node differently."""
         self.name = name
         self.settings = settings
         self.node = shared_node(bus, settings.node_id, description, settings)
+        self.channels: tuple[Channel, ...] = channels_of(name, chosen or {})
         self.latest = Latest(name, self.channels, settings.stale_after_s)
+        self._description = description
+        self._started = False
+        self._lock = threading.Lock()  # a boot may be under way when it stops
+        self._objects = ObjectChannels(self.node, description, chosen or {}, self.latest)
 
     def start(self) -> None:
         """Open the bus if nobody else has."""
-        self.node.probes = True
+        with self._lock:
+            self._started = True
+        self.node.probe()
         self.node.attach(self, self.name)
 
     def stop(self) -> None:
         """Let go of the node."""
+        with self._lock:
+            self._started = False
         self.node.detach(self)
+        self.forget()
 
     def quality(self, now_ns: int) -> Quality:
         """By its heartbeat, where it has one; else by whether it answers when it is asked now and then."""
@@ -47,12 +67,20 @@ class CanDevice:
             state = State.FAULT
             problem = f"it reports {self.node.life.active_emcy.text(self.node.description.vendor_id)}"
         trouble = self.node.trouble
-        texts = (problem, *(one.text(now_ns) for one in trouble), *self.node.findings)
+        channels = self._objects.problems(now_ns) if state in (State.OK, State.FAULT) else ()
+        texts = (problem, *channels, *(one.text(now_ns) for one in trouble), *self.node.findings)
         words = "; ".join(text for text in texts if text)
         return Quality(state, age_ms, words or None, self.node.counters(), trouble)
 
     def boot(self, sdo: SdoChannel) -> None:
-        """Nothing needs to be read."""
+        """Read which of its channels come by PDO."""
+        if not self._objects:
+            return
+        tpdos = read_tpdos(sdo, self._description)
+        with self._lock:
+            if self._started:
+                self._objects.install(tpdos)
 
     def forget(self) -> None:
-        """Nothing was kept."""
+        self._objects.forget()
+        self.latest.clear()

@@ -6,36 +6,30 @@ it should be, and the only one; else `distrust` says why not.
 """
 
 import threading
-import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from typing import Protocol, TypeVar, cast
 
 from drivers.bus.arrivals import Arrivals
+from drivers.bus.asking import Asking
+from drivers.bus.booting import Booting
 from drivers.bus.bus import BusUser, CanBus
-from drivers.bus.frames import REMOTE
 from drivers.bus.life import NodeLife
 from drivers.bus.nmt import HEARTBEAT, NmtState
+from drivers.bus.objects import identity_problem, read, read_optional, read_rest
 from drivers.bus.outlet import Requests
-from drivers.bus.sdo.channel import Interrupted, SdoChannel
+from drivers.bus.sdo.channel import SdoChannel
 from drivers.bus.sdo.worker import SdoWorker
 from drivers.bus.settings import NodeTimes, Role
 from drivers.bus.stuck import why_silent
-from drivers.bus.values import size_of, unsigned
-from drivers.errors import DeviceAbort, DeviceTimeout, DriverError, SettingsError, Unavailable
+from drivers.errors import DeviceTimeout, DriverError, SettingsError
 from drivers.noted import found
 from drivers.samples import Finding
 from eds import Description
 
 T = TypeVar("T")
 
-FIRST_RETRY_S = 0.1  # also how long the first attempt waits: a cold start must not hang on one lost frame
-LAST_RETRY_S = 2.0
-DOUBT_S = 0.1  # how often a node is asked that answers twice, to see when it does so no more
-_COMING_UP = "it was not read yet: look again in a moment"
 _NOT_ASKED = "it has not come up, so nobody knows what it is: nothing is written to it"
-PROBE_S = 1.0  # how often a node is asked that has no heartbeat and says nothing
-SILENT_S = 3.0  # without a word, though it was asked
 EMCY = 0x080
 
 
@@ -49,10 +43,6 @@ class NodeUser(Protocol):
         """What was read and received is no longer true: the node rebooted or its bus is gone."""
 
 
-def _ask_type(sdo: SdoChannel) -> None:
-    sdo.upload(0x1000, 0, attempts=1)
-
-
 class Node(BusUser):
     """A node id on a bus. Alive while at least one user is attached."""
 
@@ -61,26 +51,12 @@ class Node(BusUser):
         self.node_id = node_id
         self.description = description
         self.life = NodeLife(times.heartbeat_timeout_s)
-        self.ready = False
         self.arrivals: tuple[Arrivals, ...] = ()  # of the PDOs that its users follow
-        self.boots_begun = 0  # attempts to read what is needed of it
         self._findings: tuple[str, ...] = ()
         self._stranger: str | None = _NOT_ASKED  # why it may not be the device that it should be
         self._times = times
         self._users: tuple[tuple[NodeUser, str], ...] = ()  # with their names
         self._lock = threading.RLock()
-        self._step = _COMING_UP
-        self._guard_s = times.guard_time_s if bus.role is Role.MASTER else None
-        self._guard_ns = 0
-        self._guard_problem: str | None = None
-        self._doubt_ns = 0
-        self.probes = False  # whether it is asked where it says nothing: a user who gets no PDOs wants that
-        self._probe_ns = 0
-        self._generation = 0  # counts what makes an earlier boot worthless
-        self._booted_generation = 0  # of the boot that is under way, or was the last
-        self._booting: Future[None] | None = None
-        self._retry_s = FIRST_RETRY_S
-        self._retry_ns = 0
         self._request_id, response_id = times.sdo_ids(node_id)
         self.channel = SdoChannel(
             f"node {node_id} on {bus.name}",
@@ -89,8 +65,21 @@ class Node(BusUser):
             lambda: self.distrust,
         )
         self.worker = SdoWorker(self.channel)
+        self._booting = Booting(self.worker, self._lock, self._come_up, self._explain)
+        guard_s = times.guard_time_s if bus.role is Role.MASTER else None
+        self._asking = Asking(bus, node_id, self.life, self.worker, guard_s)
         self._emcy_id = EMCY + node_id
         self._handlers = {HEARTBEAT + node_id: self._on_heartbeat, response_id: self._on_response}
+
+    @property
+    def ready(self) -> bool:
+        """Whether its users have read what they need, and nothing has made that worthless since."""
+        return self._booting.ready
+
+    @property
+    def boots_begun(self) -> int:
+        """Attempts to read what is needed of it."""
+        return self._booting.begun
 
     @property
     def distrust(self) -> str | None:
@@ -134,6 +123,14 @@ class Node(BusUser):
 
     # What users ask.
 
+    def probe(self) -> None:
+        """Ask it now and then where it says nothing: for a user who gets no PDOs of it."""
+        self._asking.probes = True
+
+    def silence(self, now_ns: int) -> str | None:
+        """That a node without a heartbeat, which is probed, answers no more, in words."""
+        return self._asking.silence(now_ns) if self.ready else None
+
     def follow(self, arrivals: Arrivals) -> Callable[[], None]:
         """Watch whether frames are missing; returns how to end it."""
         arrivals.restart()
@@ -153,15 +150,14 @@ class Node(BusUser):
             first = not self._users
             self._set_users((*self._users, (user, name)))
             if not first:
-                self._generation += 1  # a boot that is under way does not know the new user
-                self.ready = False
+                self._booting.overtake()  # a boot that is under way does not know the new user
         if first:
             self._reset()
             self._subscribe()
             self.worker.start()
             self.bus.hold(self)
         else:
-            self._start_boot()
+            self._booting.start()
 
     def detach(self, user: NodeUser) -> None:
         """Let it go: the last one closes the bus."""
@@ -177,7 +173,7 @@ class Node(BusUser):
 
     def upload(self, index: int, subindex: int) -> Future[bytes]:
         """Read an object's bytes, no more than its type has."""
-        return self.worker.submit(lambda sdo: self._trim(index, subindex, sdo.upload(index, subindex)))
+        return self.worker.submit(lambda sdo: read(sdo, self.description, index, subindex))
 
     def upload_all(self, objects: Sequence[tuple[int, int]]) -> Future[list[bytes | DriverError]]:
         """Read several objects in a row, nothing in between; an error stands in its object's place.
@@ -185,8 +181,8 @@ class Node(BusUser):
         After one that was not answered the others are not asked for: the list ends there. What was read
         before an urgent job interrupts is not read again.
         """
-        found: list[bytes | DriverError] = []
-        return self.worker.submit(lambda sdo: self._upload_rest(sdo, objects, found))
+        done: list[bytes | DriverError] = []
+        return self.worker.submit(lambda sdo: read_rest(sdo, self.description, objects, done))
 
     def download(
         self,
@@ -221,8 +217,8 @@ class Node(BusUser):
     def problem(self, now_ns: int) -> str | None:
         """What is wrong with the node now, in words with what to check; `None` when nothing is."""
         if not self.ready:
-            return self.bus.trouble or self._step
-        return self.life.problem(now_ns) or self._guard_problem or self.bus.trouble
+            return self.bus.trouble or self._booting.step
+        return self.life.problem(now_ns) or self._asking.guard_problem or self.bus.trouble
 
     def counters(self) -> dict[str, int]:
         """What happened since the node's object was made."""
@@ -247,48 +243,17 @@ class Node(BusUser):
 
     def bus_opened(self) -> None:
         self._reset()
-        self._start_boot()
+        self._booting.start()
 
     def bus_closed(self) -> None:
         self._reset()
 
     def tick(self, now_ns: int) -> None:
-        if not self.ready and now_ns >= self._retry_ns:
-            self._start_boot()
-        if self._guard_s is not None and self.ready and now_ns >= self._guard_ns:
-            self._guard_ns = now_ns + round(self._guard_s * 1e9)
-            self._ask_life(now_ns)
-        if self.ready and self.channel.doubled and now_ns >= self._doubt_ns:
-            self._doubt_ns = now_ns + round(DOUBT_S * 1e9)
-            self.worker.submit(_ask_type)
-        if self.probes and self.ready and now_ns >= self._probe_ns and self._unheard_s(now_ns) > PROBE_S:
-            self._probe_ns = now_ns + round(PROBE_S * 1e9)
-            self.worker.submit(_ask_type)
+        self._booting.retry(now_ns)
+        if self.ready:
+            self._asking.tick(now_ns)
         for arrivals in self.arrivals:
             arrivals.look(now_ns)
-
-    def _unheard_s(self, now_ns: int) -> float:
-        """For how long a node that is probed has said nothing but PDOs; 0 for those with a heartbeat."""
-        if self.life.timeout_s is not None or not self.probes:
-            return 0.0
-        return (self.life.silent_ms(now_ns) or 0.0) / 1000
-
-    def silence(self, now_ns: int) -> str | None:
-        """That a node without a heartbeat answers no more, in words; `None` while it does."""
-        silent_s = self._unheard_s(now_ns)
-        if not self.ready or silent_s <= SILENT_S:
-            return None
-        return f"it has answered nothing for {silent_s:.1f} s: check the node's power and cable"
-
-    def _ask_life(self, now_ns: int) -> None:
-        """Node guarding: the answer is the node's state and counts as a heartbeat (CiA 301 §7.2.8)."""
-        if self.life.heartbeat_ns is None:
-            self.life.heartbeat_ns = now_ns  # from now on silence counts
-        try:
-            self.bus.send((HEARTBEAT + self.node_id) | REMOTE, b"")
-            self._guard_problem = None
-        except Unavailable as error:
-            self._guard_problem = str(error)
 
     def _on_heartbeat(self, stamp_ns: int, data: bytes) -> None:
         first = self.life.heard_ns is None
@@ -296,9 +261,9 @@ class Node(BusUser):
         if state is NmtState.BOOT_UP:
             self.channel.rebooted()
             self._begin_anew()
-            self._start_boot()
-        elif state is not None and first and not self.ready:
-            self._retry_ns = 0  # it is there: ask it at the next tick
+            self._booting.start()
+        elif state is not None and first:
+            self._booting.hurry()
 
     def _on_response(self, stamp_ns: int, data: bytes) -> None:
         self.life.heard_ns = stamp_ns
@@ -312,59 +277,23 @@ class Node(BusUser):
 
     def _begin_anew(self) -> None:
         with self._lock:
-            self._generation += 1
-            self.ready = False
+            self._booting.begin_anew()
             self._stranger = _NOT_ASKED
-            self._step = _COMING_UP
-            self._retry_s, self._retry_ns = FIRST_RETRY_S, 0
             users = self._users
         self.channel.forget_written()
         for user, _ in users:
             user.forget()
 
-    def _start_boot(self) -> None:
-        with self._lock:
-            if self._booting is None or self._booting.done():
-                self._retry_ns = time.monotonic_ns() + round(self._retry_s * 1e9)
-                self._booting = self.worker.submit(self._boot, current=self._boot_is_current)
-
-    def _boot_is_current(self) -> bool:
-        return self._booted_generation == self._generation
-
-    def _boot(self, sdo: SdoChannel) -> None:
-        self.boots_begun += 1
-        self._booted_generation = self._generation
-        try:
-            self._come_up(sdo)
-        except DriverError as error:
-            self._try_later(self._explain(error))
-        except Interrupted:
-            raise
-        except Exception as error:  # noqa: BLE001 - it must be told, and not be tried without a pause
-            self._try_later(f"internal error: {type(error).__name__}: {error}")
-        else:
-            with self._lock:
-                self.ready = self._boot_is_current()
-                self._retry_s, self._retry_ns = FIRST_RETRY_S, 0
-
-    def _try_later(self, step: str) -> None:
-        with self._lock:
-            if not self._boot_is_current():
-                self._retry_ns = 0
-                return
-            self._step = step
-            self._retry_ns = time.monotonic_ns() + round(self._retry_s * 1e9)
-            self._retry_s = min(2 * self._retry_s, LAST_RETRY_S)
-
     def _come_up(self, sdo: SdoChannel) -> None:
-        sdo.upload(0x1000, 0, attempts=1, timeout_s=min(self._retry_s, self._times.sdo_timeout_s))
-        stranger = self._identity_problem(sdo)
+        timeout_s = min(self._booting.retry_s, self._times.sdo_timeout_s)
+        sdo.upload(0x1000, 0, attempts=1, timeout_s=timeout_s)
+        stranger = identity_problem(sdo, self.description)
         with self._lock:
-            if self._boot_is_current():
+            if self._booting.is_current():
                 self._stranger = stranger
         self._findings = self._settings_findings()
-        period_ms = self._optional(sdo, 0x1017, 0)
-        self.life.expect_every(period_ms / 1000 if period_ms else self._guard_s)
+        period_ms = read_optional(sdo, self.description, 0x1017, 0)
+        self.life.expect_every(period_ms / 1000 if period_ms else self._asking.guard_s)
         self._follow_emcy(sdo)
         for user, _ in self._users:
             user.boot(sdo)
@@ -379,58 +308,15 @@ class Node(BusUser):
         return words or str(error)
 
     def _settings_findings(self) -> tuple[str, ...]:
-        unused = self._times.guard_time_s is not None and self._guard_s is None
+        unused = self._times.guard_time_s is not None and self._asking.guard_s is None
         return ("guard_time_s is not used: node guarding is the master's",) if unused else ()
 
-    def _identity_problem(self, sdo: SdoChannel) -> str | None:
-        """Why it may be another device than its EDS is for."""
-        expected = (self.description.vendor_id, self.description.product_code)
-        problems = []
-        for subindex, name, should in zip((1, 2), ("vendor id", "product code"), expected, strict=True):
-            if not should or not self.description.has(0x1018, subindex):
-                continue
-            found = self._optional(sdo, 0x1018, subindex)
-            if found != should:
-                is_ = "cannot be read" if found is None else f"is 0x{found:X}"
-                file = self.description.path.name
-                problems.append(f"1018h {name} {is_}, the EDS {file} is for 0x{should:X}")
-        if not problems:
-            return None
-        return f"{'; '.join(problems)}: nothing is written to it; correct its eds or its node_id"
-
     def _follow_emcy(self, sdo: SdoChannel) -> None:
-        cob_id = self._optional(sdo, 0x1014, 0)
+        cob_id = read_optional(sdo, self.description, 0x1014, 0)
         if cob_id is not None and not cob_id & 0x8000_0000 and cob_id & 0x7FF:
             self.bus.unsubscribe(self._emcy_id, self.life.on_emcy)
             self._emcy_id = cob_id & 0x7FF
             self.bus.subscribe(self._emcy_id, self.life.on_emcy)
-
-    def _optional(self, sdo: SdoChannel, index: int, subindex: int) -> int | None:
-        """A number that not every device has."""
-        if not self.description.has(index, subindex):
-            return None
-        try:
-            return unsigned(self._trim(index, subindex, sdo.upload(index, subindex)))
-        except DeviceAbort:
-            return None
-
-    def _upload_rest(
-        self, sdo: SdoChannel, objects: Sequence[tuple[int, int]], found: list[bytes | DriverError]
-    ) -> list[bytes | DriverError]:
-        for index, subindex in objects[len(found) :]:
-            try:
-                found.append(self._trim(index, subindex, sdo.upload(index, subindex)))
-            except DriverError as error:
-                found.append(error)
-                if not isinstance(error, DeviceAbort):
-                    break
-        return found
-
-    def _trim(self, index: int, subindex: int, data: bytes) -> bytes:
-        """Some devices answer with four bytes whatever the object's size."""
-        variable = self.description.variable(index, subindex)
-        size = None if variable is None else size_of(variable.data_type or 0)
-        return data if size is None else data[:size]
 
     def _set_users(self, users: tuple[tuple[NodeUser, str], ...]) -> None:
         self._users = users

@@ -1,4 +1,4 @@
-"""What an integrator says about a CAN bus and the devices on it: `[can.NAME]` and `[device.NAME]`."""
+"""What an integrator says about a CAN bus and what is on it: `[can.…]`, `[device.…]` and `[channel.…]`."""
 
 from collections.abc import Mapping
 from enum import StrEnum
@@ -15,7 +15,21 @@ Seconds = Annotated[float, msgspec.Meta(gt=0, le=60)]
 LongSeconds = Annotated[float, msgspec.Meta(gt=0, le=600)]
 Angle = Annotated[float, msgspec.Meta(ge=-6.2832, le=6.2832, extra={"unit": "rad"})]  # a turn
 NodeId = Annotated[int, msgspec.Meta(ge=1, le=127)]
+ObjectName = Annotated[  # as "0x6072:0"
+    str,
+    msgspec.Meta(
+        pattern=r"^0x[0-9A-Fa-f]{4}:(0x[0-9A-Fa-f]{1,2}|[0-9]{1,3})$",
+        title="index and sub-index",
+        examples=["0x6072:0"],
+    ),
+]
 CobId = Annotated[int, msgspec.Meta(ge=1, le=0x1FFF_FFFF)]
+
+
+def address_of(name: str) -> tuple[int, int]:
+    """Index and subindex of an object's name; the subindex may be more than one can be."""
+    index, _, subindex = name.partition(":")
+    return int(index, 16), int(subindex, 16 if subindex.startswith("0x") else 10)
 
 
 class Role(StrEnum):
@@ -88,3 +102,27 @@ class DeviceSettings(NodeTimes, frozen=True, forbid_unknown_fields=True, kw_only
     eds: str
     stale_after_s: LongSeconds = 0.5
     lost_after_s: LongSeconds = 2.0
+
+
+class ChannelSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """An object of a joint's or device's node that becomes a channel.
+
+    value = device's number · scale + offset, in `unit`
+    """
+
+    object: ObjectName
+    unit: str = ""  # SI, or "" for a pure number
+    scale: float = 1.0
+    offset: float = 0.0
+    poll_hz: Annotated[float, msgspec.Meta(ge=0, le=200)] = 4.0  # where no TPDO brings it; 0: never
+    words: dict[str, str] = {}  # for the numbers of a state, such as { 0 = "stance", 1 = "swing" }
+
+    @property
+    def address(self) -> tuple[int, int]:
+        """Index and subindex."""
+        return address_of(self.object)
+
+    @property
+    def states(self) -> dict[int, str] | None:
+        """The words by their numbers; `None` where it is no state."""
+        return {int(number): word for number, word in self.words.items()} or None

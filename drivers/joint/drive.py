@@ -12,6 +12,7 @@ from functools import partial
 
 from drivers.bus.arrivals import Arrivals
 from drivers.bus.bus import CanBus
+from drivers.bus.channels import Chosen, ObjectChannels, channels_of
 from drivers.bus.frames import EXTENDED, FrameHandler
 from drivers.bus.node import shared_node
 from drivers.bus.pdo import Tpdo
@@ -43,13 +44,27 @@ class JointDrive(PowerDrive):
 
     kind = Kind.JOINT
 
-    def __init__(self, name: str, settings: JointSettings, bus: CanBus, description: Description) -> None:
-        """Raises `EdsError` where the file describes no such axis, `SettingsError` on a contradiction."""
+    def __init__(
+        self,
+        name: str,
+        settings: JointSettings,
+        bus: CanBus,
+        description: Description,
+        chosen: Chosen | None = None,
+    ) -> None:
+        """`chosen` are further objects of its node that are channels.
+
+        Raises `EdsError` where the file describes no such axis, `SettingsError` on a contradiction.
+        """
         super().__init__(shared_node(bus, settings.node_id, description, settings), settings)
         self.name = name
-        self._quantities = quantities(description, settings.axis)
-        self.channels: tuple[Channel, ...] = channels(name, self._quantities)
+        chosen = chosen or {}
+        found = quantities(description, settings.axis)
+        self._quantities = tuple(one for one in found if one.name not in chosen)
+        own = channels(name, self._quantities)
+        self.channels: tuple[Channel, ...] = (*own, *channels_of(name, chosen))
         self.latest = Latest(name, self.channels, settings.stale_after_s)
+        self._objects = ObjectChannels(self.node, description, chosen, self.latest, first=len(own))
         self.reading: DriveReading | None = None  # what the drive said about itself when it came up
         self.frames = 0
         self.short_frames = 0  # shorter than the mapping says; nothing was made of them
@@ -103,7 +118,8 @@ class JointDrive(PowerDrive):
         else:
             problem = problem or self._silence_text(age_ms)
         findings = (*implausible, *self.node.trouble)
-        notes = (*self.node.findings, *(self._plan.notes if self._plan is not None else ()))
+        objects = self._objects.problems(now_ns) if state is not State.LOST else ()
+        notes = (*objects, *self.node.findings, *(self._plan.notes if self._plan is not None else ()))
         texts = (problem, self._emcy_text(state, now_ns), *(one.text(now_ns) for one in findings), *notes)
         words = "; ".join(text for text in texts if text)
         return Quality(state, age_ms, words or None, self.counters(), findings)
@@ -134,11 +150,13 @@ class JointDrive(PowerDrive):
                 self.reading, self._plan, self._stop_rpdo = reading, plan, stop_rpdo
                 self._watch.check.loaded.rated = rated_torque(self.settings, reading.scaling)
                 self._install(plan)
+                self._objects.install(reading.tpdos)
 
     def forget(self) -> None:
         with self._lock:
             while self._undo:
                 self._undo.pop()()
+            self._objects.forget()
             self.reading = self._plan = self._stop_rpdo = None
             self.latest.clear()
             self._watch.restart()
@@ -207,7 +225,7 @@ class JointDrive(PowerDrive):
         indices: tuple[int, ...] = (one.channel,)
         values: tuple[float | None, ...] = (counts * one.linear.scale + one.linear.offset,)
         if one.quantity.name == STATUSWORD:
-            indices = (*indices, len(self.channels) - 1)
+            indices = (*indices, self._index[STATE])
             values = (*values, STATE_OF[counts & STATE_BITS])
         with self._lock:
             self.latest.update(stamp_ns, indices, values)

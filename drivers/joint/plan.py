@@ -3,11 +3,12 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from drivers.bus.fields import Field, Linear
 from drivers.bus.pdo import Tpdo
-from drivers.joint.decoder import Decoder, Field, make_decoder
+from drivers.joint.decoder import Decoder, make_decoder
 from drivers.joint.quantities import POSITION, STATUSWORD, Quantity
 from drivers.joint.reading import DriveReading
-from drivers.joint.scaling import Linear, contradictions, scalings
+from drivers.joint.scaling import contradictions, scalings
 from drivers.joint.settings import JointSettings
 
 MIN_BITS = 8
@@ -67,10 +68,14 @@ def make_plan(settings: JointSettings, found: tuple[Quantity, ...], reading: Dri
 def _fields(tpdo: Tpdo, wanted: Mapping[tuple[int, int], Source]) -> list[Field]:
     """What this TPDO carries of what is wanted."""
     return [
-        Field(one.channel, mapped.at, mapped.bits, one.quantity.signed, one.linear)
+        Field(one.channel, mapped.at, mapped.bits, _kind(one.quantity), one.linear)
         for mapped in tpdo.objects
         if mapped.bits >= MIN_BITS and (one := wanted.get((mapped.index, mapped.subindex))) is not None
     ]
+
+
+def _kind(quantity: Quantity) -> str:
+    return "signed" if quantity.signed else "unsigned"
 
 
 def _bringer(channel: int, mapped: Sequence[tuple[Tpdo, list[Field]]]) -> Tpdo | None:

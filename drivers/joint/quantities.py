@@ -52,6 +52,9 @@ _TEMPERATURES: dict[tuple[int, int | None], tuple[int, int, float]] = {
     (0x0000, 0x4A44_0001): (0x2010, 0, 0.1),  # the simulated joint drive: temperature of the motor
 }
 
+# Those of every joint, which the robot's file cannot give another object.
+OWN = frozenset({STATE, *(one.name for one in _STANDARD)})
+
 REQUIRED = ((0x6041, "statusword"), (0x6064, "position actual value"))
 
 

@@ -2,8 +2,8 @@
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 
+from drivers.bus.fields import Linear
 from drivers.joint.settings import JointSettings
 
 # Object (axis 0) and sub-index of everything that the scaling reads from the drive, by its name here.
@@ -25,14 +25,6 @@ TOLERANCE = 0.01  # two figures that differ by less agree
 LEAST_EFFICIENCY = 0.4  # of a gear: torque at the joint may be this part of motor torque times ratio
 
 Readings = Mapping[str, int | None]
-
-
-@dataclass(frozen=True, slots=True)
-class Linear:
-    """SI value = counts · scale + offset."""
-
-    scale: float
-    offset: float = 0
 
 
 def scalings(settings: JointSettings, readings: Readings) -> dict[str, Linear | None]:

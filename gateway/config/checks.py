@@ -11,6 +11,7 @@ from drivers.imu.settings import CanImuSettings, ImuSettings
 from drivers.insole.settings import InsoleSettings
 from drivers.insole.shipped import shipped_names
 from drivers.joint.settings import JointSettings
+from gateway.config.channel_checks import complaints as about_channels
 from gateway.config.likelihood import warnings
 from gateway.config.parameter_checks import complaints as about_parameters
 from gateway.config.robot import COMPONENT_TABLES, NAME, RobotConfig, header
@@ -200,6 +201,7 @@ _CHECKS = (
     _about_axes,
     _about_silence,
     about_parameters,
+    about_channels,
     _about_stop,
     _about_control_loop,
 )

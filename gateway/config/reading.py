@@ -8,7 +8,7 @@ from typing import Any
 import msgspec
 from msgspec import Struct
 
-from drivers.bus.settings import CanSettings
+from drivers.bus.settings import CanSettings, ChannelSettings
 from drivers.imu.settings import MountedSettings, kind_of
 from drivers.insole.settings import InsoleSettings
 from gateway.config.checks import complaints
@@ -48,6 +48,7 @@ NAMED: Mapping[str, type[Struct]] = {
     "insole": InsoleSettings,
     "imu": MountedSettings,  # one of several, by what the table says
     "parameter": ParameterSettings,
+    "channel": ChannelSettings,
 }
 TABLES = (*SINGLE, *NAMED, "guard")
 
@@ -137,9 +138,9 @@ class _Reading:
     def _struct(self, where: str, table: Any, kind: type[Struct]) -> Struct | None:
         if not isinstance(table, dict):
             return self._decoding.struct(where, table, kind)
-        if kind is ParameterSettings and table and all(map(_is_table, table.values())):
-            component, name = where.removesuffix("]").rpartition(".")[2], next(iter(table))
-            text = f'a parameter\'s name is one key: write [parameter."{component}.{name}"]'
+        if kind in (ParameterSettings, ChannelSettings) and table and all(map(_is_table, table.values())):
+            what, _, component = where.strip("[]").partition(".")
+            text = f'a {what}\'s name is one key: write [{what}."{component}.{next(iter(table))}"]'
             self._decoding.complain(where, "", text)
             return None
         if kind is CanSettings:

@@ -7,12 +7,18 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from msgspec import Meta, Struct
 
-from drivers.bus.settings import CanSettings, DeviceSettings, Role
+from drivers.bus.settings import (
+    CanSettings,
+    ChannelSettings,
+    DeviceSettings,
+    ObjectName,
+    Role,
+    address_of,
+)
 from drivers.component import Kind
 from drivers.imu.settings import CanImuSettings, ImuSettings, MountedSettings, NodeImuSettings
 from drivers.insole.settings import InsoleSettings
 from drivers.joint.settings import JointSettings
-from gateway.config.objects import ObjectName, address_of
 from gateway.config.stop import StopSettings
 from gateway.records.folder import default_folder
 
@@ -125,6 +131,7 @@ class RobotConfig(Struct, frozen=True, kw_only=True):
     insole: dict[str, InsoleSettings] = {}
     imu: dict[str, MountedSettings] = {}
     parameter: dict[str, ParameterSettings] = {}
+    channel: dict[str, ChannelSettings] = {}
     stop: StopSettings = StopSettings()
     guard: "GuardSettings | None" = None
     control_loop: ControlLoopSettings | None = None
@@ -148,6 +155,11 @@ class RobotConfig(Struct, frozen=True, kw_only=True):
     def drives_of(self, component: str) -> tuple[str, ...]:
         """The joints that its parameters may move: those on its node; where it has none, every joint."""
         return tuple(name for name in self.sharing(component) if name in self.joint) or tuple(self.joint)
+
+    def channels_of(self, component: str) -> dict[str, ChannelSettings]:
+        """What `[channel."COMPONENT.NAME"]` adds to a joint or device, by the names after the dot."""
+        whole = ((name.partition("."), one) for name, one in self.channel.items())
+        return {quantity: one for (owner, _, quantity), one in whole if owner == component}
 
     def on_buses(self) -> Iterator[tuple[str, OnBus]]:
         """Every table of something on a CAN bus, with its header."""

@@ -5,7 +5,7 @@ from typing import Annotated
 
 from msgspec import Meta, Struct
 
-from gateway.config.objects import ObjectName, address_of
+from drivers.bus.settings import ObjectName, address_of
 
 
 class Fallback(StrEnum):

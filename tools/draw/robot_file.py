@@ -6,7 +6,7 @@ from typing import Final
 
 from msgspec import Struct
 
-from drivers.bus.settings import CanSettings
+from drivers.bus.settings import CanSettings, ChannelSettings
 from drivers.imu import can, canopen
 from drivers.imu import formats as imu_formats
 from drivers.imu.canopen.cia410 import InclinometerSettings
@@ -46,6 +46,7 @@ _TABLES: Final[tuple[tuple[str, type[Struct], tuple[str, ...]], ...]] = (
     ("`[imu.NAME]` on a CAN bus", CanImuSettings, ()),
     ("`[imu.NAME]`, an inclinometer", InclinometerSettings, ()),
     ('`[parameter."COMPONENT.NAME"]`', ParameterSettings, ()),
+    ('`[channel."COMPONENT.NAME"]`', ChannelSettings, ()),
     ("`[stop]`", StopSettings, ("controller",)),
     ("`[[stop.controller]]`", ControllerStop, ()),
     ("`[control_loop]`", ControlLoopSettings, ()),
@@ -62,6 +63,10 @@ nodes, and sends SYNC and a heartbeat where its buses say so. Before you change 
 [who may connect](../../SECURITY.md). `linger_s` and the budget are explained in
 [measure the cost](../how-to/measure-the-cost.md)."""
 _PARAMETER: Final = "The stricter of this and the device's EDS counts: [parameters](parameters.md)."
+_MAKER: Final = "[what only its maker has](../how-to/wire-a-joint.md#what-only-its-maker-has)"
+_CHANNEL: Final = f"""The channel is there as `COMPONENT.NAME`, of a joint or a device, with the type that the
+EDS gives its object. Where a TPDO of the node brings it, it is read there; else it is asked for by SDO
+`poll_hz` times a second. So a device gets channels, and a joint {_MAKER}."""
 _RULE: Final = (
     "Every rule has these keys, and those of what it watches: [the table of rules](guard.md#rules)."
 )
@@ -74,6 +79,7 @@ _MORE: Final[Mapping[str, str]] = {
     "`[insole.NAME]`": _TIMES,
     "`[imu.NAME]` on a serial port": _TIMES,
     '`[parameter."COMPONENT.NAME"]`': _PARAMETER,
+    '`[channel."COMPONENT.NAME"]`': _CHANNEL,
     "`[stop]`": "What a fallback does, and its dangers: [stop](../explanation/stop.md#the-robots-file).",
     "`[guard.rule.NAME]`": _RULE,
 }

@@ -52,7 +52,10 @@ def assemble(config: RobotConfig) -> Robot:
         gc.freeze()  # so that what is collected below is looked for among little
     for name, settings in config.can.items():
         robot.buses[name] = CanBus(name, settings, config.gateway.role, urgent=config.guard is not None)
-    site = Site(config.path, robot.buses, descriptions=robot.descriptions, recognise=_format_of)
+    chosen = {name: config.channels_of(name) for name in (*config.joint, *config.device)}
+    site = Site(
+        config.path, robot.buses, descriptions=robot.descriptions, channels=chosen, recognise=_format_of
+    )
     for kind, builder in BUILDERS.items():
         for name, settings in getattr(config, kind).items():
             _add(robot, kind, name, partial(builder.build, name, settings, site))
@@ -96,7 +99,8 @@ def _on_can(
         if all(description.path != known.path for known in site.descriptions.values()):
             gc.collect()  # what reading a file leaves is larger than what it gives, and would lie there long
         site.descriptions[name] = description
-        return make(name, settings, site.buses[settings.bus], description)
+        chosen = site.channels.get(name, {})
+        return make(name, settings, site.buses[settings.bus], description, chosen)
 
     return Builder(build, join)
 

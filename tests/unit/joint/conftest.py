@@ -8,6 +8,7 @@ import pytest
 
 import eds
 from drivers.bus.bus import CanBus
+from drivers.bus.channels import Chosen
 from drivers.bus.settings import CanSettings
 from drivers.joint.drive import JointDrive
 from drivers.joint.settings import JointSettings
@@ -93,11 +94,13 @@ def bus(channel: str) -> CanBus:
 def joint(bus: CanBus, tmp_path: Path) -> Callable[..., JointDrive]:
     """Make a joint for a drive with `objects`, node id 2."""
 
-    def make(objects: Objects, name: str = "left_knee", **more: Any) -> JointDrive:
+    def make(
+        objects: Objects, name: str = "left_knee", chosen: Chosen | None = None, **more: Any
+    ) -> JointDrive:
         path = tmp_path / "drive.eds"
         path.write_text(drive_eds(objects))
         table: dict[str, Any] = {"counts_per_revolution": 1000, "gear_ratio": 1, "sdo_timeout_s": 0.2, **more}
         settings = JointSettings(bus="main", node_id=2, eds="drive.eds", **table)
-        return JointDrive(name, settings, bus, eds.load(path, 2))
+        return JointDrive(name, settings, bus, eds.load(path, 2), chosen)
 
     return make

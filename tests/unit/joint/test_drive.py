@@ -8,6 +8,7 @@ from collections.abc import Callable
 import pytest
 
 import eds
+from drivers.bus.settings import ChannelSettings
 from drivers.errors import Unavailable
 from drivers.joint.cia402 import DriveState
 from drivers.joint.drive import JointDrive
@@ -180,6 +181,25 @@ def test_digital_inputs_are_taken_from_a_tpdo_that_brings_them(joint: Make, chan
         until(lambda: knee.frames)
         assert read(knee, "digital_inputs") == 0xFFFF_FFFF
         assert read(knee, "voltage") == pytest.approx(24.5)
+        knee.stop()
+
+
+def test_what_only_its_maker_has_is_a_channel_beside_its_own_or_in_their_place(
+    joint: Make, channel: str
+) -> None:
+    objects = drive_objects() | surroundings() | tpdo(1, 0x182, 0x60410010, 0x60790020)
+    chosen = {
+        "voltage": ChannelSettings(object="0x6079:0", unit="V", scale=0.01),
+        "brake": ChannelSettings(object="0x60FD:0", words={"0": "closed"}, poll_hz=50),
+    }
+    with FakeNode(channel, 2, objects) as fake:
+        knee = joint(objects, chosen=chosen, poll_hz=50)
+        assert [one.quantity for one in knee.channels][-3:] == ["state", "voltage", "brake"]
+        knee.start()
+        until(lambda: knee.node.ready)
+        fake.send(0x182, struct.pack("<HI", 0x1637, 4_800))
+        until(lambda: read(knee, "voltage") == 48.0 and read(knee, "brake") == 0x8001_0008)
+        assert read(knee, "state") == DriveState.OPERATION_ENABLED
         knee.stop()
 
 

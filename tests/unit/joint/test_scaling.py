@@ -5,7 +5,8 @@ from typing import Any
 
 import pytest
 
-from drivers.joint.scaling import Linear, contradictions, scalings
+from drivers.bus.fields import Linear
+from drivers.joint.scaling import contradictions, scalings
 from drivers.joint.settings import JointSettings
 
 
