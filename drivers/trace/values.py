@@ -1,0 +1,100 @@
+"""Values of objects in words: by the data type that the EDS says, and what the standard's numbers mean."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from drivers.bus.values import decode
+from drivers.error_codes import error_text
+from drivers.joint.cia402 import MODES, drive_state
+from drivers.joint.quantities import AXIS_OFFSET
+from drivers.trace.devices import Device
+from eds.datatypes import DATA_TYPES
+
+_AXES = range(0x6000, 0xA000)
+_LONGEST = 64  # letters or bytes that are shown of a long value
+
+
+@dataclass(frozen=True, slots=True)
+class Value:
+    """One object and what it held; without an EDS, `name` is `None` and the value its bytes."""
+
+    index: int
+    subindex: int
+    name: str | None
+    value: int | float | str | None
+    words: str
+
+    @property
+    def address(self) -> str:
+        return f"{self.index:04X}h:{self.subindex:02X}"
+
+    def __str__(self) -> str:
+        return f"{self.label} = {self.words}"
+
+    @property
+    def label(self) -> str:
+        return self.address if self.name is None else f"{self.address} {self.name}"
+
+
+def label(device: Device, index: int, subindex: int) -> str:
+    """An object by address and name."""
+    return Value(index, subindex, name_of(device, index, subindex), None, "").label
+
+
+def name_of(device: Device, index: int, subindex: int) -> str | None:
+    """What the EDS calls an object."""
+    variable = None if device.description is None else device.description.variable(index, subindex)
+    return None if variable is None else variable.qualname
+
+
+def value_of(device: Device, index: int, subindex: int, data: bytes) -> Value:
+    """Bytes of an object as its EDS has them."""
+    variable = None if device.description is None else device.description.variable(index, subindex)
+    name = name_of(device, index, subindex)
+    known = None if variable is None else DATA_TYPES.get(variable.data_type or 0)
+    if known is not None and known.kind == "text":
+        text = data.decode("utf-16-le" if known.name == "UNICODE_STRING" else "latin-1", "replace")
+        text = text.rstrip("\0 ")
+        return Value(index, subindex, name, text, f'"{text[:_LONGEST]}"')
+    number = None if variable is None else decode(data, variable.data_type or 0)
+    if number is None or known is None:
+        return Value(index, subindex, name, data.hex(), _hex(data))
+    return Value(index, subindex, name, number, _in_words(index, number, known.kind == "unsigned"))
+
+
+def bits_of(device: Device, index: int, subindex: int, raw: int, bits: int) -> Value:
+    """Bits of a PDO as the object that is mapped there."""
+    return value_of(device, index, subindex, raw.to_bytes((bits + 7) // 8, "little"))
+
+
+def _hex(data: bytes) -> str:
+    more = f" … {len(data)} bytes" if len(data) > _LONGEST // 4 else ""
+    return (data[: _LONGEST // 4].hex(" ").upper() + more) or "nothing"
+
+
+def _state(number: int) -> str:
+    state = drive_state(number)
+    return "no state of CiA 402" if state is None else state.words
+
+
+_WORDS: dict[int, Callable[[int], str]] = {
+    0x603F: lambda number: error_text(number, None),
+    0x6041: lambda number: f"0x{number:04X} ({_state(number)})",
+    0x6040: lambda number: f"0x{number:04X}",
+    0x6060: lambda number: f"{number} ({MODES.get(number, 'a mode of the maker')})" if number else "0",
+    0x6061: lambda number: f"{number} ({MODES.get(number, 'a mode of the maker')})" if number else "0",
+    0x60FD: lambda number: f"0x{number:08X}",
+    0x6502: lambda number: f"0x{number:08X}",
+}
+_FIRST_OF_PROFILE = 0x2000  # below, communication objects are identifiers and bits more often than amounts
+_SMALL = 10
+
+
+def _in_words(index: int, number: float, unsigned: bool) -> str:
+    if not isinstance(number, int):
+        return f"{number:g}"
+    of_axis = (index - 0x6000) % AXIS_OFFSET + 0x6000 if index in _AXES else index
+    words = _WORDS.get(of_axis)
+    if words is not None:
+        return words(number)
+    return f"0x{number:X}" if unsigned and index < _FIRST_OF_PROFILE and number >= _SMALL else str(number)
