@@ -30,6 +30,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "get": ("gateway.cli.get:main", "read parameters from the devices"),
     "set": ("gateway.cli.set:main", "change parameters, all or none, read back"),
     "params": ("gateway.cli.params:main", "parameters as files: save, compare, apply"),
+    "od": ("gateway.cli.od:main", "a device's object dictionary: search, limits, live values, write"),
     "store": ("gateway.cli.store:main", "make a device keep its parameters"),
     "restore": ("gateway.cli.restore:main", "give a device its defaults back"),
     "journal": ("gateway.cli.journal:main", "who did what to the robot; is the record whole"),

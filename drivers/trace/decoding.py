@@ -7,10 +7,10 @@ from typing import Any, ClassVar
 
 from drivers.bus.frames import ERROR, EXTENDED, REMOTE, STANDARD_IDS
 from drivers.trace import services
-from drivers.trace.devices import Devices, Pdo
+from drivers.trace.devices import Devices, Mapped, Pdo
 from drivers.trace.files import Captured
 from drivers.trace.sdo import Conversation, Said
-from drivers.trace.values import Value, bits_of, label, value_of
+from drivers.trace.values import Value, label, value_of
 
 
 class Kind(StrEnum):
@@ -114,10 +114,10 @@ class Decoder:
         device = self.devices[node_id]
         if said.object is None:
             return self._line(captured, Kind.SDO, title, node_id, said.words.replace("{}", "an object"))
-        words = said.words.format(label(device, *said.object))
+        words = said.words.format(label(device.description, *said.object))
         values: tuple[Value, ...] = ()
         if said.value is not None:
-            values = (value_of(device, *said.object, said.value),)
+            values = (value_of(device.description, *said.object, said.value),)
             words += f": {values[0].words}"
             if said.done:
                 self.devices.learn(node_id, *said.object, said.value)
@@ -149,7 +149,7 @@ class Decoder:
         data = captured.data
         raw = int.from_bytes(data, "little")
         values = tuple(
-            bits_of(device, one.index, one.subindex, raw >> one.at & (1 << one.bits) - 1, one.bits)
+            value_of(device.description, one.index, one.subindex, _part(raw, one))
             for one in pdo.objects
             if one.at + one.bits <= 8 * len(data)
         )
@@ -169,6 +169,11 @@ class Decoder:
 def _plain(captured: Captured, kind: Kind, words: str) -> Line:
     title = kind.value.upper() if kind in (Kind.NMT, Kind.SYNC, Kind.TIME, Kind.LSS) else kind.value
     return Line(captured, kind, title, None, None, words)
+
+
+def _part(raw: int, mapped: Mapped) -> bytes:
+    """The bytes of one object of a PDO."""
+    return (raw >> mapped.at & (1 << mapped.bits) - 1).to_bytes((mapped.bits + 7) // 8, "little")
 
 
 def _raw(captured: Captured) -> str:

@@ -7,7 +7,7 @@ from drivers.bus.values import decode
 from drivers.error_codes import error_text
 from drivers.joint.cia402 import MODES, drive_state
 from drivers.joint.quantities import AXIS_OFFSET
-from drivers.trace.devices import Device
+from eds import Description
 from eds.datatypes import DATA_TYPES
 
 _AXES = range(0x6000, 0xA000)
@@ -36,21 +36,16 @@ class Value:
         return self.address if self.name is None else f"{self.address} {self.name}"
 
 
-def label(device: Device, index: int, subindex: int) -> str:
+def label(description: Description | None, index: int, subindex: int) -> str:
     """An object by address and name."""
-    return Value(index, subindex, name_of(device, index, subindex), None, "").label
+    variable = None if description is None else description.variable(index, subindex)
+    return Value(index, subindex, None if variable is None else variable.qualname, None, "").label
 
 
-def name_of(device: Device, index: int, subindex: int) -> str | None:
-    """What the EDS calls an object."""
-    variable = None if device.description is None else device.description.variable(index, subindex)
-    return None if variable is None else variable.qualname
-
-
-def value_of(device: Device, index: int, subindex: int, data: bytes) -> Value:
+def value_of(description: Description | None, index: int, subindex: int, data: bytes) -> Value:
     """Bytes of an object as its EDS has them."""
-    variable = None if device.description is None else device.description.variable(index, subindex)
-    name = name_of(device, index, subindex)
+    variable = None if description is None else description.variable(index, subindex)
+    name = None if variable is None else variable.qualname
     known = None if variable is None else DATA_TYPES.get(variable.data_type or 0)
     if known is not None and known.kind == "text":
         text = data.decode("utf-16-le" if known.name == "UNICODE_STRING" else "latin-1", "replace")
@@ -60,11 +55,6 @@ def value_of(device: Device, index: int, subindex: int, data: bytes) -> Value:
     if number is None or known is None:
         return Value(index, subindex, name, data.hex(), _hex(data))
     return Value(index, subindex, name, number, _in_words(index, number, known.kind == "unsigned"))
-
-
-def bits_of(device: Device, index: int, subindex: int, raw: int, bits: int) -> Value:
-    """Bits of a PDO as the object that is mapped there."""
-    return value_of(device, index, subindex, raw.to_bytes((bits + 7) // 8, "little"))
 
 
 def _hex(data: bytes) -> str:

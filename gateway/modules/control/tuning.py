@@ -19,6 +19,7 @@ from gateway.config.robot import RobotConfig
 from gateway.connections.turns import Client
 from gateway.modules.component.module import ComponentModule
 from gateway.modules.control.catalogue import resolve
+from gateway.modules.control.dictionary import Objects
 from gateway.modules.control.ledger import WriteLedger
 from gateway.modules.control.objects import Change, Node, device_error
 from gateway.modules.control.parameters import Parameter
@@ -87,6 +88,7 @@ class Tuning:
         self._rules = Rules(config, component, self._parameters)
         self._reads = Reads(loop, self._rules.device, self._read_all)
         self._unanswered = Unanswered()
+        self.objects = Objects(component, loop, self._parameters, self._rules.silence, self._unanswered)
         self._known: dict[str, tuple[int, float]] = {}  # parameter → when, what the device held
         self._asked: set[_Asked] = set()  # writes that have not been answered
         self._ending: str | None = None
@@ -148,7 +150,8 @@ class Tuning:
         """What the devices hold now; where one does not tell, `problem` says why."""
         chosen = self._parameters.chosen(names)
         ready = self._component.when_ready({one.component for one in chosen})
-        return then(ready, lambda _none: self._reads.ask(client, chosen))
+        values = then(ready, lambda _none: self._reads.ask(client, chosen))
+        return then(values, ParameterValues)
 
     def write(
         self, values: Mapping[str, float], session: "Session", trial_s: float | None
