@@ -54,7 +54,7 @@ def value_of(description: Description | None, index: int, subindex: int, data: b
     number = None if variable is None else decode(data, variable.data_type or 0)
     if number is None or known is None:
         return Value(index, subindex, name, data.hex(), _hex(data))
-    return Value(index, subindex, name, number, _in_words(index, number, known.kind == "unsigned"))
+    return Value(index, subindex, name, number, _in_words(index, subindex, number))
 
 
 def _hex(data: bytes) -> str:
@@ -76,15 +76,27 @@ _WORDS: dict[int, Callable[[int], str]] = {
     0x60FD: lambda number: f"0x{number:08X}",
     0x6502: lambda number: f"0x{number:08X}",
 }
-_FIRST_OF_PROFILE = 0x2000  # below, communication objects are identifiers and bits more often than amounts
-_SMALL = 10
+# Identifiers and bits, not amounts (CiA 301 §7.5.2): objects, and the sub-indices of which that is so.
+_HEXADECIMAL: tuple[tuple[range, range], ...] = (
+    (range(0x1000, 0x1006), range(256)),
+    (range(0x1010, 0x1013), range(1, 256)),
+    (range(0x1012, 0x1015), range(1)),
+    (range(0x1016, 0x1017), range(1, 256)),
+    (range(0x1018, 0x1019), range(1, 4)),
+    (range(0x1200, 0x1300), range(1, 3)),
+    (range(0x1400, 0x1600), range(1, 2)),
+    (range(0x1600, 0x1800), range(1, 256)),
+    (range(0x1800, 0x1A00), range(1, 2)),
+    (range(0x1A00, 0x1C00), range(1, 256)),
+)
 
 
-def _in_words(index: int, number: float, unsigned: bool) -> str:
+def _in_words(index: int, subindex: int, number: float) -> str:
     if not isinstance(number, int):
         return f"{number:g}"
     of_axis = (index - 0x6000) % AXIS_OFFSET + 0x6000 if index in _AXES else index
     words = _WORDS.get(of_axis)
     if words is not None:
         return words(number)
-    return f"0x{number:X}" if unsigned and index < _FIRST_OF_PROFILE and number >= _SMALL else str(number)
+    is_bits = any(index in indices and subindex in members for indices, members in _HEXADECIMAL)
+    return f"0x{number:X}" if is_bits else str(number)

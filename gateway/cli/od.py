@@ -101,8 +101,8 @@ def _set(robot: Robot, found: ObjectList, description: Description, arguments: a
     info = found.objects[0]
     if info.parameter is None:
         raise NotOne(
-            f"{found.component} {info.object} {info.name} is no parameter ({info.read_only}). What may be "
-            'written stands in robot.toml: [parameter."…"], or parameters = "eds" and release'
+            f"{found.component} {info.object} {info.name} is no parameter, {info.access} in the EDS; what "
+            'may be written stands in robot.toml: [parameter."…"], or parameters = "eds" and release'
         )
     change: Change = replace(arguments.set, name=info.parameter)
     return write(robot, {info.parameter: value_of(change, description)}, description, arguments)

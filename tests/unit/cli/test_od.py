@@ -18,7 +18,7 @@ def test_objects_are_listed_with_what_they_hold(robot: Served, capsys: pytest.Ca
 
 def test_what_is_no_parameter_is_only_looked_at(robot: Served, capsys: pytest.CaptureFixture[str]) -> None:
     assert robot.run("od", "left_knee", "0x6041", "--set", "5") == 1
-    assert "is no parameter (ro in the EDS)" in capsys.readouterr().err
+    assert "is no parameter, ro in the EDS" in capsys.readouterr().err
     assert robot.run("od", "left_knee", "0x1017", "--set", "5") == 1
     assert "which belongs to who leads it" in capsys.readouterr().err
 

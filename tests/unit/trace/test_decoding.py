@@ -48,6 +48,8 @@ def line(can_id: int, data: str = "", by: Decoder | None = None) -> Line:
         (0x585, "4B 41 60 00 37 02 00 00", Kind.SDO, 5, "is 6041h:00: 37 02"),
         (0x585, "80 41 60 00 00 00 02 06", Kind.SDO, 5, "abort 6041h:00: the device has no such object"),
         (0x602, "00 01", Kind.SDO, 2, "no SDO: 2 bytes"),
+        (0x582, "4B 17 10 00 64 00 00 00", Kind.SDO, 2, "1017h:00 Producer heartbeat time: 100"),
+        (0x582, "43 00 18 01 82 01 00 40", Kind.SDO, 2, ": 0x40000182"),
         (0x285, "01 02", Kind.PDO, 5, "01 02"),
         (0x182 | REMOTE, "", Kind.PDO, 2, "is asked for"),
         (0x7E5, "04 01 00 00 00 00 00 00", Kind.LSS, None, "all: configuration"),
