@@ -8,7 +8,8 @@ from gateway.cli.set import Change, change_of, value_of
 from gateway.cli.text import exact, say, say_json, table
 from gateway.cli.writing import add_trial, write
 from gateway.client import ClientError, Robot
-from gateway.wire.dictionary import MOST_READ, ObjectInfo, ObjectList, ObjectValue
+from gateway.wire.dictionary import ObjectInfo, ObjectList, ObjectValue
+from gateway.wire.limits import OBJECTS_READ
 from gateway.wire.robot import Description
 
 EPILOG = """What is written goes the way of `gwrms set`: only parameters, in their own unit, with the same
@@ -73,8 +74,8 @@ def _show(robot: Robot, found: ObjectList, arguments: argparse.Namespace) -> int
     values: dict[str, ObjectValue] = {}
     if arguments.read:
         addresses = [one.object for one in found.objects]
-        for first in range(0, len(addresses), MOST_READ):
-            values |= robot.read_objects(found.component, *addresses[first : first + MOST_READ]).values
+        for first in range(0, len(addresses), OBJECTS_READ):
+            values |= robot.read_objects(found.component, *addresses[first : first + OBJECTS_READ]).values
     if arguments.json:
         told = {"component": found.component, "objects": found.objects, "left_off": found.left_off}
         say_json(told | {"values": values})

@@ -4,12 +4,11 @@ from typing import Annotated
 
 from msgspec import Meta, Struct
 
+from gateway.wire.limits import OBJECTS_READ
 from gateway.wire.method import Method, Number, Params
 from gateway.wire.role import Role
 
 Object = Annotated[str, Meta(pattern=r"^0x[0-9A-Fa-f]{4}:[0-9]{1,3}$")]  # 0x6041:0
-MOST_LISTED = 256
-MOST_READ = 64
 
 
 class ObjectListParams(Params, frozen=True):
@@ -51,7 +50,7 @@ class ObjectReadParams(Params, frozen=True):
     """`object.read`: these objects of a component, at most 64."""
 
     component: str
-    objects: Annotated[list[Object], Meta(min_length=1, max_length=MOST_READ)]
+    objects: Annotated[list[Object], Meta(min_length=1, max_length=OBJECTS_READ)]
 
 
 class ObjectValue(Struct, frozen=True):

@@ -14,12 +14,10 @@ from eds.datatypes import DATA_TYPES, DOMAIN
 from gateway.connections.turns import Client
 from gateway.modules.component.module import ComponentModule
 from gateway.modules.control.parameters import READABLE, WRITABLE, Parameter
-from gateway.modules.control.reads import Reads
 from gateway.modules.control.unanswered import Unanswered
 from gateway.process.futures import back, done, gather, then
 from gateway.process.loop import Loop
 from gateway.wire.dictionary import (
-    MOST_LISTED,
     ObjectInfo,
     ObjectList,
     ObjectListParams,
@@ -28,6 +26,7 @@ from gateway.wire.dictionary import (
     ObjectValues,
 )
 from gateway.wire.framing import Kind, refuse
+from gateway.wire.limits import OBJECTS_LISTED
 
 if TYPE_CHECKING:
     from canopen.objectdictionary import ODVariable
@@ -40,7 +39,7 @@ Fits = Callable[[int, int, str], bool]
 
 
 @dataclass(frozen=True, slots=True)
-class _Wanted:
+class Wanted:
     """One object that somebody wants to read."""
 
     component: str
@@ -57,18 +56,22 @@ class Objects:
 
     def __init__(
         self,
+        described: frozenset[str],
         component: ComponentModule,
         loop: Loop,
         parameters: Mapping[str, Parameter],
         silence: Callable[[str], str | None],
         unanswered: Unanswered,
+        ask: "Callable[[Client, Sequence[Wanted]], Future[dict[str, ObjectValue]]]",
     ) -> None:
+        """`described` are the joints and devices; `ask` has objects read in their turn, by `read_all`."""
+        self._described = described
         self._component = component
         self._loop = loop
         self._silence = silence
         self._unanswered = unanswered
         self._parameters = {(one.component, one.object): one for one in parameters.values()}
-        self._reads = Reads[_Wanted, ObjectValue](loop, self._device, self._read_all)
+        self._ask = ask
 
     def listed(self, params: ObjectListParams) -> ObjectList:
         """What the EDS says of those that fit.
@@ -83,7 +86,7 @@ class Objects:
             for variable in description.variables()
             if fits(variable.index, variable.subindex, variable.qualname)
         ]
-        shown = [self._info(params.component, variable) for variable in found[:MOST_LISTED]]
+        shown = [self._info(params.component, variable) for variable in found[:OBJECTS_LISTED]]
         return ObjectList(params.component, shown, len(found) - len(shown))
 
     def read(self, params: ObjectReadParams, client: Client) -> "Future[ObjectValues]":
@@ -91,23 +94,23 @@ class Objects:
         description = self._description(params.component)
         wanted = [self._wanted(params.component, text, description) for text in dict.fromkeys(params.objects)]
         ready = self._component.when_ready({params.component})
-        values = then(ready, lambda _none: self._reads.ask(client, wanted))
+        values = then(ready, lambda _none: self._ask(client, wanted))
         return then(values, partial(ObjectValues, params.component))
 
     # -- what the EDS says -----------------------------------------------------------------------------------
 
     def _description(self, component: str) -> Description:
-        found = self._component.robot.descriptions.get(component)
-        if found is not None:
-            return found
+        descriptions = self._component.robot.descriptions
+        if component in self._described and component in descriptions:
+            return descriptions[component]
         if component in self._component.absent:
             raise refuse(Kind.UNAVAILABLE, f"{component}: {self._component.absent[component]}")
-        known = ", ".join(self._component.robot.descriptions) or "none"
+        known = ", ".join(one for one in descriptions if one in self._described) or "none"
         raise refuse(Kind.UNKNOWN_NAME, f"{component!r} has no object dictionary; those that have: {known}")
 
-    def _wanted(self, component: str, text: str, description: Description) -> _Wanted:
+    def _wanted(self, component: str, text: str, description: Description) -> Wanted:
         index, _, subindex = text.partition(":")
-        wanted = _Wanted(component, int(index, 16), int(subindex))
+        wanted = Wanted(component, int(index, 16), int(subindex))
         if not description.has(wanted.index, wanted.subindex):
             raise refuse(Kind.UNKNOWN_NAME, f"{description.path.name} has no object {wanted.name}")
         return wanted
@@ -131,15 +134,11 @@ class Objects:
 
     # -- what the device holds -------------------------------------------------------------------------------
 
-    def _device(self, wanted: _Wanted) -> str:
-        node = self._node(wanted.component)
-        return wanted.component if node is None else str(id(node))  # of two joints that are one node
-
     def _node(self, component: str) -> Any:
         found: Any = self._component.robot.components.get(component)
         return None if found is None else found.node
 
-    def _read_all(self, wanted: Sequence[_Wanted]) -> "Future[list[ObjectValue]]":
+    def read_all(self, wanted: Sequence[Wanted]) -> "Future[list[ObjectValue]]":
         """For `Reads`: these are of one device."""
         why = {name: self._why_unasked(name) for name in {one.component for one in wanted}}
         asked = [one for one in wanted if why[one.component] is None and self._unreadable(one) is None]
@@ -155,7 +154,7 @@ class Objects:
         return then(back(self._loop, uploads), told)
 
     def _told(
-        self, asked: Sequence[_Wanted], node: Any, told: "Sequence[bytes | DriverError] | Exception"
+        self, asked: Sequence[Wanted], node: Any, told: "Sequence[bytes | DriverError] | Exception"
     ) -> Iterator[ObjectValue]:
         found: list[bytes | Exception] = [told] if isinstance(told, Exception) else [*told]
         last = found[-1]
@@ -168,7 +167,7 @@ class Objects:
         silence = self._silence(component)
         return self._unanswered.why(component) if silence is None else f"{component} is not there: {silence}"
 
-    def _unreadable(self, wanted: _Wanted) -> str | None:
+    def _unreadable(self, wanted: Wanted) -> str | None:
         variable = self._description(wanted.component).variable(wanted.index, wanted.subindex)
         if variable is None or variable.access_type.lower() not in READABLE:
             return "it cannot be read, the EDS says"
@@ -176,10 +175,10 @@ class Objects:
             return "a domain is not read: nobody knows how long it would keep the device busy"
         return None
 
-    def _unread(self, wanted: _Wanted, why: str | None) -> ObjectValue:
+    def _unread(self, wanted: Wanted, why: str | None) -> ObjectValue:
         return ObjectValue(None, "", None, why or self._unreadable(wanted))
 
-    def _value(self, wanted: _Wanted, told: bytes | Exception) -> ObjectValue:
+    def _value(self, wanted: Wanted, told: bytes | Exception) -> ObjectValue:
         from drivers.trace.values import value_of  # for who looks at objects only
 
         if isinstance(told, Exception):

@@ -7,7 +7,7 @@ import pytest
 
 from drivers.errors import DeviceTimeout
 from gateway.modules.control.dictionary import fitting
-from gateway.wire.dictionary import MOST_LISTED, MOST_READ
+from gateway.wire.limits import OBJECTS_READ
 from tests.unit.gateway.harness import DISABLED, ROBOT, Bench, Client, config, serving
 
 EDS = '\nparameters = "eds"\nrelease = ["profile_*"]\n'
@@ -71,11 +71,10 @@ def test_an_object_is_told_with_its_type_limits_and_whether_it_may_be_written(cl
 
 
 def test_what_is_too_much_for_one_answer_is_counted(client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("gateway.modules.control.dictionary.MOST_LISTED", 3)
+    monkeypatch.setattr("gateway.modules.control.dictionary.OBJECTS_LISTED", 3)
     answer = client.call("object.list", component="left_knee", search="0x60*")
     assert len(answer["objects"]) == 3
     assert answer["left_off"] > 10
-    assert MOST_LISTED >= MOST_READ
 
 
 def test_numbers_texts_and_states_are_read(client: Client) -> None:
@@ -129,7 +128,7 @@ def test_a_device_that_is_not_there_is_told(client: Client, bench: Bench) -> Non
         ({"component": "left_knee", "objects": ["0x6041:999"]}, "unknown_name"),
         ({"component": "left_knee", "objects": ["6041"]}, None),
         ({"component": "left_knee", "objects": []}, None),
-        ({"component": "left_knee", "objects": ["0x6041:0"] * (MOST_READ + 1)}, None),
+        ({"component": "left_knee", "objects": ["0x6041:0"] * (OBJECTS_READ + 1)}, None),
     ],
 )
 def test_what_cannot_be_read_is_refused(client: Client, params: dict[str, object], kind: str | None) -> None:
