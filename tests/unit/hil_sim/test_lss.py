@@ -208,12 +208,16 @@ def test_a_device_that_cannot_store_says_so(tmp_path: Path) -> None:
 
 def test_a_device_at_another_bit_rate_is_gone_until_the_bus_follows(tmp_path: Path) -> None:
     line = Line(tmp_path, 5)
+    line.send(0x605, bytes.fromhex("2B 17 10 00 0A 00 00 00"))  # a heartbeat each 10 ms
     line.ask(0x04, 1)
     assert line.ask(0x13, 0, 2) == [word(0x13)]
     line.ask(0x15, 20, 0)
     assert line.ask(0x5E), "until the delay is over"
     line.run(25)
+    line.heard.clear()
     assert line.ask(0x5E) == []
+    line.run(50)
+    assert line.heard == []
     line.bus.bitrate = 500_000
     assert line.ask(0x5E) == [word(0x5E, 5)]
 
