@@ -16,11 +16,17 @@ def unconfigured(master: LssMaster) -> list[Identity]:
     """Find every device without a node id.
 
     Raises:
-        Mismatch: an identity that was found is not confirmed: answers came late, or were lost.
+        Mismatch: an identity that was found is not confirmed: answers came late, or were lost. Or a device
+            without a node id answers, and takes no part in the search.
         Unavailable: the bus is not open.
 
     """
     if not master.begin_scan():
+        if master.is_anybody_unconfigured():
+            raise Mismatch(
+                "a device without a node id answers, and knows no fastscan: give its identity (1018h, often on "
+                "its label), or take all other devices off the bus and say `only`"
+            )
         return []
     identities = [Identity(*numbers) for numbers in _identities(master, ())]
     for identity in identities:

@@ -34,6 +34,7 @@ PARTS = ("vendor", "product", "revision", "serial number")
 _SWITCH_ALL, _NODE_ID, _BIT_TIMING, _STORE = 0x04, 0x11, 0x13, 0x17
 _SWITCH_ONE, _SWITCHED = 0x40, 0x44
 _FASTSCAN, _IDENTIFIED = 0x51, 0x4F
+_IDENTIFY_UNCONFIGURED, _UNCONFIGURED = 0x4C, 0x50
 _INQUIRE, _INQUIRE_NODE_ID = 0x5A, 0x5E
 _REFUSALS = {
     (_NODE_ID, 1): "no node id that it can have",
@@ -140,11 +141,15 @@ class LssMaster:
 
         Those that have turn to number `then`; to a smaller one: the device is to be configured.
         """
-        return self._scan(number, bit, part, then)
+        return self._scan(number, bit, part, then, self._scan_s)
+
+    def is_anybody_unconfigured(self) -> bool:
+        """Whether a device without a node id answers, also one that knows no fastscan (it is older)."""
+        return bool(self._answers(_IDENTIFY_UNCONFIGURED, b"", _UNCONFIGURED, self._timeout_s))
 
     def begin_scan(self) -> bool:
         """Fastscan begins anew, at the vendor: whether there is any unconfigured device."""
-        return self._scan(0, 128, 0, 0)
+        return self._scan(0, 128, 0, 0, self._timeout_s)
 
     # -- what the selected one says ------------------------------------------------------------------------
 
@@ -203,9 +208,9 @@ class LssMaster:
             )
         return answers[0]
 
-    def _scan(self, number: int, bit: int, part: int, then: int) -> bool:
+    def _scan(self, number: int, bit: int, part: int, then: int, timeout_s: float) -> bool:
         content = number.to_bytes(4, "little") + bytes([bit, part, then])
-        return bool(self._answers(_FASTSCAN, content, _IDENTIFIED, self._scan_s))
+        return bool(self._answers(_FASTSCAN, content, _IDENTIFIED, timeout_s))
 
     def _tell(self, command: int, content: bytes) -> None:
         self._answers(command, content, _NOTHING, GAP_S)

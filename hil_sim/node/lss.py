@@ -55,7 +55,8 @@ class Owner(Protocol):
 class Lss:
     """The state machine. `pending` is what becomes active at the next reset of communication.
 
-    With `stores` false the device refuses to store, as some do; with `bitrates` it offers those alone.
+    Without `stores` the device refuses to store, as some do; without `scans` it knows no fastscan, as older ones
+    do not; it offers `bitrates` alone.
     """
 
     def __init__(
@@ -67,7 +68,7 @@ class Lss:
         self.state = State.WAITING
         self.node_id = self.pending_node_id = node_id
         self.bitrate = self.pending_bitrate = bitrate
-        self.stores = True
+        self.stores = self.scans = True
         self.bitrates = frozenset(rate for rate in BITRATES if rate is not None)
         self._selected = 0  # how many numbers of a selective switch were ours
         self._in_range = 0  # likewise, of an identification
@@ -151,6 +152,8 @@ class Lss:
 
     def _fastscan(self, number: int, bit: int, part: int, then: int) -> None:
         if self.pending_node_id != UNCONFIGURED or self.configured or self.state is not State.WAITING:
+            return
+        if not self.scans:
             return
         if bit == _SCAN_BEGINS:
             self._scan_at = 0

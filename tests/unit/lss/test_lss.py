@@ -92,6 +92,15 @@ def test_an_answer_that_is_lost_is_never_an_identity_that_nobody_has(tmp_path: P
         unconfigured(master)
 
 
+def test_a_device_that_knows_no_fastscan_is_not_overlooked(tmp_path: Path) -> None:
+    line = Line(tmp_path, {7: UNCONFIGURED})
+    line.nodes[7].lss.scans = False
+    with master_of(line) as master:
+        with pytest.raises(Mismatch, match="knows no fastscan"):
+            unconfigured(master)
+        assert give_node_id(line, master, inquire(master, None), 6, store=True) == Device(identity(7), 6)
+
+
 # Asking
 
 
