@@ -24,8 +24,8 @@ def unconfigured(master: LssMaster) -> list[Identity]:
     if not master.begin_scan():
         if master.is_anybody_unconfigured():
             raise Mismatch(
-                "a device without a node id answers, and knows no fastscan: give its identity (1018h, often on "
-                "its label), or take all other devices off the bus and say `only`"
+                "a device without a node id answers, and knows no fastscan: give its identity (1018h, often "
+                "on its label), or take all other devices off the bus and say `only`"
             )
         return []
     identities = [Identity(*numbers) for numbers in _identities(master, ())]

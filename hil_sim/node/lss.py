@@ -55,8 +55,8 @@ class Owner(Protocol):
 class Lss:
     """The state machine. `pending` is what becomes active at the next reset of communication.
 
-    Without `stores` the device refuses to store, as some do; without `scans` it knows no fastscan, as older ones
-    do not; it offers `bitrates` alone.
+    Without `stores` the device refuses to store, as some do; without `scans` it knows no fastscan, as some
+    older ones; it offers `bitrates` alone.
     """
 
     def __init__(
