@@ -5,6 +5,7 @@
     ├── Unavailable        the interface, port, file or node is not there (and may come back)
     ├── DeviceTimeout      the device did not answer in time (also a TimeoutError)
     ├── DeviceAbort        the device refused, with a CiA 301 abort code
+    ├── LssRefusal         the device refused, with an error code of CiA 305
     ├── NotPermitted       a write is forbidden now, or nobody knows who would take it; nothing was sent
     └── Mismatch           the device holds another value than the one that was written
 
@@ -34,6 +35,15 @@ class DeviceAbort(DriverError):
     def __init__(self, message: str, abort_code: int) -> None:
         super().__init__(message)
         self.abort_code = abort_code
+
+
+class LssRefusal(DriverError):
+    """The device answered a layer setting service with an error code (CiA 305)."""
+
+    def __init__(self, message: str, error_code: int, specific: int) -> None:
+        super().__init__(message)
+        self.error_code = error_code
+        self.specific = specific  # the maker's own, where the code is 255
 
 
 class NotPermitted(DriverError):

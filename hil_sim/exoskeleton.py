@@ -18,6 +18,7 @@ from hil_sim.gait.posture import STANDING
 from hil_sim.gait.subject import subject
 from hil_sim.gait.timetable import Entry, timetable
 from hil_sim.gait.wearer import Wearer
+from hil_sim.node.lss import UNCONFIGURED
 from hil_sim.node.node import Node
 from hil_sim.sensors.suite import FEET, PERIOD_NS, TRUNK, SensorChoice, SensorSuite
 
@@ -25,6 +26,7 @@ JOINTS = {"left_hip": 1, "left_knee": 2, "left_ankle": 3, "right_hip": 4, "right
 CONTROLLER, CONTROLLER_NODE = "gait", 16
 SENSORS = (*FEET, TRUNK)
 
+SERIAL_NUMBERS = 20_260_000  # that of a drive: and its node id
 DRIVE_EDS = "joint_drive.eds"
 CONTROLLER_EDS = "gait_controller.eds"
 
@@ -51,8 +53,9 @@ class Exoskeleton:
     """A robot and its wearer in simulated time; the same arguments give the same frames and bytes.
 
     The wearer is the subject of number `person`. `drives` gives joints another EDS or DCF than our own
-    drive's. The nodes named in `without` are somebody else's and never switched on. What is in `measured` is
-    called after each cycle of the sensors.
+    drive's. The nodes named in `without` are somebody else's and never switched on; the drives of the joints
+    in `unconfigured` have no node id yet, and wait for LSS. What is in `measured` is called after each cycle
+    of the sensors.
 
     Raises `hil_sim.errors.SimulatorError` for a file that cannot be used, and where the controller would lead
     a drive that is not simulated.
@@ -66,6 +69,7 @@ class Exoskeleton:
         person: int = 0,
         drives: Mapping[str, Path] | None = None,
         without: Collection[str] = (),
+        unconfigured: Collection[str] = (),
     ) -> None:
         _refuse_to_lead_others(without)
         self.without = frozenset(without)
@@ -75,6 +79,8 @@ class Exoskeleton:
         self.bus = CanBus(self.clock)
         files = dict.fromkeys(JOINTS, eds.locate(DRIVE_EDS, None)) | dict(drives or {})
         self.drives = {name: self._drive(name, node_id, files[name]) for name, node_id in JOINTS.items()}
+        for name in unconfigured:
+            self.drives[name].factory_node_id = UNCONFIGURED
         self.controller = self._controller(person)
         self.wearer = Wearer(self.controller.generator)
         self.sensors = SensorSuite(sensors or SensorChoice(), self.clock, self.bus, seed)
@@ -122,7 +128,9 @@ class Exoskeleton:
     def _drive(self, name: str, node_id: int, file: Path) -> JointDrive:
         description = personality.describe(file, node_id)
         start = getattr(STANDING, name.partition("_")[2])
-        return JointDrive(self.clock, self.bus, name, node_id, description, Joint(JointConstants(), start))
+        drive = JointDrive(self.clock, self.bus, name, node_id, description, Joint(JointConstants(), start))
+        drive.number_serially(SERIAL_NUMBERS + node_id)
+        return drive
 
     def _controller(self, person: int) -> GaitController:
         description = eds.load(eds.locate(CONTROLLER_EDS, None), CONTROLLER_NODE)

@@ -23,6 +23,11 @@ STATE_WORDS = {
 }
 
 
+def bits_per_s(frames_per_s: float, bytes_per_s: float) -> float:
+    """What frames with so many bytes of data take of a bus's time, in bits."""
+    return FRAME_BITS * frames_per_s + BYTE_BITS * bytes_per_s
+
+
 class BusHealth:
     """Written by the bus's thread, read by any; the counters are since it was made."""
 
@@ -83,9 +88,7 @@ class BusHealth:
             return
         seconds = (now_ns - before[0]) / 1e9
         self.frames_per_s = (frames - before[1]) / seconds
-        self._judge_load(
-            now_ns, FRAME_BITS * self.frames_per_s + BYTE_BITS * (data_bytes - before[2]) / seconds
-        )
+        self._judge_load(now_ns, bits_per_s(self.frames_per_s, (data_bytes - before[2]) / seconds))
         self._judge_errors(now_ns)
         self._judge_lost(now_ns, dropped - before[3])
 

@@ -24,7 +24,7 @@ KINDS = {
     12: "SDO request",
     14: "heartbeat",
 }
-SYNC_ID = 0x080
+OF_NO_NODE = {0x080: "SYNC", 0x7E4: "LSS", 0x7E5: "LSS"}
 _id_of = itemgetter(1)
 
 
@@ -77,7 +77,7 @@ def kind_of(can_id: int) -> tuple[str, int | None]:
     """Return kind and node of an id."""
     if can_id > STANDARD:
         return OTHER, None
-    if can_id == SYNC_ID:
-        return "SYNC", None
+    if can_id in OF_NO_NODE:
+        return OF_NO_NODE[can_id], None
     kind, node_id = KINDS.get(can_id >> 7, OTHER), can_id & 0x7F
     return (kind, node_id or None) if kind != OTHER else (OTHER, None)

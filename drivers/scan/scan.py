@@ -48,7 +48,7 @@ def scan(settings: CanSettings, seconds: float, wait: Callable[[float], object],
         bus.subscribe(can_id, _taking(traffic, can_id))
     bus.start()
     try:
-        _await_open(bus, wait)
+        await_open(bus, wait)
         began = time.monotonic()
         wait(seconds)
         told: dict[int, Told | str] = {}
@@ -68,7 +68,8 @@ def _taking(traffic: Traffic, can_id: int) -> Callable[[int, bytes], None]:
     return lambda stamp_ns, data: traffic.take(stamp_ns, can_id, data)
 
 
-def _await_open(bus: CanBus, wait: Callable[[float], object]) -> None:
+def await_open(bus: CanBus, wait: Callable[[float], object]) -> None:
+    """Wait until a bus that was started is open; raises `Unavailable`."""
     until = time.monotonic() + OPEN_S
     while not bus.is_open:
         if bus.problem is not None or time.monotonic() > until:

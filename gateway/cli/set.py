@@ -52,7 +52,7 @@ def main(argv: list[str]) -> int:
         "changes",
         metavar="NAME=VALUE[UNIT]",
         nargs="+",
-        type=_change,
+        type=change_of,
         help="in the parameter's own unit, or in another: 3deg, 420mm, 30rpm",
     )
     add_trial(made)
@@ -62,11 +62,12 @@ def main(argv: list[str]) -> int:
     with connect(arguments, "set") as robot:
         description = robot.describe()
         check_names("parameter", [each.name for each in arguments.changes], parameter_names(description))
-        changes = {each.name: _value(each, description) for each in arguments.changes}
+        changes = {each.name: value_of(each, description) for each in arguments.changes}
         return write(robot, changes, description, arguments)
 
 
-def _change(text: str) -> Change:
+def change_of(text: str) -> Change:
+    """Take NAME=VALUE[UNIT] apart; an `argparse` type."""
     found = _CHANGE.fullmatch(text)
     if found is None:
         raise argparse.ArgumentTypeError(
@@ -75,7 +76,7 @@ def _change(text: str) -> Change:
     return Change(found[1], found[2], found[3])
 
 
-def _value(change: Change, description: Description) -> Number:
+def value_of(change: Change, description: Description) -> Number:
     """The value in the parameter's own unit; a whole number as such, so that none of its digits is lost."""
     if change.unit is None and change.number.lstrip("+-").isdecimal() and len(change.number) <= LONGEST:
         whole = int(change.number)

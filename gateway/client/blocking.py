@@ -15,6 +15,7 @@ from gateway.wire.bus import Buses
 from gateway.wire.component import Snapshot
 from gateway.wire.control import JournalEntries, JournalProof
 from gateway.wire.cost import GatewayCost
+from gateway.wire.dictionary import ObjectList, ObjectValues
 from gateway.wire.parameter import Confirmed, ParameterValues, Reverted, Stored, Written
 from gateway.wire.resource import Overruns, ResourceSnapshot, ResourceSnapshotParams
 from gateway.wire.robot import Description, Hello
@@ -133,6 +134,14 @@ class Robot:
     def read(self, *names: str) -> ParameterValues:
         """Parameters (globs; none means all) as the devices hold them now."""
         return self._wait(self._client.read(*names))
+
+    def objects(self, component: str, search: str = "") -> ObjectList:
+        """What an EDS says of a component's objects; `search`: an address, a range, or words of the name."""
+        return self._wait(self._client.objects(component, search))
+
+    def read_objects(self, component: str, *objects: str) -> ObjectValues:
+        """What a device holds of objects such as `0x6041:0` now; at most 64."""
+        return self._wait(self._client.read_objects(component, *objects))
 
     def write(self, changes: Mapping[str, float]) -> Written:
         """Take the lease, change parameters (all or none, read back), give the lease back.

@@ -23,6 +23,14 @@ from gateway.wire.control import (
     TailParams,
 )
 from gateway.wire.cost import GATEWAY_COST, GatewayCost
+from gateway.wire.dictionary import (
+    OBJECT_LIST,
+    OBJECT_READ,
+    ObjectList,
+    ObjectListParams,
+    ObjectReadParams,
+    ObjectValues,
+)
 from gateway.wire.method import Params
 from gateway.wire.parameter import (
     PARAMETER_CONFIRM,
@@ -158,6 +166,15 @@ class Client:
     async def read(self, *names: str) -> ParameterValues:
         """Parameters (globs; none means all) as the devices hold them now."""
         return await self.link.call(PARAMETER_READ, ParameterParams(list(names) or None), WRITE_TIMEOUT_S)
+
+    async def objects(self, component: str, search: str = "") -> ObjectList:
+        """What an EDS says of a component's objects; `search`: an address, a range, or words of the name."""
+        return await self.link.call(OBJECT_LIST, ObjectListParams(component, search))
+
+    async def read_objects(self, component: str, *objects: str) -> ObjectValues:
+        """What a device holds of objects such as `0x6041:0` now; at most 64."""
+        params = ObjectReadParams(component, list(objects))
+        return await self.link.call(OBJECT_READ, params, WRITE_TIMEOUT_S)
 
     async def acquire(self, ttl_s: float = 60.0) -> Lease:
         """Become the one writer for `ttl_s` seconds (at most 300); again to stay it."""

@@ -50,8 +50,8 @@ function _shtab_gwrms_using
   test "$_shtab_gwrms_cmdpath" = "$argv"
 end
 
-set -g _shtab_gwrms_commands gateway install-service keys 'keys pair' 'keys list' 'keys revoke' pair check describe snapshot cost bench blame watch top plot get set params 'params save' 'params compare' 'params apply' store restore journal 'journal tail' 'journal verify' stop reset enable completion docs eds scan sensor 'sensor record' 'sensor replay' 'sensor decode' calibrate 'calibrate insole' 'calibrate imu' collect sessions 'sessions ls' 'sessions show' 'sessions gait' 'sessions resources' 'sessions compare' 'sessions export' label train cloud 'cloud ls' 'cloud du' 'cloud verify' 'cloud mend' 'cloud upload' 'cloud download' 'cloud compact' 'cloud retain' 'cloud vacuum' query models 'models ls' 'models show' 'models promote' 'models rollback' 'models history' 'models export' predict gui evaluate demo sim 'sim run' sim-record sim-fault
-set -g _shtab_gwrms_opts_with_value --activity --adapt-from --author --axes --baud --benchmark --bitrate --bus --channels --clear --cluster --component --config --consent --controller --count --data --days --dir --drive --eds --falling --falls --file --foot --for --format --from --grace --held-out --host --imu --include --insole --instead-of --junit --key --kind --layout --limit --link --look --mark --minutes --model --mounting --name --node-id --notes --on --onnx --operator --out --path --picture --port --pseudo-labels --rate --reason --report --requests --robot --role --run-as --saturation --scale --scenario --schema --script --seconds --seed --serial --session --sort --speed --subject --subjects --table --task --to --trial --truth --url --wearer --who --why --without --witness --write -n
+set -g _shtab_gwrms_commands gateway install-service keys 'keys pair' 'keys list' 'keys revoke' pair check describe snapshot cost bench blame watch top plot get set params 'params save' 'params compare' 'params apply' od store restore journal 'journal tail' 'journal verify' stop reset enable completion docs eds scan lss trace sensor 'sensor record' 'sensor replay' 'sensor decode' calibrate 'calibrate insole' 'calibrate imu' collect sessions 'sessions ls' 'sessions show' 'sessions gait' 'sessions resources' 'sessions compare' 'sessions export' label train cloud 'cloud ls' 'cloud du' 'cloud verify' 'cloud mend' 'cloud upload' 'cloud download' 'cloud compact' 'cloud retain' 'cloud vacuum' query models 'models ls' 'models show' 'models promote' 'models rollback' 'models history' 'models export' predict gui evaluate demo sim 'sim run' sim-record sim-fault
+set -g _shtab_gwrms_opts_with_value --activity --adapt-from --author --axes --baud --benchmark --bitrate --bus --channels --clear --cluster --component --config --consent --controller --count --data --days --dir --drive --eds --falling --falls --file --foot --for --format --from --grace --held-out --host --imu --include --insole --instead-of --junit --key --kind --layout --limit --link --look --mark --minutes --model --mounting --name --new-bitrate --node --node-id --notes --object --on --onnx --operator --out --path --picture --port --pseudo-labels --rate --reason --report --requests --robot --role --run-as --saturation --scale --scenario --schema --script --seconds --seed --serial --session --set --sort --speed --subject --subjects --table --task --timeout --to --trial --truth --unconfigured --url --wearer --who --why --without --witness --write -n
 
 complete -c gwrms -e
 complete -c gwrms -f
@@ -179,6 +179,13 @@ complete -c gwrms -n '_shtab_gwrms_using params apply' -l yes -d 'do not ask'
 complete -c gwrms -n '_shtab_gwrms_using params apply' -l skip -d 'leave out what cannot be changed at all'
 complete -c gwrms -n '_shtab_gwrms_using params apply' -l trial -x -d 'try it for S seconds (at most 300); exit status 0 if kept'
 complete -c gwrms -n '_shtab_gwrms_using params apply; and test $_shtab_gwrms_npos -eq 0' -ka "(__fish_complete_path (commandline -ct))" -d 'a .toml or .dcf file'
+complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a od -d 'Look into a device'"'"'s object dictionary: names, types, limits, values.'
+complete -c gwrms -n '_shtab_gwrms_using od' -s h -l help -d 'show this help message and exit'
+complete -c gwrms -n '_shtab_gwrms_using od' -l robot -x -d 'the gateway to ask (default 127.0.0.1:7420)'
+complete -c gwrms -n '_shtab_gwrms_using od' -l json -d 'one JSON object a line, for machines'
+complete -c gwrms -n '_shtab_gwrms_using od' -l read -d 'ask the device what it holds now'
+complete -c gwrms -n '_shtab_gwrms_using od' -l set -x -d 'write the one object that SEARCH finds; 3deg, 420mm'
+complete -c gwrms -n '_shtab_gwrms_using od' -l trial -x -d 'try it for S seconds (at most 300); exit status 0 if kept'
 complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a store -d 'Make a device keep its parameters as they are now (1010h).'
 complete -c gwrms -n '_shtab_gwrms_using store' -s h -l help -d 'show this help message and exit'
 complete -c gwrms -n '_shtab_gwrms_using store' -l robot -x -d 'the gateway to ask (default 127.0.0.1:7420)'
@@ -233,6 +240,32 @@ complete -c gwrms -n '_shtab_gwrms_using scan' -l active -d 'ask all 127 node id
 complete -c gwrms -n '_shtab_gwrms_using scan' -l eds -xka "(__fish_complete_path (commandline -ct))" -d 'folder of EDS files'
 complete -c gwrms -n '_shtab_gwrms_using scan' -l serial -x -d 'a serial port'
 complete -c gwrms -n '_shtab_gwrms_using scan' -l json -d 'one JSON line a bus or port, for machines'
+complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a lss -d 'Finds CANopen devices that have no node id yet; gives node ids and bit rates (CiA 305).'
+complete -c gwrms -n '_shtab_gwrms_using lss' -s h -l help -d 'show this help message and exit'
+complete -c gwrms -n '_shtab_gwrms_using lss' -l node-id -x -d 'set: the node id that it is to have'
+complete -c gwrms -n '_shtab_gwrms_using lss' -l new-bitrate -xka "1000000 800000 500000 250000 125000 50000 20000 10000" -d 'set: the bit rate that it stores'
+complete -c gwrms -n '_shtab_gwrms_using lss' -l no-store -d 'set: a node id until it is switched off'
+complete -c gwrms -n '_shtab_gwrms_using lss' -l bitrate -x -d 'bit/s of the bus now, for interfaces opened with one'
+complete -c gwrms -n '_shtab_gwrms_using lss' -l seconds -x -d 'how long to listen first (default 3)'
+complete -c gwrms -n '_shtab_gwrms_using lss' -l timeout -x -d 'find: for each answer (default 0.05)'
+complete -c gwrms -n '_shtab_gwrms_using lss' -l anyway -d 'although something is at work on the bus'
+complete -c gwrms -n '_shtab_gwrms_using lss' -l yes -d 'do not ask'
+complete -c gwrms -n '_shtab_gwrms_using lss' -l json -d 'one JSON line, for machines'
+complete -c gwrms -n '_shtab_gwrms_using lss; and test $_shtab_gwrms_npos -eq 0' -ka "find inquire set" -d 'what to do'
+complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a trace -d 'Shows the frames of a CAN bus or of a recording, decoded by EDS. Only listens.'
+complete -c gwrms -n '_shtab_gwrms_using trace' -s h -l help -d 'show this help message and exit'
+complete -c gwrms -n '_shtab_gwrms_using trace' -l robot -xka "(__fish_complete_path (commandline -ct))" -d 'robot'"'"'s file that names nodes and EDS files'
+complete -c gwrms -n '_shtab_gwrms_using trace' -l eds -x -d 'EDS or DCF of a node (again for others)'
+complete -c gwrms -n '_shtab_gwrms_using trace' -l node -x -d 'only this one, by id or name (or again)'
+complete -c gwrms -n '_shtab_gwrms_using trace' -l kind -x -d 'only these: nmt, sync, time, emcy, pdo, sdo, heartbeat, lss, error, other'
+complete -c gwrms -n '_shtab_gwrms_using trace' -l object -x -d 'only 0x6041, 0x1018:4 or '"'"'*position*'"'"''
+complete -c gwrms -n '_shtab_gwrms_using trace' -l write -xka "(__fish_complete_path (commandline -ct))" -d 'what is shown also to *.log or *.pcap'
+complete -c gwrms -n '_shtab_gwrms_using trace' -l quiet -d 'show nothing: with --write'
+complete -c gwrms -n '_shtab_gwrms_using trace' -l load -d 'a table a second: frames and load by node and kind'
+complete -c gwrms -n '_shtab_gwrms_using trace' -l bitrate -x -d 'bit/s, for the load, and for interfaces opened with one'
+complete -c gwrms -n '_shtab_gwrms_using trace' -l seconds -x -d 'end after N seconds (default: Ctrl-C)'
+complete -c gwrms -n '_shtab_gwrms_using trace' -l count -x -d 'end after N frames that are shown'
+complete -c gwrms -n '_shtab_gwrms_using trace' -l json -d 'one JSON line a frame, or a table'
 complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a sensor -d 'Says what is on a serial port, how well it fits, and shows it live.'
 complete -c gwrms -n '_shtab_gwrms_using sensor' -s h -l help -d 'show this help message and exit'
 complete -c gwrms -n '_shtab_gwrms_using sensor' -l baud -x -d 'try this baud rate only'
@@ -514,6 +547,7 @@ complete -c gwrms -n '_shtab_gwrms_using sim' -s h -l help -d 'show this help me
 complete -c gwrms -n '_shtab_gwrms_using sim' -l dir -xka "(__fish_complete_path (commandline -ct))" -d 'folder of this robot; made if needed'
 complete -c gwrms -n '_shtab_gwrms_using sim' -l bus -x -d 'hub (default), or socketcan:NAME for the CAN interface NAME of this computer'
 complete -c gwrms -n '_shtab_gwrms_using sim' -l without -x -d 'joints, and gait, that are not simulated; with commas between them, * for any letters'
+complete -c gwrms -n '_shtab_gwrms_using sim' -l unconfigured -x -d 'joints whose drives have no node id yet: they say nothing until LSS gives them one (gwrms lss)'
 complete -c gwrms -n '_shtab_gwrms_using sim' -l scenario -xka "walk stand sit sit_to_stand stairs_up stairs_down ramp_up ramp_down turn_left turn_right stumble fall day" -d 'default: walk'
 complete -c gwrms -n '_shtab_gwrms_using sim' -l imu -xka "bno08x-rvc microstrain vectornav vectornav-binary witmotion xsens cia410 witmotion-can" -d 'default: witmotion'
 complete -c gwrms -n '_shtab_gwrms_using sim' -l insole -xka "brilliant-star insole-cobs insole-csv insole-frame" -d 'default: insole-cobs'

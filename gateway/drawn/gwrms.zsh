@@ -31,7 +31,9 @@ _shtab_gwrms_commands() {
     journal:'who did what to the robot; is the record whole'
     keys:'on the robot: who is let in, and as what'
     label:'What robot and wearer did in a recorded session.'
+    lss:'Finds CANopen devices that have no node id yet; gives node ids and bit rates (CiA 305).'
     models:'learned models: look at, promote, roll back, export'
+    od:'Look into a device'"'"'s object dictionary: names, types, limits, values.'
     pair:'Pairs this desk with the robot on which `gwrms keys pair` shows CODE: this desk'"'"'s key is made where it'
     params:'parameters as files: save, compare, apply'
     plot:'Channels over time, live, until q, or Ctrl-C.'
@@ -50,6 +52,7 @@ _shtab_gwrms_commands() {
     stop:'Quick stop on every drive, held until gwrms reset. Needs no lease.'
     store:'Make a device keep its parameters as they are now (1010h).'
     top:'One robot in the terminal, live: its joints, feet, trunk, parameters and computer.'
+    trace:'Shows the frames of a CAN bus or of a recording, decoded by EDS. Only listens.'
     train:'A model from recorded sessions and their labels.'
     watch:'Follow channels live, one line for every tick.'
   )
@@ -576,6 +579,25 @@ _shtab_gwrms_label_options=(
 # guard to ensure default positional specs are added only once per session
 _shtab_gwrms_label_defaults_added=0
 
+_shtab_gwrms_lss_options=(
+  "(- : *)"{-h,--help}"[show this help message and exit]"
+  "--node-id[set\: the node id that it is to have]:N:"
+  "--new-bitrate[set\: the bit rate that it stores]:N:(1000000 800000 500000 250000 125000 50000 20000 10000)"
+  "--no-store[set\: a node id until it is switched off]"
+  "--bitrate[bit\/s of the bus now, for interfaces opened with one]:bitrate:"
+  "--seconds[how long to listen first (default 3)]:seconds:"
+  "--timeout[find\: for each answer (default 0.05)]:S:"
+  "--anyway[although something is at work on the bus]"
+  "--yes[do not ask]"
+  "--json[one JSON line, for machines]"
+  ":what to do:(find inquire set)"
+  ":can0, INTERFACE\:CHANNEL, or a robot\'s file with one bus:"
+  ":which one\; not for find:"
+)
+
+# guard to ensure default positional specs are added only once per session
+_shtab_gwrms_lss_defaults_added=0
+
 _shtab_gwrms_models_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
 )
@@ -657,6 +679,20 @@ _shtab_gwrms_models_show_options=(
 
 # guard to ensure default positional specs are added only once per session
 _shtab_gwrms_models_show_defaults_added=0
+
+_shtab_gwrms_od_options=(
+  "(- : *)"{-h,--help}"[show this help message and exit]"
+  "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
+  "--json[one JSON object a line, for machines]"
+  "--read[ask the device what it holds now]"
+  "--set[write the one object that SEARCH finds\; 3deg, 420mm]:VALUE:"
+  "--trial[try it for S seconds (at most 300)\; exit status 0 if kept]:S:"
+  ":a joint or device by name, or a node id:"
+  ":0x6041, 0x1018\:4, 0x60\*, 0x6060-0x607F, 0x6060\…, or words of the name (default\: all):"
+)
+
+# guard to ensure default positional specs are added only once per session
+_shtab_gwrms_od_defaults_added=0
 
 _shtab_gwrms_pair_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
@@ -936,6 +972,7 @@ _shtab_gwrms_sim_options=(
   "--dir[folder of this robot\; made if needed]:DIR:_files"
   "--bus[hub (default), or socketcan\:NAME for the CAN interface NAME of this computer]:BUS:"
   "--without[joints, and gait, that are not simulated\; with commas between them, \* for any letters]:NODES:"
+  "--unconfigured[joints whose drives have no node id yet\: they say nothing until LSS gives them one (gwrms lss)]:JOINTS:"
   "--scenario[default\: walk]:scenario:(walk stand sit sit_to_stand stairs_up stairs_down ramp_up ramp_down turn_left turn_right stumble fall day)"
   "--imu[default\: witmotion]:imu:(bno08x-rvc microstrain vectornav vectornav-binary witmotion xsens cia410 witmotion-can)"
   "--insole[default\: insole-cobs]:insole:(brilliant-star insole-cobs insole-csv insole-frame)"
@@ -1037,6 +1074,26 @@ _shtab_gwrms_top_options=(
 # guard to ensure default positional specs are added only once per session
 _shtab_gwrms_top_defaults_added=0
 
+_shtab_gwrms_trace_options=(
+  "(- : *)"{-h,--help}"[show this help message and exit]"
+  "--robot[robot\'s file that names nodes and EDS files]:FILE:_files"
+  "*--eds[EDS or DCF of a node (again for others)]:NODE=FILE:"
+  "*--node[only this one, by id or name (or again)]:NODE:"
+  "*--kind[only these\: nmt, sync, time, emcy, pdo, sdo, heartbeat, lss, error, other]:KIND:"
+  "*--object[only 0x6041, 0x1018\:4 or \'\*position\*\']:OBJECT:"
+  "--write[what is shown also to \*.log or \*.pcap]:FILE:_files"
+  "--quiet[show nothing\: with --write]"
+  "--load[a table a second\: frames and load by node and kind]"
+  "--bitrate[bit\/s, for the load, and for interfaces opened with one]:bitrate:"
+  "--seconds[end after N seconds (default\: Ctrl-C)]:N:"
+  "--count[end after N frames that are shown]:N:"
+  "--json[one JSON line a frame, or a table]"
+  ":can0, INTERFACE\:CHANNEL of python-can, a robot\'s file with one bus\; or FILE.log, FILE.pcap:"
+)
+
+# guard to ensure default positional specs are added only once per session
+_shtab_gwrms_trace_defaults_added=0
+
 _shtab_gwrms_train_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
@@ -1110,7 +1167,9 @@ _shtab_gwrms() {
         journal) _shtab_gwrms_journal ;;
         keys) _shtab_gwrms_keys ;;
         label) _arguments -C -s $_shtab_gwrms_label_options ;;
+        lss) _arguments -C -s $_shtab_gwrms_lss_options ;;
         models) _shtab_gwrms_models ;;
+        od) _arguments -C -s $_shtab_gwrms_od_options ;;
         pair) _arguments -C -s $_shtab_gwrms_pair_options ;;
         params) _shtab_gwrms_params ;;
         plot) _arguments -C -s $_shtab_gwrms_plot_options ;;
@@ -1129,6 +1188,7 @@ _shtab_gwrms() {
         stop) _arguments -C -s $_shtab_gwrms_stop_options ;;
         store) _arguments -C -s $_shtab_gwrms_store_options ;;
         top) _arguments -C -s $_shtab_gwrms_top_options ;;
+        trace) _arguments -C -s $_shtab_gwrms_trace_options ;;
         train) _arguments -C -s $_shtab_gwrms_train_options ;;
         watch) _arguments -C -s $_shtab_gwrms_watch_options ;;
       esac

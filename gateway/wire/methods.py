@@ -3,11 +3,11 @@
 from collections.abc import Mapping
 from typing import Final
 
-from gateway.wire import bus, component, control, cost, parameter, resource, robot, stop, stream
+from gateway.wire import bus, component, control, cost, dictionary, parameter, resource, robot, stop, stream
 from gateway.wire.method import AnyMethod
 
 METHODS: Final[Mapping[str, AnyMethod]] = {
     method.name: method
-    for group in (robot, cost, resource, component, bus, stream, control, parameter, stop)
+    for group in (robot, cost, resource, component, bus, stream, control, parameter, dictionary, stop)
     for method in group.METHODS
 }

@@ -39,7 +39,10 @@ def _unread_by(peer: tuple[str, int], hub_port: int) -> bool:
 
 
 class _Client:
-    """One connection: `raw` once it wants frames, `held` while they wait for its "< ok >" to be read."""
+    """One connection: `raw` once it wants frames, `held` while they wait for its "< ok >" to be read.
+
+    `remote`: it knows a word for remote frames.
+    """
 
     def __init__(self, connection: socket.socket, peer: tuple[str, int]) -> None:
         self.connection = connection
@@ -49,6 +52,7 @@ class _Client:
         self.blocked = False
         self.raw = False
         self.held = False
+        self.remote = False
 
 
 class Hub:
@@ -115,6 +119,9 @@ class Hub:
                 self.messages_refused += 1
             else:
                 self._bus.send(frame, client)
+        elif command == b"remote":
+            client.remote = True
+            self._say(client, b"< ok >")
         elif command == b"open":
             self._say(client, b"< ok >")
         elif command == b"rawmode":
@@ -142,11 +149,9 @@ class Hub:
     # -- frames ----------------------------------------------------------------------------------------
 
     def _receive(self, frame: Frame, sender: object) -> None:
-        if frame.remote:  # the protocol has no word for them
-            return
         message = b""
         for client in self._clients.values():
-            if client.raw and client is not sender:
+            if client.raw and client is not sender and (client.remote or not frame.remote):
                 message = message or frame_message(frame, self._epoch_s + self._bus.clock.now_s)
                 client.waiting += message
 

@@ -40,6 +40,9 @@ the bus
                    and time of the frames are then those of that bus, and error frames are not simulated. Who
                    has a node id of a simulated one is looked for first and watched for later: then the
                    simulator ends. When the interface goes, it says so, and waits until it is back.
+  --unconfigured JOINTS
+                   drives as their maker sends them: without a node id, silent, found and named by gwrms lss.
+                   What LSS stores is in DIR/stored
   --without NODES  leaves nodes to somebody else: real drives, another controller. The simulated controller
                    enables drives, and leads simulated ones only: without a joint goes without gait
 
@@ -102,8 +105,15 @@ def _interface(text: str) -> str | None:
     return name or None
 
 
+def _joints(text: str) -> list[str]:
+    return _named(text, tuple(JOINTS))
+
+
 def _nodes(text: str) -> list[str]:
-    nodes = (*JOINTS, CONTROLLER)
+    return _named(text, (*JOINTS, CONTROLLER))
+
+
+def _named(text: str, nodes: tuple[str, ...]) -> list[str]:
     left_out = [name for pattern in text.split(",") for name in fnmatch.filter(nodes, pattern.strip())]
     for pattern in text.split(","):
         if not fnmatch.filter(nodes, pattern.strip()):
@@ -133,6 +143,13 @@ def _parser() -> argparse.ArgumentParser:
         default=[],
         metavar="NODES",
         help="joints, and gait, that are not simulated; with commas between them, * for any letters",
+    )
+    parser.add_argument(
+        "--unconfigured",
+        type=_joints,
+        default=[],
+        metavar="JOINTS",
+        help="joints whose drives have no node id yet: they say nothing until LSS gives them one (gwrms lss)",
     )
     parser.add_argument(
         "--scenario", choices=[str(scenario) for scenario in Scenario], default="walk", help="default: walk"
@@ -221,6 +238,7 @@ def main(argv: list[str]) -> int:
         interface=arguments.bus,
         say=running.say,
         without=arguments.without,
+        unconfigured=arguments.unconfigured,
         guard=script.guard,
     )
 

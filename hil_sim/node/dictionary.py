@@ -120,6 +120,17 @@ class Dictionary:
             if entry is not None and number and not entry.value:
                 entry.default = entry.value = number
 
+    def readdress(self, before: Description, after: Description) -> None:
+        """The device has another node id, by which the file gives other defaults."""
+        for entry in self._entries.values():
+            old, new = before.variable(*entry.key), after.variable(*entry.key)
+            if old is None or new is None or (old.default, old.value) == (new.default, new.value):
+                continue
+            given: Value = entry.default if new.default is None else new.default
+            if entry.value == entry.default:
+                entry.value = given
+            entry.default, entry.commissioned = given, new.value
+
     def __getitem__(self, key: Key) -> Entry:
         return self._entries[key]
 

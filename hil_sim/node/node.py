@@ -3,20 +3,23 @@
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator
 
+import eds
 from eds.description import Description
 from hil_sim.bus.can_bus import CanBus, Frame
 from hil_sim.clock import MILLISECOND_NS, Clock
-from hil_sim.node import nmt, pdo
-from hil_sim.node.dictionary import Dictionary, Key
+from hil_sim.node import lss, nmt, pdo
+from hil_sim.node.dictionary import IDENTITY, Dictionary, Key
 from hil_sim.node.emergency import ALL_ERRORS, COMMUNICATION_ERRORS, Emergencies
 from hil_sim.node.guarding import Guarding
 from hil_sim.node.heartbeat import HeartbeatConsumer, HeartbeatProducer
+from hil_sim.node.lss import Lss
 from hil_sim.node.nmt import NmtService, NmtState
 from hil_sim.node.pdos import Pdos
 from hil_sim.node.sdo import SdoServer
 from hil_sim.node.sdo_channel import SdoChannels
 from hil_sim.node.storage import COMMUNICATION, EVERYTHING, Storage
 from hil_sim.node.sync import Sync
+from hil_sim.node.time_stamp import TimeStamp
 
 BOOT_TIME_NS = 50 * MILLISECOND_NS
 
@@ -27,7 +30,11 @@ Handler = Callable[[Frame], None]
 
 
 class Node:
-    """A device with the services of CiA 301; a profile is added by the `_on_…` methods of a subclass."""
+    """A device with the services of CiA 301; a profile is added by the `_on_…` methods of a subclass.
+
+    Where it has no node id yet, `factory_node_id` is `lss.UNCONFIGURED`, and `node_id` the one that the
+    description is for; LSS gives it another.
+    """
 
     def __init__(self, clock: Clock, bus: CanBus, name: str, node_id: int, description: Description) -> None:
         self.clock = clock
@@ -47,7 +54,16 @@ class Node:
         self._guarding = Guarding(clock, dictionary, self._send_state, self._guard_lost, self._guard_back)
         self._sync = Sync(clock, dictionary, self.send, self._synchronise, self._wrong_sync, self._listen)
         self._pdos = Pdos(clock, dictionary, self.send, self._rpdo_error, self._listen)
-        self._sdo = SdoChannels(clock, dictionary, node_id, self.send, self._listen)
+        self._time = TimeStamp(clock, dictionary, self.send, self._listen)
+        self._sdo = SdoChannels(clock, dictionary, lambda: self.node_id, self.send, self._listen)
+        self.factory_node_id = node_id
+        self.lss = Lss(clock, dictionary, _Layer(self), node_id, bus.bitrate)
+
+    def number_serially(self, number: int) -> None:
+        """Give the device its serial number (1018h:4), where it shows one."""
+        entry = self.dictionary.get((IDENTITY, 4))
+        if entry is not None:
+            entry.default = entry.value = number
 
     # -- power and boot --------------------------------------------------------------------------------
 
@@ -55,6 +71,7 @@ class Node:
         """Switch the device on; it says so on the bus when it has booted."""
         self.powered = True
         self.storage.load()
+        self._load_layer_settings()
         self._emergencies.forget()
         self._bus.attach(self, self._receive)
         self._boot(EVERYTHING, boot_ns)
@@ -68,9 +85,13 @@ class Node:
         self.state = NmtState.INITIALISING
         self._on_reset()
 
+    def _load_layer_settings(self) -> None:
+        self.lss.begin(*self.storage.layer_settings(self.factory_node_id, self.lss.bitrate))
+
     def _boot(self, objects: range, boot_ns: int) -> None:
         self._enter(NmtState.INITIALISING)
         self._fall_silent()
+        self._adopt_node_id()
         self.storage.restore(objects)
         self._emergencies.reset(ALL_ERRORS if objects is EVERYTHING else COMMUNICATION_ERRORS)
         if objects is EVERYTHING:
@@ -79,7 +100,17 @@ class Node:
         boot = self._boots
         self.clock.after(boot_ns, lambda: self._booted() if boot == self._boots else None)
 
+    def _adopt_node_id(self) -> None:
+        self.lss.adopt()
+        if self.lss.configured and self.lss.node_id != self.node_id:
+            self.node_id = self.lss.node_id
+            before, self.description = self.description, eds.load(self.description.path, self.node_id)
+            self.dictionary.readdress(before, self.description)
+
     def _booted(self) -> None:
+        if not self.lss.configured:
+            self._take({lss.REQUEST: (self._lss_received,)})
+            return
         self._pdos.load()
         self._listen()
         self._send_heartbeat()
@@ -124,7 +155,7 @@ class Node:
     # -- for the profile -------------------------------------------------------------------------------
 
     def send(self, identifier: int, data: bytes) -> None:
-        if self.powered:  # it may have been switched off by what it is just answering
+        if self.powered and self._hears:  # it may have been switched off by what it is just answering
             self._bus.send(Frame(identifier, data), self)
 
     def watched(self, key: Key) -> bool:
@@ -145,6 +176,11 @@ class Node:
         """The device's CAN controller has left the bus: it acts as 1029h and its profile say."""
         self._communication_error()
 
+    @property
+    def time_of_day(self) -> tuple[int, int] | None:
+        """Milliseconds after midnight and days since 1984, as TIME last said (1012h); `None`: never."""
+        return self._time.taken
+
     # -- for who disturbs it -----------------------------------------------------------------------------
 
     def sdo_channels(self) -> dict[int, int]:
@@ -157,8 +193,13 @@ class Node:
 
     # -- the bus ---------------------------------------------------------------------------------------
 
+    @property
+    def _hears(self) -> bool:
+        """Whether it runs at the bus's bit rate; else its controller is off, and disturbs nobody."""
+        return self.lss.bitrate == self._bus.bitrate
+
     def _receive(self, frame: Frame, _sender: object) -> None:
-        if not frame.extended:
+        if not frame.extended and self._hears:
             for handle in self._handlers.get(frame.cob_id, ()):
                 handle(frame)
 
@@ -177,6 +218,8 @@ class Node:
     def _all_handlers(self) -> Iterator[tuple[int, Handler]]:
         yield nmt.NMT_COB_ID, self._nmt_received
         yield self._sync.cob_id, self._sync_received
+        yield from self._time.handlers()
+        yield lss.REQUEST, self._lss_received
         for node_id in range(1, 128):
             handler = self._guard_received if node_id == self.node_id else self._heartbeat_received
             yield nmt.HEARTBEAT_BASE + node_id, handler
@@ -197,7 +240,8 @@ class Node:
 
     def _rpdo_handler(self, rpdo: pdo.Rpdo) -> Handler:
         def handle(frame: Frame) -> None:
-            if self.state is NmtState.OPERATIONAL and not frame.remote:
+            late = rpdo.synchronous and self._sync.window_over
+            if self.state is NmtState.OPERATIONAL and not (frame.remote or late):
                 rpdo.receive(frame.data)
 
         return handle
@@ -218,9 +262,14 @@ class Node:
         if service in nmt.STATE_AFTER:
             self._enter(nmt.STATE_AFTER[service])
         elif service == NmtService.RESET_NODE:
+            self._load_layer_settings()
             self._boot(EVERYTHING, BOOT_TIME_NS)
         elif service == NmtService.RESET_COMMUNICATION:
-            self._boot(COMMUNICATION, BOOT_TIME_NS)
+            self.reset_communication()
+
+    def reset_communication(self) -> None:
+        """What LSS has left pending becomes active."""
+        self._boot(COMMUNICATION, BOOT_TIME_NS)
 
     def _enter(self, state: NmtState) -> None:
         before, self.state = self.state, state
@@ -232,6 +281,7 @@ class Node:
             self._stop_communicating()
         elif before not in nmt.COMMUNICATING:
             self._sync.start()
+            self._time.start()
         if state is NmtState.OPERATIONAL:
             self._pdos.start()
         self._on_state(before)
@@ -241,8 +291,16 @@ class Node:
 
     def _stop_communicating(self) -> None:
         self._sync.stop()
+        self._time.stop()
         self._emergencies.silence()
         self._sdo.reset()
+
+    # -- LSS -------------------------------------------------------------------------------------------
+
+    def _lss_received(self, frame: Frame) -> None:
+        """Not while it is operational, as strict devices have it."""
+        if self.state is not NmtState.OPERATIONAL and not frame.remote:
+            self.lss.received(frame.data)
 
     # -- SYNC and PDOs ---------------------------------------------------------------------------------
 
@@ -307,3 +365,22 @@ class Node:
         behaviour = self.dictionary.number(nmt.ERROR_BEHAVIOUR)
         if self.state is NmtState.OPERATIONAL and behaviour in nmt.STATE_AFTER_ERROR:
             self._enter(nmt.STATE_AFTER_ERROR[behaviour])
+
+
+class _Layer:
+    """What LSS does to its device."""
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+
+    def tell(self, data: bytes) -> None:
+        self._node.send(lss.ANSWER, data)
+
+    def keep(self, node_id: int, bitrate: int) -> None:
+        self._node.storage.keep_layer_settings(node_id, bitrate)
+
+    def node_id_given(self) -> None:
+        self._node.reset_communication()
+
+    def bitrate_changed(self) -> None:
+        """Whether it hears and is heard is asked at each frame."""

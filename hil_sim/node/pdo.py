@@ -162,6 +162,10 @@ class Rpdo:
         self._waiting: bytes | None = None
         self.wrong: set[int] = set()  # the errors that were reported and are not over
 
+    @property
+    def synchronous(self) -> bool:
+        return self._type in SYNCHRONOUS
+
     def stop(self) -> None:
         self._waiting = None
         if self._deadline is not None:
@@ -178,7 +182,7 @@ class Rpdo:
             self._watch()
         if len(data) < length:
             return
-        if self._type in SYNCHRONOUS:
+        if self.synchronous:
             self._waiting = data
         else:
             self._mapping.unpack(data)

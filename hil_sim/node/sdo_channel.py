@@ -29,7 +29,7 @@ class SdoChannels:
         self,
         clock: Clock,
         dictionary: Dictionary,
-        node_id: int,
+        node_id: Callable[[], int],
         send: Callable[[int, bytes], None],
         moved: Callable[[], None],
     ) -> None:
@@ -61,4 +61,4 @@ class SdoChannels:
 
     def _cob_id(self, index: int, subindex: int) -> int:
         default = _DEFAULTS.get((index, subindex), cob_id.INVALID)
-        return self._dictionary.number((index, subindex)) or default + self._node_id
+        return self._dictionary.number((index, subindex)) or default + self._node_id()

@@ -1,4 +1,4 @@
-"""Store and restore of parameters: 1010h, 1011h (CiA 301 §7.5.2.13, §7.5.2.14)."""
+"""Store and restore of parameters: 1010h, 1011h (CiA 301 §7.5.2.13, §7.5.2.14), and what LSS stores."""
 
 from contextlib import suppress
 
@@ -16,6 +16,7 @@ EVERYTHING = range(0x1000, 0x10000)
 COMMUNICATION = range(0x1000, 0x2000)
 MANUFACTURER = range(0x2000, 0x6000)
 APPLICATION = range(0x6000, 0xA000)
+_LSS_NODE_ID, _LSS_BITRATE = (0, 1), (0, 2)  # among what is kept: index 0 is no object, and no group of any
 _GROUPS = {1: EVERYTHING, 2: COMMUNICATION, 3: APPLICATION}  # by sub-index; above are the manufacturer's
 
 
@@ -44,6 +45,17 @@ class Storage:
             if entry.key in self._kept:
                 with suppress(SdoAbort):  # kept by an older description of the device
                     entry.value = decode(entry.data_type, self._kept[entry.key])
+
+    def layer_settings(self, node_id: int, bitrate: int) -> tuple[int, int]:
+        """Return node id and bit rate as LSS has stored them; those given where it never did."""
+        kept = (self._kept.get(_LSS_NODE_ID), self._kept.get(_LSS_BITRATE))
+        numbers = [None if data is None else int.from_bytes(data, "little") for data in kept]
+        return numbers[0] or node_id, numbers[1] or bitrate
+
+    def keep_layer_settings(self, node_id: int, bitrate: int) -> None:
+        """Store them (CiA 305); raises `OSError` where they cannot be."""
+        given = {_LSS_NODE_ID: bytes([node_id]), _LSS_BITRATE: bitrate.to_bytes(4, "little")}
+        self._keep({**self._kept, **given})
 
     def _parameters(self, objects: range) -> list[Entry]:
         return [

@@ -1,4 +1,4 @@
-"""SYNC: taking it, and making it where the device is its producer (CiA 301 §7.2.5)."""
+"""SYNC: taking it, its window, and making it where the device is its producer (CiA 301 §7.2.5)."""
 
 from collections.abc import Callable
 
@@ -9,6 +9,7 @@ from hil_sim.node.dictionary import Dictionary, Value
 
 COB_ID = (0x1005, 0)
 CYCLE_PERIOD = (0x1006, 0)
+WINDOW = (0x1007, 0)  # µs after a SYNC in which synchronous PDOs count; 0: until the next
 COUNTER_OVERFLOW = (0x1019, 0)
 
 _DEFAULT_COB_ID = 0x80
@@ -38,16 +39,24 @@ class Sync:
         self._moved = moved
         self._timer: Repeating | None = None
         self._counter = 0
+        self._arrived_ns = clock.now_ns
         self._guard()
 
     @property
     def cob_id(self) -> int:
         return self._dictionary.number(COB_ID, _DEFAULT_COB_ID) & cob_id.IDENTIFIER
 
+    @property
+    def window_over(self) -> bool:
+        """Whether it is too late for a synchronous PDO until the next SYNC."""
+        window_us = self._dictionary.number(WINDOW)
+        return bool(window_us) and self._clock.now_ns - self._arrived_ns > window_us * 1000
+
     def received(self, data: bytes) -> None:
         if len(data) != bool(self._dictionary.number(COUNTER_OVERFLOW)):
             self._wrong_length()
         else:
+            self._arrived_ns = self._clock.now_ns
             self._arrived(data[0] if data else None)
 
     def start(self) -> None:
@@ -66,6 +75,7 @@ class Sync:
     def _produce(self) -> None:
         overflow = self._dictionary.number(COUNTER_OVERFLOW)
         counter = self._counter = self._counter % overflow + 1 if overflow else 0
+        self._arrived_ns = self._clock.now_ns
         self._send(self.cob_id, bytes([counter]) if overflow else b"")
         self._arrived(counter or None)
 

@@ -79,7 +79,7 @@ class RecordedNode:
         for key, data in reversed([shown for frame in sdo if (shown := self._shown(frame)) is not None]):
             self.dictionary.learn(key, data)
         self._pdos = self._mappings()
-        channels = SdoChannels(bus.clock, self.dictionary, node_id, self._send, lambda: None)
+        channels = SdoChannels(bus.clock, self.dictionary, lambda: node_id, self._send, lambda: None)
         self._servers = {channel.request: channel.server for channel in channels.channels()}
         bus.attach(self, self._receive)
 

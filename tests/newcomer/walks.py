@@ -13,6 +13,7 @@ WALKS: Final[Mapping[str, tuple[str, ...]]] = {
         "how-to/install.md",
         "how-to/first-robot.md",
         "how-to/wire-a-joint.md",
+        "how-to/look-at-a-bus.md",
         "how-to/wire-a-sensor.md",
         "how-to/check-files.md",
         "how-to/run-as-a-service.md",
@@ -40,6 +41,9 @@ PASSED: Final[Mapping[str, tuple[str, ...]]] = {
     INTEGRATOR: (
         "pip install",
         "gwrms eds ",
+        "gwrms lss ",
+        "gwrms trace ",
+        "gwrms od ",
         "gwrms sensor ",
         "gwrms calibrate imu ",
         "gwrms check ",

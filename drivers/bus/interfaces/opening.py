@@ -10,7 +10,8 @@ from drivers.errors import Unavailable
 def _socketcand(settings: CanSettings) -> Transport:
     from drivers.bus.interfaces.socketcand import SocketcandTransport
 
-    return SocketcandTransport(*_address(settings), str(settings.channel))
+    remote_frames = settings.more.get("remote_frames") is True
+    return SocketcandTransport(*_address(settings), str(settings.channel), remote_frames=remote_frames)
 
 
 def _address(settings: CanSettings) -> tuple[str, int]:

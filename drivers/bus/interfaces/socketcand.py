@@ -9,11 +9,12 @@ import socket
 import time
 from collections.abc import Sequence
 
-from drivers.bus.frames import ERROR, EXTENDED, REMOTE, Frame
+from drivers.bus.frames import ERROR, EXTENDED, REMOTE, STANDARD_IDS, Frame
 from drivers.errors import Unavailable
 
 CONNECT_TIMEOUT_S = 1.0
 RECEIVE_BYTES = 65536
+REMOTE_WORD = "R"  # of the simulator's hub; the protocol has none
 MAX_PENDING = 4096  # characters without the end of a message: not socketcand
 
 
@@ -46,6 +47,8 @@ def frame_of(message: str, stamp_ns: int) -> Frame | None:
     ` error 088 1234.5 ` is an error frame, of which the protocol tells no more than its class.
     """
     words = message.split()
+    if len(words) == 4 and words[0] == "frame" and words[3] == REMOTE_WORD:
+        return _remote_frame(words[1], stamp_ns)
     if len(words) == 3 and words[0] == "error":
         return _error_frame(words[1], stamp_ns)
     if len(words) < 3 or words[0] != "frame":
@@ -69,23 +72,33 @@ def _error_frame(error_class: str, stamp_ns: int) -> Frame | None:
     return (stamp_ns, found & (ERROR - 1) | ERROR, b"") if found > 0 else None
 
 
+def _remote_frame(identifier: str, stamp_ns: int) -> Frame | None:
+    found = frame_of(f" frame {identifier} 0 ", stamp_ns)
+    return None if found is None else (stamp_ns, found[1] | REMOTE, b"")
+
+
 def send_message(can_id: int, data: bytes) -> str:
     """The line that sends a frame."""
-    identifier = f"{can_id & 0x1FFF_FFFF:08X}" if can_id & EXTENDED else f"{can_id:03X}"
-    return f"< send {identifier} {len(data)} {data.hex(' ')} >"
+    identifier = f"{can_id & 0x1FFF_FFFF:08X}" if can_id & EXTENDED else f"{can_id & STANDARD_IDS:03X}"
+    content = REMOTE_WORD if can_id & REMOTE else f"{len(data)} {data.hex(' ')}"
+    return f"< send {identifier} {content} >"
 
 
 class SocketcandTransport:
-    """An open connection to one CAN channel of a socketcand server."""
+    """An open connection to one CAN channel of a socketcand server.
+
+    With `remote_frames` it must know a word for these, as the simulator's hub does.
+    """
 
     blocks = False
 
-    def __init__(self, host: str, port: int, channel: str) -> None:
+    def __init__(self, host: str, port: int, channel: str, *, remote_frames: bool = False) -> None:
         """Connect and enter raw mode; raises `Unavailable`."""
         self.dropped = 0  # messages that were no frames
         self.warning: str | None = None
         self._where = f"socketcand at {host}:{port}"
         self.full = f"{self._where} takes no frames: is the CAN server, or the network to it, stuck?"
+        self._remote_frames = remote_frames
         self._unsent = b""  # of a frame that was taken
         self._parser = SocketcandParser()
         self._early: list[str] = []
@@ -125,8 +138,11 @@ class SocketcandTransport:
         return frames
 
     def try_send(self, can_id: int, data: bytes) -> bool:
-        if can_id & REMOTE:
-            raise Unavailable(f"{self._where}: the protocol has no remote frames, so no node guarding")
+        if can_id & REMOTE and not self._remote_frames:
+            raise Unavailable(
+                f"{self._where}: the protocol has no remote frames, so no node guarding; the simulator's hub "
+                "has them for who says remote_frames = true"
+            )
         if not self.flush():
             return False
         line = send_message(can_id, data).encode("ascii")
@@ -177,6 +193,9 @@ class SocketcandTransport:
     def _handshake(self, channel: str) -> None:
         deadline = time.monotonic() + CONNECT_TIMEOUT_S
         self._expect("hi", deadline)
+        if self._remote_frames:
+            self._socket.sendall(b"< remote >")
+            self._expect("ok", deadline)
         for request in (f"< open {channel} >", "< rawmode >"):
             self._socket.sendall(request.encode("ascii"))
             self._expect("ok", deadline)

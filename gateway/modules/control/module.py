@@ -34,6 +34,14 @@ from gateway.wire.control import (
     ReleaseParams,
     TailParams,
 )
+from gateway.wire.dictionary import (
+    OBJECT_LIST,
+    OBJECT_READ,
+    ObjectList,
+    ObjectListParams,
+    ObjectReadParams,
+    ObjectValues,
+)
 from gateway.wire.method import Done, Params
 from gateway.wire.parameter import (
     PARAMETER_CONFIRM,
@@ -109,6 +117,8 @@ class ControlModule:
             on(PARAMETER_REVERT, self._revert),
             on(PARAMETER_STORE, self._store),
             on(PARAMETER_RESTORE, self._restore),
+            on(OBJECT_LIST, self._objects),
+            on(OBJECT_READ, self._read_objects),
             on(ROBOT_STOP, self._stop_asked),
             on(ROBOT_RESET, self._reset),
             on(ROBOT_ENABLE, self._enable),
@@ -218,6 +228,12 @@ class ControlModule:
 
     def _restore(self, session: "Session", params: ComponentParams) -> "Future[Stored]":
         return self._tuning.store(RESTORING, session, params.component)
+
+    def _objects(self, _session: "Session", params: ObjectListParams) -> ObjectList:
+        return self._tuning.objects.listed(params)
+
+    def _read_objects(self, session: "Session", params: ObjectReadParams) -> "Future[ObjectValues]":
+        return self._tuning.objects.read(params, session)
 
     def _stop_asked(self, session: "Session", params: StopParams) -> "Future[Stopped]":
         return self.stop_robot(session.who, str(params.reason))

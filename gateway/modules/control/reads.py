@@ -1,4 +1,4 @@
-"""Whose parameters are read next: a few objects of a few devices at a time, in turn between the clients.
+"""Whose objects are read next: a few objects of a few devices at a time, in turn between the clients.
 
 Everything that a robot offers is a thousand transfers on its buses, and a client may ask for it again and
 again. So what is asked waits here as it was asked, and not as a thousand jobs before the devices: a write
@@ -12,54 +12,58 @@ from collections.abc import Callable, Container, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Final
+from typing import Final, Generic, Protocol, TypeVar
 
 from gateway.connections.turns import Client, Turns
-from gateway.modules.control.parameters import Parameter
 from gateway.process.futures import done, outcome, then
 from gateway.process.loop import Loop
-from gateway.wire.parameter import ParameterValue, ParameterValues
 
 DEVICES: Final = 2  # that are read at the same time; such as keep us waiting do not count
 OBJECTS: Final = 8  # of one device in a row
 SLOW_S: Final = 0.2  # a device that takes longer for these
 
-Values = list[ParameterValue]
-ReadAll = Callable[[Sequence[Parameter]], "Future[Values]"]
-DeviceOf = Callable[[Parameter], str]
+
+class Named(Protocol):
+    """What is read: a parameter, or an object."""
+
+    @property
+    def name(self) -> str: ...
+
+
+P = TypeVar("P", bound=Named)
+V = TypeVar("V")  # what is told of each
 
 
 @dataclass(slots=True, eq=False)
-class _Reading:
+class _Reading(Generic[P, V]):
     """One request."""
 
-    chosen: Sequence[Parameter]
-    device_of: DeviceOf
-    answer: "Future[ParameterValues]" = field(default_factory=Future)
-    values: dict[str, ParameterValue] = field(default_factory=dict)
-    _left: dict[str, deque[Parameter]] | None = None  # by device; only once it is this one's turn
+    chosen: Sequence[P]
+    device_of: Callable[[P], str]
+    answer: "Future[dict[str, V]]" = field(default_factory=Future)
+    values: dict[str, V] = field(default_factory=dict)
+    _left: dict[str, deque[P]] | None = None  # by device; only once it is this one's turn
 
     def free(self, busy: Container[str]) -> str | None:
         """A device that is to be read, and is not being read."""
         return next((name for name, left in self._by_device().items() if left and name not in busy), None)
 
-    def take(self, device: str) -> list[Parameter]:
+    def take(self, device: str) -> list[P]:
         """What is to be read of it now."""
         left = self._by_device()[device]
         return [left.popleft() for _ in range(min(OBJECTS, len(left)))]
 
-    def put(self, taken: Sequence[Parameter], values: Values) -> None:
+    def put(self, taken: Sequence[P], values: Sequence[V]) -> None:
         """These have these values; when it has all, it is answered in the order in which it was asked."""
         self.values.update((one.name, value) for one, value in zip(taken, values, strict=True))
         if len(self.values) == len(self.chosen) and not self.answer.done():
-            found = {one.name: self.values[one.name] for one in self.chosen}
-            self.answer.set_result(ParameterValues(found))
+            self.answer.set_result({one.name: self.values[one.name] for one in self.chosen})
 
     def fail(self, error: Exception) -> None:
         if not self.answer.done():
             self.answer.set_exception(error)
 
-    def _by_device(self) -> dict[str, deque[Parameter]]:
+    def _by_device(self) -> dict[str, deque[P]]:
         if self._left is None:
             self._left = {}
             for one in self.chosen:
@@ -67,22 +71,24 @@ class _Reading:
         return self._left
 
 
-class Reads:
+class Reads(Generic[P, V]):
     """One robot's. It belongs to the loop's thread. `read_all` reads these parameters of one device."""
 
-    def __init__(self, loop: Loop, device_of: DeviceOf, read_all: ReadAll) -> None:
+    def __init__(
+        self, loop: Loop, device_of: Callable[[P], str], read_all: "Callable[[Sequence[P]], Future[list[V]]]"
+    ) -> None:
         self._loop = loop
         self._device_of = device_of
         self._read_all = read_all
-        self._turns = Turns[_Reading]()
+        self._turns = Turns[_Reading[P, V]]()
         self._busy: dict[str, float] = {}  # devices, and since when
         self._slow: set[str] = set()
 
-    def ask(self, client: Client, chosen: Sequence[Parameter]) -> "Future[ParameterValues]":
+    def ask(self, client: Client, chosen: Sequence[P]) -> "Future[dict[str, V]]":
         """Read these, after what this client has asked for before."""
         if not chosen:
-            return done(ParameterValues({}))
-        reading = _Reading(chosen, self._device_of)
+            return done({})
+        reading = _Reading[P, V](chosen, self._device_of)
         self._turns.add(client, reading)
         self._go_on()
         return reading.answer
@@ -94,7 +100,7 @@ class Reads:
                 return
             self._begin(*following)
 
-    def _begin(self, client: Client, reading: _Reading, device: str) -> None:
+    def _begin(self, client: Client, reading: _Reading[P, V], device: str) -> None:
         taken = reading.take(device)
         self._busy[device] = time.monotonic()
         ended = partial(self._end, client, reading, device, taken)
@@ -104,10 +110,10 @@ class Reads:
     def _end(
         self,
         client: Client,
-        reading: _Reading,
+        reading: _Reading[P, V],
         device: str,
-        taken: Sequence[Parameter],
-        found: "Future[Values]",
+        taken: Sequence[P],
+        found: "Future[list[V]]",
     ) -> None:
         is_slow = time.monotonic() - self._busy.pop(device) > SLOW_S
         (self._slow.add if is_slow else self._slow.discard)(device)

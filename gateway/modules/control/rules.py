@@ -7,7 +7,7 @@ the allowed states of the drives that they may move.
 import time
 from collections.abc import Collection, Iterable, Mapping
 from concurrent.futures import Future
-from typing import Any
+from typing import Any, Protocol
 
 from drivers.bus.settings import DeviceSettings
 from drivers.bus.values import unsigned
@@ -25,6 +25,13 @@ from gateway.records.undo import UndoChange
 from gateway.wire.framing import Kind
 
 Known = tuple[DriveState | None, str]  # a drive's state; in words where that is from, or why it is not known
+
+
+class OfComponent(Protocol):
+    """A parameter, or an object."""
+
+    @property
+    def component(self) -> str: ...
 
 
 class OutOfReach(Exception):
@@ -50,10 +57,10 @@ class Rules:
         device = self._devices[parameter.component]
         return device.bus, device.node_id, parameter.index, parameter.subindex
 
-    def device(self, parameter: Parameter) -> str:
+    def device(self, of: OfComponent) -> str:
         """What is one device is one name, whichever tables of the robot's file describe it."""
-        bus, node_id, _index, _subindex = self.address(parameter)
-        return f"node {node_id} on {bus}"
+        device = self._devices[of.component]
+        return f"node {device.node_id} on {device.bus}"
 
     def node(self, parameter: Parameter) -> Node:
         """Raises `RpcError` (unavailable) where its device could not be built."""

@@ -19,6 +19,7 @@ from gateway.config.robot import RobotConfig
 from gateway.connections.turns import Client
 from gateway.modules.component.module import ComponentModule
 from gateway.modules.control.catalogue import resolve
+from gateway.modules.control.dictionary import Objects, Wanted
 from gateway.modules.control.ledger import WriteLedger
 from gateway.modules.control.objects import Change, Node, device_error
 from gateway.modules.control.parameters import Parameter
@@ -85,8 +86,11 @@ class Tuning:
         self._infos = [one.info for one in self._parameters.values()]
         self._joints = tuple(config.joint)
         self._rules = Rules(config, component, self._parameters)
-        self._reads = Reads(loop, self._rules.device, self._read_all)
+        self._reads: Reads[Parameter | Wanted, Any] = Reads(loop, self._rules.device, self._read_any)
         self._unanswered = Unanswered()
+        described = frozenset({*config.joint, *config.device})
+        silence, ask = self._rules.silence, self._reads.ask
+        self.objects = Objects(described, component, loop, self._parameters, silence, self._unanswered, ask)
         self._known: dict[str, tuple[int, float]] = {}  # parameter → when, what the device held
         self._asked: set[_Asked] = set()  # writes that have not been answered
         self._ending: str | None = None
@@ -148,7 +152,8 @@ class Tuning:
         """What the devices hold now; where one does not tell, `problem` says why."""
         chosen = self._parameters.chosen(names)
         ready = self._component.when_ready({one.component for one in chosen})
-        return then(ready, lambda _none: self._reads.ask(client, chosen))
+        values = then(ready, lambda _none: self._reads.ask(client, chosen))
+        return then(values, ParameterValues)
 
     def write(
         self, values: Mapping[str, float], session: "Session", trial_s: float | None
@@ -201,8 +206,14 @@ class Tuning:
         stamp_ns, value = self._known.get(parameter.name, (None, None)) if problem is None else (None, None)
         return _value(parameter, value, stamp_ns, problem)
 
+    def _read_any(self, chosen: "Sequence[Parameter | Wanted]") -> "Future[list[Any]]":
+        """For `Reads`: these are of one request, which is for parameters or for objects."""
+        parameters = [one for one in chosen if isinstance(one, Parameter)]
+        objects = [one for one in chosen if isinstance(one, Wanted)]
+        return self._read_all(parameters) if parameters else self.objects.read_all(objects)
+
     def _read_all(self, parameters: Sequence[Parameter]) -> "Future[list[ParameterValue]]":
-        """For `Reads`: these are of one device. What cannot be asked of it says why."""
+        """These are of one device. What cannot be asked of it says why."""
         why = {name: self._why_unasked(name) for name in {one.component for one in parameters}}
         refusals = ((one.name, self._refusal(one, why[one.component])) for one in parameters)
         refused = {name: refusal for name, refusal in refusals if refusal is not None}

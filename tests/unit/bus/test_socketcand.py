@@ -211,6 +211,22 @@ def test_a_remote_frame_is_refused_in_words() -> None:
         transport.close()
 
 
+def test_a_server_that_knows_remote_frames_is_told_first_and_gets_them() -> None:
+    with server(b"< hi >", b"< ok >", b"< ok >", b"< ok >< frame 702 1.0 R >", keep_open=True) as port:
+        transport = SocketcandTransport("127.0.0.1", port, "can0", remote_frames=True)
+        assert [frame[1:] for frame in receive(transport)] == [(0x702 | REMOTE, b"")]
+        assert transport.try_send(0x702 | REMOTE, b"")
+        transport.close()
+    assert send_message(0x702 | REMOTE, b"") == "< send 702 R >"
+    assert frame_of(" frame 7G2 1.0 R ", 0) is None
+
+
+def test_a_server_that_knows_no_remote_frames_says_so() -> None:
+    words = b"< error unknown command >"
+    with server(b"< hi >", words) as port, pytest.raises(Unavailable, match="'error unknown command'"):
+        SocketcandTransport("127.0.0.1", port, "can0", remote_frames=True)
+
+
 def test_a_server_that_does_not_greet_is_named() -> None:
     with server(b"< h", b"", keep_open=True) as port, pytest.raises(Unavailable, match="did not answer 'hi'"):
         SocketcandTransport("127.0.0.1", port, "can0")

@@ -22,7 +22,9 @@ SECOND_NS = 1_000_000_000
         (0x583, "SDO answer", 3),
         (0x603, "SDO request", 3),
         (0x704, "heartbeat", 4),
-        (0x7E5, "other", None),
+        (0x7E4, "LSS", None),
+        (0x7E5, "LSS", None),
+        (0x7F0, "other", None),
         (0x1234567, "other", None),
     ],
 )

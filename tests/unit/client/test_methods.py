@@ -19,6 +19,8 @@ ARGUMENTS: dict[str, tuple[Any, ...]] = {
     "revert": (1,),
     "store": ("gait",),
     "restore": ("gait",),
+    "objects": ("gait",),
+    "read_objects": ("gait", "0x2001:0"),
     "stop": ("test",),
 }
 # What asyncio has and blocking calls do by themselves, or in another form.

@@ -38,6 +38,8 @@ EXAMPLES: dict[str, dict[str, Any]] = {
     "parameter.revert": {"write": 1},
     "parameter.store": {"component": "gait"},
     "parameter.restore": {"component": "gait"},
+    "object.list": {"component": "gait", "search": "0x2001"},
+    "object.read": {"component": "gait", "objects": ["0x2001:0"]},
 }
 
 

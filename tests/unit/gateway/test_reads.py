@@ -98,13 +98,13 @@ def test_it_is_answered_once_all_is_there_in_the_order_that_was_asked_for(bench:
     while bench.asked:
         assert not answer.done()
         bench.answer()
-    values = answer.result(0).values
+    values = answer.result(0)
     assert list(values) == [one.name for one in chosen]
     assert all(values[one.name] == _value(one.name) for one in chosen)
 
 
 def test_nothing_asked_for_is_answered_at_once(bench: _Bench) -> None:
-    assert bench.reads.ask(_Client("a"), []).result(0).values == {}
+    assert bench.reads.ask(_Client("a"), []).result(0) == {}
 
 
 def test_one_that_asks_for_everything_again_and_again_does_not_keep_another_waiting(bench: _Bench) -> None:
@@ -175,7 +175,7 @@ def test_an_unforeseen_error_is_its_own_requests_and_the_next_goes_on(bench: _Be
     bench.turn()
     assert isinstance(first.exception(0), ZeroDivisionError)
     bench.answer()
-    assert second.result(0).values
+    assert second.result(0)
 
 
 def test_two_errors_of_one_request_are_one_answer_and_the_next_goes_on(bench: _Bench) -> None:
@@ -187,7 +187,7 @@ def test_two_errors_of_one_request_are_one_answer_and_the_next_goes_on(bench: _B
     bench.turn()
     assert isinstance(first.exception(0), ZeroDivisionError)
     bench.answer()
-    assert second.result(0).values
+    assert second.result(0)
 
 
 def test_a_device_whose_reading_cannot_begin_is_not_busy_for_ever(bench: _Bench) -> None:
@@ -198,4 +198,4 @@ def test_a_device_whose_reading_cannot_begin_is_not_busy_for_ever(bench: _Bench)
     bench.refuses = False
     second = bench.reads.ask(_Client("a"), _of("left_hip", 1))
     bench.answer()
-    assert second.result(0).values
+    assert second.result(0)

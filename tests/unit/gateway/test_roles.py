@@ -21,7 +21,7 @@ VIEWERS = {
     "hello", "clock.read", "robot.describe", "gateway.cost", "resource.snapshot", "resource.overruns",
     "component.snapshot", "bus.snapshot", "status.snapshot", "stream.start", "stream.stop", "journal.tail",
     "journal.head",
-    "parameter.list", "parameter.read", "robot.stop",
+    "parameter.list", "parameter.read", "object.list", "object.read", "robot.stop",
 }  # fmt: skip
 OPERATORS = VIEWERS | {
     "control.acquire", "control.release", "parameter.write", "parameter.confirm", "parameter.revert",

@@ -202,6 +202,27 @@ def test_the_handshake_word_for_word(running: Running) -> None:
         assert text.startswith((b"< frame 181 ", b"< frame 080 "))
 
 
+def test_remote_frames_pass_between_who_knows_them_and_the_bus(running: Running) -> None:
+    with connect(running) as knows, connect(running) as knows_not:
+        for client, words in (
+            (knows, b"< remote >< open sim >< rawmode >"),
+            (knows_not, b"< open sim >< rawmode >"),
+        ):
+            assert client.recv(6) == b"< hi >"
+            client.sendall(words)
+        knows_not.sendall(b"< send 705 R >")
+        text = b""
+        while b"< frame 705 " not in text:
+            text += knows.recv(1000)
+        knows.sendall(b"< send 706 R >< send 707 0 >")
+        others = b""
+        while b"< frame 707 " not in others:
+            others += knows_not.recv(1000)
+    assert b" R >" in text
+    assert b"< frame 706 " not in others
+    assert Frame(0x706, remote=True) in running.heard
+
+
 def test_it_listens_on_the_loopback_interface_only(running: Running) -> None:
     with connect(running) as client:
         assert client.getpeername()[0] == "127.0.0.1"
@@ -222,6 +243,7 @@ def test_a_taken_port_is_refused_in_words(running: Running) -> None:
         (Frame(0x181, b"\x01\xab"), b"< frame 181 1.500000 01AB >"),
         (Frame(0x80), b"< frame 080 1.500000  >"),
         (Frame(0x1234, b"\x00", extended=True), b"< frame 00001234 1.500000 00 >"),
+        (Frame(0x705, remote=True), b"< frame 705 1.500000 R >"),
     ],
 )
 def test_frames_as_the_protocol_writes_them(frame: Frame, text: bytes) -> None:
@@ -234,6 +256,8 @@ def test_frames_as_the_protocol_writes_them(frame: Frame, text: bytes) -> None:
         ("send 123 2 1 ff", Frame(0x123, b"\x01\xff")),
         ("send 080 0", Frame(0x80)),
         ("send 00000123 1 a", Frame(0x123, b"\x0a", extended=True)),
+        ("send 705 R", Frame(0x705, remote=True)),
+        ("send 705 R 1", None),
         ("send 123 3 1 2", None),
         ("send 123 9 1 2 3 4 5 6 7 8 9", None),
         ("send 800 0", None),

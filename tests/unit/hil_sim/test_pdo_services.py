@@ -13,6 +13,7 @@ from tests.unit.hil_sim.device_file import (
     REAL32,
     UNSIGNED8,
     UNSIGNED16,
+    UNSIGNED32,
     UNSIGNED64,
     communication,
 )
@@ -276,6 +277,43 @@ def test_a_device_may_produce_sync(tmp_path: Path) -> None:
     bench.heard.clear()
     bench.run(100)
     assert bench.of(0x081) == []
+
+
+def test_a_synchronous_pdo_after_the_window_of_1007h_waits_for_nothing(tmp_path: Path) -> None:
+    file = communication().add(OTHER, None, UNSIGNED16, 0, mapping=True).add(0x1007, None, UNSIGNED32, 5000)
+    file.pdo(0, True, "$NODEID+0x200", 1, OTHER << 16 | 16)
+    bench = DeviceBench(file.write(tmp_path))
+    bench.start()
+    for late_ms, value in ((0, 0x1111), (10, 0x2222)):
+        bench.send(0x080)
+        bench.run(late_ms)
+        bench.send(RPDO, value.to_bytes(2, "little").hex())
+    bench.send(0x080)
+    assert bench.read(OTHER) == 0x1111
+    assert bench.write(0x1007, 0, 0, 4) == "ok"
+    bench.run(50)
+    bench.send(RPDO, "3333")
+    bench.send(0x080)
+    assert bench.read(OTHER) == 0x3333, "without a window it counts whenever it comes"
+
+
+def test_the_time_of_day_is_taken_and_made_at_1012h(tmp_path: Path) -> None:
+    bench = DeviceBench(communication().add(0x1012, None, UNSIGNED32, 0x8000_0100).write(tmp_path))
+    bench.boot()
+    bench.send(0x100, "01 00 00 00 02 00")
+    bench.send(0x100, "FF 00")
+    assert bench.node.time_of_day == (1, 2)
+    assert bench.write(0x1012, 0, 0x8000_0123, 4) == "06090030", "not while it is taken"
+    assert bench.write(0x1012, 0, 0x0000_0100, 4) == "ok"
+    assert bench.write(0x1012, 0, 0x4000_0100, 4) == "ok"
+    before = len(bench.of(0x100))
+    bench.run(2500)
+    made = [int.from_bytes(data[:4], "little") for data in bench.of(0x100)[before:]]
+    assert [b - a for a, b in pairwise(made)] == [1000]
+    bench.send(0x000, "02 00")
+    before = len(bench.of(0x100))
+    bench.run(2500)
+    assert len(bench.of(0x100)) == before
 
 
 # -- identifiers -----------------------------------------------------------------------------------------

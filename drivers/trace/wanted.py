@@ -1,0 +1,67 @@
+"""Which lines of a trace somebody wants to see: by node, by service, by object."""
+
+import fnmatch
+import re
+from collections.abc import Callable, Sequence
+
+from drivers.errors import SettingsError
+from drivers.trace.decoding import Kind, Line
+from drivers.trace.devices import Device
+
+Wanted = Callable[[Line], bool]
+_OBJECT = re.compile(r"(?:0x([0-9a-f]{4})|([0-9a-f]{4})h)(?::(?:0x)?([0-9a-f]{1,2}))?", re.IGNORECASE)
+
+
+def by_node(words: Sequence[str], devices: Sequence[Device]) -> Wanted:
+    """Lines of these nodes, by number or name, and NMT commands to them; raises `SettingsError`."""
+    nodes = frozenset(_node(word, devices) for word in words)
+
+    def wanted(line: Line) -> bool:
+        if line.kind is Kind.NMT and len(line.captured.data) == 2:
+            return line.captured.data[1] in nodes | {0}
+        return line.node_id in nodes
+
+    return wanted
+
+
+def _node(word: str, devices: Sequence[Device]) -> int:
+    if word.isdecimal():
+        return int(word)
+    found = [device.node_id for device in devices if word in device.name.split("/")]
+    if not found:
+        names = ", ".join(device.name for device in devices) or "none, give --robot"
+        raise SettingsError(f"--node {word}: no device has that name; known are {names}")
+    return found[0]
+
+
+def by_kind(words: Sequence[str]) -> Wanted:
+    """Lines of these services; raises `SettingsError`."""
+    names = [name.strip().lower() for word in words for name in word.split(",")]
+    unknown = [name for name in names if name not in tuple(Kind)]
+    if unknown:
+        raise SettingsError(f"--kind {', '.join(unknown)}: there are {', '.join(Kind)}")
+    kinds = frozenset(map(Kind, names))
+    return lambda line: line.kind in kinds
+
+
+def by_object(words: Sequence[str]) -> Wanted:
+    """Lines about these objects: 0x6041, 6041h:00, or a pattern of their names, as *position*."""
+    matches = [_matching(word) for word in words]
+
+    def wanted(line: Line) -> bool:
+        objects = {(value.index, value.subindex): value.name for value in line.values}
+        if line.about is not None:
+            objects.setdefault(line.about, None)
+        return any(match(*key, name) for key, name in objects.items() for match in matches)
+
+    return wanted
+
+
+def _matching(word: str) -> Callable[[int, int, str | None], bool]:
+    found = _OBJECT.fullmatch(word)
+    if found is None:
+        pattern = word.lower()
+        return lambda _index, _subindex, name: name is not None and fnmatch.fnmatch(name.lower(), pattern)
+    wanted_index = int(found[1] or found[2], 16)
+    wanted_subindex = None if found[3] is None else int(found[3], 16)
+    return lambda index, subindex, _name: index == wanted_index and wanted_subindex in (None, subindex)

@@ -1,0 +1,114 @@
+"""`gwrms od`: the object dictionary of a device, with what it holds now."""
+
+import argparse
+from dataclasses import replace
+
+from gateway.cli.connect import UnknownName, connect, parser
+from gateway.cli.set import Change, change_of, value_of
+from gateway.cli.text import exact, say, say_json, table
+from gateway.cli.writing import add_trial, write
+from gateway.client import ClientError, Robot
+from gateway.wire.dictionary import ObjectInfo, ObjectList, ObjectValue
+from gateway.wire.limits import OBJECTS_READ
+from gateway.wire.robot import Description
+
+EPILOG = """What is written goes the way of `gwrms set`: only parameters, in their own unit, with the same
+checks, in the journal, read back. An object that is none becomes one by parameters = "eds" and release in
+robot.toml.
+
+examples:
+  gwrms od left_knee                     every object of its EDS
+  gwrms od left_knee 0x6060…             from there on
+  gwrms od 2 'target position'           of node 2, by words of the name
+  gwrms od left_knee 0x60* --read        with what the device holds now
+  gwrms od left_knee 0x6072:0 --set 500"""
+
+
+class NotOne(ClientError):
+    """What is to be written is not one parameter."""
+
+
+def main(argv: list[str]) -> int:
+    """Run `gwrms od`."""
+    made = parser("od", "Look into a device's object dictionary: names, types, limits, values.", EPILOG)
+    made.add_argument("device", metavar="DEVICE", help="a joint or device by name, or a node id")
+    made.add_argument(
+        "search",
+        metavar="SEARCH",
+        nargs="?",
+        default="",
+        help="0x6041, 0x1018:4, 0x60*, 0x6060-0x607F, 0x6060…, or words of the name (default: all)",
+    )
+    made.add_argument("--read", action="store_true", help="ask the device what it holds now")
+    made.add_argument(
+        "--set", metavar="VALUE", type=_value, help="write the one object that SEARCH finds; 3deg, 420mm"
+    )
+    add_trial(made)
+    arguments = made.parse_args(argv)
+    if arguments.trial is not None and arguments.set is None:
+        made.error("--trial is for --set")
+    with connect(arguments, "od") as robot:
+        description = robot.describe()
+        component = _component(arguments.device, description)
+        found = robot.objects(component, arguments.search)
+        if not found.objects:
+            raise UnknownName(f"{component} has no object that fits {arguments.search!r}")
+        if arguments.set is not None:
+            return _set(robot, found, description, arguments)
+        return _show(robot, found, arguments)
+
+
+def _component(device: str, description: Description) -> str:
+    """The component's name; of a node with several the first, whose EDS is that of all."""
+    if not device.isdecimal():
+        return device
+    nodes = {node.node_id: node.components for bus in description.buses for node in bus.nodes}
+    components = nodes.get(int(device))
+    if not components:
+        known = ", ".join(f"{node_id} ({'/'.join(names)})" for node_id, names in sorted(nodes.items()))
+        raise UnknownName(f"the robot has no node {device}; it has {known or 'none'}")
+    return components[0]
+
+
+def _show(robot: Robot, found: ObjectList, arguments: argparse.Namespace) -> int:
+    values: dict[str, ObjectValue] = {}
+    if arguments.read:
+        addresses = [one.object for one in found.objects]
+        for first in range(0, len(addresses), OBJECTS_READ):
+            values |= robot.read_objects(found.component, *addresses[first : first + OBJECTS_READ]).values
+    if arguments.json:
+        told = {"component": found.component, "objects": found.objects, "left_off": found.left_off}
+        say_json(told | {"values": values})
+    else:
+        head = ("OBJECT", "NAME", "TYPE", "ACCESS", "RANGE", *(("HOLDS",) if arguments.read else ()), "")
+        say(table(head, [_row(one, values.get(one.object)) for one in found.objects]))
+        if found.left_off:
+            say(f"and {found.left_off} more: search for less, or from 0x…… on\n")
+    return 1 if values and all(one.problem for one in values.values()) else 0
+
+
+def _row(info: ObjectInfo, value: ObjectValue | None) -> tuple[str, ...]:
+    low_high = "" if info.min is None and info.max is None else f"{exact(info.min)} … {exact(info.max)}"
+    name = info.parameter or ""
+    note = name if info.read_only is None or not name else f"{name} (read-only: {info.read_only})"
+    held = () if value is None else (value.problem or value.words,)
+    return info.object, info.name, info.type, info.access, low_high, *held, note
+
+
+def _set(robot: Robot, found: ObjectList, description: Description, arguments: argparse.Namespace) -> int:
+    if len(found.objects) != 1 or found.left_off:
+        count = len(found.objects) + found.left_off
+        raise NotOne(f"{arguments.search!r} fits {count} objects; name one, as 0x6072:0")
+    info = found.objects[0]
+    if info.parameter is None:
+        raise NotOne(
+            f"{found.component} {info.object} {info.name} is no parameter, {info.access} in the EDS; what "
+            'may be written stands in robot.toml: [parameter."…"], or parameters = "eds" and release'
+        )
+    change: Change = replace(arguments.set, name=info.parameter)
+    return write(robot, {info.parameter: value_of(change, description)}, description, arguments)
+
+
+def _value(text: str) -> Change:
+    """A value and its unit, for a parameter that is not known yet."""
+    return change_of(f"object={text}")

@@ -1,0 +1,216 @@
+"""Any object of a device that has an EDS: found by address or name, and read; writing is for parameters."""
+
+import re
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Future
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from drivers.errors import DeviceTimeout, DriverError
+from eds import Description
+from eds.datatypes import DATA_TYPES, DOMAIN
+from gateway.connections.turns import Client
+from gateway.modules.component.module import ComponentModule
+from gateway.modules.control.parameters import READABLE, WRITABLE, Parameter
+from gateway.modules.control.unanswered import Unanswered
+from gateway.process.futures import back, done, gather, then
+from gateway.process.loop import Loop
+from gateway.wire.dictionary import (
+    ObjectInfo,
+    ObjectList,
+    ObjectListParams,
+    ObjectReadParams,
+    ObjectValue,
+    ObjectValues,
+)
+from gateway.wire.framing import Kind, refuse
+from gateway.wire.limits import OBJECTS_LISTED
+
+if TYPE_CHECKING:
+    from canopen.objectdictionary import ODVariable
+
+_ADDRESS = re.compile(r"0x([0-9a-f]{1,4})(?::([0-9]{1,3}))?")
+_RANGE = re.compile(r"0x([0-9a-f]{1,4})\s*(?:-\s*(?:0x([0-9a-f]{1,4}))?|…|\.\.\.)")
+_LAST = 0xFFFF
+
+Fits = Callable[[int, int, str], bool]
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """One object that somebody wants to read."""
+
+    component: str
+    index: int
+    subindex: int
+
+    @property
+    def name(self) -> str:
+        return address(self.index, self.subindex)
+
+
+class Objects:
+    """Every object of a robot's devices. It belongs to the loop's thread."""
+
+    def __init__(
+        self,
+        described: frozenset[str],
+        component: ComponentModule,
+        loop: Loop,
+        parameters: Mapping[str, Parameter],
+        silence: Callable[[str], str | None],
+        unanswered: Unanswered,
+        ask: "Callable[[Client, Sequence[Wanted]], Future[dict[str, ObjectValue]]]",
+    ) -> None:
+        """`described` are the joints and devices; `ask` has objects read in their turn, by `read_all`."""
+        self._described = described
+        self._component = component
+        self._loop = loop
+        self._silence = silence
+        self._unanswered = unanswered
+        self._parameters = {(one.component, one.object): one for one in parameters.values()}
+        self._ask = ask
+
+    def listed(self, params: ObjectListParams) -> ObjectList:
+        """What the EDS says of those that fit.
+
+        Raises:
+            RpcError: there is no such component, or it has no object dictionary.
+
+        """
+        description, fits = self._description(params.component), fitting(params.search)
+        found = [
+            variable
+            for variable in description.variables()
+            if fits(variable.index, variable.subindex, variable.qualname)
+        ]
+        shown = [self._info(params.component, variable) for variable in found[:OBJECTS_LISTED]]
+        return ObjectList(params.component, shown, len(found) - len(shown))
+
+    def read(self, params: ObjectReadParams, client: Client) -> "Future[ObjectValues]":
+        """What the device holds of them now; raises `RpcError` for one that its EDS lacks."""
+        description = self._description(params.component)
+        wanted = [self._wanted(params.component, text, description) for text in dict.fromkeys(params.objects)]
+        ready = self._component.when_ready({params.component})
+        values = then(ready, lambda _none: self._ask(client, wanted))
+        return then(values, partial(ObjectValues, params.component))
+
+    # -- what the EDS says -----------------------------------------------------------------------------------
+
+    def _description(self, component: str) -> Description:
+        descriptions = self._component.robot.descriptions
+        if component in self._described and component in descriptions:
+            return descriptions[component]
+        if component in self._component.absent:
+            raise refuse(Kind.UNAVAILABLE, f"{component}: {self._component.absent[component]}")
+        known = ", ".join(one for one in descriptions if one in self._described) or "none"
+        raise refuse(Kind.UNKNOWN_NAME, f"{component!r} has no object dictionary; those that have: {known}")
+
+    def _wanted(self, component: str, text: str, description: Description) -> Wanted:
+        index, _, subindex = text.partition(":")
+        wanted = Wanted(component, int(index, 16), int(subindex))
+        if not description.has(wanted.index, wanted.subindex):
+            raise refuse(Kind.UNKNOWN_NAME, f"{description.path.name} has no object {wanted.name}")
+        return wanted
+
+    def _info(self, component: str, variable: "ODVariable") -> ObjectInfo:
+        data_type = DATA_TYPES.get(variable.data_type or 0)
+        where = address(variable.index, variable.subindex)
+        parameter = self._parameters.get((component, where))
+        default = variable.default
+        return ObjectInfo(
+            where,
+            variable.qualname,
+            "?" if data_type is None else data_type.name,
+            variable.access_type.lower(),
+            variable.min,
+            variable.max,
+            default if isinstance(default, int | float | str) else None,
+            None if parameter is None else parameter.name,
+            _read_only(variable, parameter),
+        )
+
+    # -- what the device holds -------------------------------------------------------------------------------
+
+    def _node(self, component: str) -> Any:
+        found: Any = self._component.robot.components.get(component)
+        return None if found is None else found.node
+
+    def read_all(self, wanted: Sequence[Wanted]) -> "Future[list[ObjectValue]]":
+        """For `Reads`: these are of one device."""
+        why = {name: self._why_unasked(name) for name in {one.component for one in wanted}}
+        asked = [one for one in wanted if why[one.component] is None and self._unreadable(one) is None]
+        if not asked:
+            return done([self._unread(one, why[one.component]) for one in wanted])
+        node = self._node(asked[0].component)
+        uploads = gather({"all": node.upload_all([(one.index, one.subindex) for one in asked])})
+
+        def told(found: Mapping[str, Any]) -> list[ObjectValue]:
+            values = dict(zip(asked, self._told(asked, node, found["all"]), strict=True))
+            return [values.get(one) or self._unread(one, why[one.component]) for one in wanted]
+
+        return then(back(self._loop, uploads), told)
+
+    def _told(
+        self, asked: Sequence[Wanted], node: Any, told: "Sequence[bytes | DriverError] | Exception"
+    ) -> Iterator[ObjectValue]:
+        found: list[bytes | Exception] = [told] if isinstance(told, Exception) else [*told]
+        last = found[-1]
+        if isinstance(last, DeviceTimeout):
+            self._unanswered.note({one.component for one in asked}, node, str(last))
+        found += [last] * (len(asked) - len(found))
+        return (self._value(one, each) for one, each in zip(asked, found, strict=True))
+
+    def _why_unasked(self, component: str) -> str | None:
+        silence = self._silence(component)
+        return self._unanswered.why(component) if silence is None else f"{component} is not there: {silence}"
+
+    def _unreadable(self, wanted: Wanted) -> str | None:
+        variable = self._description(wanted.component).variable(wanted.index, wanted.subindex)
+        if variable is None or variable.access_type.lower() not in READABLE:
+            return "it cannot be read, the EDS says"
+        if variable.data_type == DOMAIN:
+            return "a domain is not read: nobody knows how long it would keep the device busy"
+        return None
+
+    def _unread(self, wanted: Wanted, why: str | None) -> ObjectValue:
+        return ObjectValue(None, "", None, why or self._unreadable(wanted))
+
+    def _value(self, wanted: Wanted, told: bytes | Exception) -> ObjectValue:
+        from drivers.trace.values import value_of  # for who looks at objects only
+
+        if isinstance(told, Exception):
+            return ObjectValue(None, "", None, str(told) or "no answer")
+        found = value_of(self._description(wanted.component), wanted.index, wanted.subindex, told)
+        return ObjectValue(found.value, found.words, time.monotonic_ns())
+
+
+def address(index: int, subindex: int) -> str:
+    """`0x6041:0`, as parameters have it."""
+    return f"0x{index:04X}:{subindex}"
+
+
+def fitting(search: str) -> Fits:
+    """Which objects a search means: see `ObjectListParams`."""
+    text = search.strip().lower()
+    if text.startswith("0x") and text.endswith("*"):
+        prefix = text[2:-1]
+        return lambda index, _subindex, _name: f"{index:04x}".startswith(prefix)
+    if found := _RANGE.fullmatch(text):
+        first, last = int(found[1], 16), int(found[2], 16) if found[2] else _LAST
+        return lambda index, _subindex, _name: first <= index <= last
+    if found := _ADDRESS.fullmatch(text):
+        wanted, member = int(found[1], 16), None if found[2] is None else int(found[2])
+        return lambda index, subindex, _name: index == wanted and member in (None, subindex)
+    words = text.split()
+    return lambda _index, _subindex, name: all(word in name.lower() for word in words)
+
+
+def _read_only(variable: "ODVariable", parameter: Parameter | None) -> str | None:
+    if variable.access_type.lower() not in WRITABLE:
+        return f"{variable.access_type.lower()} in the EDS"
+    if parameter is None:
+        return "no parameter"
+    return parameter.problem or parameter.read_only

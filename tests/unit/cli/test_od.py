@@ -1,0 +1,56 @@
+"""`gwrms od`: objects by address or name, what they hold, and writing as `gwrms set` does."""
+
+import json
+
+import pytest
+
+from tests.unit.cli.served import VELOCITY, Served, lines
+
+
+def test_objects_are_listed_with_what_they_hold(robot: Served, capsys: pytest.CaptureFixture[str]) -> None:
+    assert robot.run("od", "left_knee", "0x6081", "--read") == 0
+    head, row = lines(capsys)[:2]
+    assert head == ["OBJECT", "NAME", "TYPE", "ACCESS", "RANGE", "HOLDS"]
+    assert row[0] == "0x6081:0"
+    assert "65190" in row
+    assert row[-1] == "left_knee.profile_velocity"
+
+
+def test_what_is_no_parameter_is_only_looked_at(robot: Served, capsys: pytest.CaptureFixture[str]) -> None:
+    assert robot.run("od", "left_knee", "0x6041", "--set", "5") == 1
+    assert "is no parameter, ro in the EDS" in capsys.readouterr().err
+    assert robot.run("od", "left_knee", "0x1017", "--set", "5") == 1
+    assert "which belongs to who leads it" in capsys.readouterr().err
+
+
+def test_a_parameter_is_written_as_set_does(robot: Served, capsys: pytest.CaptureFixture[str]) -> None:
+    assert robot.run("od", "left_knee", "0x6081:0", "--set", "70001", "--json") == 0
+    assert json.loads(capsys.readouterr().out)["after"] == {"left_knee.profile_velocity": 70001}
+    assert robot.left(VELOCITY) == 70001
+
+
+def test_one_object_is_written_at_a_time(robot: Served, capsys: pytest.CaptureFixture[str]) -> None:
+    assert robot.run("od", "left_knee", "0x60*", "--set", "1") == 1
+    assert "name one, as 0x6072:0" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("left_kne", "0x6041"), "has no object dictionary; those that have: left_knee"),
+        (("left_knee", "nonsense"), "left_knee has no object that fits 'nonsense'"),
+        (("99", "0x6041"), "the robot has no node 99"),
+    ],
+)
+def test_what_is_not_there_is_said(
+    robot: Served, words: tuple[str, ...], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert robot.run("od", *words) == 1
+    assert said in capsys.readouterr().err
+
+
+def test_json_holds_objects_and_values(robot: Served, capsys: pytest.CaptureFixture[str]) -> None:
+    assert robot.run("od", "left_knee", "0x6081:0", "--read", "--json") == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["component"] == "left_knee"
+    assert told["values"]["0x6081:0"]["value"] == 65190
