@@ -40,6 +40,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "docs": ("gateway.cli.docs:main", "the pages of the docs, as they were installed"),
     "eds": ("eds.cli.eds:main", "what an EDS or DCF file says, and what is wrong with it"),
     "scan": ("drivers.cli.scan:main", "what is on a CAN bus: nodes, what they are, whose EDS; serial ports"),
+    "commission": ("gateway.cli.commission:main", "a robot's file found out on the bench, joint by joint"),
     "sensor": ("drivers.cli.sensor:main", "what is on a serial port; record, replay and decode it"),
     "calibrate": ("drivers.cli.calibrate:main", "an insole's pressure, an IMU's zero"),
     "collect": ("server_gui.cli.collect:main", "record every robot into the store, without a window"),

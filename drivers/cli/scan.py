@@ -3,16 +3,16 @@
 import argparse
 import sys
 import threading
-import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import msgspec
 
 from drivers.bus.settings import CanSettings
+from drivers.cli.buses import settings_of
 from drivers.cli.listen import best, listen
-from drivers.errors import SettingsError, Unavailable
+from drivers.errors import Unavailable
 from drivers.scan.asking import Told
 from drivers.scan.products import Library, files
 from drivers.scan.report import as_json, as_text
@@ -71,7 +71,7 @@ def main(arguments: Sequence[str]) -> int:
     library = Library(files(options.eds)) if options.active else Library(())
     for problem in library.unreadable.values():
         sys.stderr.write(f"gwrms scan: {problem}\n")
-    for name, settings in _settings(options.buses, options.bitrate):
+    for name, settings in settings_of(options.buses, options.bitrate):
         failed |= not _told(name, lambda settings=settings: _scan_bus(settings, options, library))
     for port in options.serial:
         failed |= not _told(port, lambda port=port: _scan_port(port, options))
@@ -85,36 +85,6 @@ def _told(name: str, act: Any) -> bool:
         sys.stderr.write(f"gwrms scan: {name}: {error}\n")
         return False
     return True
-
-
-def _settings(buses: Sequence[str], bitrate: int | None) -> Iterator[tuple[str, CanSettings]]:
-    for bus in buses:
-        if bus.endswith(".toml"):
-            yield from _of_file(Path(bus))
-        else:
-            interface, colon, channel = bus.partition(":")
-            named = (interface, channel) if colon else ("socketcan", bus)
-            yield bus, CanSettings(interface=named[0], channel=named[1], bitrate=bitrate)
-
-
-def _of_file(path: Path) -> Iterator[tuple[str, CanSettings]]:
-    """The buses of a robot's file; the rest of it may be wrong.
-
-    Raises:
-        SettingsError: it has none, or cannot be read.
-
-    """
-    try:
-        tables: Mapping[str, Mapping[str, Any]] = tomllib.loads(path.read_text("utf-8-sig")).get("can", {})
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise SettingsError(f"{path}: cannot be read: {error}") from error
-    if not tables:
-        raise SettingsError(f"{path}: has no [can.NAME] table")
-    for name, table in tables.items():
-        try:
-            yield name, CanSettings.from_table(table)
-        except msgspec.ValidationError as error:
-            raise SettingsError(f"{path}: [can.{name}]: {error}") from error
 
 
 def _scan_bus(settings: CanSettings, options: argparse.Namespace, library: Library) -> None:

@@ -1,0 +1,47 @@
+"""A bus as commands take it: can0, INTERFACE:CHANNEL of python-can, or those of a robot's file."""
+
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from drivers.bus.settings import CanSettings
+from drivers.errors import SettingsError
+
+
+def settings_of(buses: Sequence[str], bitrate: int | None) -> Iterator[tuple[str, CanSettings]]:
+    """The buses that somebody names, each with its name; `bitrate` is for those that no file describes.
+
+    Raises:
+        SettingsError: a robot's file has none, or cannot be read.
+
+    """
+    for bus in buses:
+        if bus.endswith(".toml"):
+            yield from _of_file(Path(bus))
+        else:
+            interface, colon, channel = bus.partition(":")
+            named = (interface, channel) if colon else ("socketcan", bus)
+            yield bus, CanSettings(interface=named[0], channel=named[1], bitrate=bitrate)
+
+
+def _of_file(path: Path) -> Iterator[tuple[str, CanSettings]]:
+    """The buses of a robot's file; the rest of it may be wrong.
+
+    Raises:
+        SettingsError: it has none, or cannot be read.
+
+    """
+    try:
+        tables: Mapping[str, Mapping[str, Any]] = tomllib.loads(path.read_text("utf-8-sig")).get("can", {})
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise SettingsError(f"{path}: cannot be read: {error}") from error
+    if not tables:
+        raise SettingsError(f"{path}: has no [can.NAME] table")
+    for name, table in tables.items():
+        try:
+            yield name, CanSettings.from_table(table)
+        except msgspec.ValidationError as error:
+            raise SettingsError(f"{path}: [can.{name}]: {error}") from error
