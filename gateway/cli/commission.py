@@ -140,7 +140,7 @@ def _write(draft: Draft, made: str, who: str) -> str:
 
 
 def _journal(config: RobotConfig, draft: Draft, who: str) -> str:
-    """Put what was found into the robot's journal; what is in the way is told and keeps nobody from working."""
+    """Put what was found into the robot's journal; what is in the way of that is told, no more."""
     records = Records(config.records)
     try:
         findings = {table: msgspec.to_builtins(keys) for table, keys in draft.tables.items()}
@@ -164,7 +164,7 @@ class _Terminal:
 
 
 class _JsonFace:
-    """A line each: {"say": …} and {"ask": …, "choices": …, "default": …, "unit": …}; answers are plain lines."""
+    """A line each: {"say": …} and {"ask": …, "choices": …, "default": …, "unit": …}; plain lines answer."""
 
     def say(self, text: str) -> None:
         say_json({"say": text})

@@ -202,7 +202,7 @@ def _keep(draft: Draft, joint: str, found: Scale, first: Held, second: Held) -> 
     draft.put(
         one, "direction", found.direction, f"counts {'rise' if found.direction > 0 else 'fall'} with flexion"
     )
-    draft.put(one, "zero_offset", found.zero_offset, f"rad; of {angles} by hand")
+    draft.put(one, "zero_offset", round(found.zero_offset, 5), f"rad; of {angles} by hand")
 
 
 def limits(draft: Draft, bench: Bench, joint: str, axis: Axis, scale: Scale) -> Talk[None]:

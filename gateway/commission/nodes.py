@@ -83,14 +83,19 @@ def file_of(draft: Draft, library: Library, node: int, told: Told) -> Talk[None]
         for line in proposal.differs:
             yield Say(f"  {path.name}, but: {line}")
         how = "its vendor and product (1018h) are the device's"
-        if not proposal.differs or (yield from agree(f"Node {node} ({told.name}): is {path.name} its file?")):
+        if not proposal.differs or (yield from agree(f"{_called(node, told)}: is {path.name} its file?")):
             draft.put(table(node), "eds", _named(path, draft), how)
             return
-    asked = f"Node {node} ({told.name}, vendor {told.vendor_id or 0:#x}, product {told.product_code or 0:#x})"
     typed = yield from word(
-        f"{asked}: which EDS file is for it?", check=lambda text: _unreadable(text, draft.file, node)
+        f"{_called(node, told)}: which EDS file is for it?",
+        check=lambda text: _unreadable(text, draft.file, node),
     )
     draft.put(table(node), "eds", typed, "named by hand")
+
+
+def _called(node: int, told: Told) -> str:
+    numbers = f"vendor {told.vendor_id or 0:#x}, product {told.product_code or 0:#x}"
+    return f"Node {node} ({told.name or 'without a name'}, {numbers})"
 
 
 def _named(path: Path, draft: Draft) -> str:
