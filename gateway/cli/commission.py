@@ -86,7 +86,7 @@ def _parser() -> argparse.ArgumentParser:
         "--serial", action="append", default=[], metavar="PORT", help="an insole's or IMU's port"
     )
     parser.add_argument(
-        "--who", default=getpass.getuser(), help="who does it, for the record (default: %(default)s)"
+        "--who", default=getpass.getuser(), help="who does it, for the record (default: your user name)"
     )
     parser.add_argument(
         "--json", action="store_true", help="questions and answers as JSON lines, for other faces"

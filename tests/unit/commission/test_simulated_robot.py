@@ -1,6 +1,6 @@
 """A robot of unknown drives is commissioned by somebody who only reads, moves joints by hand and types."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import pytest
@@ -15,7 +15,7 @@ from gateway.commission.serial_bench import SerialPorts
 from gateway.commission.steps import commission
 from gateway.commission.writing import text
 from gateway.config.reading import examine
-from hil_sim.cli.fault import ask
+from hil_sim.control_socket import ask
 from hil_sim.exoskeleton import JOINTS, Scenario
 from hil_sim.mounting import Mounting
 from hil_sim.robot import SimulatedRobot
@@ -36,6 +36,7 @@ DRIVES = {
     "right_hip": SHIPPED / "trinamic_tmcm_1270.eds",
     "right_knee": SHIPPED / "elmo_gold.dcf",
 }
+POSTURES = {"Stand upright": [0, 0], "Lean forward": [25, 0], "Lean to your left": [0, 25]}
 STRAIGHT, BENT = 2.0, 47.0
 
 
@@ -80,6 +81,11 @@ class Person:
             return "40"
         elif "its file?" in asked or "heartbeat" in asked or "May the" in asked:
             return "y"
+        elif "stamp with" in asked:
+            ask(self._folder, {"stamp": "left" if "left" in asked else "right"})
+        for posture, lean in POSTURES.items():
+            if asked.startswith(posture):
+                ask(self._folder, {"lean": lean})
         return ""
 
     def _move(self, joint: str, degrees: float) -> None:
@@ -98,12 +104,12 @@ def robot(tmp_path: Path) -> Iterator[SimulatedRobot]:
         yield robot
 
 
-def go(draft: Draft, person: Person) -> None:
+def go(draft: Draft, person: Person, ports: Sequence[str] = ()) -> None:
     bench = CanBench("main", SETTINGS)
     draft.put("can.main", "interface", "virtual")
     draft.put("can.main", "channel", CHANNEL)
     try:
-        run(commission(draft, bench, Library(files([])), SerialPorts(), []), person)
+        run(commission(draft, bench, Library(files([])), SerialPorts(), ports), person)
     finally:
         bench.close()
 
@@ -125,3 +131,18 @@ def test_six_drives_of_three_makers_become_a_file_that_is_true(robot: SimulatedR
         assert joint.counts_per_revolution * joint.gear_ratio == pytest.approx(409_600, rel=1e-3)
         assert joint.zero_offset == pytest.approx(mounting.angle(0, 409_600 / 6.283185307), abs=1e-3)
         assert Path(joint.eds).name == DRIVES.get(name, SHIPPED / "joint_drive.eds").name
+
+
+@pytest.mark.nightly  # it listens for half a minute
+def test_feet_are_told_apart_by_a_stamp_and_the_imu_by_three_postures(
+    robot: SimulatedRobot, tmp_path: Path
+) -> None:
+    draft = Draft(tmp_path / "exo-01.toml")
+    draft.put("robot", "joints", [])
+    ports = {name: str(robot.folder.path / name) for name in ("right_insole", "left_insole", "trunk")}
+    go(draft, Person(robot), list(ports.values()))
+    for foot in ("left_insole", "right_insole"):
+        assert draft.value(f"insole.{foot}", "port") == ports[foot]
+        assert draft.value(f"insole.{foot}", "format") == "insole-cobs"
+    assert draft.value("imu.trunk", "axes") == ["x", "y", "z"]
+    assert draft.value("imu.trunk", "format") == "witmotion"
