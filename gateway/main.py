@@ -43,6 +43,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "scan": ("drivers.cli.scan:main", "what is on a CAN bus: nodes, what they are, whose EDS; serial ports"),
     "lss": ("drivers.cli.lss:main", "CANopen devices without a node id found; node ids and bit rates given"),
     "trace": ("drivers.cli.trace:main", "every frame of a CAN bus, decoded by EDS; candump and PCAP files"),
+    "commission": ("gateway.cli.commission:main", "a robot's file found out on the bench, joint by joint"),
     "sensor": ("drivers.cli.sensor:main", "what is on a serial port; record, replay and decode it"),
     "calibrate": ("drivers.cli.calibrate:main", "an insole's pressure, an IMU's zero"),
     "collect": ("server_gui.cli.collect:main", "record every robot into the store, without a window"),

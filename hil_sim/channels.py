@@ -7,7 +7,6 @@ without load has no centre of pressure (None).
 import math
 
 from hil_sim.drive import objects
-from hil_sim.drive.drive import JointDrive
 from hil_sim.exoskeleton import JOINTS, Exoskeleton
 from hil_sim.sensors.imus import witmotion
 from hil_sim.sensors.insoles import insole_cobs
@@ -35,17 +34,19 @@ Values = list[float | None]
 
 def reported(robot: Exoskeleton) -> Values:
     """Return the values of all channels now, in the order of `UNITS`; after the sensors' first cycle."""
-    drives, sensors = robot.drives.values(), robot.sensors
+    drives, sensors = list(zip(robot.drives.values(), robot.mountings.values(), strict=True)), robot.sensors
     return [
-        *(_counted(drive, objects.POSITION_ACTUAL) for drive in drives),
-        *(_counted(drive, objects.VELOCITY_ACTUAL) for drive in drives),
+        *(
+            mounting.angle(drive.dictionary[objects.POSITION_ACTUAL].number(), drive.counts_per_radian)
+            for drive, mounting in drives
+        ),
+        *(
+            mounting.seen(drive.dictionary[objects.VELOCITY_ACTUAL].number() / drive.counts_per_radian)
+            for drive, mounting in drives
+        ),
         *(value for side, pressures in enumerate(sensors.pressures) for value in _load(side, pressures)),
         *_trunk(sensors.motion),
     ]
-
-
-def _counted(drive: JointDrive, key: tuple[int, int]) -> float:
-    return drive.dictionary[key].number() / drive.counts_per_radian
 
 
 def _load(side: int, pressures: Pressures) -> Values:

@@ -11,6 +11,7 @@ from hil_sim import controller, personality
 from hil_sim.bus.can_bus import CanBus
 from hil_sim.clock import MILLISECOND_NS, SECOND_NS, Clock, Event
 from hil_sim.controller import GaitController
+from hil_sim.drive import objects
 from hil_sim.drive.drive import JointDrive
 from hil_sim.drive.mechanics import Joint, JointConstants
 from hil_sim.errors import SimulatorError
@@ -18,6 +19,8 @@ from hil_sim.gait.posture import STANDING
 from hil_sim.gait.subject import subject
 from hil_sim.gait.timetable import Entry, timetable
 from hil_sim.gait.wearer import Wearer
+from hil_sim.hands import Hands
+from hil_sim.mounting import Mounting
 from hil_sim.node.lss import UNCONFIGURED
 from hil_sim.node.node import Node
 from hil_sim.sensors.suite import FEET, PERIOD_NS, TRUNK, SensorChoice, SensorSuite
@@ -53,9 +56,9 @@ class Exoskeleton:
     """A robot and its wearer in simulated time; the same arguments give the same frames and bytes.
 
     The wearer is the subject of number `person`. `drives` gives joints another EDS or DCF than our own
-    drive's. The nodes named in `without` are somebody else's and never switched on; the drives of the joints
-    in `unconfigured` have no node id yet, and wait for LSS. What is in `measured` is called after each cycle
-    of the sensors.
+    drive's; `mountings` says how joints are built in otherwise than ours. The nodes named in `without` are
+    somebody else's and never switched on; the drives of the joints in `unconfigured` have no node id yet, and
+    wait for LSS. What is in `measured` is called after each cycle of the sensors.
 
     Raises `hil_sim.errors.SimulatorError` for a file that cannot be used, and where the controller would lead
     a drive that is not simulated.
@@ -70,6 +73,7 @@ class Exoskeleton:
         drives: Mapping[str, Path] | None = None,
         without: Collection[str] = (),
         unconfigured: Collection[str] = (),
+        mountings: Mapping[str, Mounting] | None = None,
     ) -> None:
         _refuse_to_lead_others(without)
         self.without = frozenset(without)
@@ -78,12 +82,15 @@ class Exoskeleton:
         self.clock = Clock()
         self.bus = CanBus(self.clock)
         files = dict.fromkeys(JOINTS, eds.locate(DRIVE_EDS, None)) | dict(drives or {})
-        self.drives = {name: self._drive(name, node_id, files[name]) for name, node_id in JOINTS.items()}
+        usual = {name: Mounting(node_id) for name, node_id in JOINTS.items()}
+        self.mountings = usual | dict(mountings or {})
+        self.drives = {name: self._drive(name, one, files[name]) for name, one in self.mountings.items()}
         for name in unconfigured:
             self.drives[name].factory_node_id = UNCONFIGURED
         self.controller = self._controller(person)
         self.wearer = Wearer(self.controller.generator)
         self.sensors = SensorSuite(sensors or SensorChoice(), self.clock, self.bus, seed)
+        self.hands = Hands()
         self._entries = timetable(scenario, seed)
         self._next_entry: Event | None = None
 
@@ -125,11 +132,18 @@ class Exoskeleton:
         if math.isfinite(entry.seconds):
             self._next_entry = self.clock.after(round(entry.seconds * SECOND_NS), self._go_on)
 
-    def _drive(self, name: str, node_id: int, file: Path) -> JointDrive:
-        description = personality.describe(file, node_id)
-        start = getattr(STANDING, name.partition("_")[2])
-        drive = JointDrive(self.clock, self.bus, name, node_id, description, Joint(JointConstants(), start))
-        drive.number_serially(SERIAL_NUMBERS + node_id)
+    def _drive(self, name: str, mounting: Mounting, file: Path) -> JointDrive:
+        description = personality.describe(file, mounting.node_id)
+        start = mounting.seen(getattr(STANDING, name.partition("_")[2]))
+        joint = Joint(mounting.constants(JointConstants()), start)
+        drive = JointDrive(self.clock, self.bus, name, mounting.node_id, description, joint)
+        drive.encoder.offset_counts = mounting.zero
+        drive.number_serially(SERIAL_NUMBERS + JOINTS[name])
+        limits = [drive.dictionary[key] for key in objects.POSITION_LIMITS if drive.objects.has(key)]
+        built_in = sorted(mounting.direction * entry.number() + mounting.zero for entry in limits)
+        for entry, counts in zip(limits, built_in, strict=True):
+            if mounting != Mounting(mounting.node_id) and built_in[0] < built_in[-1]:
+                entry.commissioned = entry.value = round(counts)
         return drive
 
     def _controller(self, person: int) -> GaitController:
@@ -140,7 +154,7 @@ class Exoskeleton:
             CONTROLLER,
             CONTROLLER_NODE,
             description,
-            tuple(JOINTS.values()),
+            tuple(self.mountings.values()),
             next(iter(self.drives.values())).counts_per_radian,
             subject(person),
             random.Random(f"{self.seed} gait"),
@@ -150,10 +164,14 @@ class Exoskeleton:
     def _measure(self) -> None:
         """One cycle of the sensors, and of what the wearer does to the joints."""
         now_s = self.clock.now_s
-        for drive, load in zip(self.drives.values(), self.wearer.joint_loads(now_s), strict=True):
+        drives = zip(
+            self.drives.values(), self.mountings.values(), self.wearer.joint_loads(now_s), strict=True
+        )
+        for drive, mounting, load in drives:
             drive.advance()
-            drive.joint.load = load
-        self.sensors.measure(*self.wearer.feet(now_s), self.wearer.trunk(now_s))
+            drive.joint.load = mounting.seen(load)
+        feet, trunk = self.hands.upon(self.wearer.feet(now_s), self.wearer.trunk(now_s), now_s)
+        self.sensors.measure(*feet, trunk)
         for watch in self.measured:
             watch()
 

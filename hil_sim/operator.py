@@ -1,21 +1,24 @@
 """What somebody may ask of a running robot: a fault, an activity, a start. One request, one answer."""
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from typing import Any
 
 from hil_sim import controller
 from hil_sim.errors import SimulatorError
-from hil_sim.exoskeleton import Exoskeleton
+from hil_sim.exoskeleton import JOINTS, Exoskeleton
 from hil_sim.faults.injector import Faults, check_fault, find
 from hil_sim.faults.registry import FAULTS
 from hil_sim.gait.activity import Activity
 from hil_sim.gait.timetable import Entry
+from hil_sim.hands import FEET
 
 Request = Mapping[str, Any]
 Answer = dict[str, Any]
 
 EVERYTHING = "all"
+NOBODY = "nobody"
 CONTROLLER_COMMANDS = {"start": b"\x01", "stop": b"\x00"}  # object 2000h
 
 
@@ -34,6 +37,9 @@ class Operator:
             "clear": self._clear,
             "activity": self._activity,
             "controller": self._controller,
+            "hand": self._hand,
+            "lean": self._lean,
+            "stamp": self._stamp,
             "list": self._list,
         }
 
@@ -59,6 +65,21 @@ class Operator:
             *controller.COMMAND, CONTROLLER_COMMANDS[request["controller"]]
         )
         return {"controller": self._robot.controller.controller_state.name.lower()}
+
+    def _hand(self, request: Request) -> Answer:
+        joint, degrees = str(request["hand"]), float(request["degrees"])
+        drive = self._robot.drives[joint]
+        self._robot.hands.move(drive, self._robot.mountings[joint], math.radians(degrees))
+        return {"hand": joint, "degrees": degrees}
+
+    def _lean(self, request: Request) -> Answer:
+        forward, left = (math.radians(degrees) for degrees in request["lean"])
+        self._robot.hands.lean = (forward, left)
+        return {"lean": request["lean"]}
+
+    def _stamp(self, request: Request) -> Answer:
+        self._robot.hands.stamping = None if request["stamp"] == NOBODY else str(request["stamp"])
+        return {"stamp": request["stamp"]}
 
     def _list(self, _request: Request) -> Answer:
         """Every fault with its keys and where it is on now, and those that are on."""
@@ -122,6 +143,30 @@ def _check_controller(request: Request) -> None:
         )
 
 
+def _check_hand(request: Request) -> None:
+    if request["hand"] not in JOINTS:
+        raise RequestRefused(f"there is no joint {request['hand']!r}: {', '.join(JOINTS)}")
+    _check_degrees("degrees", request.get("degrees"))
+
+
+def _check_lean(request: Request) -> None:
+    lean = request["lean"]
+    if not isinstance(lean, list) or len(lean) != 2:
+        raise RequestRefused(f"lean = {lean!r} is not [forward, left], in degrees")
+    for degrees in lean:
+        _check_degrees("lean", degrees)
+
+
+def _check_degrees(key: str, degrees: object) -> None:
+    if not isinstance(degrees, int | float) or isinstance(degrees, bool) or not abs(degrees) <= 180:
+        raise RequestRefused(f"{key} = {degrees!r} is no number of degrees, -180 to 180")
+
+
+def _check_stamp(request: Request) -> None:
+    if request["stamp"] not in (*FEET, NOBODY):
+        raise RequestRefused(f"stamp = {request['stamp']!r} is none of {', '.join(FEET)}, {NOBODY}")
+
+
 def _nothing_to_check(_request: Request) -> None:
     """Every value will do."""
 
@@ -132,5 +177,10 @@ _CHECKS: Mapping[str, tuple[tuple[str, ...], Callable[[Request], None]]] = {
     "clear": (("on",), _check_clear),
     "activity": ((), _check_activity),
     "controller": ((), _check_controller),
+    "hand": (("degrees",), _check_hand),
+    "lean": ((), _check_lean),
+    "stamp": ((), _check_stamp),
     "list": ((), _nothing_to_check),
 }
+
+VERBS = tuple(_CHECKS)

@@ -15,6 +15,7 @@ from hil_sim.exoskeleton import Exoskeleton, Scenario
 from hil_sim.faults.injector import Faults
 from hil_sim.housing import Housing
 from hil_sim.loop import Loop
+from hil_sim.mounting import Mounting
 from hil_sim.node.lss import UNCONFIGURED
 from hil_sim.operator import Operator
 from hil_sim.sensors.serial_port import SerialPort
@@ -31,8 +32,9 @@ class SimulatedRobot(Housing):
 
     The wearer is subject `person`; the ground truth is written to `truth`; `drives` names the files of joints
     with other drives than ours. With `interface` the bus is that CAN interface of Linux; the nodes named in
-    `without` are not simulated, the drives of those in `unconfigured` have no node id yet. `guard` is that
-    table of robot.toml. `say` is told when the interface goes and comes back, and when the bus is overloaded.
+    `without` are not simulated, the drives of those in `unconfigured` have no node id yet; `mountings` says
+    how joints are built in. `guard` is that table of robot.toml. `say` is told when the interface goes and
+    comes back, and when the bus is overloaded.
     `faults` and `operator` belong to the thread that runs it; others use the control socket in the folder.
     For the rest see `Housing`.
     """
@@ -54,8 +56,11 @@ class SimulatedRobot(Housing):
         without: Collection[str] = (),
         guard: Mapping[str, Any] | None = None,
         unconfigured: Collection[str] = (),
+        mountings: Mapping[str, Mounting] | None = None,
     ) -> None:
-        self.exoskeleton = Exoskeleton(scenario, seed, sensors, person, drives, without, unconfigured)
+        self.exoskeleton = Exoskeleton(
+            scenario, seed, sensors, person, drives, without, unconfigured, mountings
+        )
         super().__init__(folder, self.exoskeleton.bus, virtual_channel, speed, epoch_s)
         self.faults = Faults(self.exoskeleton, self.folder.path, seed)
         self.operator = Operator(self.exoskeleton, self.faults)

@@ -9,6 +9,7 @@ from hil_sim import personality, toml_text
 from hil_sim.bus.hub import HOST
 from hil_sim.drive.drive import JointDrive
 from hil_sim.exoskeleton import CONTROLLER, CONTROLLER_EDS, CONTROLLER_NODE, DRIVE_EDS, Exoskeleton
+from hil_sim.mounting import Mounting
 from hil_sim.sensors.tables import tables
 
 CHANNEL = "sim"
@@ -69,8 +70,8 @@ node_id = {node_id}                     # its CANopen node id (1–127)
 eds = {eds:<25} # beside this file, or one that ships with GWRMS
 counts_per_revolution = 4096    # of the encoder that 6064h counts, here the motor's
 gear_ratio = 100.0              # motor revolutions per revolution of the joint
-direction = 1                   # −1 where counts fall when the joint bends
-zero_offset = 0.0               # rad, the joint's angle where the drive counts 0
+direction = {direction:<20}# −1 where counts fall when the joint bends
+zero_offset = {zero:<18}# rad, the joint's angle where the drive counts 0
 """
 
 _JOINT = """
@@ -80,8 +81,8 @@ node_id = {node_id}
 eds = {eds}
 counts_per_revolution = 4096
 gear_ratio = 100.0
-direction = 1
-zero_offset = 0.0
+direction = {direction}
+zero_offset = {zero}
 """
 
 _RATED = """\
@@ -214,7 +215,10 @@ def text(folder: Path, bus: str, robot: Exoskeleton, guard: Mapping[str, Any] | 
     return "".join(
         (
             _HEAD.format(path=folder / "robot.toml", bus=bus + _OUR_NODE * ("heartbeat_ms" in (guard or {}))),
-            *map(_joint, templates, drives),
+            *(
+                _joint(one, drive, robot.mountings[drive.name])
+                for one, drive in zip(templates, drives, strict=True)
+            ),
             _NOT_SIMULATED.format(names=", ".join(sorted(robot.without))) if robot.without else "",
             _controller_table() if led else "",
             "\n",
@@ -234,9 +238,15 @@ def _controller_table() -> str:
     )
 
 
-def _joint(template: str, drive: JointDrive) -> str:
+def _joint(template: str, drive: JointDrive, mounting: Mounting) -> str:
     file = personality.name(drive.description)
-    table = template.format(name=drive.name, node_id=drive.node_id, eds=json.dumps(file, ensure_ascii=False))
+    table = template.format(
+        name=drive.name,
+        node_id=drive.node_id,
+        eds=json.dumps(file, ensure_ascii=False),
+        direction=mounting.direction,
+        zero=round(mounting.angle(0, drive.counts_per_radian), 6) + 0.0,
+    )
     return table if file == DRIVE_EDS else table + _RATED
 
 

@@ -85,13 +85,16 @@ class TruthFile:
         robot, generator = self._robot, self._robot.controller.generator
         now_s = robot.clock.now_s
         feet, trunk = robot.wearer.feet(now_s), robot.wearer.trunk(now_s)
-        joints = [None if name in robot.without else drive.joint for name, drive in robot.drives.items()]
+        joints = [
+            (None if name in robot.without else robot.drives[name].joint, mounting)
+            for name, mounting in robot.mountings.items()
+        ]
         numbers = [
             *phases(generator),
             generator.shape.step_length,
             generator.shape.cycle_time,
-            *(None if joint is None else joint.position for joint in joints),
-            *(None if joint is None else joint.velocity for joint in joints),
+            *(None if joint is None else mounting.seen(joint.position) for joint, mounting in joints),
+            *(None if joint is None else mounting.seen(joint.velocity) for joint, mounting in joints),
             *(value for foot in feet for value in _loaded(foot)),
             robot.wearer.support(),
             *(trunk.roll, trunk.pitch, trunk.yaw),

@@ -10,7 +10,7 @@ from drivers.imu.conventions import Conventions
 from drivers.imu.frame import ImuFrame
 from drivers.imu.motion import UNITS, TrunkMotion, channels
 from drivers.imu.plausibility import ImuCheck
-from drivers.imu.rotation import IDENTITY, Quaternion
+from drivers.imu.rotation import IDENTITY, Quaternion, Vector
 from drivers.imu.settings import Attitude, MountedSettings
 from drivers.latest import Latest
 from drivers.noted import found
@@ -71,6 +71,10 @@ class TrunkImu:
         measured = zero.measure(self._motion.ups_as_mounted())
         self._motion.set_zero(measured)
         return measured
+
+    def ups_as_mounted(self) -> list[Vector]:
+        """The world's up in the axes of the trunk without a zero, of the last second or so."""
+        return self._motion.ups_as_mounted()
 
     def _take(self, frame: ImuFrame, stamp_ns: int) -> None:
         """A frame that was taken at `stamp_ns`."""

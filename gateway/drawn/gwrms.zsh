@@ -16,6 +16,7 @@ _shtab_gwrms_commands() {
     check:'Checks a robot'"'"'s file, a server'"'"'s file or a scenario as a gateway, a collector or `gwrms sim run` would read'
     cloud:'the store: browse, upload, download, verify, tidy'
     collect:'Record every robot, whole, into the store; and ask how that goes.'
+    commission:'Finds out, one joint at a time, what a robot'"'"'s file has to say, and writes it.'
     completion:'Print what completes commands, options and files in a shell.'
     cost:'What monitoring costs a robot now: CPU, memory, wake-ups, bus, network.'
     demo:'A simulated exoskeleton, its gateway and a live view, with one command.'
@@ -360,6 +361,20 @@ _shtab_gwrms_collect_options=(
 
 # guard to ensure default positional specs are added only once per session
 _shtab_gwrms_collect_defaults_added=0
+
+_shtab_gwrms_commission_options=(
+  "(- : *)"{-h,--help}"[show this help message and exit]"
+  "--bitrate[bit\/s, for interfaces that are opened with one]:bitrate:"
+  "*--eds[folder of EDS files]:DIR:_files"
+  "*--serial[an insole\'s or IMU\'s port]:PORT:"
+  "--who[who does it, for the record (default\: your user name)]:who:"
+  "--json[questions and answers as JSON lines, for other faces]"
+  ":the robot\'s file that is to be written:_files"
+  ":can0, INTERFACE\:CHANNEL, or a file that has only its \[can.\…\]:"
+)
+
+# guard to ensure default positional specs are added only once per session
+_shtab_gwrms_commission_defaults_added=0
 
 _shtab_gwrms_completion_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
@@ -982,6 +997,7 @@ _shtab_gwrms_sim_options=(
   "--seed[of noise, losses and strides\; same seed, same bytes (default\: 0)]:S:"
   "--subject[who wears the robot (default\: 0, nominal)]:N:"
   "*--drive[the EDS or DCF of the drives, or of one joint\'s (again for another one)]:[JOINT=]FILE:"
+  "*--mount[a drive\'s node id, 1 or -1 (its motor built in the other way round), counts at zero]:JOINT=NODE[,DIRECTION[,ZERO]]:"
   "--truth[write the ground truth there]:FILE:_files"
 )
 
@@ -998,6 +1014,9 @@ _shtab_gwrms_sim_fault_options=(
   "--clear[end a fault, or all]:NAME:(all node_lost reboot late_boot node_stopped emcy heartbeat_missing tpdo_silent bus_off sdo_duplicate sdo_late sdo_silent sdo_abort frame_loss error_frames bus_load bus_cut gateway_bus_off sync_lost overcurrent overtemperature undervoltage encoder_jump encoder_stuck gear_slip following_error sto limit_switch drift runaway sensor_unplugged sensor_garbage sensor_wrong_baud sensor_frozen sensor_dropout insole_stuck_cell insole_drift insole_saturated imu_drift imu_saturated swapped_feet swapped_ports gait_asymmetry cpu_hog memory_hog slow_disk)"
   "--activity[what the wearer does from now on]:WHAT:(stand walk sit stairs_up stairs_down ramp_up ramp_down turn_left turn_right stumble fall)"
   "--controller[start or stop the gait controller]:WHAT:(start stop)"
+  "--hand[move a joint without power by hand]:JOINT=DEGREES:"
+  "--lean[lean the trunk, in degrees]:('FORWARD', 'LEFT'):"
+  "--stamp[stamp with the left or right foot, or nobody]:FOOT:"
   ":the fault:(node_lost reboot late_boot node_stopped emcy heartbeat_missing tpdo_silent bus_off sdo_duplicate sdo_late sdo_silent sdo_abort frame_loss error_frames bus_load bus_cut gateway_bus_off sync_lost overcurrent overtemperature undervoltage encoder_jump encoder_stuck gear_slip following_error sto limit_switch drift runaway sensor_unplugged sensor_garbage sensor_wrong_baud sensor_frozen sensor_dropout insole_stuck_cell insole_drift insole_saturated imu_drift imu_saturated swapped_feet swapped_ports gait_asymmetry cpu_hog memory_hog slow_disk)"
   "(*)::its parameters:"
 )
@@ -1152,6 +1171,7 @@ _shtab_gwrms() {
         check) _arguments -C -s $_shtab_gwrms_check_options ;;
         cloud) _shtab_gwrms_cloud ;;
         collect) _arguments -C -s $_shtab_gwrms_collect_options ;;
+        commission) _arguments -C -s $_shtab_gwrms_commission_options ;;
         completion) _arguments -C -s $_shtab_gwrms_completion_options ;;
         cost) _arguments -C -s $_shtab_gwrms_cost_options ;;
         demo) _arguments -C -s $_shtab_gwrms_demo_options ;;

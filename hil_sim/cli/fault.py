@@ -9,6 +9,7 @@ from typing import Any
 from hil_sim.control_socket import ask
 from hil_sim.faults.fault import Target
 from hil_sim.faults.registry import FAULTS
+from hil_sim.operator import VERBS
 
 _DESCRIPTION = """\
 Makes a fault in the robot of a running `gwrms sim --dir DIR`, or ends it. Without --for it stays until it is
@@ -56,6 +57,11 @@ def _parser() -> argparse.ArgumentParser:
     others.add_argument("--clear", metavar="NAME", help="end a fault, or all")
     others.add_argument("--activity", metavar="WHAT", help="what the wearer does from now on")
     others.add_argument("--controller", metavar="WHAT", help="start or stop the gait controller")
+    others.add_argument("--hand", metavar="JOINT=DEGREES", help="move a joint without power by hand")
+    others.add_argument(
+        "--lean", type=float, nargs=2, metavar=("FORWARD", "LEFT"), help="lean the trunk, in degrees"
+    )
+    others.add_argument("--stamp", metavar="FOOT", help="stamp with the left or right foot, or nobody")
     return parser
 
 
@@ -87,10 +93,23 @@ def _request(parser: argparse.ArgumentParser, arguments: argparse.Namespace) -> 
         "on": arguments.on,
         "for_s": arguments.for_s,
         "params": _params(parser, arguments.params) or None,
+        "lean": arguments.lean,
+        "stamp": arguments.stamp,
+        **_hand(parser, arguments.hand),
     }
-    if not any(given[verb] for verb in ("fault", "clear", "activity", "controller", "list")):
-        parser.error("name a fault, or say --list, --active, --clear, --activity or --controller")
+    if not any(given.get(verb) for verb in VERBS):
+        parser.error("name a fault, or say what else: --help lists it")
     return {key: value for key, value in given.items() if value is not None}
+
+
+def _hand(parser: argparse.ArgumentParser, word: str | None) -> dict[str, Any]:
+    if word is None:
+        return {}
+    joint, _, degrees = word.partition("=")
+    try:
+        return {"hand": joint, "degrees": float(degrees)}
+    except ValueError:
+        parser.error(f"--hand {word!r} is not JOINT=DEGREES, as left_knee=30")
 
 
 def _params(parser: argparse.ArgumentParser, words: list[str]) -> dict[str, str]:

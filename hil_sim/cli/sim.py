@@ -5,10 +5,10 @@ import fnmatch
 import time
 from pathlib import Path
 
-from hil_sim import personality
+from hil_sim import mounting, personality
 from hil_sim.cli import replay, run, running
 from hil_sim.cli.arguments import seconds, speed
-from hil_sim.exoskeleton import CONTROLLER, JOINTS, Scenario
+from hil_sim.exoskeleton import CONTROLLER, CONTROLLER_NODE, JOINTS, Scenario
 from hil_sim.robot import SimulatedRobot
 from hil_sim.scenario.runner import schedule
 from hil_sim.scenario.script import Script, load
@@ -189,6 +189,13 @@ def _parser() -> argparse.ArgumentParser:
         metavar="[JOINT=]FILE",
         help="the EDS or DCF of the drives, or of one joint's (again for another one)",
     )
+    parser.add_argument(
+        "--mount",
+        action="append",
+        default=[],
+        metavar="JOINT=NODE[,DIRECTION[,ZERO]]",
+        help="a drive's node id, 1 or -1 (its motor built in the other way round), counts at zero",
+    )
     parser.add_argument("--truth", type=Path, metavar="FILE", help="write the ground truth there")
     return parser
 
@@ -240,6 +247,7 @@ def main(argv: list[str]) -> int:
         without=arguments.without,
         unconfigured=arguments.unconfigured,
         guard=script.guard,
+        mountings=mounting.choose(arguments.mount, JOINTS, [CONTROLLER_NODE]),
     )
 
     return running.run(robot, arguments.seconds, lambda: schedule(script.lines, robot))

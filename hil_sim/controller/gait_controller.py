@@ -21,6 +21,7 @@ from hil_sim.gait.generator import Generator
 from hil_sim.gait.profiles import smooth
 from hil_sim.gait.subject import NOMINAL, WearerSettings
 from hil_sim.gait.walk import Shape
+from hil_sim.mounting import Mounting
 from hil_sim.node.dictionary import Value
 from hil_sim.node.nmt import NMT_COB_ID, NmtService, NmtState
 from hil_sim.node.node import Handler, Node
@@ -32,7 +33,7 @@ _TAKE_OVER_S = 1.0  # how long the way from where the joints are to the motion t
 
 
 class GaitController(Node):
-    """Node that runs the gait; `joints` are the node ids of the drives in the order of its sub-indices.
+    """Node that runs the gait; `joints` are the mountings of the drives in the order of its sub-indices.
 
     `counts_per_radian` holds for every drive; those that are `foreign` are set up before they are started.
     The motion is that of `wearer`; its strides vary by `source`.
@@ -45,7 +46,7 @@ class GaitController(Node):
         name: str,
         node_id: int,
         description: Description,
-        joints: tuple[int, ...],
+        joints: tuple[Mounting, ...],
         counts_per_radian: float,
         wearer: WearerSettings = NOMINAL,
         source: random.Random | None = None,
@@ -54,7 +55,9 @@ class GaitController(Node):
         super().__init__(clock, bus, name, node_id, description)
         self.controller_state = ControllerState.IDLE
         self._counts_per_radian = counts_per_radian
-        self._drives = [Seen(joint, clock) for joint in joints]
+        self._joints = joints
+        self._drives = [Seen(joint.node_id, clock) for joint in joints]
+        objects.listen_to(self.dictionary, [joint.node_id for joint in joints])
         self._commissionings = {
             node: Commissioning(clock, self.send, node, partial(self._start_node, node)) for node in foreign
         }
@@ -202,9 +205,11 @@ class GaitController(Node):
         """Begin the motion where the joints are: what they differ from it fades out."""
         self._go(ControllerState.RUNNING)
         numbers = range(1, len(self._drives) + 1)
-        actual = [self.dictionary[objects.POSITIONS, number].number() for number in numbers]
-        wanted = self._angles()
-        self._offsets = [a / self._counts_per_radian - w for a, w in zip(actual, wanted, strict=True)]
+        counts = [self.dictionary[objects.POSITIONS, number].number() for number in numbers]
+        actual = [
+            joint.angle(one, self._counts_per_radian) for joint, one in zip(self._joints, counts, strict=True)
+        ]
+        self._offsets = [one - wanted for one, wanted in zip(actual, self._angles(), strict=True)]
         self._taken_over_s = 0.0
         self._move()
 
@@ -224,9 +229,9 @@ class GaitController(Node):
         self._taken_over_s = min(self._taken_over_s + dt, _TAKE_OVER_S)
         self.generator.step(dt, Activity(self.dictionary[objects.ACTIVITY].number()), self._shape())
         left = 1.0 - smooth(self._taken_over_s / _TAKE_OVER_S)
-        parts = zip(self._angles(), self._offsets, self.strays, strict=True)
-        for number, (angle, offset, stray) in enumerate(parts, 1):
-            target = round((angle + left * offset + stray) * self._counts_per_radian)
+        parts = zip(self._joints, self._angles(), self._offsets, self.strays, strict=True)
+        for number, (joint, angle, offset, stray) in enumerate(parts, 1):
+            target = joint.counts(angle + left * offset + stray, self._counts_per_radian)
             self._set(number, ENABLE_OPERATION, target)
 
     def _command_where_they_are(self) -> None:

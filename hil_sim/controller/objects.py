@@ -1,6 +1,9 @@
 """The objects of the gait controller (gait_controller.eds), and what the numbers in them mean."""
 
+from collections.abc import Sequence
 from enum import IntEnum
+
+from hil_sim.node.dictionary import Dictionary
 
 COMMAND = (0x2000, 0)
 STEP_LENGTH = (0x2001, 0)
@@ -28,3 +31,17 @@ class ControllerState(IntEnum):
 
 
 COMMANDING = (ControllerState.STARTING, ControllerState.ENABLING, ControllerState.RUNNING)
+
+_HEARTBEAT_MS = 250
+_RPDO, _TPDO, _OWN_TPDOS = 0x1400, 0x1800, 1
+
+
+def listen_to(dictionary: Dictionary, nodes: Sequence[int]) -> None:
+    """Have the drives of these node ids behind its PDOs and heartbeats, in the order of its sub-indices."""
+    for number, node in enumerate(nodes):
+        for key, value in (
+            ((0x1016, number + 1), node << 16 | _HEARTBEAT_MS),
+            ((_RPDO + number, 1), 0x180 + node),
+            ((_TPDO + _OWN_TPDOS + number, 1), 0x200 + node),
+        ):
+            dictionary[key].commissioned = dictionary[key].value = value

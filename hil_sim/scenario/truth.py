@@ -20,20 +20,18 @@ _SHAPE = {
 
 
 _DRIVE: Mapping[str, Callable[[JointDrive], Seen]] = {
-    "position": lambda drive: drive.joint.position,
-    "velocity": lambda drive: drive.joint.velocity,
-    "torque": lambda drive: drive.servo.torque,
     "temperature": lambda drive: drive.temperature_c,
     "state": lambda drive: _spoken(drive.power_state, " "),
     "nmt": lambda drive: _spoken(drive.state, "-") if drive.powered else _OFF,
 }
+_MOVING = ("position", "velocity", "torque")  # as the joint has it, however its motor is built in
 _OFF = "off"
 _FEET = ("left", "right")
 
 
 def names() -> tuple[str, ...]:
     """Of everything that is told, on a robot whose drives are all simulated."""
-    drives = [f"{joint}.{quantity}" for joint in JOINTS for quantity in _DRIVE]
+    drives = [f"{joint}.{quantity}" for joint in JOINTS for quantity in (*_MOVING, *_DRIVE)]
     feet = [f"{side}_foot.force" for side in _FEET]
     return ("wearer.activity", "gait.state", *(f"gait.{name}" for name in _SHAPE), *feet, *drives)
 
@@ -66,5 +64,8 @@ def truth(robot: Exoskeleton) -> dict[str, Seen]:
     for side, foot in zip(_FEET, robot.wearer.feet(robot.clock.now_s), strict=True):
         found[f"{side}_foot.force"] = foot.force
     for name, drive in robot.drives.items():
-        found |= {f"{name}.{quantity}": seen(drive) for quantity, seen in _DRIVE.items()}
+        found |= {f"{name}.{quantity}": of(drive) for quantity, of in _DRIVE.items()}
+        seen = robot.mountings[name].seen
+        moving = drive.joint.position, drive.joint.velocity, drive.servo.torque
+        found |= {f"{name}.{quantity}": seen(value) for quantity, value in zip(_MOVING, moving, strict=True)}
     return found

@@ -1,0 +1,188 @@
+"""`gwrms commission`: a robot's file from an interface's name, in a dialogue, the joints moved by hand."""
+
+import argparse
+import datetime
+import getpass
+import shutil
+import sys
+from pathlib import Path
+
+import msgspec
+
+from drivers.bus.settings import CanSettings
+from drivers.cli.buses import named
+from drivers.errors import SettingsError
+from drivers.scan.products import Library, files
+from gateway.cli.text import say, say_json, warn
+from gateway.commission.bench import CanBench
+from gateway.commission.dialogue import Ask, Talk, agree, run
+from gateway.commission.draft import Draft
+from gateway.commission.serial_bench import SerialPorts
+from gateway.commission.steps import commission
+from gateway.commission.writing import text
+from gateway.config.reading import examine
+from gateway.config.robot import RobotConfig
+from gateway.records import durable
+from gateway.records.records import Records
+
+_EPILOG = """\
+example
+  gwrms commission exo-01.toml can0 --eds ~/eds --serial /dev/serial/by-id/usb-left --serial …
+
+The joints are moved by hand, without power: nothing here moves, enables or stops anything. What is to be
+written to a drive is asked for, and read back. Ctrl-C interrupts; the same command goes on where it was, and
+what is known is kept in FILE.commission until FILE is written.
+
+exit status
+  0 written, 1 not (interrupted, or something failed), 2 usage
+"""
+
+
+def main(argv: list[str]) -> int:
+    """Run `gwrms commission`."""
+    parser = _parser()
+    options = parser.parse_args(argv)
+    missing = [str(folder) for folder in options.eds if not folder.is_dir()]
+    if missing:
+        parser.error(f"--eds {', '.join(missing)}: there is no such folder")
+    name, settings = _the_bus(options.bus, options.bitrate)
+    draft = Draft(options.file)
+    _keep_bus(draft, settings)
+    face: _JsonFace | _Terminal = _JsonFace() if options.json else _Terminal()
+    bench = CanBench(name, settings)
+    try:
+        run(_all(draft, bench, options, face), face)
+    except EOFError:
+        warn(
+            "commission",
+            f"nobody answers any more; {draft.path} has what was found, go on with the same command",
+        )
+        return 1
+    except KeyboardInterrupt:
+        warn("commission", f"interrupted; {draft.path} has what was found, go on with the same command")
+        return 130
+    finally:
+        bench.close()
+    return 0 if not draft.path.exists() else 1
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="gwrms commission",
+        description="Finds out, one joint at a time, what a robot's file has to say, and writes it.",
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    parser.add_argument("file", type=Path, metavar="FILE", help="the robot's file that is to be written")
+    parser.add_argument(
+        "bus", metavar="BUS", help="can0, INTERFACE:CHANNEL, or a file that has only its [can.…]"
+    )
+    parser.add_argument("--bitrate", type=int, help="bit/s, for interfaces that are opened with one")
+    parser.add_argument(
+        "--eds", type=Path, action="append", default=[], metavar="DIR", help="folder of EDS files"
+    )
+    parser.add_argument(
+        "--serial", action="append", default=[], metavar="PORT", help="an insole's or IMU's port"
+    )
+    parser.add_argument(
+        "--who", default=getpass.getuser(), help="who does it, for the record (default: your user name)"
+    )
+    parser.add_argument(
+        "--json", action="store_true", help="questions and answers as JSON lines, for other faces"
+    )
+    return parser
+
+
+def _the_bus(bus: str, bitrate: int | None) -> tuple[str, CanSettings]:
+    found = list(named([bus], bitrate))
+    if len(found) != 1:
+        raise SettingsError(
+            f"{bus} has {len(found)} buses: commission one at a time, each from a file of its own"
+        )
+    return found[0]
+
+
+def _keep_bus(draft: Draft, settings: CanSettings) -> None:
+    told = {**msgspec.to_builtins(settings), **settings.more}
+    usual = msgspec.to_builtins(CanSettings(interface="", channel=""))
+    for key, value in told.items():
+        if key != "more" and value != usual.get(key, not value):
+            draft.put("can.main", key, value)
+
+
+def _all(
+    draft: Draft, bench: CanBench, options: argparse.Namespace, face: "_Terminal | _JsonFace"
+) -> Talk[None]:
+    library = Library(files(options.eds))
+    yield from commission(draft, bench, library, SerialPorts(), options.serial)
+    when = datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+    made = text(draft, options.who, when)
+    face.say(made)
+    if (yield from agree(f"Write this to {draft.file}?")):
+        face.say(_write(draft, made, options.who))
+    else:
+        face.say(f"Nothing is written; {draft.path} has what was found.")
+
+
+def _write(draft: Draft, made: str, who: str) -> str:
+    """What became of it, in words."""
+    if draft.file.exists():
+        shutil.copyfile(draft.file, draft.file.with_name(draft.file.name + ".before"))
+    durable.write(draft.file, made.encode())
+    found = examine(draft.file)
+    said = "".join(f"  {finding.severity}: {finding.words}\n" for finding in found.findings)
+    if found.config is None:
+        return f"{draft.file} is written and cannot be used yet:\n{said}"
+    journaled = _journal(found.config, draft, who)
+    draft.end()
+    return f"{draft.file} is written.\n{said}{journaled}Next: gwrms gateway {draft.file}"
+
+
+def _journal(config: RobotConfig, draft: Draft, who: str) -> str:
+    """Put what was found into the robot's journal; what is in the way of that is told, no more."""
+    records = Records(config.records)
+    try:
+        findings = {table: msgspec.to_builtins(keys) for table, keys in draft.tables.items()}
+        records.journal.append(who, "commission", file=str(draft.file), found=findings).result()
+    except OSError as error:
+        return f"  It is not in the journal: {error.strerror or error}\n"
+    finally:
+        records.close()
+    return ""
+
+
+class _Terminal:
+    def say(self, text: str) -> None:
+        say(text + "\n")
+
+    def ask(self, question: Ask) -> str:
+        choices = f" [{'/'.join(question.choices)}]" if question.choices else ""
+        default = f" (Enter: {question.default})" if question.default else ""
+        say(f"\n{question.text}{choices}{default}\n> ")
+        return _line()
+
+
+class _JsonFace:
+    """A line each: {"say": …} and {"ask": …, "choices": …, "default": …, "unit": …}; plain lines answer."""
+
+    def say(self, text: str) -> None:
+        say_json({"say": text})
+
+    def ask(self, question: Ask) -> str:
+        say_json(
+            {
+                "ask": question.text,
+                "choices": question.choices,
+                "default": question.default,
+                "unit": question.unit,
+            }
+        )
+        return _line()
+
+
+def _line() -> str:
+    typed = sys.stdin.readline()
+    if not typed:
+        raise EOFError
+    return typed

@@ -1,0 +1,55 @@
+"""The drives that a bus has, axis by axis: read while they stand without power, moved by hand."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from drivers.bus.values import unsigned
+from drivers.joint.cia402 import ENERGISED, DriveState, drive_state
+from drivers.joint.quantities import AXIS_OFFSET
+from drivers.scan.asking import Told
+from gateway.commission.bench import Bench
+
+STATUSWORD, POSITION = 0x6041, 0x6064
+
+
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """One axis of one node."""
+
+    node: int
+    number: int = 0
+
+    def __str__(self) -> str:
+        return f"node {self.node}" + (f", axis {self.number}" if self.number else "")
+
+    def index(self, index: int) -> int:
+        """Where this axis has the object that the first one has at `index` (CiA 402-2 §5)."""
+        return index + self.number * AXIS_OFFSET
+
+
+def axes_of(told: Mapping[int, Told]) -> tuple[Axis, ...]:
+    """Every axis of every node that says that it is a drive."""
+    return tuple(Axis(node, axis.number) for node, one in sorted(told.items()) for axis in one.axes)
+
+
+def state(bench: Bench, axis: Axis) -> DriveState | None:
+    """Of its state machine; `None` where nobody knows. Raises `DriverError`."""
+    data = bench.read(axis.node, axis.index(STATUSWORD))
+    return None if data is None else drive_state(unsigned(data))
+
+
+def powered(bench: Bench, axes: Sequence[Axis]) -> tuple[Axis, ...]:
+    """Those that might move by themselves, or whose state is not known. Raises `DriverError`."""
+    return tuple(axis for axis in axes if (found := state(bench, axis)) is None or found in ENERGISED)
+
+
+def counts(bench: Bench, axis: Axis) -> int | None:
+    """Of its encoder, now; `None` where it has no position. Raises `DriverError`."""
+    data = bench.read(axis.node, axis.index(POSITION))
+    return None if data is None else int.from_bytes(data[:4], "little", signed=True)
+
+
+def number(bench: Bench, axis: Axis, index: int, subindex: int = 0) -> int | None:
+    """An unsigned object of the axis; `None` where it has none. Raises `DriverError`."""
+    data = bench.read(axis.node, axis.index(index), subindex)
+    return None if data is None else unsigned(data)

@@ -1,0 +1,62 @@
+"""What has been found out until now, and how: kept beside the file it becomes, after every finding."""
+
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from drivers.errors import SettingsError
+from gateway.records import durable
+
+SUFFIX = ".commission"
+
+
+class Found(msgspec.Struct, frozen=True):
+    """One value of the robot's file, and how it was found, for its comment."""
+
+    value: Any
+    how: str = ""
+
+
+class Draft:
+    """Values by table and key, as `("joint.left_knee", "node_id")`; any that is there is not asked again."""
+
+    def __init__(self, file: Path) -> None:
+        """Of the robot's file `file`, from where it was left.
+
+        Raises:
+            SettingsError: what was left cannot be read.
+
+        """
+        self.file = file
+        self.path = file.with_name(file.name + SUFFIX)
+        self.tables: dict[str, dict[str, Found]] = {}
+        if self.path.exists():
+            try:
+                self.tables = msgspec.json.decode(self.path.read_bytes(), type=dict[str, dict[str, Found]])
+            except (OSError, msgspec.DecodeError) as error:
+                raise SettingsError(
+                    f"{self.path}: cannot be gone on with: {error}; remove it to begin anew"
+                ) from error
+
+    def has(self, table: str, key: str) -> bool:
+        return key in self.tables.get(table, {})
+
+    def value(self, table: str, key: str, default: Any = None) -> Any:
+        found = self.tables.get(table, {}).get(key)
+        return default if found is None else found.value
+
+    def put(self, table: str, key: str, value: Any, how: str = "") -> None:
+        """Keep a finding; raises `OSError` where it cannot be kept."""
+        self.tables.setdefault(table, {})[key] = Found(value, how)
+        durable.write(self.path, msgspec.json.format(msgspec.json.encode(self.tables)))
+
+    def forget(self, table: str, *keys: str) -> None:
+        """Ask for these again; without keys, for the whole table."""
+        kept = self.tables.pop(table, {})
+        if keys:
+            self.tables[table] = {key: found for key, found in kept.items() if key not in keys}
+
+    def end(self) -> None:
+        """The file is written: nothing is left to go on with."""
+        durable.remove(self.path)

@@ -1,0 +1,81 @@
+"""From two positions with known angles to what counts mean: direction, gear ratio and zero of a joint."""
+
+import math
+from dataclasses import dataclass
+
+AGREES = 0.05  # a share by which hand and eye may be off
+LEAST_RAD = math.radians(10.0)  # between the two positions
+LEAST_COUNTS = 20
+WHOLE = 0.02  # a ratio that is so near to a whole number is that number
+
+
+@dataclass(frozen=True, slots=True)
+class Held:
+    """A joint held still: the angle that was told (rad) and what its encoder counts."""
+
+    angle: float
+    counts: int
+
+
+@dataclass(frozen=True, slots=True)
+class Nominal:
+    """What the drive says of its encoder (608Fh) and gear (6091h); `None` where it does not know."""
+
+    counts_per_revolution: float | None
+    gear_ratio: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Scale:
+    """How counts become the joint's angle; see `JointSettings`."""
+
+    counts_per_revolution: float
+    gear_ratio: float
+    direction: int
+    zero_offset: float
+
+
+def problem(first: Held, second: Held) -> str | None:
+    """Why these two say nothing."""
+    if abs(second.angle - first.angle) < LEAST_RAD:
+        return f"the two angles must differ by {math.degrees(LEAST_RAD):g}° or more"
+    if abs(second.counts - first.counts) < LEAST_COUNTS:
+        return (
+            f"its encoder counted {second.counts - first.counts} in between: another joint was moved, or the "
+            "encoder is dead"
+        )
+    return None
+
+
+def counts_per_turn(first: Held, second: Held) -> float:
+    """Of the joint, as measured; negative where counts fall while the angle rises."""
+    return (second.counts - first.counts) / (second.angle - first.angle) * math.tau
+
+
+def disagreement(measured: float, nominal: Nominal) -> float | None:
+    """How many times what the drive says was measured; `None` where both agree, or it says nothing."""
+    if nominal.counts_per_revolution is None or nominal.gear_ratio is None:
+        return None
+    ratio = abs(measured) / (nominal.counts_per_revolution * nominal.gear_ratio)
+    return None if abs(ratio - 1) <= AGREES else ratio
+
+
+def scale(first: Held, second: Held, counts_per_revolution: float, gear_ratio: float) -> Scale:
+    """The scale with these; its direction and zero are those of the two positions."""
+    direction = 1 if counts_per_turn(first, second) > 0 else -1
+    per_count = direction * math.tau / (counts_per_revolution * gear_ratio)
+    zeros = [held.angle - held.counts * per_count for held in (first, second)]
+    return Scale(counts_per_revolution, gear_ratio, direction, sum(zeros) / 2)
+
+
+def gear(measured: float, counts_per_revolution: float) -> float:
+    """The gear ratio that makes them agree; whole where it nearly is."""
+    ratio = abs(measured) / counts_per_revolution
+    whole = round(ratio)
+    return float(whole) if whole and abs(ratio / whole - 1) <= WHOLE else round(ratio, 3)
+
+
+def angle(scale: Scale, counts: int) -> float:
+    """Of the joint (rad) where its encoder counts so."""
+    turns = counts / (scale.counts_per_revolution * scale.gear_ratio)
+    return scale.direction * turns * math.tau + scale.zero_offset

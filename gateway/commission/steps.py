@@ -1,0 +1,57 @@
+"""Commissioning from an interface's name to a robot's file, in the order in which it is gone through.
+
+What the draft has is not asked again: a dialogue that was interrupted goes on where it was.
+"""
+
+from collections.abc import Sequence
+
+from drivers.scan.asking import Told
+from drivers.scan.products import Library
+from gateway.commission import joints, nodes
+from gateway.commission.axes import Axis, axes_of
+from gateway.commission.bench import Bench
+from gateway.commission.dialogue import Say, Talk, word
+from gateway.commission.draft import Draft
+from gateway.commission.sensors import SerialBench, sensors
+from gateway.config.robot import NAME
+
+BEGIN = (
+    "Nothing is moved, enabled or stopped here: the joints are moved by hand, without power. What is written "
+    "to a drive is asked for first. Ctrl-C interrupts; the same command goes on from there."
+)
+
+
+def commission(
+    draft: Draft, bench: Bench, library: Library, serial: SerialBench, ports: Sequence[str]
+) -> Talk[None]:
+    """Find out everything that the file of this robot needs; what is found is in the draft."""
+    yield Say(BEGIN)
+    if not draft.has("robot", "name"):
+        name = yield from word("How is the robot called (as exo-01)?", check=_name_problem)
+        draft.put("robot", "name", name)
+    found, told = yield from nodes.scanned(bench)
+    yield from nodes.role(draft, found)
+    left = list(axes := axes_of(told))
+    for joint in (yield from joints.names(draft, axes)):
+        axis = yield from joints.which_drive(draft, bench, joint, left)
+        if axis is None:
+            continue
+        if axis not in left:
+            yield Say(f"{axis}, the {joints.words(joint)}, does not answer now: it stays as it was found.")
+            continue
+        left.remove(axis)
+        yield from _joint(draft, bench, library, joint, axis, told[axis.node])
+    yield from sensors(draft, serial, ports)
+
+
+def _joint(draft: Draft, bench: Bench, library: Library, joint: str, axis: Axis, told: Told) -> Talk[None]:
+    yield from nodes.file_of(draft, library, axis.node, told)
+    yield from nodes.heartbeat(draft, bench, axis.node)
+    yield from nodes.mapping(draft, axis, told, joint)
+    scale = yield from joints.meaning(draft, bench, joint, axis)
+    yield from joints.limits(draft, bench, joint, axis, scale)
+    yield from joints.ratings(draft, bench, joint, axis, scale.gear_ratio)
+
+
+def _name_problem(text: str) -> str | None:
+    return None if NAME.fullmatch(text) else f"{text!r} is no name: letters, digits, - and _, a letter first"
