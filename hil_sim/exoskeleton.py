@@ -29,7 +29,7 @@ JOINTS = {"left_hip": 1, "left_knee": 2, "left_ankle": 3, "right_hip": 4, "right
 CONTROLLER, CONTROLLER_NODE = "gait", 16
 SENSORS = (*FEET, TRUNK)
 
-SERIAL_NUMBERS = 20_260_000  # that of a drive: and its node id
+SERIAL_NUMBERS = 20_260_000  # of the drives: this and the usual node id
 DRIVE_EDS = "joint_drive.eds"
 CONTROLLER_EDS = "gait_controller.eds"
 
