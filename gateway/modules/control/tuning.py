@@ -13,6 +13,8 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from msgspec import UNSET
+
 from drivers.errors import DeviceTimeout, DriverError
 from drivers.samples import State
 from gateway.config.robot import RobotConfig
@@ -87,7 +89,7 @@ class Tuning:
         self._rules = Rules(config, component, self._parameters)
         self._reads = Reads(loop, self._rules.device, self._read_all)
         self._unanswered = Unanswered()
-        self._known: dict[str, tuple[int, float]] = {}  # parameter → when, what the device held
+        self._known: dict[str, tuple[int, float | str]] = {}  # parameter → when, what the device held
         self._asked: set[_Asked] = set()  # writes that have not been answered
         self._ending: str | None = None
         self._writer = Writer()
@@ -249,7 +251,7 @@ class Tuning:
         try:
             if isinstance(found, Exception):
                 raise found
-            value = parameter.decode(found)
+            value = parameter.told(found)
         except (DriverError, TimeoutError) as error:
             return _value(parameter, None, None, str(device_error(parameter, "reading", error)))
         except RpcError as error:
@@ -311,6 +313,8 @@ class Tuning:
 
 
 def _value(
-    parameter: Parameter, value: float | None, stamp_ns: int | None, problem: str | None = None
+    parameter: Parameter, value: float | str | None, stamp_ns: int | None, problem: str | None = None
 ) -> ParameterValue:
-    return ParameterValue(value, parameter.settings.unit, parameter.min, parameter.max, stamp_ns, problem)
+    number, text = (None, value) if isinstance(value, str) else (value, UNSET)
+    unit = parameter.settings.unit
+    return ParameterValue(number, unit, parameter.min, parameter.max, stamp_ns, problem, text)
