@@ -89,7 +89,7 @@ def read_tpdo(sdo: SdoChannel, description: Description | None, number: int) -> 
         cob_id = unsigned(sdo.upload(parameter, 1))
     except DeviceAbort:
         return None  # the EDS knows it, this device does not
-    enabled = not cob_id & NOT_VALID
+    enabled = not cob_id & NOT_VALID and cob_id & 0x1FFF_FFFF != 0  # 0 is NMT's: nobody has set it
     transmission_type = unsigned(sdo.upload(parameter, 2)[:1])
     extended = bool(cob_id & EXTENDED_ID)
     mapped = _read_entries(sdo, mapping) if enabled else ()

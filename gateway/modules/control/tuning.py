@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any
 from msgspec import UNSET
 
 from drivers.errors import DeviceTimeout, DriverError
-from drivers.samples import State
 from gateway.config.robot import RobotConfig
 from gateway.connections.turns import Client
 from gateway.modules.component.module import ComponentModule
@@ -191,12 +190,9 @@ class Tuning:
 
     def _lost(self, parameters: Iterable[Parameter]) -> dict[str, str]:
         """Why what was read last may hold no longer; of each device that has one of these parameters."""
-        now_ns, lost = time.monotonic_ns(), {}
-        for name in {one.component for one in parameters if one.problem is None}:
-            quality = self._component.quality(name, now_ns)
-            if quality["state"] == State.LOST:
-                lost[name] = f"{name} is not there: {quality['problem'] or 'it is silent'}"
-        return lost
+        names = {one.component for one in parameters if one.problem is None}
+        absent = ((name, self._rules.absence(name)) for name in names)
+        return {name: f"{name} is not there: {why}" for name, why in absent if why is not None}
 
     def _last(self, parameter: Parameter, lost: Mapping[str, str]) -> ParameterValue:
         problem = parameter.problem or lost.get(parameter.component)

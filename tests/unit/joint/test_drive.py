@@ -472,6 +472,20 @@ def test_a_multiplexed_pdo_is_not_empty_and_is_left_alone(joint: Make, channel: 
         knee.stop()
 
 
+def test_a_tpdo_without_an_identifier_brings_nothing(joint: Make, channel: str) -> None:
+    objects = drive_objects() | tpdo(1, 0, *STATUS_AND_POSITION)
+    with FakeNode(channel, 2, objects) as fake:
+        knee = joint(objects, poll_hz=0, slow_poll_hz=0)
+        knee.start()
+        until(lambda: knee.node.ready)
+        assert "no TPDO is enabled" in quality(knee)[1]
+        fake.send(0x000, struct.pack("<Hi", 0x1637, 250))  # as no NMT command is
+        fake.heartbeat()
+        until(lambda: knee.node.life.heartbeats)
+        assert read(knee, "position") is None
+        knee.stop()
+
+
 def test_empty_tpdos_are_told_where_they_may_not_be_taken(joint: Make, channel: str) -> None:
     objects = drive_objects() | tpdo(1, 0x182) | tpdo(2, 0x282)
     with FakeNode(channel, 2, dict(objects)) as fake:
