@@ -118,6 +118,19 @@ def test_a_pdo_that_stays_away_and_an_object_that_is_refused_are_told(
         gait.stop()
 
 
+def test_a_mapping_that_cannot_be_leaves_the_device_and_its_channels_by_sdo(
+    bus: CanBus, channel: str, describe: Describe
+) -> None:
+    with FakeNode(channel, 5, {**OBJECTS, **tpdo(0x2102_0040, 0x2100_0010)}):
+        gait = device(bus, describe, phase=PHASE)
+        gait.start()
+        until(lambda: value(gait, 0) == 0.25)
+        assert "its PDOs are not read: " in problem(gait)
+        assert "maps 80 bits" in problem(gait)
+        assert gait.node.ready
+        gait.stop()
+
+
 def test_what_came_before_a_reboot_is_not_shown_as_what_is_now(
     bus: CanBus, channel: str, describe: Describe
 ) -> None:
