@@ -91,7 +91,7 @@ class CanDevice:
                 self._objects.install(tpdos)
 
     def _tpdos(self, sdo: SdoChannel) -> tuple[tuple[Tpdo, ...], str | None]:
-        """What it sends; nothing, and why, where its mapping cannot be understood: it is there all the same."""
+        """What it sends; nothing, and why, where its mapping cannot be understood."""
         try:
             return read_tpdos(sdo, self._description), None
         except (DeviceTimeout, Unavailable):

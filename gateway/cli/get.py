@@ -10,8 +10,7 @@ from gateway.wire.parameter import ParameterInfo, ParameterValue
 
 EPILOG = """examples:
   gwrms get gait                      all of a component
-  gwrms get 'left_knee.*'            with parameters = "eds" all that its EDS lets write, read-only or not
-  gwrms get left_knee.0x1008:0       a text, such as the device's name; with parameters = "eds"
+  gwrms get 'left_knee.*'            with parameters = "eds" all that its EDS lets write, read-only or not, and texts
   gwrms get left_knee.0x6072:0       by its address in the device"""
 
 
