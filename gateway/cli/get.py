@@ -10,7 +10,7 @@ from gateway.wire.parameter import ParameterInfo, ParameterValue
 
 EPILOG = """examples:
   gwrms get gait                      all of a component
-  gwrms get 'left_knee.*'            with parameters = "eds" all that its EDS lets write, read-only or not, and texts
+  gwrms get 'left_knee.*'            with parameters = "eds" all that its EDS lets write, and its texts
   gwrms get left_knee.0x6072:0       by its address in the device"""
 
 
