@@ -78,7 +78,8 @@ class CanDevice:
             *self.node.findings,
         )
         words = "; ".join(text for text in texts if text)
-        return Quality(state, age_ms, words or None, self.node.counters(), trouble)
+        counters = {"short_frames": self._objects.short_frames, **self.node.counters()}
+        return Quality(state, age_ms, words or None, counters, trouble)
 
     def boot(self, sdo: SdoChannel) -> None:
         """Read which of its channels come by PDO."""

@@ -101,6 +101,8 @@ def test_what_a_pdo_brings_is_read_there_at_any_bit_and_not_asked_for(
             return [value(gait, index) for index in range(3)] == [0.4, -2.5, 1.0]
 
         until(has_come)
+        fake.send(0x185, frame[:5])
+        until(lambda: gait.quality(time.monotonic_ns()).counters["short_frames"] == 1)
         assert not [data for can_id, data in fake.seen if can_id == 0x605 and data[1:3] == b"\x00\x21"]
         gait.stop()
 
