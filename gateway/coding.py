@@ -18,6 +18,8 @@ from eds.datatypes import DATA_TYPE_BY_NAME, DATA_TYPES, DataType
 Number = int | float
 
 NUMBERS = ("boolean", "signed", "unsigned", "real")  # the kinds of data types that are numbers
+LONGEST_TEXT = 4096  # characters of what is no number; more of it is counted
+_UNICODE_STRING = 0x0B
 EXACT_COUNTS = 2**52  # below, a count and its value with a decimal point lead to each other
 _REAL_FORMATS = {32: "<f", 64: "<d"}
 
@@ -36,6 +38,17 @@ def scaled(number: Number, scale: float) -> Number:
 def text(value: Number) -> str:
     """A value with every digit that a person needs to tell it from another one."""
     return str(value) if isinstance(value, int) else f"{value:.10g}"
+
+
+def words(data: bytes, data_type: int) -> str:
+    """What is no number: a text as it stands, other bytes in hexadecimal; a long one ends in its length."""
+    if DATA_TYPES[data_type].kind == "text":
+        encoding = "utf-16-le" if data_type == _UNICODE_STRING else "utf-8"
+        said = data.decode(encoding, errors="replace").rstrip("\0")
+        said = "".join(sign if sign.isprintable() else "\N{REPLACEMENT CHARACTER}" for sign in said)
+    else:
+        said = data[:LONGEST_TEXT].hex(" ")
+    return said if len(said) <= LONGEST_TEXT else f"{said[:LONGEST_TEXT]} … ({len(data)} bytes)"
 
 
 @dataclass(frozen=True, slots=True)

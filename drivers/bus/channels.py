@@ -187,9 +187,8 @@ class ObjectChannels:
                 by_rate.setdefault(one.settings.poll_hz, []).append(one)
         for hz, some in by_rate.items():
             self._undo.append(self._node.worker.repeat(1 / hz, partial(self._poll, plan, some)))
-            self._expected[f"the device does not answer the SDO that asks for it {hz:g} times a second"] = (
-                some
-            )
+            words = f"the device does not answer the SDO that asks for it {hz:g} times a second"
+            self._expected[words] = some
 
     def _poll(self, plan: int, sources: Sequence[_Source], sdo: SdoChannel) -> None:
         for one in sources:

@@ -5,10 +5,11 @@ import threading
 from drivers.bus.bus import CanBus
 from drivers.bus.channels import Chosen, ObjectChannels, channels_of
 from drivers.bus.node import shared_node
-from drivers.bus.pdo import read_tpdos
+from drivers.bus.pdo import Tpdo, read_tpdos
 from drivers.bus.sdo.channel import SdoChannel
 from drivers.bus.settings import DeviceSettings
 from drivers.component import Kind
+from drivers.errors import DeviceTimeout, DriverError, Unavailable
 from drivers.latest import Latest
 from drivers.samples import Channel, Quality, State
 from eds import Description
@@ -34,6 +35,7 @@ class CanDevice:
         self.channels: tuple[Channel, ...] = channels_of(name, chosen or {})
         self.latest = Latest(name, self.channels, settings.stale_after_s)
         self._description = description
+        self._unread: str | None = None  # why nothing is known of its PDOs
         self._started = False
         self._lock = threading.Lock()  # a boot may be under way when it stops
         self._objects = ObjectChannels(self.node, description, chosen or {}, self.latest)
@@ -68,19 +70,37 @@ class CanDevice:
             problem = f"it reports {self.node.life.active_emcy.text(self.node.description.vendor_id)}"
         trouble = self.node.trouble
         channels = self._objects.problems(now_ns) if state in (State.OK, State.FAULT) else ()
-        texts = (problem, *channels, *(one.text(now_ns) for one in trouble), *self.node.findings)
+        texts = (
+            problem,
+            self._unread,
+            *channels,
+            *(one.text(now_ns) for one in trouble),
+            *self.node.findings,
+        )
         words = "; ".join(text for text in texts if text)
-        return Quality(state, age_ms, words or None, self.node.counters(), trouble)
+        counters = {"short_frames": self._objects.short_frames, **self.node.counters()}
+        return Quality(state, age_ms, words or None, counters, trouble)
 
     def boot(self, sdo: SdoChannel) -> None:
         """Read which of its channels come by PDO."""
         if not self._objects:
             return
-        tpdos = read_tpdos(sdo, self._description)
+        tpdos, unread = self._tpdos(sdo)
         with self._lock:
             if self._started:
+                self._unread = unread
                 self._objects.install(tpdos)
 
+    def _tpdos(self, sdo: SdoChannel) -> tuple[tuple[Tpdo, ...], str | None]:
+        """What it sends; nothing, and why, where its mapping cannot be understood."""
+        try:
+            return read_tpdos(sdo, self._description), None
+        except (DeviceTimeout, Unavailable):
+            raise
+        except DriverError as error:
+            return (), f"its PDOs are not read: {error}"
+
     def forget(self) -> None:
+        self._unread = None
         self._objects.forget()
         self.latest.clear()

@@ -38,6 +38,12 @@ class Tpdo:
     transmission_type: int  # 0–240 on SYNC, 252/253 on request, 254/255 on event
     event_timer_s: float  # 0: only when something changes
     objects: tuple[MappedObject, ...]
+    multiplexed: bool = False  # an MPDO: each frame says what it brings
+
+    @property
+    def empty(self) -> bool:
+        """Whether it is enabled and brings nothing."""
+        return self.enabled and not self.objects and not self.multiplexed
 
     @property
     def size(self) -> int:
@@ -83,9 +89,10 @@ def read_tpdo(sdo: SdoChannel, description: Description | None, number: int) -> 
         cob_id = unsigned(sdo.upload(parameter, 1))
     except DeviceAbort:
         return None  # the EDS knows it, this device does not
-    enabled = not cob_id & NOT_VALID
+    enabled = not cob_id & NOT_VALID and cob_id & 0x1FFF_FFFF != 0  # 0 is NMT's: nobody has set it
     transmission_type = unsigned(sdo.upload(parameter, 2)[:1])
     extended = bool(cob_id & EXTENDED_ID)
+    mapped = _read_entries(sdo, mapping) if enabled else ()
     return Tpdo(
         number=number + 1,
         cob_id=cob_id & (0x1FFF_FFFF if extended else 0x7FF),
@@ -93,7 +100,8 @@ def read_tpdo(sdo: SdoChannel, description: Description | None, number: int) -> 
         enabled=enabled,
         transmission_type=transmission_type,
         event_timer_s=_event_timer_s(sdo, description, parameter) if transmission_type >= 254 else 0,
-        objects=read_mapping(sdo, mapping) if enabled else (),
+        objects=mapped or (),
+        multiplexed=mapped is None,
     )
 
 
@@ -108,9 +116,14 @@ def _event_timer_s(sdo: SdoChannel, description: Description | None, parameter: 
 
 def read_mapping(sdo: SdoChannel, mapping: int) -> tuple[MappedObject, ...]:
     """The objects of a PDO, by the index of its mapping parameter; raises `DriverError`."""
+    return _read_entries(sdo, mapping) or ()
+
+
+def _read_entries(sdo: SdoChannel, mapping: int) -> tuple[MappedObject, ...] | None:
+    """The same; `None` for an MPDO, which has no mapping of its own."""
     count = unsigned(sdo.upload(mapping, 0)[:1])
     if count in _MULTIPLEXED:
-        return ()
+        return None
     objects: list[MappedObject] = []
     at = 0
     for subindex in range(1, min(count, _MAX_ENTRIES) + 1):

@@ -27,7 +27,7 @@ from drivers.joint.plan import Plan, Source, make_plan
 from drivers.joint.power import PowerDrive
 from drivers.joint.quantities import POSITION, STATE, STATUSWORD, channels, quantities
 from drivers.joint.reading import DriveReading, read_drive
-from drivers.joint.remap import disable, free_tpdo, remap
+from drivers.joint.remap import free_tpdo, put_back, remap
 from drivers.joint.scaling import rated_torque
 from drivers.joint.settings import JointSettings
 from drivers.joint.stop_rpdo import find_stop_rpdo
@@ -172,7 +172,7 @@ class JointDrive(PowerDrive):
         try:
             return remap(sdo, self._description, *free, self._offset)
         except (DeviceAbort, Mismatch) as error:
-            disable(sdo, *free)
+            put_back(sdo, self._description, *free)
             return f"configure_pdos: {error}"
 
     # How values come.

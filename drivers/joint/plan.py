@@ -1,6 +1,6 @@
 """Where each of a joint's values comes from: a TPDO, a poll by SDO, or nowhere."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from drivers.bus.fields import Field, Linear
@@ -100,7 +100,19 @@ def _polling_notes(settings: JointSettings, polled: tuple[Source, ...], tpdos: t
     if not polled:
         return []
     names = [one.quantity.name for one in polled]
-    enabled = [tpdo for tpdo in tpdos if tpdo.enabled and tpdo.objects]
-    why = f"none of its {len(enabled)} enabled TPDOs carries it" if enabled else "no TPDO is enabled"
+    why = "; ".join(_lacks(tpdos)) or "no TPDO is enabled"
     how = f"asked by SDO at {settings.poll_hz:g} Hz" if settings.poll_hz else "not asked for (poll_hz is 0)"
     return [f"{' and '.join(names)}: {how}, because {why}"]
+
+
+def _lacks(tpdos: tuple[Tpdo, ...]) -> Iterator[str]:
+    """Why no enabled TPDO brings what is wanted."""
+    full = sum(bool(tpdo.enabled and tpdo.objects) for tpdo in tpdos)
+    if full:
+        yield f"none of its {full} enabled TPDOs carries it"
+    empty = [f"TPDO{tpdo.number}" for tpdo in tpdos if tpdo.empty]
+    if empty:
+        yield f"{' and '.join(empty)} {'is' if len(empty) == 1 else 'are'} enabled and empty"
+    multiplexed = [f"TPDO{tpdo.number}" for tpdo in tpdos if tpdo.multiplexed]
+    if multiplexed:
+        yield f"{' and '.join(multiplexed)}, multiplexed (MPDO), cannot be read here"

@@ -1,11 +1,13 @@
 """What a joint can tell: CiA 402 objects, their units, and the channels made of them."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from drivers.joint.cia402 import MODES, STATE_WORDS
 from drivers.samples import Channel
 from eds import Description
 from eds.datatypes import DATA_TYPES
+from eds.profile import profile_of
 
 AXIS_OFFSET = 0x800  # between the objects of two axes in one node (CiA 402-2 §5)
 
@@ -45,13 +47,6 @@ _SURROUNDINGS = (
     Quantity("voltage", 0x6079, 0, "V", signed=False, scale=0.001),
 )
 
-# CiA 402 has no temperature: each vendor has its own object, °C per count. By vendor id and product code;
-# a product code of None stands for all of the vendor's drives.
-_TEMPERATURES: dict[tuple[int, int | None], tuple[int, int, float]] = {
-    (0x00FB, None): (0x3201, 1, 0.1),  # maxon EPOS4: temperature of the power stage
-    (0x0000, 0x4A44_0001): (0x2010, 0, 0.1),  # the simulated joint drive: temperature of the motor
-}
-
 # Those of every joint, which the robot's file cannot give another object.
 OWN = frozenset({STATE, *(one.name for one in _STANDARD)})
 
@@ -64,12 +59,9 @@ def quantities(description: Description, axis: int) -> tuple[Quantity, ...]:
     description.require(
         [(index + offset, name) for index, name in REQUIRED], "a joint" if axis == 0 else f"axis {axis}"
     )
-    shifted = (
-        _shift(quantity, offset) for quantity in (*_STANDARD, *_temperature(description), *_SURROUNDINGS)
-    )
-    return tuple(
-        _as_described(quantity, description) for quantity in shifted if _described(quantity, description)
-    )
+    shifted = (_shift(quantity, offset) for quantity in (*_STANDARD, *_makers(description), *_SURROUNDINGS))
+    found = {one.name: _as_described(one, description) for one in shifted if _described(one, description)}
+    return tuple(found.values())
 
 
 def channels(component: str, found: tuple[Quantity, ...]) -> tuple[Channel, ...]:
@@ -80,13 +72,13 @@ def channels(component: str, found: tuple[Quantity, ...]) -> tuple[Channel, ...]
     )
 
 
-def _temperature(description: Description) -> tuple[Quantity, ...]:
-    vendor, product = description.vendor_id or 0, description.product_code
-    known = _TEMPERATURES.get((vendor, product)) or _TEMPERATURES.get((vendor, None))
-    if known is None:
-        return ()
-    index, subindex, scale = known
-    return (Quantity("temperature", index, subindex, "°C", signed=True, scale=scale),)
+def _makers(description: Description) -> Iterator[Quantity]:
+    """What CiA 402 has no object for, or what not every drive has there, by the product's profile."""
+    profile = profile_of(description)
+    if profile is None:
+        return
+    for name, one in profile.found(description)[0].items():
+        yield Quantity(name, one.index, one.subindex, one.unit, signed=True, scale=one.scale)
 
 
 def _shift(quantity: Quantity, offset: int) -> Quantity:

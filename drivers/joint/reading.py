@@ -10,6 +10,7 @@ from drivers.errors import DeviceAbort
 from drivers.joint.quantities import AXIS_OFFSET
 from drivers.joint.scaling import SCALING_OBJECTS
 from eds import Description
+from eds.profile import profile_of
 
 OPTION_OBJECTS: dict[str, tuple[int, int]] = {"quick_stop": (0x605A, 0), "abort_connection": (0x6007, 0)}
 
@@ -19,7 +20,7 @@ class DriveReading:
     """One reading of one axis. A number is `None` where the device has no such object."""
 
     tpdos: tuple[Tpdo, ...]
-    scaling: Mapping[str, int | None]  # by the names of SCALING_OBJECTS
+    scaling: Mapping[str, float | None]  # by the names of SCALING_OBJECTS
     options: Mapping[str, int | None]  # by the names of OPTION_OBJECTS
 
 
@@ -27,9 +28,19 @@ def read_drive(sdo: SdoChannel, description: Description, axis: int) -> DriveRea
     """Ask the drive; raises `DriverError` where it stays silent."""
     return DriveReading(
         tpdos=read_tpdos(sdo, description),
-        scaling=_read_all(sdo, description, SCALING_OBJECTS, axis),
+        scaling=_in_usual_units(_read_all(sdo, description, SCALING_OBJECTS, axis), description),
         options=_read_all(sdo, description, OPTION_OBJECTS, axis),
     )
+
+
+def _in_usual_units(
+    scaling: Mapping[str, int | None], description: Description
+) -> Mapping[str, float | None]:
+    """Rated values as CiA 402 has them, also of a product that counts otherwise."""
+    profile, torque = profile_of(description), scaling["rated_torque_mnm"]
+    if profile is None or torque is None:
+        return scaling
+    return {**scaling, "rated_torque_mnm": torque * profile.rated_torque_nm * 1000}
 
 
 def _read_all(

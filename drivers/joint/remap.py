@@ -1,9 +1,10 @@
 """Brings position and statusword into a TPDO, where `configure_pdos = true` allows it.
 
-Only a TPDO that is disabled is taken: another master may live on the enabled ones. What is written is read
-back; nothing is stored in the device, and a device that refuses is left with that TPDO disabled, as it was.
+Only a TPDO that is disabled, or enabled and empty, is taken: another master may live on the others. What is
+written is read back; nothing is stored in the device, and a device that refuses keeps that TPDO as it was.
 """
 
+import contextlib
 from collections.abc import Collection
 
 from drivers.bus.pdo import TPDO_MAPPING, TPDO_PARAMETER, Tpdo, read_tpdo
@@ -20,12 +21,15 @@ ENTRIES = ((0x6041, 16), (0x6064, 32))  # statusword, position
 
 
 def free_tpdo(tpdos: Collection[Tpdo], node_id: int, taken: Collection[int]) -> tuple[Tpdo, int] | None:
-    """A disabled TPDO and the identifier it can have; `None` where there is none that is surely nobody's."""
-    used = {tpdo.cob_id for tpdo in tpdos if tpdo.enabled} | set(taken)
-    for tpdo in tpdos:
+    """A TPDO that brings nothing, and the identifier it can have; a disabled one rather than an empty one.
+
+    `None` where there is none that is surely nobody's.
+    """
+    for tpdo in sorted((one for one in tpdos if not one.enabled or one.empty), key=lambda one: one.enabled):
+        others = {one.cob_id for one in tpdos if one.enabled and one is not tpdo}
         usual = _BASES[tpdo.number - 1] + node_id if tpdo.number <= len(_BASES) else 0
         cob_id = tpdo.cob_id or usual
-        if not tpdo.enabled and not tpdo.extended and cob_id and cob_id not in used:
+        if not tpdo.extended and cob_id and cob_id not in others | set(taken):
             return tpdo, cob_id
     return None
 
@@ -75,9 +79,15 @@ def _verify(sdo: SdoChannel, description: Description, number: int, cob_id: int,
         raise Mismatch(f"{sdo.label}: 0x{TPDO_MAPPING + number:04X} was written and is not what it holds")
 
 
-def disable(sdo: SdoChannel, tpdo: Tpdo, cob_id: int) -> None:
-    """Leave a TPDO that could not be mapped disabled; a device that refuses that too keeps what it has."""
-    try:
-        _write(sdo, TPDO_PARAMETER + tpdo.number - 1, 1, cob_id | _NOT_VALID | _NO_REMOTE, 4)
-    except DeviceAbort:
-        return
+def put_back(sdo: SdoChannel, description: Description, tpdo: Tpdo, cob_id: int) -> None:
+    """Leave a TPDO that could not be mapped as it was; one that refuses that too keeps what it has."""
+    number = tpdo.number - 1
+    parameter, mapping = TPDO_PARAMETER + number, TPDO_MAPPING + number
+    steps = [(parameter, 1, cob_id | _NOT_VALID | _NO_REMOTE, 4)]
+    if tpdo.empty:
+        timer = [(parameter, 5, round(tpdo.event_timer_s * 1000), 2)] if description.has(parameter, 5) else []
+        steps += [(mapping, 0, 0, 1), (parameter, 2, tpdo.transmission_type, 1), *timer]
+        steps += [(parameter, 1, cob_id | _NO_REMOTE, 4)]
+    for step in steps:
+        with contextlib.suppress(DeviceAbort):
+            _write(sdo, *step)

@@ -24,7 +24,7 @@ _VELOCITY_UNITS = {0x00B4_4700: "rpm", 0xFFB4_4700: "0.1rpm", 0xFEB4_4700: "0.01
 TOLERANCE = 0.01  # two figures that differ by less agree
 LEAST_EFFICIENCY = 0.4  # of a gear: torque at the joint may be this part of motor torque times ratio
 
-Readings = Mapping[str, int | None]
+Readings = Mapping[str, float | None]
 
 
 def scalings(settings: JointSettings, readings: Readings) -> dict[str, Linear | None]:
@@ -114,7 +114,7 @@ def _check_current(settings: JointSettings, readings: Readings) -> str | None:
 
 
 def _check_velocity_unit(settings: JointSettings, readings: Readings) -> str | None:
-    device = _VELOCITY_UNITS.get(readings.get("velocity_unit") or 0)
+    device = _VELOCITY_UNITS.get(int(readings.get("velocity_unit") or 0))
     if device is None or device == settings.velocity_unit:
         return None
     return f'velocity_unit is "{settings.velocity_unit}", but the drive\'s 60A9h says "{device}"'

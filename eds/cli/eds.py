@@ -9,6 +9,7 @@ from pathlib import Path
 
 import eds
 from eds.description import Description, EdsError
+from eds.profile import profile_of
 from eds.report import ObjectRow, PdoRow, grouped_findings, joint_text, object_rows, pdo_rows
 
 _DESCRIPTION = """\
@@ -82,9 +83,23 @@ def _as_json(description: Description, *, brief: bool) -> dict[str, object]:
         "vendor_id": description.vendor_id,
         "product_code": description.product_code,
         "joint": joint_text(description),
+        "profile": _profile_json(description),
         "pdos": [asdict(row) for row in pdo_rows(description)],
         "findings": [asdict(finding) for finding in description.findings],
         **({} if brief else {"objects": [_object_json(row) for row in object_rows(description)]}),
+    }
+
+
+def _profile_json(description: Description) -> dict[str, object] | None:
+    profile = profile_of(description)
+    if profile is None:
+        return None
+    quantities, gains = profile.found(description)
+    return {
+        "name": profile.name,
+        "quantities": {name: asdict(one) for name, one in quantities.items()},
+        "gains": {name: asdict(one) for name, one in gains.items()},
+        "quirks": [asdict(one) for one in profile.quirks],
     }
 
 
@@ -99,6 +114,7 @@ def _as_text(description: Description, *, brief: bool) -> Iterator[str]:
     yield f"  device      {vendor}: {product}"
     yield f"  identity    vendor {_hex(description.vendor_id)}, product {_hex(description.product_code)}"
     yield f"  a joint?    {joint_text(description)}"
+    yield from _profile_text(description)
     yield f"  objects     {len({row.index for row in rows})} with {len(rows)} values"
     yield "  PDO defaults"
     yield from (_pdo_text(row, description) for row in pdo_rows(description))
@@ -111,6 +127,21 @@ def _as_text(description: Description, *, brief: bool) -> Iterator[str]:
         yield f"    {severity:<8}{where} {text}" + (f" (and {often - 1} more alike)" if often > 1 else "")
     if not findings:
         yield "    none"
+
+
+def _profile_text(description: Description) -> Iterator[str]:
+    """Which profile fits, what this device has of it, and where that stands."""
+    profile = profile_of(description)
+    if profile is None:
+        yield "  profile     none fits: it is read by its EDS and CiA 402 alone"
+        return
+    yield f"  profile     {profile.name}"
+    quantities, gains = profile.found(description)
+    for title, objects in (("has", quantities), ("gains", gains)):
+        if objects:
+            yield f"    {title:<10}{', '.join(f'{name} {one.name}' for name, one in objects.items())}"
+    yield from (f"    note      {one.text}" for one in profile.quirks)
+    yield from (f"    source    {one}" for one in profile.sources)
 
 
 def _hex(number: int | None) -> str:

@@ -12,7 +12,7 @@ from gateway.cli.connect import connect, parser
 from gateway.cli.text import budget, exact, say, say_json, table
 from gateway.client.blocking import Robot
 from gateway.wire.bus import CLOSED
-from gateway.wire.component import ChannelInfo
+from gateway.wire.component import ChannelInfo, ComponentInfo
 from gateway.wire.parameter import ParameterInfo
 from gateway.wire.robot import Description, GuardInfo, GuardRuleInfo, Hello
 from gateway.wire.stop import StopInfo
@@ -63,6 +63,7 @@ def _chapters(robot: Description) -> Iterator[str]:
         ("COMPONENT", "KIND", "STATE", "PROBLEM"),
         [(part.name, part.kind, part.state, part.problem or "") for part in robot.components],
     )
+    yield from _profiles(robot.components)
     yield from describe_buses.chapters(robot)
     yield _channels(robot.channels)
     if robot.parameters:
@@ -76,6 +77,17 @@ def _chapters(robot: Description) -> Iterator[str]:
         yield _guard(robot.guard)
     if robot.budget is not None:
         yield f"BUDGET  {budget(robot.budget)}\n"
+
+
+def _profiles(components: list[ComponentInfo]) -> Iterator[str]:
+    """Which of them are known beside their EDS, and as what."""
+    known: dict[str, list[str]] = {}
+    for part in components:
+        profile = part.device.get("profile") if isinstance(part.device, dict) else None
+        if profile is not None:
+            known.setdefault(str(profile), []).append(part.name)
+    if known:
+        yield "PROFILES (known beside their EDS)\n" + _wrapped(known.items())
 
 
 def _channels(channels: list[ChannelInfo]) -> str:

@@ -1,5 +1,7 @@
 """`gwrms get`: parameters, as the devices have them now."""
 
+from msgspec import UNSET
+
 from gateway.cli.connect import check_names, connect, parameter_names, parser, widened
 from gateway.cli.shown import add_degrees, unit_of
 from gateway.cli.text import exact, say, say_json, table
@@ -8,7 +10,7 @@ from gateway.wire.parameter import ParameterInfo, ParameterValue
 
 EPILOG = """examples:
   gwrms get gait                      all of a component
-  gwrms get 'left_knee.*'            with parameters = "eds" all that its EDS lets write, read-only or not
+  gwrms get 'left_knee.*'            with parameters = "eds" all that its EDS lets write, and its texts
   gwrms get left_knee.0x6072:0       by its address in the device"""
 
 
@@ -37,12 +39,14 @@ def main(argv: list[str]) -> int:
             for name, value in values.items()
         ]
         say(table(("PARAMETER", "VALUE", "UNIT", "RANGE", ""), rows, right=(1,)))
-    return 1 if any(value.value is None for value in values.values()) else 0
+    return 1 if any(one.value is None and one.text is UNSET for one in values.values()) else 0
 
 
 def _row(info: ParameterInfo, value: ParameterValue, unit: Unit) -> tuple[str, ...]:
     read_only = f"read-only: {info.read_only}" if info.read_only else ""
     held, low, high = (_text(number, unit) for number in (value.value, value.min, value.max))
+    if isinstance(value.text, str):
+        return info.name, value.text, "", "", value.problem or ""
     return info.name, held, unit.symbol, f"{low} … {high}", value.problem or read_only
 
 

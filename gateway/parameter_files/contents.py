@@ -12,7 +12,7 @@ from gateway.wire.component import ComponentInfo
 from gateway.wire.parameter import ParameterInfo
 from gateway.wire.robot import Description
 
-COMMANDS = ("commanded", "controlword", "storage")  # as `ParameterInfo.read_only` calls them
+COMMANDS = ("no number", "commanded", "controlword", "storage")  # as `ParameterInfo.read_only` calls them
 
 
 class FileProblem(ValueError):

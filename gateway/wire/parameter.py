@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from msgspec import Meta, Struct
+from msgspec import UNSET, Meta, Struct, UnsetType
 
 from gateway.wire.method import Globs, Method, Number, Params, Seconds
 from gateway.wire.role import Role
@@ -54,7 +54,10 @@ class ParameterParams(Params, frozen=True):
 
 
 class ParameterValue(Struct, frozen=True):
-    """One parameter's value; `None` with the reason in `problem` where it is not known."""
+    """One parameter's value; `None` with the reason in `problem` where it is not known.
+
+    What is no number has a `text` instead: a string as it stands, other bytes in hexadecimal.
+    """
 
     value: Number | None
     unit: str
@@ -62,6 +65,7 @@ class ParameterValue(Struct, frozen=True):
     max: Number | None
     stamp_ns: int | None
     problem: str | None = None
+    text: str | UnsetType = UNSET
 
 
 class ParameterValues(Struct, frozen=True):

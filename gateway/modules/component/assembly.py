@@ -20,6 +20,7 @@ from drivers.joint.drive import JointDrive
 from drivers.joint.pairs import join_joints
 from drivers.joint.settings import JointSettings
 from drivers.site import Site
+from eds.profile import profile_of
 from gateway.config.robot import RobotConfig
 from gateway.process.light_imports import standing_in, without
 
@@ -126,6 +127,11 @@ def facts(config: RobotConfig, name: str, description: eds.Description) -> Mappi
     }
     if bitrate is not None:
         found["bitrate"] = bitrate
+    profile = profile_of(description)
+    if profile is not None:
+        found["profile"] = profile.name
+        if profile.quirks:
+            found["quirks"] = "; ".join(one.text for one in profile.quirks)
     warnings = [f"{one.where}: {one.text}" for one in description.findings if one.severity == "warning"]
     if warnings:
         found["warnings"] = "; ".join(warnings)

@@ -11,6 +11,8 @@ from gateway.modules.control.eds_parameters import offered
 from gateway.modules.control.parameters import Parameter, contradiction
 from gateway.streaming.sources import Wanted, check_globs
 
+_TEXT = 'what is none is read where its device has parameters = "eds"'
+
 
 class Catalogue(Mapping[str, Parameter]):
     """Parameters by name. An object's address, as in `left_knee.0x6072:0`, means the same parameter."""
@@ -43,7 +45,7 @@ class Catalogue(Mapping[str, Parameter]):
         globs = [name for name in names if name not in self]
         check_globs("parameter", self._by_name, globs)
         wanted = Wanted(globs)
-        meant.update(name for name in self._by_name if name in wanted)
+        meant.update(name for name, one in self._by_name.items() if name in wanted and not one.is_long)
         return [one for name, one in self._by_name.items() if name in meant]
 
 
@@ -76,7 +78,7 @@ def described(
         )
     known = DATA_TYPES.get(variable.data_type or 0)
     if known is None or known.kind not in NUMBERS:
-        return unusable(f"{settings.object} is no number in {description.path.name}; parameters are numbers")
+        return unusable(f"{settings.object} is no number in {description.path.name}: {_TEXT}")
     eds_low, eds_high = _scaled_limits(variable.min, variable.max, settings.scale)
     least = max((limit for limit in (low, eds_low) if limit is not None), default=None)
     most = min((limit for limit in (high, eds_high) if limit is not None), default=None)

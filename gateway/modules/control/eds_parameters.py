@@ -1,4 +1,7 @@
-"""What an EDS offers as parameters: its writable numbers, by readable names, locked until released."""
+"""What an EDS offers as parameters: its writable numbers, by readable names, locked until released.
+
+Its texts and other bytes are there to be read.
+"""
 
 import difflib
 from collections import Counter
@@ -12,7 +15,7 @@ from eds.report import pdo_rows
 from gateway.coding import NUMBERS
 from gateway.config.objects import AXIS_OFFSET, CONTROLWORD, RESTORE, STORE
 from gateway.config.robot import DeviceTable, JointTable, Node, ParameterSettings, RobotConfig
-from gateway.modules.control.parameters import WRITABLE, Lock, Parameter, contradiction
+from gateway.modules.control.parameters import READABLE, WRITABLE, Lock, Parameter, contradiction
 from gateway.streaming.sources import matches
 
 if TYPE_CHECKING:
@@ -96,8 +99,7 @@ class _Offer:
         data_type = DATA_TYPES.get(variable.data_type or 0)
         return (
             data_type is not None
-            and data_type.kind in NUMBERS
-            and variable.access_type.lower() in WRITABLE
+            and variable.access_type.lower() in (WRITABLE if data_type.kind in NUMBERS else READABLE)
             and (self._node, variable.index, variable.subindex) not in self._taken
             and self._is_ours(variable.index, common=common)
         )
@@ -122,6 +124,8 @@ class _Offer:
 
     def _parameter(self, variable: "ODVariable", name: str) -> Parameter:
         address = _address(variable)
+        numeric = _is_number(variable)
+        low, high = (variable.min, variable.max) if numeric else (None, None)
         return Parameter(
             f"{self._component}.{name}",
             self._component,
@@ -130,13 +134,13 @@ class _Offer:
             variable.subindex,
             variable.data_type or 0,
             variable.access_type.lower(),
-            variable.min,
-            variable.max,
+            low,
+            high,
             self._store,
-            contradiction(variable.min, variable.max, self._description.path.name),
-            lock=self._lock(variable, name, address),
+            contradiction(low, high, self._description.path.name),
+            lock=self._lock(variable, name, address) if numeric else Lock.TEXT,
             table=self._where,
-            default=variable.default,
+            default=variable.default if numeric else None,
         )
 
     def _lock(self, variable: "ODVariable", name: str, address: str) -> Lock | None:
@@ -170,6 +174,10 @@ class _Offer:
                 yield Parameter(
                     f"{self._component}.{entry}", self._component, settings, 0, 0, problem=problem
                 )
+
+
+def _is_number(variable: "ODVariable") -> bool:
+    return DATA_TYPES[variable.data_type or 0].kind in NUMBERS
 
 
 def _address(variable: "ODVariable") -> str:

@@ -9,7 +9,7 @@ from enum import Enum
 
 from drivers.bus.values import size_of
 from eds.datatypes import DATA_TYPES
-from gateway.coding import Coding, CodingError, Limit, Number, broken_limit, text
+from gateway.coding import NUMBERS, Coding, CodingError, Limit, Number, broken_limit, text, words
 from gateway.config.robot import ParameterSettings
 from gateway.wire.framing import Kind, RpcError, refuse
 from gateway.wire.parameter import ParameterInfo
@@ -21,6 +21,7 @@ WRITABLE = ("rw", "rwr", "rww")
 class Lock(Enum):
     """Why a parameter that an EDS offers is read-only: in a word, and what to do about it."""
 
+    TEXT = "no number"
     UNRELEASED = "not released"
     COMMANDED = "commanded"
     STOPPING = "stopping"
@@ -30,6 +31,7 @@ class Lock(Enum):
 
 
 _REMEDIES = {
+    Lock.TEXT: "it is no number, and can only be read",
     Lock.UNRELEASED: 'add "{name}" to release in {table} of the robot\'s file',
     Lock.COMMANDED: "who leads the bus writes it; to change it all the same, add its whole name "
     '"{name}" to release in {table} of the robot\'s file: a glob does not reach it',
@@ -81,11 +83,22 @@ class Parameter:
         return Coding(self.data_type, self.settings.scale)
 
     @property
+    def is_number(self) -> bool:
+        """Whether it has a value, and no text; so has one that cannot be used."""
+        known = DATA_TYPES.get(self.data_type)
+        return known is None or known.kind in NUMBERS
+
+    @property
+    def is_long(self) -> bool:
+        """Whether it may be of any length, so that it is read only where it is named."""
+        return not self.is_number and DATA_TYPES[self.data_type].kind == "bytes"
+
+    @property
     def read_only(self) -> str | None:
         """In a word, why it cannot be written; `None` where it can, or cannot be used at all."""
         if self.problem is not None:
             return None
-        if self.access not in WRITABLE:
+        if self.access not in WRITABLE and self.lock is not Lock.TEXT:
             return f"{self.access} in the EDS"
         return None if self.lock is None else self.lock.value
 
@@ -173,6 +186,10 @@ class Parameter:
         value = self.decode(data)
         self._check_limits(value, f"{text(value)} {self.settings.unit}")
         return value
+
+    def told(self, data: bytes) -> Number | str:
+        """What the device's bytes mean: a value, or a text; raises `RpcError` (mismatch) as `decode`."""
+        return self.decode(data) if self.is_number else words(data, self.data_type)
 
     def decode(self, data: bytes) -> Number:
         """The value that the device's bytes mean; raises `RpcError` (mismatch) where they mean none."""

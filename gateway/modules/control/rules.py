@@ -15,6 +15,7 @@ from drivers.joint.cia402 import ENERGISED, STATE_WORDS, DriveState, drive_state
 from drivers.joint.commands import STATUSWORD
 from drivers.joint.quantities import AXIS_OFFSET
 from drivers.joint.settings import JointSettings
+from drivers.samples import State
 from gateway.coding import Limit, broken_limit
 from gateway.config.robot import RobotConfig
 from gateway.modules.component.module import ComponentModule
@@ -24,6 +25,7 @@ from gateway.modules.stop.authority import Address
 from gateway.records.undo import UndoChange
 from gateway.wire.framing import Kind
 
+HEARD_S = 2.0  # a node that has said something within it is there
 Known = tuple[DriveState | None, str]  # a drive's state; in words where that is from, or why it is not known
 
 
@@ -78,6 +80,22 @@ class Rules:
         if found.node.ready:
             return None
         return str(self._component.quality(component, time.monotonic_ns())["problem"] or "it is silent")
+
+    def absence(self, component: str) -> str | None:
+        """Why what was read of a device may hold no longer: it is lost, and its node says nothing either.
+
+        A joint is lost without its position, though a node that waits for its master answers.
+        """
+        now_ns = time.monotonic_ns()
+        quality = self._component.quality(component, now_ns)
+        found: Any = self._component.robot.components.get(component)
+        if quality["state"] != State.LOST:
+            return None
+        if component in self._config.joint and found is not None and found.node.ready:
+            heard_ns = found.node.life.heard_ns
+            if heard_ns is not None and now_ns - heard_ns <= HEARD_S * 1e9:
+                return None
+        return str(quality["problem"] or "it is silent")
 
     def reach(self, change: UndoChange) -> tuple[Parameter, Node]:
         """What was written, as long as the robot's file still means the same by its name.

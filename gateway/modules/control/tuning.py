@@ -13,8 +13,9 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from msgspec import UNSET
+
 from drivers.errors import DeviceTimeout, DriverError
-from drivers.samples import State
 from gateway.config.robot import RobotConfig
 from gateway.connections.turns import Client
 from gateway.modules.component.module import ComponentModule
@@ -91,7 +92,7 @@ class Tuning:
         described = frozenset({*config.joint, *config.device})
         silence, ask = self._rules.silence, self._reads.ask
         self.objects = Objects(described, component, loop, self._parameters, silence, self._unanswered, ask)
-        self._known: dict[str, tuple[int, float]] = {}  # parameter → when, what the device held
+        self._known: dict[str, tuple[int, float | str]] = {}  # parameter → when, what the device held
         self._asked: set[_Asked] = set()  # writes that have not been answered
         self._ending: str | None = None
         self._writer = Writer()
@@ -194,12 +195,9 @@ class Tuning:
 
     def _lost(self, parameters: Iterable[Parameter]) -> dict[str, str]:
         """Why what was read last may hold no longer; of each device that has one of these parameters."""
-        now_ns, lost = time.monotonic_ns(), {}
-        for name in {one.component for one in parameters if one.problem is None}:
-            quality = self._component.quality(name, now_ns)
-            if quality["state"] == State.LOST:
-                lost[name] = f"{name} is not there: {quality['problem'] or 'it is silent'}"
-        return lost
+        names = {one.component for one in parameters if one.problem is None}
+        absent = ((name, self._rules.absence(name)) for name in names)
+        return {name: f"{name} is not there: {why}" for name, why in absent if why is not None}
 
     def _last(self, parameter: Parameter, lost: Mapping[str, str]) -> ParameterValue:
         problem = parameter.problem or lost.get(parameter.component)
@@ -260,7 +258,7 @@ class Tuning:
         try:
             if isinstance(found, Exception):
                 raise found
-            value = parameter.decode(found)
+            value = parameter.told(found)
         except (DriverError, TimeoutError) as error:
             return _value(parameter, None, None, str(device_error(parameter, "reading", error)))
         except RpcError as error:
@@ -322,6 +320,8 @@ class Tuning:
 
 
 def _value(
-    parameter: Parameter, value: float | None, stamp_ns: int | None, problem: str | None = None
+    parameter: Parameter, value: float | str | None, stamp_ns: int | None, problem: str | None = None
 ) -> ParameterValue:
-    return ParameterValue(value, parameter.settings.unit, parameter.min, parameter.max, stamp_ns, problem)
+    number, text = (None, value) if isinstance(value, str) else (value, UNSET)
+    unit = parameter.settings.unit
+    return ParameterValue(number, unit, parameter.min, parameter.max, stamp_ns, problem, text)

@@ -101,6 +101,8 @@ def test_what_a_pdo_brings_is_read_there_at_any_bit_and_not_asked_for(
             return [value(gait, index) for index in range(3)] == [0.4, -2.5, 1.0]
 
         until(has_come)
+        fake.send(0x185, frame[:5])
+        until(lambda: gait.quality(time.monotonic_ns()).counters["short_frames"] == 1)
         assert not [data for can_id, data in fake.seen if can_id == 0x605 and data[1:3] == b"\x00\x21"]
         gait.stop()
 
@@ -115,6 +117,19 @@ def test_a_pdo_that_stays_away_and_an_object_that_is_refused_are_told(
         until(lambda: "no phase: TPDO1 (0x185), which brings it on SYNC, does not come" in problem(gait))
         until(lambda: "load: " in problem(gait) and "0x2101:00" in problem(gait))
         assert gait.quality(time.monotonic_ns()).state is State.OK  # the node itself answers
+        gait.stop()
+
+
+def test_a_mapping_that_cannot_be_leaves_the_device_and_its_channels_by_sdo(
+    bus: CanBus, channel: str, describe: Describe
+) -> None:
+    with FakeNode(channel, 5, {**OBJECTS, **tpdo(0x2102_0040, 0x2100_0010)}):
+        gait = device(bus, describe, phase=PHASE)
+        gait.start()
+        until(lambda: value(gait, 0) == 0.25)
+        assert "its PDOs are not read: " in problem(gait)
+        assert "maps 80 bits" in problem(gait)
+        assert gait.node.ready
         gait.stop()
 
 

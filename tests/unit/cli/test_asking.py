@@ -42,6 +42,18 @@ def test_describe_names_what_is_wrong(robot: FakeRobot, capsys: pytest.CaptureFi
     assert "gait.step_length" in text
 
 
+def test_describe_says_which_profile_is_used_for_whom(
+    robot: FakeRobot, capsys: pytest.CaptureFixture[str]
+) -> None:
+    known = robot.describe()
+    for part in known["components"]:
+        if part["name"] in ("left_hip", "right_hip"):
+            part["device"] = {"profile": "maxon EPOS4"}
+    robot.overrides["robot.describe"] = lambda _params: known
+    assert run(robot, "describe") == 0
+    assert "PROFILES (known beside their EDS)\nmaxon EPOS4  left_hip, right_hip\n" in printed(capsys)
+
+
 def test_describe_says_who_one_is_and_what_that_one_may_not(
     robot: FakeRobot, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -128,6 +128,10 @@ def test_a_program_reads_the_same_as_json(tmp_path: Path, capsys: pytest.Capture
             'mistake: [parameter."knee.x"]: joint_drive.eds has no object 0x2001:0',
         ),
         (
+            ("", '[channel."knee.x"]\nobject = "0x1008:0"\n'),
+            'mistake: [channel."knee.x"] object: 0x1008:0 is no number in joint_drive.eds',
+        ),
+        (
             ("", STEP + "min = 2\nmax = 3\n"),
             'mistake: [parameter."gait.step_length"]: its limits allow nothing: minimum 2 is above maximum',
         ),

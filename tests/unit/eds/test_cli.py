@@ -57,6 +57,19 @@ def test_json_is_one_object_a_file(drive: Path, capsys: pytest.CaptureFixture[st
     assert {row["index"]: row["maximum"] for row in first["objects"]}[0x6064] == 5
 
 
+def test_the_profile_that_fits_is_told_with_its_sources(
+    drive: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["--brief", "elmo_gold.dcf"]) == 0
+    text = capsys.readouterr().out
+    assert "profile     Elmo Gold\n    has       temperature 22A3h:1\n    source    Elmo's own" in text
+    assert main(["--brief", str(drive)]) == 0
+    assert "profile     none fits" in capsys.readouterr().out
+    assert main(["--json", "--brief", "joint_drive.eds"]) == 0
+    profile = json.loads(capsys.readouterr().out)["profile"]
+    assert profile["gains"]["position_p"]["index"] == 0x2030
+
+
 def test_a_file_that_cannot_be_used_is_told_and_hides_no_other(
     drive: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

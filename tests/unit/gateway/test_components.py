@@ -289,3 +289,20 @@ def test_status_is_a_small_choice_of_both_modules(client: Client) -> None:
     until(
         lambda: client.call("status.snapshot")["values"]["resource.cpu_percent"] is not None, "cpu is known"
     )
+
+
+def test_objects_that_the_file_makes_channels_are_channels_of_their_components(tmp_path: Path) -> None:
+    more = (
+        '[channel."gait.phase"]\nobject = "0x2011:0"\nscale = 0.001\n'
+        '[channel."gait.state"]\nobject = "0x2010:0"\nwords = { 0 = "idle" }\n'
+        '[channel."left_knee.temperature"]\nobject = "0x2011:0"\nunit = "°C"\nscale = 0.1\n'
+    )
+    components = assemble(config(tmp_path, ROBOT + more)).components
+    assert [(one.name, one.enum) for one in components["gait"].channels] == [
+        ("gait.phase", None),
+        ("gait.state", {0: "idle"}),
+    ]
+    knee = [one.quantity for one in components["left_knee"].channels]
+    assert knee[-2:] == ["state", "temperature"]
+    assert knee.count("temperature") == 1
+    assert "temperature" in [one.quantity for one in components["right_knee"].channels][:-1]

@@ -18,6 +18,7 @@ from gateway.config.robot import ParameterSettings
 from gateway.modules.control import unanswered
 from gateway.modules.control.catalogue import described
 from gateway.modules.control.parameters import Parameter
+from gateway.modules.control.rules import HEARD_S
 from gateway.wire.framing import RpcError
 from tests.support.waiting import WAIT_S, until
 from tests.unit.gateway.harness import DISABLED, QUICK_STOPPED, ROBOT, Bench, Client, config, serving
@@ -58,6 +59,20 @@ def test_list_asks_nobody_and_knows_only_what_was_read(client: Client, bench: Be
     bench.gait.lost = "no power"
     lost = client.call("parameter.list")["values"]["gait.step_length"]
     assert (lost["value"], lost["stamp_ns"], lost["problem"]) == (None, None, "gait is not there: no power")
+
+
+def test_a_joint_without_a_position_is_there_as_long_as_its_node_says_something(
+    client: Client, bench: Bench
+) -> None:
+    client.call("parameter.read", names=["left_knee.max_torque"])
+    bench.left.lost = "it is pre-operational (NMT) and sends no PDOs until its master starts it"
+    silent = client.call("parameter.list")["values"]["left_knee.max_torque"]
+    assert (silent["value"], silent["problem"]) == (None, f"left_knee is not there: {bench.left.lost}")
+    bench.left.node.life.heard_ns = time.monotonic_ns()
+    heard = client.call("parameter.list")["values"]["left_knee.max_torque"]
+    assert (heard["value"], heard["problem"]) == (100.0, None)
+    bench.left.node.life.heard_ns = time.monotonic_ns() - round((HEARD_S + 1) * 1e9)
+    assert client.call("parameter.list")["values"]["left_knee.max_torque"]["value"] is None
 
 
 def test_a_device_that_does_not_tell_is_null_with_the_reason(client: Client, bench: Bench) -> None:
