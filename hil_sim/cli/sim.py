@@ -9,6 +9,7 @@ from hil_sim import personality
 from hil_sim.cli import replay, run, running
 from hil_sim.cli.arguments import seconds, speed
 from hil_sim.exoskeleton import CONTROLLER, JOINTS, Scenario
+from hil_sim.mistakes.registry import MISTAKES, NONE
 from hil_sim.robot import SimulatedRobot
 from hil_sim.scenario.runner import schedule
 from hil_sim.scenario.script import Script, load
@@ -74,6 +75,12 @@ sensors
   --imu and --insole choose the languages that they speak, from the makers' manuals. `gwrms sensor
   DIR/trunk` finds out which.
 
+mistakes
+  --mistake NAME makes a mistake that people make, for gwrms doctor to find; again for more than one, none for
+  a robot that is well. The folder then has a file robot.toml of its own, and `computer`, the files of /sys
+  and /proc of the robot's computer, for gwrms doctor --computer DIR/computer.
+{mistakes}
+
 scenario files
   gwrms sim run FILE        runs it against a gateway and checks what it expects (--help says more)
   gwrms sim --script FILE   only lets happen what it says, for a gateway of your own
@@ -111,11 +118,16 @@ def _nodes(text: str) -> list[str]:
     return left_out
 
 
+def _mistakes() -> str:
+    width = max(map(len, MISTAKES))
+    return "\n".join(f"    {name:<{width}}  {one.what}" for name, one in MISTAKES.items())
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="gwrms sim",
         description=_DESCRIPTION,
-        epilog=_EPILOG,
+        epilog=_EPILOG.replace("{mistakes}", _mistakes()),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument(
@@ -172,6 +184,13 @@ def _parser() -> argparse.ArgumentParser:
         metavar="[JOINT=]FILE",
         help="the EDS or DCF of the drives, or of one joint's (again for another one)",
     )
+    parser.add_argument(
+        "--mistake",
+        action="append",
+        choices=(NONE, *MISTAKES),
+        metavar="NAME",
+        help="make a mistake for gwrms doctor to find (again for more); none: make none",
+    )
     parser.add_argument("--truth", type=Path, metavar="FILE", help="write the ground truth there")
     return parser
 
@@ -222,6 +241,7 @@ def main(argv: list[str]) -> int:
         say=running.say,
         without=arguments.without,
         guard=script.guard,
+        mistakes=arguments.mistake,
     )
 
     return running.run(robot, arguments.seconds, lambda: schedule(script.lines, robot))
