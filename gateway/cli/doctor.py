@@ -53,6 +53,8 @@ def main(argv: Sequence[str]) -> int:
         return 0
     if options.file is None:
         parser.error("name the robot's file")
+    if options.fix and options.json:
+        parser.error("--fix asks people, --json is for machines: say one of both")
     if not LEAST_S <= options.seconds <= MOST_S:
         parser.error(f"--seconds {options.seconds:g} is outside {LEAST_S:g} to {MOST_S:g}")
     found = examine(options.file)
@@ -97,12 +99,14 @@ def _gateway(config: RobotConfig, options: argparse.Namespace) -> Address | None
 
 
 def _mend(config: RobotConfig, gateway: Address | None, verdicts: Sequence[Verdict], *, yes: bool) -> None:
-    """Ask for each finding's first fix that is ours to do, and do it."""
+    """Ask for each finding's likeliest fix, where it is ours to do, and do it."""
     with ExitStack() as ending:
         mender = Mender(config, _robot(gateway, ending))
         for finding in findings(verdicts):
-            fix = next((one for one in finding.fixes if mender.can(one)), None)
-            if fix is None or not ask(f"{finding.about}: {finding.words}\n{fix.words}\nmend it?", yes=yes):
+            fix = finding.fixes[0]
+            if not mender.can(fix) or not ask(
+                f"{finding.about}: {finding.words}\n{fix.words}\nmend it?", yes=yes
+            ):
                 continue
             try:
                 say(f"{mender.mend(finding, fix)}\n")

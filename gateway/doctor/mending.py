@@ -11,12 +11,13 @@ import os
 import re
 import time
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from functools import reduce
 from typing import Any
 
 from gateway.client import ClientError, Robot
 from gateway.config.robot import RobotConfig, header
-from gateway.doctor.verdicts import Edit, Finding, Fix, Write
+from gateway.doctor.verdicts import Edit, Finding, Fix, Together, Write
 
 RECORD = "doctor.jsonl"
 
@@ -31,11 +32,15 @@ class Mender:
     def __init__(self, config: RobotConfig, robot: Robot | None) -> None:
         self._config = config
         self._robot = robot
-        self._acts: Mapping[type[Fix], Callable[[Any], str]] = {Edit: self._edit, Write: self._write}
+        self._acts: Mapping[type[Fix], Callable[[Any], str]] = {
+            Edit: lambda edit: self._edit((edit,)),
+            Together: lambda fix: self._edit(fix.edits),
+            Write: self._write,
+        }
 
     def can(self, fix: Fix) -> bool:
         """Whether that is a fix of ours; all else is for people."""
-        return type(fix) in self._acts
+        return fix.is_safe if isinstance(fix, Write) else type(fix) in self._acts
 
     def mend(self, finding: Finding, fix: Fix) -> str:
         """Do it; returns what was done.
@@ -48,11 +53,11 @@ class Mender:
         self._note(finding, fix, done)
         return done
 
-    def _edit(self, fix: Edit) -> str:
+    def _edit(self, edits: Sequence[Edit]) -> str:
         path = self._config.path
         try:
             before = path.read_text(encoding="utf-8")
-            after = edited(before, fix)
+            after = reduce(edited, edits, before)
             draft = path.with_name(f"{path.name}.new")
             draft.write_text(after, encoding="utf-8")
             draft.chmod(path.stat().st_mode)
@@ -67,7 +72,7 @@ class Mender:
         try:
             written = self._robot.write({fix.address: fix.value})
         except ClientError as error:
-            raise NotMended(f"the gateway refused: {error}") from error
+            raise NotMended(f"the gateway refused: {error}. {_permission(fix)}") from error
         return f"written and read back (write {written.write}); gwrms store {fix.component} keeps it"
 
     def _note(self, finding: Finding, fix: Fix, done: str) -> None:
@@ -89,6 +94,14 @@ class Mender:
                 os.fsync(file.fileno())
         except OSError as error:
             raise NotMended(f"it was done, but could not be written down in {folder}: {error}") from error
+
+
+def _permission(fix: Write) -> str:
+    """How the robot's owner lets it be written."""
+    lines = (
+        f'[parameter."{fix.component}.object_{fix.index:04x}"] object = "0x{fix.index:04X}:{fix.subindex}"'
+    )
+    return f"The robot's file has the last word on what may be written; this allows it: {lines}"
 
 
 def edited(text: str, fix: Edit) -> str:

@@ -25,6 +25,21 @@ class Edit:
 
 
 @dataclass(frozen=True, slots=True)
+class Together:
+    """Lines of the robot's file of which one without the other would be worse than none."""
+
+    edits: tuple[Edit, ...]
+
+    @property
+    def words(self) -> str:
+        return "\n          and ".join(edit.words for edit in self.edits)
+
+
+# Written by the doctor itself: what watches a drive or limits it, and never what moves it or paces the bus.
+SAFE = frozenset({0x1017, 0x6007, 0x605A, 0x6065, 0x6073})
+
+
+@dataclass(frozen=True, slots=True)
 class Write:
     """An object of a device, through the gateway's own writes."""
 
@@ -33,6 +48,11 @@ class Write:
     subindex: int
     value: int
     was: int | None = None
+
+    @property
+    def is_safe(self) -> bool:
+        """Whether it moves nothing."""
+        return (self.index if self.index < 0x6000 else self.index % 0x800 + 0x6000) in SAFE
 
     @property
     def address(self) -> str:
@@ -58,7 +78,7 @@ class Advice:
     words: str
 
 
-Fix = Edit | Write | Run | Advice
+Fix = Edit | Together | Write | Run | Advice
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,6 +21,7 @@ _shtab_gwrms_commands() {
     demo:'A simulated exoskeleton, its gateway and a live view, with one command.'
     describe:'What a robot is made of: its components and buses and what is wrong with them, since when and what'
     docs:'Prints a page of the docs, which are installed with GWRMS; without a name, the list of all. A page'"'"'s own name'
+    doctor:'Finds what is wrong with a robot: by its file, its buses, its sensors and its computer, through its gateway'
     eds:'Read EDS and DCF files (CiA 306) as a gateway would: the device, whether it can be a joint, its PDOs as the'
     enable:'Enable drives, one confirmed transition at a time.'
     evaluate:'How well predictions hold for people, real or simulated, whom no model has seen.'
@@ -405,6 +406,24 @@ _shtab_gwrms_docs_options=(
 
 # guard to ensure default positional specs are added only once per session
 _shtab_gwrms_docs_defaults_added=0
+
+_shtab_gwrms_doctor_options=(
+  "(- : *)"{-h,--help}"[show this help message and exit]"
+  "--robot[ask this gateway, and not the one that the file means]:HOST:PORT:"
+  "--seconds[how long to watch (default 20)]:seconds:"
+  "--silent[ask no gateway]"
+  "--active[where no gateway runs, ask devices by SDO]"
+  "*--eds[folder of EDS files]:DIR:_files"
+  "--computer[a copy of \/sys, \/proc and \/run (default \/)]:DIR:_files"
+  "--fix[mend what is safe to mend, asking for each]"
+  "--yes[with --fix\: do not ask]"
+  "--rules[tell what is looked for, and by what]"
+  "--json[one JSON object, for machines]"
+  ":the robot\'s file:_files"
+)
+
+# guard to ensure default positional specs are added only once per session
+_shtab_gwrms_doctor_defaults_added=0
 
 _shtab_gwrms_eds_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
@@ -945,6 +964,7 @@ _shtab_gwrms_sim_options=(
   "--seed[of noise, losses and strides\; same seed, same bytes (default\: 0)]:S:"
   "--subject[who wears the robot (default\: 0, nominal)]:N:"
   "*--drive[the EDS or DCF of the drives, or of one joint\'s (again for another one)]:[JOINT=]FILE:"
+  "*--mistake[make a mistake for gwrms doctor to find (again for more)\; none\: make none]:NAME:(none bit_rate terminator double_node_id second_sdo_client bus_load sync eds_product gear counts sign joints_swapped insoles_swapped zero heartbeat_slow velocity_unit imu_axes heartbeat pdo_mapping mode current_limit following_window reaction coasting sync_slow insole_scale imu_frozen latency_timer clock governor realtime txqueuelen)"
   "--truth[write the ground truth there]:FILE:_files"
 )
 
@@ -1100,6 +1120,7 @@ _shtab_gwrms() {
         demo) _arguments -C -s $_shtab_gwrms_demo_options ;;
         describe) _arguments -C -s $_shtab_gwrms_describe_options ;;
         docs) _arguments -C -s $_shtab_gwrms_docs_options ;;
+        doctor) _arguments -C -s $_shtab_gwrms_doctor_options ;;
         eds) _arguments -C -s $_shtab_gwrms_eds_options ;;
         enable) _arguments -C -s $_shtab_gwrms_enable_options ;;
         evaluate) _arguments -C -s $_shtab_gwrms_evaluate_options ;;

@@ -25,7 +25,7 @@ from gateway.doctor.gait import (
 )
 from gateway.doctor.observations import Observations, Place
 from gateway.doctor.rules.drive import device_ratio, figures
-from gateway.doctor.verdicts import Advice, Edit, Finding, Fix, Unknown, Verdict
+from gateway.doctor.verdicts import Advice, Edit, Finding, Fix, Together, Unknown, Verdict
 
 SCALE_DIFFERS = 1.6  # times, between the ranges of left and right
 ZERO_DIFFERS = 0.15  # rad, between the means of left and right
@@ -119,7 +119,18 @@ def gear(seen: Observations) -> Iterator[Verdict]:
         elif max(spans.values()) / min(spans.values()) > SCALE_DIFFERS and wrong.isdisjoint(
             place.header for place in places.values()
         ):
+            if all(device_ratio(seen, place, 0x6091) for place in places.values()):
+                yield Unknown("gear", f"{pair.kind}s", _one_sided(spans))
+                continue
             yield _scale(pair.kind, spans, places, _stride(pairs, pair.kind))
+
+
+def _one_sided(spans: dict[str, float]) -> str:
+    left, right = (math.degrees(spans[side]) for side in SIDES)
+    return (
+        f"left goes {left:.0f}°, right {right:.0f}°, though the drives have the file's figures: it is how "
+        "the wearer walks, or a drive was told a wrong gear"
+    )
 
 
 def _stride(pairs: list[Pair | str], but: str) -> float:
@@ -210,7 +221,7 @@ def sides(seen: Observations) -> Iterator[Verdict]:
         )
         about = " and ".join(place.name for place in places)
         words = f"left and right {kind} are swapped: each moves with the other leg's foot"
-        yield Finding("sides", about, words, tuple(_halves(found, kind)), edits)
+        yield Finding("sides", about, words, tuple(_halves(found, kind)), (Together(edits),))
 
 
 def _halves(found: Gait, kind: str) -> Iterator[str]:
@@ -230,11 +241,12 @@ def _swapped_insoles(seen: Observations, found: Gait, swapped: list[str]) -> Fin
         for number, name in enumerate(names)
         if tables[0].port != tables[1].port
     )
-    joints = Advice("or every joint of both legs is swapped: then exchange their node ids")
-    shoes = Advice("or they lie in the wrong shoes: exchange them")
+    ports = (Together(edits),) if edits else ()
+    joints = Advice("every joint of both legs is swapped: then exchange their node ids")
+    shoes = Advice("they lie in the wrong shoes: exchange them")
     evidence = tuple(text for kind in swapped for text in _halves(found, kind))
     words = "left and right insole are swapped: every joint swings while its own foot stands"
-    return Finding("sides", " and ".join(names), words, evidence, (*edits, shoes, joints))
+    return Finding("sides", " and ".join(names), words, evidence, (*ports, shoes, joints))
 
 
 def zero(seen: Observations) -> Iterator[Verdict]:

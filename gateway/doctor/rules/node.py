@@ -255,8 +255,6 @@ def _unmapped(place: Place, mapped: dict[int, list[int]], missing: list[int]) ->
         evidence or ("no TPDO is enabled",),
         (
             Edit(place.kind, place.name, "configure_pdos", value=True, was=False),
-            Advice(
-                "or map it with the drive's own software: statusword 6041h and position 6064h in one TPDO"
-            ),
+            Advice("map it with the drive's own software: statusword 6041h and position 6064h in one TPDO"),
         ),
     )

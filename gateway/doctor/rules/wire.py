@@ -146,7 +146,7 @@ def second_sdo_client(seen: Observations) -> Iterator[Verdict]:
             (
                 Advice(f"end the other program that sends 0x{request:X} (candump shows when)"),
                 Advice(
-                    f"or give the gateway a channel of its own: a second SDO server (1201h) on node {node}, "
+                    f"give the gateway a channel of its own: a second SDO server (1201h) on node {node}, "
                     f"then sdo_cob_ids = [request, response] in {place.header}"
                 ),
             ),
