@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from math import isfinite
 
 from drivers.bus.interfaces.controller_state import BusState
 from drivers.joint.quantities import AXIS_OFFSET
@@ -136,14 +137,21 @@ class Observations:
         value = self.holds(place, index, subindex)
         return None if value is None else int(value)
 
+    def why_no(self, channel: str) -> str:
+        """Why a channel could not be judged by."""
+        component = channel.partition(".")[0]
+        late = "its values came too late, or not at all"
+        known = channel in self.samples.columns
+        return self.samples.problems.get(component) or (late if known else self.samples.why_none)
+
     def column(self, channel: str) -> list[float] | None:
         """A channel's values, a missing one as the one before; `None` where more than a tenth is missing."""
         column = self.samples.columns.get(channel, ())
-        known = [value for value in column if value is not None]
+        known = [value for value in column if value is not None and isfinite(value)]
         if not known or len(known) < 0.9 * len(column):
             return None
         last, filled = known[0], []
         for value in column:
-            last = last if value is None else value
+            last = last if value is None or not isfinite(value) else value
             filled.append(last)
         return filled

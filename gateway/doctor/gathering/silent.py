@@ -26,7 +26,7 @@ from gateway.doctor.observations import Object, Place, Samples, Value
 from gateway.modules.component.assembly import assemble
 
 PERIOD_S = 0.02
-SETTLE_S = 2.0
+SETTLE_S = 3.0
 WHY_NONE = "a silent robot's joints are asked only with --active"
 
 Wait = Callable[[float], object]

@@ -61,8 +61,7 @@ def velocity_unit(seen: Observations) -> Iterator[Verdict]:
         if not isinstance(table, JointSettings) or not _has(seen, place, 0x606C):
             continue
         if position is None or velocity is None or len(position) != len(velocity):
-            why = seen.samples.problems.get(place.name, seen.samples.why_none)
-            yield Unknown("velocity_unit", place.header, why)
+            yield Unknown("velocity_unit", place.header, seen.why_no(f"{place.name}.velocity"))
             continue
         ratio = _slope_ratio(position, velocity, seen.samples.period_s)
         if ratio is None:

@@ -91,11 +91,10 @@ def _place(seen: Observations, side: str, kind: str) -> Place:
     return Place("joint", name, seen.config.joint[name])
 
 
-def _unjudged(seen: Observations, rule: str, pair: str) -> Unknown:
-    name = joint_of("left", pair)
-    problems = seen.samples.problems
-    why = problems.get(name) or problems.get(joint_of("right", pair)) or seen.samples.why_none
-    return Unknown(rule, f"{pair}s", why)
+def _unjudged(seen: Observations, rule: str, kind: str) -> Unknown:
+    channels = [f"{joint_of(side, kind)}.position" for side in SIDES]
+    missing = next(one for one in channels if seen.column(one) is None)
+    return Unknown(rule, f"{kind}s", seen.why_no(missing))
 
 
 def gear(seen: Observations) -> Iterator[Verdict]:
@@ -195,8 +194,8 @@ def _unseen(seen: Observations, rule: str, found: Gait) -> Iterator[Unknown]:
     known = {joint_of(side, kind): (kind, side) for kind in NORMAL for side in SIDES}
     for place in seen.joints():
         if known.get(place.name) not in found.matches:
-            problem = seen.samples.problems.get(place.name) or seen.samples.why_none
-            yield Unknown(rule, place.header, problem if place.name in known else ALONE)
+            why = seen.why_no(f"{place.name}.position")
+            yield Unknown(rule, place.header, why if place.name in known else ALONE)
 
 
 def sides(seen: Observations) -> Iterator[Verdict]:
@@ -297,8 +296,7 @@ def insole_scale(seen: Observations) -> Iterator[Verdict]:
     for side in SIDES:
         insole, values = insole_of(seen, side), force(seen, side)
         if insole is not None and values is None:
-            why = seen.samples.problems.get(insole) or seen.samples.why_none
-            yield Unknown("insole_scale", f"[insole.{insole}]", why)
+            yield Unknown("insole_scale", f"[insole.{insole}]", seen.why_no(f"{insole}.force"))
         elif values is not None:
             most[side] = sorted(values)[int(0.98 * (len(values) - 1))]
     walks = _walks(seen, list(_pairs(seen))) or not seen.config.joint

@@ -23,10 +23,8 @@ def imu(seen: Observations) -> Iterator[Verdict]:
         problem = seen.samples.problems.get(name)
         if problem is not None and "again and again" in problem:
             yield _frozen(about, problem)
-        elif f"{name}.acceleration_x" not in seen.samples.columns:
-            yield Unknown("imu", about, problem or seen.samples.why_none)
         elif any(column is None for column in columns):
-            yield Unknown("imu", about, problem or "it said too little")
+            yield Unknown("imu", about, seen.why_no(f"{name}.acceleration_x"))
         else:
             yield from _judged(seen, name, [column for column in columns if column is not None])
 

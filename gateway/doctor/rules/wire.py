@@ -84,7 +84,7 @@ def terminator(seen: Observations) -> Iterator[Verdict]:
             words = (
                 "frames are destroyed on the wire: no terminator, one too many, a short or a loose contact"
             )
-            look = Advice("then look at each plug, and unplug one device after the other until errors end")
+            look = Advice("look at each plug, and unplug one device after the other until errors end")
             yield Finding("terminator", about, words, evidence, (_ADVICE, look))
 
 

@@ -144,6 +144,30 @@ def test_nothing_known_is_nothing_judged(walker: Patient) -> None:
         assert well(verdicts) == []
 
 
+ODD = {
+    "nothing": (),
+    "one value": (0.0,),
+    "nothing known": (None,) * 500,
+    "always 0": (0.0,) * 500,
+    "always the same": (1.5,) * 500,
+    "below 0": (-3.0,) * 500,
+    "to and fro": (0.0, 1e9) * 250,
+    "no number": (float("nan"),) * 500,
+    "beyond all": (float("inf"), float("-inf")) * 250,
+}
+
+
+@pytest.mark.parametrize("odd", ODD)
+def test_odd_values_are_judged_without_an_error_and_never_called_well(odd: str, walker: Patient) -> None:
+    seen = walker.seen()
+    for chosen, rule in (("left_knee", "gear"), ("", "sides")):
+        columns = {
+            name: ODD[odd] if chosen in name else column for name, column in seen.samples.columns.items()
+        }
+        verdicts = list(judged(replace(seen, samples=replace(seen.samples, columns=columns))))
+        assert rule not in well(verdicts)
+
+
 def test_without_what_the_drive_says_the_other_leg_shows_gear_and_zero(walker: Patient) -> None:
     for name in ("gear", "counts", "zero"):
         found = findings(replace(walker.seen(name), objects={}))
