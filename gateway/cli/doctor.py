@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
+from drivers.errors import DriverError
 from gateway.cli.connect import address, ask
 from gateway.cli.text import say, say_json, warn
 from gateway.client import Address, ClientError, LinkSettings, Robot
@@ -57,6 +58,14 @@ def main(argv: Sequence[str]) -> int:
         parser.error("--fix asks people, --json is for machines: say one of both")
     if not LEAST_S <= options.seconds <= MOST_S:
         parser.error(f"--seconds {options.seconds:g} is outside {LEAST_S:g} to {MOST_S:g}")
+    try:
+        return _asked(options)
+    except (ClientError, DriverError) as error:
+        warn("doctor", str(error))
+        return NOTHING
+
+
+def _asked(options: argparse.Namespace) -> int:
     found = examine(options.file)
     if found.config is None:
         warn(

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from gateway.doctor.observations import Observations
-from gateway.doctor.rules import computer, drive, motion, node, trunk, wire
+from gateway.doctor.rules import components, computer, drive, motion, node, trunk, wire
 from gateway.doctor.verdicts import Verdict
 
 Judge = Callable[[Observations], Iterator[Verdict]]
@@ -71,6 +71,9 @@ RULES: tuple[Rule, ...] = (
     Rule("zero", "a joint's zero is off", "walking: left beside right", motion.zero),
     Rule("insole_scale", "an insole's scale is off", "walking: force under each foot", motion.insole_scale),
     Rule("imu", "the IMU's axes are wrong, or it is frozen", "standing: gravity; walking: sway", trunk.imu),
+    Rule(
+        "component", "a driver says that something else is wrong", "channels: quality", components.component
+    ),
     Rule("latency_timer", "a USB serial adapter gathers bytes", "computer: /sys", computer.latency_timer),
     Rule("clock", "the clock is not synchronised", "computer: adjtimex", computer.clock),
     Rule("governor", "the cores save power", "computer: /sys", computer.governor),
@@ -81,5 +84,4 @@ RULES: tuple[Rule, ...] = (
 
 def judged(seen: Observations) -> Iterator[Verdict]:
     """What every rule says, in the table's order."""
-    for rule in RULES:
-        yield from rule.judge(seen)
+    yield from components.unexplained(seen, (verdict for rule in RULES for verdict in rule.judge(seen)))

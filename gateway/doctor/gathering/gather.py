@@ -99,6 +99,8 @@ def _running(empty: Observations, how: How, robot: Robot) -> _Seen:
     with Listening(ears, _waiting()) as listening:
         before = robot.buses()
         samples = running.samples(robot, described, how.seconds)
+        if not samples.columns:
+            _waiting()(how.seconds)
         after = robot.buses()
         buses = running.by_figures(before, after)
         facts = listening.facts(running.begun_between(before, after))
