@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Callable, Iterator
 from functools import partial
-from math import log, tau
+from math import hypot, log, sqrt, tau
 from statistics import median
 
 from msgspec.structs import replace
@@ -26,7 +26,9 @@ CYCLIC_MODES = {
 MOVES_ON = {0x6007: "its master dies (6007h = 0: no action)", 0x605A: "it is stopped (605Ah = 0: it coasts)"}
 SAFER = {0x6007: 3, 0x605A: 2}  # quick stop; down by the quick stop's ramp
 RPDO_TARGETS = {0x607A: 8, 0x60FF: 9, 0x6071: 10}
-LEAST_SPEED = 0.3  # rad/s, on which velocity and position are compared
+LEAST_SPEED = 0.1  # rad/s on average, on which velocity and position are compared
+SLOPE_S = 0.1  # over which the position's change is taken: frames may come in bursts
+UNIT_DIFFERS, UNIT_FITS = 3.0, 1.6  # times
 _UNITS = ("counts/s", "rpm", "0.1rpm", "0.01rpm", "0.001rpm")
 
 
@@ -63,20 +65,29 @@ def velocity_unit(seen: Observations) -> Iterator[Verdict]:
         if position is None or velocity is None or len(position) != len(velocity):
             yield Unknown("velocity_unit", place.header, seen.why_no(f"{place.name}.velocity"))
             continue
-        ratio = _slope_ratio(position, velocity, seen.samples.period_s)
+        ratio = _speeds_ratio(position, velocity, seen.samples.period_s)
         if ratio is None:
             yield Unknown("velocity_unit", place.header, "the joint did not move: walk, or bend it by hand")
-        elif not 0.5 < abs(ratio) < 2.0:
-            now = _per_count(table, table.velocity_unit)
-            wanted = min(_UNITS, key=lambda unit: abs(log(abs(ratio) * now / _per_count(table, unit))))
-            told = seen.whole(place, 0x60A9)
-            evidence = (
-                f"its velocity is {1 / ratio:.3g} times what its position changes by",
-                *(() if not told else (f"60A9h = 0x{told:08X}",)),
-            )
-            words = f"velocity is not in {table.velocity_unit}"
-            edit = Edit(place.kind, place.name, "velocity_unit", wanted, table.velocity_unit)
-            yield Finding("velocity_unit", place.header, words, evidence, (edit,))
+        elif not 1 / UNIT_DIFFERS < ratio < UNIT_DIFFERS:
+            yield _wrong_unit(seen, place, table, ratio)
+
+
+def _wrong_unit(seen: Observations, place: Place, table: JointSettings, ratio: float) -> Verdict:
+    """The unit that fits best, where one does."""
+    now = _per_count(table, table.velocity_unit)
+
+    def misfit(unit: str) -> float:
+        return abs(log(ratio * now / _per_count(table, unit)))
+
+    wanted, told = min(_UNITS, key=misfit), seen.whole(place, 0x60A9)
+    times = f"its velocity is {1 / ratio:.3g} times what its position changes by"
+    if misfit(wanted) > log(UNIT_FITS):
+        return Unknown("velocity_unit", place.header, f"{times}, and no unit explains that")
+    evidence = (times, *(() if not told else (f"60A9h = 0x{told:08X}",)))
+    edit = Edit(place.kind, place.name, "velocity_unit", wanted, table.velocity_unit)
+    return Finding(
+        "velocity_unit", place.header, f"velocity is not in {table.velocity_unit}", evidence, (edit,)
+    )
 
 
 def _has(seen: Observations, place: Place, index: int) -> bool:
@@ -89,15 +100,17 @@ def _per_count(table: JointSettings, unit: str) -> float:
     return abs(scaling.scale) if scaling is not None else 1.0
 
 
-def _slope_ratio(position: list[float], velocity: list[float], period_s: float) -> float | None:
-    """By which the velocity has to be multiplied to be the position's change; `None` where it stands."""
-    slopes = [(b - a) / (2 * period_s) for a, b in zip(position, position[2:], strict=False)]
-    speeds = velocity[1:-1]
-    if not slopes or sum(map(abs, slopes)) / len(slopes) < LEAST_SPEED / 3:
+def _speeds_ratio(position: list[float], velocity: list[float], period_s: float) -> float | None:
+    """By which the velocity has to be multiplied to be the position's; `None` where one of them stands.
+
+    Their sizes are compared, not their courses: a velocity that is only polled now and then is late.
+    """
+    over = max(1, round(SLOPE_S / period_s))
+    slopes = [(b - a) / (over * period_s) for a, b in zip(position, position[over:], strict=False)]
+    if not slopes or sum(map(abs, slopes)) / len(slopes) < LEAST_SPEED:
         return None
-    crossed = sum(a * b for a, b in zip(slopes, speeds, strict=True))
-    squared = sum(one * one for one in speeds)
-    return crossed / squared if squared > 0 and crossed else None
+    slope, speed = (hypot(*values) / sqrt(len(values)) for values in (slopes, velocity))
+    return slope / speed if speed > 0 else None
 
 
 def mode(seen: Observations) -> Iterator[Verdict]:

@@ -144,6 +144,17 @@ def test_nothing_known_is_nothing_judged(walker: Patient) -> None:
         assert well(verdicts) == []
 
 
+def test_a_velocity_that_is_only_polled_now_and_then_is_no_other_unit(walker: Patient) -> None:
+    seen = walker.seen()
+    late = {
+        name: tuple(column[at // 13 * 13] for at in range(len(column)))
+        if name.endswith(".velocity")
+        else column
+        for name, column in seen.samples.columns.items()
+    }
+    assert findings(replace(seen, samples=replace(seen.samples, columns=late))) == []
+
+
 def test_what_a_driver_says_is_told_unless_another_finding_names_it_better(walker: Patient) -> None:
     problems = {"left_hip": "its position jumped", "left_knee": "gear_ratio is 50", "trunk": "it hangs"}
     for mistake, told in (("gear", {"[joint.left_hip]", "[imu.trunk]"}), ("txqueuelen", {"[imu.trunk]"})):
