@@ -196,11 +196,16 @@ def _slow_sync(seen: Observations, bus: str, period_s: float, wanted_s: float | 
     writes = [
         Write(place.name, 0x1006, 0, round(wanted * 1e6), period)
         for place, period in _producers(seen, bus)
-        if period and place.kind == "device"
+        if period and place.kind == "device" and period != round(wanted * 1e6)
     ]
+    producers = [period for place, period in _producers(seen, bus) if period and place.kind == "device"]
+    late = Advice(
+        "its master means to send it so often (1006h) and is late: look what keeps it busy (gwrms blame)"
+    )
     words = "SYNC does not come as often as PDOs and drives need it"
     master = Advice(f"set the master's SYNC period to {wanted * 1e3:g} ms (1006h in µs)")
-    return Finding("sync", f"[can.{bus}]", words, tuple(evidence), (*writes, master))
+    fixes: tuple[Fix, ...] = (*writes, late if producers and not writes else master)
+    return Finding("sync", f"[can.{bus}]", words, tuple(evidence), fixes)
 
 
 def _interpolation_s(seen: Observations, places: list[Place]) -> float | None:
