@@ -19,6 +19,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "keys": ("gateway.cli.keys:main", "on the robot: who is let in, and as what"),
     "pair": ("gateway.cli.pair:main", "let a robot know this desk, and this desk the robot"),
     "check": ("gateway.cli.check:main", "what is wrong with a robot's or server's file, or a scenario"),
+    "doctor": ("gateway.cli.doctor:main", "what is wrong with a robot, by which figures, what mends it"),
     "describe": ("gateway.cli.describe:main", "what a robot is made of, and what is wrong with it"),
     "snapshot": ("gateway.cli.snapshot:main", "one look at resources, components or status"),
     "cost": ("gateway.cli.cost:main", "what monitoring costs the robot, client by client"),

@@ -15,6 +15,8 @@ from hil_sim.exoskeleton import Exoskeleton, Scenario
 from hil_sim.faults.injector import Faults
 from hil_sim.housing import Housing
 from hil_sim.loop import Loop
+from hil_sim.mistakes import computer, registry
+from hil_sim.mistakes.mistake import written
 from hil_sim.mounting import Mounting
 from hil_sim.node.lss import UNCONFIGURED
 from hil_sim.operator import Operator
@@ -33,10 +35,11 @@ class SimulatedRobot(Housing):
     The wearer is subject `person`; the ground truth is written to `truth`; `drives` names the files of joints
     with other drives than ours. With `interface` the bus is that CAN interface of Linux; the nodes named in
     `without` are not simulated, the drives of those in `unconfigured` have no node id yet; `mountings` says
-    how joints are built in. `guard` is that table of robot.toml. `say` is told when the interface goes and
-    comes back, and when the bus is overloaded.
-    `faults` and `operator` belong to the thread that runs it; others use the control socket in the folder.
-    For the rest see `Housing`.
+    how joints are built in. `guard` is that table of robot.toml. `mistakes` are made by their names; with
+    them, or an empty list, the files of the robot's computer are written to `computer` in the folder. `say`
+    is told when the interface goes and comes back, and when the bus is overloaded. `faults` and `operator`
+    belong to the thread that runs it; others use the control socket in the folder. For the rest see
+    `Housing`.
     """
 
     def __init__(
@@ -57,6 +60,7 @@ class SimulatedRobot(Housing):
         guard: Mapping[str, Any] | None = None,
         unconfigured: Collection[str] = (),
         mountings: Mapping[str, Mounting] | None = None,
+        mistakes: Collection[str] | None = None,
     ) -> None:
         self.exoskeleton = Exoskeleton(
             scenario, seed, sensors, person, drives, without, unconfigured, mountings
@@ -68,9 +72,15 @@ class SimulatedRobot(Housing):
         self._interface = interface
         self._say = say
         self._guard = guard
+        self._mistakes = None if mistakes is None else registry.chosen(mistakes)
+        for mistake in self._mistakes or ():
+            if mistake.act is not None:
+                mistake.act(self.exoskeleton)
 
     def _config_text(self, bus: str) -> str:
-        return robot_file.text(self.folder.path, bus, self.exoskeleton, self._guard)
+        text = robot_file.text(self.folder.path, bus, self.exoskeleton, self._guard)
+        lines = [line for mistake in self._mistakes or () for line in mistake.lines]
+        return written(text, lines, str(self.folder.path))
 
     def _companions(self) -> Mapping[str, str]:
         return companions(self.exoskeleton.sensors.choice)
@@ -85,6 +95,11 @@ class SimulatedRobot(Housing):
                 "delete it, or choose another folder"
             )
 
+    def _check_mistakes(self) -> None:
+        """A file that was there before may be right; raises `SimulatorError`."""
+        if not self.config_is_ours and any(mistake.lines for mistake in self._mistakes or ()):
+            raise SimulatorError(f"{self.config} is there already: delete it, or choose another folder")
+
     def _open_bus(self, loop: Loop, closing: ExitStack) -> str:
         if self._interface is None:
             return super()._open_bus(loop, closing)
@@ -97,11 +112,15 @@ class SimulatedRobot(Housing):
 
     def _furnish(self, loop: Loop, closing: ExitStack) -> None:
         self._check_guard()
+        self._check_mistakes()
         for drive in self.exoskeleton.simulated_drives:
             drive.storage.memory = self.folder.memory(drive)
         for name, line in self.exoskeleton.sensors.lines.items():
             line.port = SerialPort(self.folder.link(name), line.baudrate)
             closing.callback(line.port.close)
+        if self._mistakes is not None:
+            ports = [self.folder.link(name) for name in self.exoskeleton.sensors.lines]
+            computer.write(self.folder.path, ports, self._mistakes)
         if self._truth is not None:
             closing.callback(TruthFile(self._truth, self.exoskeleton).close)
         closing.callback(ControlSocket(loop, self.folder.path, self.operator.obey).close)

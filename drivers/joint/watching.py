@@ -9,6 +9,8 @@ from drivers.joint.quantities import POSITION, STATE
 from drivers.latest import Latest
 from drivers.samples import Channel
 
+BESIDE_S = 0.03  # PDOs of one SYNC; a velocity that was polled is older the next time
+
 
 class JointWatch(BusUser):
     """Feeds `check`, about 20 times a second as long as the bus is open."""
@@ -40,7 +42,7 @@ class JointWatch(BusUser):
         now = Motion(
             stamp_ns,
             position,
-            self._newest("velocity", now_ns),
+            beside(self._latest, self._index.get("velocity"), stamp_ns, now_ns),
             self._newest("torque", now_ns),
             self._newest("following_error", now_ns),
             None if mode is None else int(mode),
@@ -51,6 +53,12 @@ class JointWatch(BusUser):
     def _newest(self, quantity: str, now_ns: int) -> float | None:
         index = self._index.get(quantity)
         return None if index is None else self._latest.read(index, now_ns)[0]
+
+
+def beside(latest: Latest, index: int | None, stamp_ns: int, now_ns: int) -> float | None:
+    """A value of about the time of another one; one that is only polled now and then says nothing of it."""
+    value, at_ns = (None, None) if index is None else latest.read(index, now_ns)
+    return None if at_ns is None or abs(stamp_ns - at_ns) > BESIDE_S * 1e9 else value
 
 
 def _index(channels: Iterable[Channel]) -> dict[str, int]:

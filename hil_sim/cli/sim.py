@@ -9,6 +9,7 @@ from hil_sim import mounting, personality
 from hil_sim.cli import replay, run, running
 from hil_sim.cli.arguments import seconds, speed
 from hil_sim.exoskeleton import CONTROLLER, CONTROLLER_NODE, JOINTS, Scenario
+from hil_sim.mistakes.registry import MISTAKES, NONE
 from hil_sim.robot import SimulatedRobot
 from hil_sim.scenario.runner import schedule
 from hil_sim.scenario.script import Script, load
@@ -77,6 +78,12 @@ sensors
   --imu and --insole choose the languages that they speak, from the makers' manuals. `gwrms sensor
   DIR/trunk` finds out which.
 
+mistakes
+  --mistake NAME makes a mistake that people make, for gwrms doctor to find; again for more than one, none for
+  a robot that is well. The folder then has a file robot.toml of its own, and `computer`, the files of /sys
+  and /proc of the robot's computer, for gwrms doctor --computer DIR/computer.
+{mistakes}
+
 scenario files
   gwrms sim run FILE        runs it against a gateway and checks what it expects (--help says more)
   gwrms sim --script FILE   only lets happen what it says, for a gateway of your own
@@ -121,11 +128,16 @@ def _named(text: str, nodes: tuple[str, ...]) -> list[str]:
     return left_out
 
 
+def _mistakes() -> str:
+    width = max(map(len, MISTAKES))
+    return "\n".join(f"    {name:<{width}}  {one.what}" for name, one in MISTAKES.items())
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="gwrms sim",
         description=_DESCRIPTION,
-        epilog=_EPILOG,
+        epilog=_EPILOG.replace("{mistakes}", _mistakes()),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument(
@@ -196,6 +208,13 @@ def _parser() -> argparse.ArgumentParser:
         metavar="JOINT=NODE[,DIRECTION[,ZERO]]",
         help="a drive's node id, 1 or -1 (its motor built in the other way round), counts at zero",
     )
+    parser.add_argument(
+        "--mistake",
+        action="append",
+        choices=(NONE, *MISTAKES),
+        metavar="NAME",
+        help="make a mistake for gwrms doctor to find (again for more); none: make none",
+    )
     parser.add_argument("--truth", type=Path, metavar="FILE", help="write the ground truth there")
     return parser
 
@@ -248,6 +267,7 @@ def main(argv: list[str]) -> int:
         unconfigured=arguments.unconfigured,
         guard=script.guard,
         mountings=mounting.choose(arguments.mount, JOINTS, [CONTROLLER_NODE]),
+        mistakes=arguments.mistake,
     )
 
     return running.run(robot, arguments.seconds, lambda: schedule(script.lines, robot))

@@ -54,6 +54,8 @@ _JOINT = (
     Write(0x6066, 0, 500, 2),
     Write(0x6085, 0, 1_300_000, 4),  # quick stop deceleration
     Write(0x605A, 0, 2, 2),
+    Write(0x6073, 0, 3000, 2),  # the most current (per mille of the rated)
+    Write(0x1017, 0, 100, 2),  # heartbeat (ms)
 )
 
 

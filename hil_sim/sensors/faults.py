@@ -26,6 +26,7 @@ class InsoleFaults(LineFaults):
     saturated: bool = False  # its amplifier ends far too low, and it says so where its format can
     drift: float = 0.0  # Pa/s by which every cell reads more and more; 0 again takes all of it away
     swapped: bool = False  # it lies in the other shoe
+    scale: float = 1.0  # by which each cell is told wrong
 
 
 @dataclass(slots=True)

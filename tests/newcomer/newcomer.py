@@ -21,8 +21,8 @@ _GWRMS: Final = """#!/bin/sh
 for word; do [ "$word" = --robot ] && exec @RUN@ "$@"; done
 case $1 in
     gateway) shift && exec @RUN@ gateway --port @PORT@ "$@" ;;
-    describe | snapshot | cost | bench | blame | watch | plot | top | get | set | od | params | store | \\
-        restore | stop | reset | enable)
+    doctor | describe | snapshot | cost | bench | blame | watch | plot | top | get | set | od | params | \\
+        store | restore | stop | reset | enable)
         exec @RUN@ "$@" --robot 127.0.0.1:@PORT@ ;;
     journal) [ "$2" = tail ] && exec @RUN@ "$@" --robot 127.0.0.1:@PORT@ ;;
 esac

@@ -1,0 +1,169 @@
+"""`gwrms doctor`: what is wrong with a robot, by which figures, and what mends it."""
+
+import argparse
+from collections.abc import Sequence
+from contextlib import ExitStack
+from pathlib import Path
+
+from drivers.errors import DriverError
+from gateway.cli.connect import address, ask
+from gateway.cli.text import say, say_json, warn
+from gateway.client import Address, ClientError, LinkSettings, Robot
+from gateway.config.reading import examine
+from gateway.config.robot import RobotConfig
+from gateway.doctor.gathering.computer import ROOT
+from gateway.doctor.gathering.gather import How, gather
+from gateway.doctor.mending import Mender, NotMended
+from gateway.doctor.report import as_json, as_text, findings, status
+from gateway.doctor.table import RULES, judged
+from gateway.doctor.verdicts import Verdict
+from gateway.tables.finding import lines, mistakes
+
+DESCRIPTION = """\
+Finds what is wrong with a robot: by its file, its buses, its sensors and its computer, through its gateway
+where one runs. Each finding is named with the figures that it goes by and with what mends it, the likeliest
+first; what could not be judged is said too, with why. Nothing is ever enabled or moved.
+"""
+EPILOG = """\
+While the robot walks for 20 s, joints and insoles are judged too: one leg beside the other, and both beside
+how people walk. Standing still, only what devices, bus and computer say is judged.
+
+Where no gateway answers, the robot is looked at as a silent one: buses and sensors are listened to, and not
+one frame is sent. With --active, devices that nobody else asks are asked by SDO; nothing is written.
+
+exit status: 0 nothing wrong was found; 1 findings; 2 nothing could be judged, or wrong usage
+
+examples
+  gwrms doctor /etc/gwrms/robot.toml                   through its gateway, else as a silent robot
+  gwrms doctor robot.toml --seconds 40 --json
+  gwrms doctor robot.toml --active                     no gateway runs: ask the devices too
+  gwrms doctor robot.toml --robot exo:7420             from a desk: without its buses and its computer
+  gwrms doctor robot.toml --fix                        ask for each thing that is safe to mend, and mend it
+"""
+NOTHING = 2
+LOOPBACK = ("127.0.0.1", "::1", "localhost")
+LEAST_S, MOST_S = 1.0, 600.0
+
+
+def main(argv: Sequence[str]) -> int:
+    """Run `gwrms doctor`."""
+    parser = _parser()
+    options = parser.parse_args(argv)
+    if options.rules:
+        say("".join(f"{rule.name:<18} {rule.meaning}; {rule.looks}\n" for rule in RULES))
+        return 0
+    if options.file is None:
+        parser.error("name the robot's file")
+    if options.fix and options.json:
+        parser.error("--fix asks people, --json is for machines: say one of both")
+    if not LEAST_S <= options.seconds <= MOST_S:
+        parser.error(f"--seconds {options.seconds:g} is outside {LEAST_S:g} to {MOST_S:g}")
+    try:
+        return _asked(options)
+    except (ClientError, DriverError) as error:
+        warn("doctor", str(error))
+        return NOTHING
+
+
+def _asked(options: argparse.Namespace) -> int:
+    found = examine(options.file)
+    if found.config is None:
+        warn(
+            "doctor",
+            f"the file must be mended first (gwrms check):\n{lines(options.file, mistakes(found.findings))}",
+        )
+        return NOTHING
+    return _examined(found.config, options)
+
+
+def _examined(config: RobotConfig, options: argparse.Namespace) -> int:
+    gateway = _gateway(config, options)
+    seen = gather(
+        config,
+        How(
+            seconds=options.seconds,
+            gateway=gateway,
+            active=options.active,
+            here=options.robot is None or options.robot.host in LOOPBACK,
+            root=options.computer,
+            folders=tuple(options.eds),
+            say=(lambda text: warn("doctor", text.rstrip())) if not options.json else lambda _: None,
+        ),
+    )
+    verdicts = list(judged(seen))
+    if options.json:
+        say_json(as_json(verdicts))
+    else:
+        say("\n".join(as_text(verdicts)) + "\n")
+    if options.fix:
+        _mend(config, gateway, verdicts, yes=options.yes)
+    return status(verdicts)
+
+
+def _gateway(config: RobotConfig, options: argparse.Namespace) -> Address | None:
+    """Whom to ask: the gateway that is named, else the file's own."""
+    if options.silent:
+        return None
+    return options.robot or Address("127.0.0.1", config.gateway.port)
+
+
+def _mend(config: RobotConfig, gateway: Address | None, verdicts: Sequence[Verdict], *, yes: bool) -> None:
+    """Ask for each finding's likeliest fix, where it is ours to do, and do it."""
+    with ExitStack() as ending:
+        mender = Mender(config, _robot(gateway, ending))
+        for finding in findings(verdicts):
+            fix = finding.fixes[0]
+            if not mender.can(fix) or not ask(
+                f"{finding.about}: {finding.words}\n{fix.words}\nmend it?", yes=yes
+            ):
+                continue
+            try:
+                say(f"{mender.mend(finding, fix)}\n")
+            except NotMended as error:
+                warn("doctor", str(error))
+
+
+def _robot(gateway: Address | None, ending: ExitStack) -> Robot | None:
+    try:
+        return (
+            None
+            if gateway is None
+            else ending.enter_context(Robot(gateway, LinkSettings(client="gwrms doctor")))
+        )
+    except ClientError:
+        return None
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="gwrms doctor",
+        description=DESCRIPTION,
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    parser.add_argument("file", nargs="?", type=Path, metavar="FILE", help="the robot's file")
+    parser.add_argument(
+        "--robot",
+        metavar="HOST:PORT",
+        type=address,
+        help="ask this gateway, and not the one that the file means",
+    )
+    parser.add_argument("--seconds", type=float, default=20.0, help="how long to watch (default 20)")
+    parser.add_argument("--silent", action="store_true", help="ask no gateway")
+    parser.add_argument("--active", action="store_true", help="where no gateway runs, ask devices by SDO")
+    parser.add_argument(
+        "--eds", type=Path, action="append", default=[], metavar="DIR", help="folder of EDS files"
+    )
+    parser.add_argument(
+        "--computer",
+        type=Path,
+        default=ROOT,
+        metavar="DIR",
+        help="a copy of /sys, /proc and /run (default /)",
+    )
+    parser.add_argument("--fix", action="store_true", help="mend what is safe to mend, asking for each")
+    parser.add_argument("--yes", action="store_true", help="with --fix: do not ask")
+    parser.add_argument("--rules", action="store_true", help="tell what is looked for, and by what")
+    parser.add_argument("--json", action="store_true", help="one JSON object, for machines")
+    return parser

@@ -1,0 +1,152 @@
+"""A robot looked at once: its file, its computer, then for some seconds its buses, devices and sensors."""
+
+import contextlib
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import eds
+from drivers.bus.interfaces.opening import obstacle
+from drivers.scan.asking import Told
+from drivers.scan.products import Library, files
+from eds.shipped import SHIPPED
+from gateway.client import Address, LinkSettings, Robot, Unreachable
+from gateway.config.robot import RobotConfig
+from gateway.doctor.gathering import running, silent
+from gateway.doctor.gathering.computer import ROOT, computer
+from gateway.doctor.gathering.listening import Listening, Wait
+from gateway.doctor.observations import BusFacts, Computer, NodeTable, Object, Observations, Samples, Value
+
+NOT_ACTIVE = "devices are asked only through a gateway, or with --active"
+NOT_HERE = "it was asked, and did not answer"
+
+
+@dataclass(frozen=True, slots=True)
+class How:
+    """How to look: for how long, by which gateway, and what may be sent where there is none."""
+
+    seconds: float = 20.0
+    gateway: Address | None = None  # None: nobody is asked
+    active: bool = False
+    here: bool = True  # whether this is the robot's computer
+    root: Path = ROOT
+    folders: tuple[Path, ...] = ()  # of EDS files
+    say: Callable[[str], object] = lambda _: None
+
+
+@dataclass(frozen=True, slots=True)
+class _Seen:
+    buses: Mapping[str, BusFacts]
+    objects: Mapping[str, Mapping[Object, Value]]
+    samples: Samples
+    why_no_objects: str
+
+
+def gather(config: RobotConfig, how: How) -> Observations:
+    """Everything that the doctor goes by; what could not be seen is not there, and says why."""
+    descriptions = dict(_descriptions(config))
+    empty = Observations(config, descriptions, {}, {}, Samples(), Computer())
+    with _gateway(how) as robot:
+        seen = _silent(empty, how) if robot is None else _running(empty, how, robot)
+    return replace(
+        empty,
+        buses=seen.buses,
+        objects=seen.objects,
+        samples=seen.samples,
+        computer=computer(config, how.root) if how.here else Computer(),
+        proposals=dict(_proposals(empty, seen.objects, how.folders)),
+        why_no_objects=seen.why_no_objects,
+        bus_obstacles=dict(_obstacles(config)) if how.here else {},
+    )
+
+
+@contextlib.contextmanager
+def _gateway(how: How) -> Iterator[Robot | None]:
+    """The robot's gateway, where one runs."""
+    if how.gateway is None:
+        yield None
+        return
+    try:
+        robot = Robot(how.gateway, LinkSettings(client="gwrms doctor"))
+    except Unreachable:
+        if not how.here:
+            raise
+        how.say(f"no gateway answers at {how.gateway}: the robot is looked at as a silent one\n")
+        yield None
+        return
+    with robot:
+        how.say(f"the gateway at {how.gateway} is asked, for {how.seconds:g} s; best while the robot walks\n")
+        yield robot
+
+
+def _descriptions(config: RobotConfig) -> Iterator[tuple[str, eds.Description]]:
+    tables: dict[str, NodeTable] = {**config.joint, **config.device}
+    for name, table in tables.items():
+        with contextlib.suppress(eds.EdsError, OSError):
+            yield name, eds.load(eds.locate(table.eds, config.path), table.node_id)
+
+
+def _obstacles(config: RobotConfig) -> Iterator[tuple[str, str]]:
+    for name, settings in config.can.items():
+        if (why := obstacle(settings)) is not None:
+            yield name, why
+
+
+def _running(empty: Observations, how: How, robot: Robot) -> _Seen:
+    described = robot.describe()
+    ears = empty.config.can if how.here else {}
+    with Listening(ears, _waiting()) as listening:
+        before = robot.buses()
+        samples = running.samples(robot, described, how.seconds)
+        if not samples.columns:
+            _waiting()(how.seconds)
+        after = robot.buses()
+        buses = running.by_figures(before, after)
+        facts = listening.facts(running.begun_between(before, after))
+        buses |= {name: one for name, one in facts.items() if one.heard is not None}
+    objects = running.objects(robot, described, empty.nodes(), empty.descriptions)
+    return _Seen(buses, objects, samples, NOT_HERE)
+
+
+def _silent(empty: Observations, how: How) -> _Seen:
+    config, wait = empty.config, _waiting()
+    with Listening(config.can, wait) as listening:
+        samples = silent.samples(config, how.seconds, wait, active=False)
+        if not samples.columns:
+            wait(how.seconds)
+        buses = listening.facts({})
+        asked = {name: listening.asked(name) for name in config.can}
+    if not how.active:
+        return _Seen(buses, {}, samples, NOT_ACTIVE)
+    objects = silent.objects(config, empty.nodes(), empty.descriptions, asked, wait)
+    return _Seen(buses, objects, silent.samples(config, how.seconds, wait, active=True), NOT_HERE)
+
+
+def _waiting() -> Wait:
+    return threading.Event().wait
+
+
+def _proposals(
+    seen: Observations, objects: Mapping[str, Mapping[Object, Value]], folders: tuple[Path, ...]
+) -> Iterator[tuple[str, str]]:
+    """The EDS file for what each device says it is, where its own is another's."""
+    library: Library | None = None
+    for place in seen.nodes():
+        vendor, product = (objects.get(place.name, {}).get((0x1018, sub)) for sub in (1, 2))
+        own = seen.descriptions.get(place.name)
+        if (
+            vendor is None
+            or product is None
+            or (own and (own.vendor_id, own.product_code) == (vendor, product))
+        ):
+            continue
+        library = library or Library(files(folders))
+        for fits in library.proposals(place.table.node_id, _told(int(vendor), int(product)))[:1]:
+            path = fits.description.path
+            yield place.name, path.name if path.parent == SHIPPED else str(path)
+
+
+def _told(vendor: int, product: int) -> Told:
+    """A device of which only that is known."""
+    return Told(0, None, None, None, None, vendor, product, None, None, None, (), ())

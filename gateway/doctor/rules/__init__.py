@@ -1,0 +1,1 @@
+"""What the doctor knows to find, a file for each place where it looks."""

@@ -1,0 +1,38 @@
+"""What the drivers of joints and sensors say by themselves, where no other finding explains it."""
+
+from collections.abc import Iterable, Iterator
+
+from gateway.config.robot import COMPONENT_TABLES, header
+from gateway.doctor.observations import Observations
+from gateway.doctor.verdicts import Advice, Finding, Unknown, Verdict
+
+_DESCRIBE = Advice("gwrms describe says since when, and what to check")
+
+
+def component(seen: Observations) -> Iterator[Verdict]:
+    """Every joint and sensor of which its driver says that something is wrong."""
+    sampled = {name.partition(".")[0] for name in seen.samples.columns}
+    for kind in COMPONENT_TABLES:
+        for name in getattr(seen.config, kind):
+            problem = seen.samples.problems.get(name)
+            if problem is not None:
+                words = "its driver says that something is wrong"
+                yield Finding("component", header(kind, name), words, (problem,), (_DESCRIBE,))
+            elif name not in sampled and kind != "device":  # a device has no channels
+                yield Unknown("component", header(kind, name), seen.samples.why_none)
+
+
+def unexplained(seen: Observations, verdicts: Iterable[Verdict]) -> Iterator[Verdict]:
+    """Without what a component says of a thing that another finding names better."""
+    every = list(verdicts)
+    named = {one.about for one in every if isinstance(one, Finding) and one.rule != "component"}
+    for one in every:
+        if not (isinstance(one, Finding) and one.rule == "component" and _is_named(seen, one.about, named)):
+            yield one
+
+
+def _is_named(seen: Observations, about: str, named: set[str]) -> bool:
+    name = about.rpartition(".")[2].strip('"]')
+    tables = (getattr(seen.config, kind).get(name) for kind in COMPONENT_TABLES)
+    bus = next((header("can", table.bus) for table in tables if hasattr(table, "bus")), None)
+    return bus in named or any(name in other for other in named)

@@ -1,0 +1,87 @@
+"""Every finding of the doctor: its name, what it looks at, what it means, and who judges it."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+from gateway.doctor.observations import Observations
+from gateway.doctor.rules import components, computer, drive, motion, node, trunk, wire
+from gateway.doctor.verdicts import Verdict
+
+Judge = Callable[[Observations], Iterator[Verdict]]
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """One finding; `looks` says by what it is judged."""
+
+    name: str
+    meaning: str
+    looks: str
+    judge: Judge
+
+
+RULES: tuple[Rule, ...] = (
+    Rule("bit_rate", "the devices talk at another bit rate", "bus: error frames, no frame", wire.bit_rate),
+    Rule(
+        "terminator",
+        "no terminator, one too many, or a short",
+        "bus: error frames among frames",
+        wire.terminator,
+    ),
+    Rule(
+        "double_node_id",
+        "two devices have one node id",
+        "bus: heartbeats, PDOs beside SYNC",
+        wire.double_node_id,
+    ),
+    Rule(
+        "second_sdo_client",
+        "somebody else asks on our SDO channel",
+        "bus: SDO requests",
+        wire.second_sdo_client,
+    ),
+    Rule("bus_load", "the bus is too busy", "bus: load, identifiers", wire.bus_load),
+    Rule("eds_product", "the EDS is of another product or revision", "objects: 1018h", node.eds_product),
+    Rule("heartbeat", "no heartbeat, or slower than the guard", "objects: 1017h; bus", node.heartbeat),
+    Rule("sync", "no SYNC, or too slow for the PDOs", "bus: 80h; objects: 1800h, 60C2h", node.sync),
+    Rule("pdo_mapping", "position or state is in no PDO", "objects: 1800h, 1A00h", node.pdo_mapping),
+    Rule(
+        "velocity_unit",
+        "velocity is in another unit",
+        "walking: velocity beside position",
+        drive.velocity_unit,
+    ),
+    Rule("mode", "the mode of operation is not what it is led in", "objects: 6061h, 1600h", drive.mode),
+    Rule(
+        "current_limit",
+        "current limit unset, or above the motor's",
+        "objects: 6073h, 6075h",
+        drive.current_limit,
+    ),
+    Rule("following_window", "the following error is not watched", "objects: 6065h", drive.following_window),
+    Rule("reaction", "moves on when its master dies", "objects: 605Ah, 6007h", drive.reaction),
+    Rule(
+        "gear",
+        "counts or gear ratio are off",
+        "objects: 608Fh, 6091h; walking: left beside right",
+        motion.gear,
+    ),
+    Rule("sign", "a joint's sign is flipped", "walking: joint over the stride of its foot", motion.sign),
+    Rule("sides", "left and right are swapped", "walking: joints beside insoles", motion.sides),
+    Rule("zero", "a joint's zero is off", "walking: left beside right", motion.zero),
+    Rule("insole_scale", "an insole's scale is off", "walking: force under each foot", motion.insole_scale),
+    Rule("imu", "the IMU's axes are wrong, or it is frozen", "standing: gravity; walking: sway", trunk.imu),
+    Rule(
+        "component", "a driver says that something else is wrong", "channels: quality", components.component
+    ),
+    Rule("latency_timer", "a USB serial adapter gathers bytes", "computer: /sys", computer.latency_timer),
+    Rule("clock", "the clock is not synchronised", "computer: adjtimex", computer.clock),
+    Rule("governor", "the cores save power", "computer: /sys", computer.governor),
+    Rule("realtime", "no real-time priority", "computer: limits", computer.realtime),
+    Rule("txqueuelen", "the CAN interface's queue is too short", "computer: /sys", computer.txqueuelen),
+)
+
+
+def judged(seen: Observations) -> Iterator[Verdict]:
+    """What every rule says, in the table's order."""
+    yield from components.unexplained(seen, (verdict for rule in RULES for verdict in rule.judge(seen)))

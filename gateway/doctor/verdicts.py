@@ -1,0 +1,108 @@
+"""What the doctor says of one thing: it is wrong, with figures and what mends it, or it cannot be judged."""
+
+import json
+from dataclasses import dataclass
+
+from gateway.config.robot import header
+
+Plain = str | float | int | list[str]
+
+
+@dataclass(frozen=True, slots=True)
+class Edit:
+    """A line of the robot's file."""
+
+    kind: str  # joint, device, insole, imu, can
+    name: str
+    key: str
+    value: Plain
+    was: Plain | None  # None: the key is not in the file
+
+    @property
+    def words(self) -> str:
+        before = "" if self.was is None else f"   # was {_toml(self.was)}"
+        return f"robot.toml: {header(self.kind, self.name)} {self.key} = {_toml(self.value)}{before}"
+
+
+@dataclass(frozen=True, slots=True)
+class Together:
+    """Lines of the robot's file of which one without the other would be worse than none."""
+
+    edits: tuple[Edit, ...]
+
+    @property
+    def words(self) -> str:
+        return "\n          and ".join(edit.words for edit in self.edits)
+
+
+# Written by the doctor itself: what watches a drive or limits it, and never what moves it or paces the bus.
+SAFE = frozenset({0x1017, 0x6007, 0x605A, 0x6065, 0x6073})
+
+
+@dataclass(frozen=True, slots=True)
+class Write:
+    """An object of a device, through the gateway's own writes."""
+
+    component: str
+    index: int
+    subindex: int
+    value: int
+    was: int | None = None
+
+    @property
+    def is_safe(self) -> bool:
+        """Whether it moves nothing."""
+        return (self.index if self.index < 0x6000 else self.index % 0x800 + 0x6000) in SAFE
+
+    @property
+    def address(self) -> str:
+        return f"{self.component}.0x{self.index:04X}:{self.subindex}"
+
+    @property
+    def words(self) -> str:
+        before = "" if self.was is None else f"   # was {self.was}"
+        return f"SDO: gwrms set {self.address}={self.value}{before}"
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """A command for a shell on the robot, as its administrator: shown, never run."""
+
+    words: str
+
+
+@dataclass(frozen=True, slots=True)
+class Advice:
+    """What only hands can mend."""
+
+    words: str
+
+
+Fix = Edit | Together | Write | Run | Advice
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One thing that is wrong: with what, by which figures, and what mends it, the likeliest first."""
+
+    rule: str
+    about: str
+    words: str
+    evidence: tuple[str, ...]
+    fixes: tuple[Fix, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Unknown:
+    """What could not be judged, and why: it is never called well."""
+
+    rule: str
+    about: str
+    why: str
+
+
+Verdict = Finding | Unknown
+
+
+def _toml(value: Plain) -> str:
+    return json.dumps(value, ensure_ascii=False)
