@@ -68,7 +68,7 @@ def test_other_computers_are_served_with_keys_only(host: str) -> None:
     with listen(host, 0) as listener:
         assert kind_of(listener, has_keys=True) is Kind.TLS
         with pytest.raises(
-            DoorProblem, match=r"`gwrms keys pair ROBOT.toml` here.*`gwrms pair HOST:PORT CODE`"
+            DoorProblem, match=r"`gwrms keys pair ROBOT.toml` here.*`gwrms pair HOST:PORT`"
         ):
             kind_of(listener, has_keys=False)
 
@@ -80,7 +80,7 @@ def test_without_keys_the_command_refuses_other_computers_and_says_what_leads_on
     assert main(["gateway", str(tmp_path / "robot.toml"), "--host", "0.0.0.0"]) == 1
     error = capsys.readouterr().err
     assert "gwrms keys pair" in error
-    assert "gwrms pair HOST:PORT CODE" in error
+    assert "`gwrms pair HOST:PORT`" in error
 
 
 def test_a_socket_that_was_handed_over_is_judged_by_where_it_listens(bench: Bench, tmp_path: Path) -> None:
