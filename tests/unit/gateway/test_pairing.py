@@ -1,5 +1,6 @@
 """Pairing, both sides over real sockets: who proves the code is let in, once, and nobody in between."""
 
+import contextlib
 import itertools
 import socket
 import ssl
@@ -18,8 +19,9 @@ from gateway.client import Address, NotPaired, Unreachable, WrongRobot
 from gateway.client import pairing as desk
 from gateway.client.keys import keys_folder, pin_of
 from gateway.connections.listeners import listen
-from gateway.wire.pairing import DESK, TRIES, Offer, Reply, link, new_code, normal, proof
+from gateway.wire.pairing import DESK, SAY_S, TRIES, Offer, Reply, link, new_code, normal, proof
 from gateway.wire.role import Role
+from tests.support.waiting import WAIT_S
 from tests.unit.gateway import keyed as keys
 from tests.unit.gateway.pairing_robot import CODE, Shown
 
@@ -175,6 +177,24 @@ def test_who_says_nothing_or_rubbish_is_no_try_and_in_nobody_s_way(
         silent.close()
         shown.take(waiting)
         assert paired.result().name == "anna"
+
+
+@pytest.mark.parametrize("says", [b"", b"\x16\x03\x01\x02\x00\x01"])
+def test_silence_by_the_dozen_keeps_no_desk_out_and_nobody_waiting(
+    shown: Shown, asked: Callable[[str], "Future[desk.Paired]"], says: bytes
+) -> None:
+    """Of an address of its own here; each would have a place for ten seconds."""
+    waiting = shown.wait()
+    with contextlib.ExitStack() as open_:
+        for number in range(30):
+            source = ("127.0.0.2", 0)
+            slow = socket.create_connection(("127.0.0.1", shown.where.port), WAIT_S, source)
+            open_.enter_context(slow).sendall(says)
+            if number == 15:
+                paired = asked(CODE)
+        candidate = waiting.result(SAY_S - 1.0)
+        shown.take(waiting)
+        assert (paired.result().name, candidate.name) == ("anna", desk.own_name())
 
 
 def test_where_nobody_pairs_that_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
