@@ -32,7 +32,7 @@ _shtab_gwrms_commands() {
     keys:'on the robot: who is let in, and as what'
     label:'What robot and wearer did in a recorded session.'
     models:'learned models: look at, promote, roll back, export'
-    pair:'Pairs this desk with the robot on which `gwrms keys pair` shows CODE: this desk'"'"'s key is made where it'
+    pair:'Pairs this desk with the robot on which `gwrms keys pair` shows a code. The code is asked for, so that it'
     params:'parameters as files: save, compare, apply'
     plot:'Channels over time, live, until q, or Ctrl-C.'
     predict:'What robot and wearer are doing, and how far to believe that.'
@@ -81,7 +81,7 @@ _shtab_gwrms_cloud_commands() {
 
 _shtab_gwrms_journal_commands() {
   local _commands=(
-    tail:'The newest entries: who did what, when, and what came of it. WHO is the program, by the name that'
+    tail:'The newest entries: who did what, when, and what came of it. WHO is known by their key or account'
     verify:'Check every entry of a journal, in itself and against what desks have seen of it.'
   )
   _describe 'gwrms journal commands' _commands
@@ -90,7 +90,7 @@ _shtab_gwrms_journal_commands() {
 _shtab_gwrms_keys_commands() {
   local _commands=(
     list:'Who is let in on this robot, and as what.'
-    pair:'Shows HOST:PORT and a code. On the desk, `gwrms pair HOST:PORT CODE` proves to know it; then you say'
+    pair:'Shows HOST:PORT and a code. On the desk, `gwrms pair HOST:PORT` asks for it and proves to know it; then you'
     revoke:'Let somebody in no more. A gateway that runs closes their connections at once.'
   )
   _describe 'gwrms keys commands' _commands
@@ -662,8 +662,8 @@ _shtab_gwrms_pair_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--name[that the robot is to call this desk (default\: your user and computer)]:name:"
   "--json[one JSON object, for machines]"
-  ":as the robot shows it\; or its link, gwrms\:\/\/\…:"
-  ":as the robot shows it:"
+  ":as the robot shows it (asked for, if not):"
+  ":instead of being asked\; others here may see it:"
 )
 
 # guard to ensure default positional specs are added only once per session
