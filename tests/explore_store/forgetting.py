@@ -56,20 +56,26 @@ def look(world: World, store: Store) -> None:
 
 
 def _at(world: World, server: Server, name: str) -> None:
+    """Where the other computer has removed what this one has no second copy of, that is accepted first."""
+    try:
+        _forget(world, server, name)
+    except CannotForget as error:
+        if "somebody else" not in str(error):
+            _accept(world, server)
+            _forget(world, server, name)
+
+
+def _forget(world: World, server: Server, name: str) -> None:
     try:
         store = Store.existing(world.url)
     except NoSuchTable:
         return
     world.times.wall_ns = server.wall_ns
     with Spool(server.folder, reserve_bytes=1, keep_bytes=1 << 20) as spool:
-        try:
+        known = forget.plan(store, server.folder, name, lambda _: ())
+        if known.sessions:
+            forget.upload(store, spool, known, name, _expect)
             known = forget.plan(store, server.folder, name, lambda _: ())
-            if known.sessions:
-                forget.upload(store, spool, known, name, _expect)
-                known = forget.plan(store, server.folder, name, lambda _: ())
-        except CannotForget as error:
-            world.check("somebody else" in str(error), "a wearer cannot be forgotten", error)
-            return
         _are_theirs(world, set(known.sessions), name)
         if known.sessions:
             left = forget.forget(store, spool, known, name, _expect)
