@@ -3,6 +3,8 @@
 import contextlib
 import os
 import secrets
+import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
@@ -51,6 +53,30 @@ def _make(name: str, key: Path, certificate: Path) -> None:
     key_pem, certificate_pem = _made(name)
     write_file(certificate, certificate_pem, 0o644)
     write_file(key, key_pem, 0o600)
+
+
+@contextlib.contextmanager
+def alone_in(folder: Path) -> Iterator[None]:
+    """Within the block no other process of ours changes the files of this folder; it is made where it is not.
+
+    Whoever comes second waits: each is done in some milliseconds.
+
+    Raises:
+        OSError: it cannot be made or opened.
+
+    """
+    folder.mkdir(parents=True, mode=0o755, exist_ok=True)
+    if sys.platform == "win32":
+        yield  # a desk there has no locks of folders
+        return
+    import fcntl
+
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(descriptor)
 
 
 def write_file(file: Path, content: bytes, mode: int) -> None:

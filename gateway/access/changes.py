@@ -1,12 +1,13 @@
 """What is changed in a robot's access folder: keys made, clients added and taken away."""
 
-from collections.abc import Callable
+import contextlib
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 
 from gateway.access.folder import CERTIFICATE, KEY, AccessFolder
 from gateway.certificates import NAME, KeyProblem, der_of, fingerprint, pem_of
-from gateway.key_making import make, write_file
+from gateway.key_making import alone_in, make, write_file
 from gateway.tables.entries import NoSuchLine, with_entry, without_entry
 from gateway.wire.role import Role
 
@@ -25,10 +26,11 @@ may = []   # "reset", "enable"
 
 def ensure_keys(folder: AccessFolder, robot: str) -> bool:
     """Make the robot's key where it has none; whether it was made now. Raises `KeyProblem`."""
-    if folder.key.exists():
-        return False
-    make(_file_name(robot), folder.folder / "keys" / KEY, folder.folder / "keys" / CERTIFICATE)
-    return True
+    with _alone(folder):
+        if folder.key.exists():
+            return False
+        make(_file_name(robot), folder.folder / "keys" / KEY, folder.folder / "keys" / CERTIFICATE)
+        return True
 
 
 def own_fingerprint(folder: AccessFolder) -> str:
@@ -48,6 +50,11 @@ def add(folder: AccessFolder, name: str, der: bytes, role: Role) -> None:
     """
     if not NAME.fullmatch(name):
         raise KeyProblem(f"{name!r} is no name: letters, digits, _, . and -, at most 64")
+    with _alone(folder):
+        _add(folder, name, der, role)
+
+
+def _add(folder: AccessFolder, name: str, der: bytes, role: Role) -> None:
     file = folder.clients / f"{name}.crt"
     if file.exists():
         raise KeyProblem(f"{name} is known already; take another name, or revoke that one first")
@@ -68,6 +75,11 @@ def remove(folder: AccessFolder, name: str) -> None:
         KeyProblem: there is none, or it stays.
 
     """
+    with _alone(folder):
+        _remove(folder, name)
+
+
+def _remove(folder: AccessFolder, name: str) -> None:
     files = {one.stem: one for one in folder.files()}
     if name not in files:
         raise KeyProblem(f"there is no {name}; known are {', '.join(files) or 'nobody'}")
@@ -80,6 +92,16 @@ def remove(folder: AccessFolder, name: str) -> None:
             problem = f"{files[one]} cannot be removed: {error.strerror}; {name} IS STILL LET IN"
             raise KeyProblem(problem) from error
         _edit(folder, partial(without_entry, table="clients", key=one))
+
+
+@contextlib.contextmanager
+def _alone(folder: AccessFolder) -> Iterator[None]:
+    """One command at a time: of two, none makes another key beside the first, or loses the other's line."""
+    try:
+        with alone_in(folder.folder):
+            yield
+    except OSError as error:
+        raise KeyProblem(f"{folder.folder} cannot be changed: {error.strerror or error}") from error
 
 
 def _known_as(folder: AccessFolder, der: bytes) -> str | None:

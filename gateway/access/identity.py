@@ -14,6 +14,8 @@ class Peer(Struct, frozen=True):
 
     uid: int
     gid: int
+    name: str = ""  # as the computer's tables have it; "" where nobody has told
+    groups: tuple[str, ...] = ()  # by numbers and names
 
 
 class Identity(Struct, frozen=True):

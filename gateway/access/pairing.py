@@ -41,6 +41,26 @@ class Candidate:
             self.connection.sendall(msgspec.json.encode(reply) + b"\n")
 
 
+@dataclass(frozen=True, slots=True)
+class _Visitor:
+    """Somebody who has come, and may still say something, in a thread."""
+
+    address: str
+    connection: socket.socket  # a second handle: TLS takes the first one over
+    thread: threading.Thread
+
+    def send_away(self) -> None:
+        """Its thread ends at once."""
+        with contextlib.suppress(OSError):
+            self.connection.shutdown(socket.SHUT_RDWR)
+        self.see_out()
+
+    def see_out(self) -> None:
+        """Wait for its thread."""
+        self.thread.join()
+        self.connection.close()
+
+
 class Pairing:
     """One code's life, on a listening socket: `wait` for a desk, within it."""
 
@@ -61,7 +81,7 @@ class Pairing:
         self._tries = TRIES
         self._lock = threading.Lock()
         self._proved: queue.Queue[Candidate] = queue.Queue()
-        self._taken = False  # by one desk: the code is used up
+        self._winner: threading.Thread | None = None  # of the desk that has used the code up
         self._context = _context(folder)
 
     def wait(self) -> Candidate:
@@ -72,18 +92,21 @@ class Pairing:
 
         """
         self._listener.settimeout(_LOOK_S)
-        threads: list[threading.Thread] = []
+        visitors: list[_Visitor] = []  # the oldest first
         try:
             while True:
                 with contextlib.suppress(queue.Empty):
                     return self._proved.get_nowait()
                 self._check()
-                threads = [one for one in threads if one.is_alive()]
+                for one in [one for one in visitors if not one.thread.is_alive()]:
+                    visitors.remove(one)
+                    one.see_out()
                 with contextlib.suppress(TimeoutError):
-                    self._accept(threads)
+                    self._accept(visitors)
         finally:
-            for one in threads:
-                one.join()  # each ends within twice `SAY_S`
+            for one in visitors:
+                one.thread.join(_LOOK_S)  # whoever is being judged is told
+                (one.see_out if one.thread is self._winner else one.send_away)()
 
     def proof(self, candidate: Candidate) -> str:
         """The robot's own, for the reply."""
@@ -95,13 +118,18 @@ class Pairing:
         if self._clock() >= self._until_s:
             raise PairingEnded("nobody came in time: the code is void; begin again with a new one")
 
-    def _accept(self, threads: list[threading.Thread]) -> None:
-        connection, _address = self._listener.accept()
-        if len(threads) >= _AT_ONCE:
-            connection.close()
-            return
+    def _accept(self, visitors: list[_Visitor]) -> None:
+        """Where too many wait, the oldest of the address that most have come from makes room."""
+        connection, address = self._listener.accept()
+        if len(visitors) >= _AT_ONCE:
+            others = [one for one in visitors if one.thread is not self._winner]
+            addresses = [one.address for one in others]
+            greediest = max(addresses, key=addresses.count)
+            oldest = next(one for one in others if one.address == greediest)
+            visitors.remove(oldest)
+            oldest.send_away()
         thread = threading.Thread(target=self._hear, args=(connection,), name="pairing")
-        threads.append(thread)
+        visitors.append(_Visitor(str(address[0]), connection.dup(), thread))
         thread.start()
 
     # In a thread a connection.
@@ -130,14 +158,14 @@ class Pairing:
     def _judged(self, offer: Offer, der: bytes) -> str | None:
         """One proof at a time, so that no number of them at once is more than the tries."""
         with self._lock:
-            if self._taken:
+            if self._winner is not None:
                 return "another desk has used this code: it is for one"
             if self._tries <= 0 or self._clock() >= self._until_s:
                 return "this code is void: begin again on the robot"
             if not proves(offer.proof, DESK, self._code, self._own, fingerprint(der)):
                 self._tries -= 1
                 return "that is not the code which the robot shows, or somebody is in between"
-            self._taken = True
+            self._winner = threading.current_thread()
             return None
 
 

@@ -25,26 +25,28 @@ def peer_of(connection: socket.socket) -> Peer:
     return Peer(uid, gid)
 
 
-def identity_of(peer: Peer, table: AccessTable) -> Identity | None:
-    """The highest role that the user or one of their groups has; `None` for a stranger.
+def is_maintainer(peer: Peer) -> bool:
+    """Root, and the account that the gateway runs as, could do all of it anyway."""
+    return peer.uid in (ROOT, os.geteuid())
 
-    Root, and the account that the gateway runs as, could do all of it anyway: they are maintainers.
-    """
-    name = _user(peer.uid)
-    roles = [Role.MAINTAINER] if peer.uid in (ROOT, os.geteuid()) else []
+
+def identity_of(peer: Peer, table: AccessTable) -> Identity | None:
+    """The highest role that the user or one of their groups has; `None` for a stranger."""
+    name, groups = peer.name or str(peer.uid), {str(peer.gid), *peer.groups}
+    roles = [Role.MAINTAINER] if is_maintainer(peer) else []
     roles += [role for user, role in table.users.items() if user in (name, str(peer.uid))]
-    if table.groups:
-        groups = set(_groups(name, peer.gid))
-        roles += [role for group, role in table.groups.items() if group in groups]
+    roles += [role for group, role in table.groups.items() if group in groups]
     highest = next((role for role in reversed(Role) if role in roles), None)
     return None if highest is None else Identity(highest, name, peer=peer, granted=table.operators.may)
 
 
-def _user(uid: int) -> str:
+def resolved(peer: Peer) -> Peer:
+    """The same with the names that the system's directories have of it, which may ask the network."""
     try:
-        return pwd.getpwuid(uid).pw_name
+        name = pwd.getpwuid(peer.uid).pw_name
     except KeyError:
-        return str(uid)
+        return peer
+    return Peer(peer.uid, peer.gid, name, tuple(_groups(name, peer.gid)))
 
 
 def _groups(name: str, gid: int) -> Iterator[str]:

@@ -53,8 +53,8 @@ def tail(argv: list[str]) -> int:
     """Run `gwrms journal tail`."""
     made = parser(
         "journal tail",
-        "The newest entries: who did what, when, and what came of it. WHO is the program, by the name that\n"
-        "it gives itself, and its address; which person sat there is not known to the robot.",
+        "The newest entries: who did what, when, and what came of it. WHO is known by their key or account\n"
+        "[in brackets]; behind that, the name that the program gives itself, and its address.",
     )
     made.add_argument("-n", type=int, default=20, metavar="N", help="how many, at most 1000 (default 20)")
     arguments = made.parse_args(argv)

@@ -18,6 +18,7 @@ from gateway.cli.text import say, say_json, table, warn
 from gateway.client.address import DEFAULT_PORT
 from gateway.connections.doors import is_loopback
 from gateway.connections.listeners import listen
+from gateway.private import forbid_core_dumps
 from gateway.wire.pairing import PAIRING_PORT, TRIES, VALID_S, Reply, link, new_code
 from gateway.wire.role import Role
 
@@ -34,8 +35,8 @@ CONFIG is the robot's file (default /etc/gwrms/robot.toml); keys and clients are
 gwrms keys COMMAND --help says more.
 """
 _PAIR = """\
-Shows HOST:PORT and a code. On the desk, `gwrms pair HOST:PORT CODE` proves to know it; then you say
-here how that desk is called and what it may do. The robot's own key is made where it has none: from
+Shows HOST:PORT and a code. On the desk, `gwrms pair HOST:PORT` asks for it and proves to know it; then you
+say here how that desk is called and what it may do. The robot's own key is made where it has none: from
 its gateway's next start on, every TCP connection is TLS.
 """
 
@@ -60,6 +61,7 @@ def pair(argv: list[str]) -> int:
         made.error("--yes needs --name and --role: who comes is taken as that")
     if not arguments.yes and not sys.stdin.isatty():
         raise NobodyToAsk("there is no terminal to ask on; give --name, --role and --yes")
+    forbid_core_dumps()
     robot, folder = _robot(arguments)
     if changes.ensure_keys(folder, robot.robot.name):
         say(f"The robot's key was made in {folder.keys}. Start its gateway again: it speaks TLS only then.\n")
@@ -92,7 +94,7 @@ def _show(listener: socket.socket, code: str, own: str) -> None:
     shown = _address() if host in ("0.0.0.0", "::") else host
     where = f"[{shown}]:{port}" if ":" in shown else f"{shown}:{port}"
     say(f"\nOn the desk, within {VALID_S / 60:.0f} minutes ({TRIES} tries):\n\n")
-    say(f"  gwrms pair {where} {code}\n\n")
+    say(f"  gwrms pair {where}\n\nIt asks for this code:\n\n  {code}\n\n")
     say("".join(f"{one}\n" for one in _drawn(link(where, code))))
     say(f"This robot's key: {grouped(own)}\n")
     if is_loopback(listener.getsockname()):

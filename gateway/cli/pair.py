@@ -1,16 +1,24 @@
 """`gwrms pair`: let a robot know this desk, and this desk the robot."""
 
 import argparse
+import sys
+from typing import Final
 
-from gateway.cli.text import say, say_json
-from gateway.client import pairing
+from gateway.cli.connect import NobodyToAsk
+from gateway.cli.text import say, say_json, warn
+from gateway.client import Address, pairing
 from gateway.client.keys import keys_folder, server_file
+from gateway.private import forbid_core_dumps
+from gateway.wire.pairing import SCHEME, normal
 
 _DESCRIPTION = """\
-Pairs this desk with the robot on which `gwrms keys pair` shows CODE: this desk's key is made where it
-has none, the robot's is pinned in server.toml, and a person on the robot says what this desk may do.
-From then on every command, the window and scripts reach the robot by its address, as before.
+Pairs this desk with the robot on which `gwrms keys pair` shows a code. The code is asked for, so that it
+stands in no list of processes and no shell's history; where this is no terminal, it is a line of the
+standard input. This desk's key is made where it has none, the robot's is pinned in server.toml, and a
+person on the robot says what this desk may do. From then on every command, the window and scripts reach
+the robot by its address, as before.
 """
+_MOST: Final = 1024  # letters of a line that is typed
 
 
 def main(argv: list[str]) -> int:
@@ -21,13 +29,22 @@ def main(argv: list[str]) -> int:
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
-    made.add_argument("robot", metavar="HOST:PORT", help="as the robot shows it; or its link, gwrms://…")
-    made.add_argument("code", metavar="CODE", nargs="?", default="", help="as the robot shows it")
+    made.add_argument(
+        "robot",
+        metavar="HOST:PORT",
+        nargs="?",
+        default="",
+        help="as the robot shows it (asked for, if not)",
+    )
+    made.add_argument(
+        "code", metavar="CODE", nargs="?", default="", help="instead of being asked; others here may see it"
+    )
     made.add_argument("--name", help="that the robot is to call this desk (default: your user and computer)")
     made.add_argument("--json", action="store_true", help="one JSON object, for machines")
     arguments = made.parse_args(argv)
+    forbid_core_dumps()
     try:
-        where, code = pairing.typed(arguments.robot, arguments.code)
+        where, code = _typed(arguments)
     except ValueError as error:
         made.error(str(error))
     if not arguments.json:
@@ -49,3 +66,41 @@ def main(argv: list[str]) -> int:
     say(f"Its key is pinned in {server_file()}, yours is in {keys_folder()}.\n")
     say(f"\n  gwrms describe --robot {paired.address}\n")
     return 0
+
+
+def _typed(arguments: argparse.Namespace) -> tuple[Address, str]:
+    """Address and code, each asked for where it was not given.
+
+    Raises:
+        ValueError: one is none.
+        NobodyToAsk: nobody has typed it.
+
+    """
+    robot = arguments.robot or _asked("HOST:PORT, or the robot's link: ", arguments)
+    if arguments.code or robot.startswith(SCHEME):
+        return pairing.typed(robot, arguments.code)
+    where = pairing.place(robot)
+    while True:
+        try:
+            return where, normal(_asked("The code that the robot shows: ", arguments))
+        except ValueError as error:
+            if not sys.stdin.isatty():
+                raise
+            warn("pair", str(error))
+
+
+def _asked(question: str, arguments: argparse.Namespace) -> str:
+    """A line of the standard input; where a person types it, they are asked.
+
+    Raises:
+        NobodyToAsk: the input has ended.
+
+    """
+    if sys.stdin.isatty():
+        asking = sys.stderr if arguments.json else sys.stdout
+        asking.write(question)
+        asking.flush()
+    line = sys.stdin.buffer.readline(_MOST)
+    if not line:
+        raise NobodyToAsk(f"nothing was typed: {question.rstrip(': ')}")
+    return line.decode("utf-8", "replace").strip()

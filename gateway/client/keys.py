@@ -10,9 +10,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from gateway.certificates import fingerprint
+from gateway.certificates import KeyProblem, fingerprint
 from gateway.client.address import Address
 from gateway.client.errors import BadAddress, NotPaired, WrongRobot
+from gateway.private import check_private, forbid_core_dumps
 
 if TYPE_CHECKING:
     import ssl
@@ -75,18 +76,22 @@ def context_for(address: Address, pin: str) -> "ssl.SSLContext":
     """TLS 1.3 with this desk's key. Whoever answers is held against the pin, and against nothing else.
 
     Raises:
-        NotPaired: this desk has no key, or it cannot be read.
+        NotPaired: this desk has no key, it cannot be read, or others can read it.
 
     """
     import ssl  # for who has paired
 
     folder = keys_folder()
+    forbid_core_dumps()
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
     context.minimum_version = ssl.TLSVersion.TLSv1_3
     context.check_hostname = False
     context.verify_mode = ssl.CERT_NONE  # `check_pin` is stricter
     try:
+        check_private(folder / KEY)
         context.load_cert_chain(folder / CERTIFICATE, folder / KEY, password=_no_password)
+    except KeyProblem as error:
+        raise NotPaired(f"{address} is pinned to {pin[:16]}…, but {error}") from error
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else "it is no key pair"
         raise NotPaired(

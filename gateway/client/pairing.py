@@ -18,7 +18,8 @@ from gateway.certificates import KeyProblem, der_of, fingerprint
 from gateway.client.address import DEFAULT_PORT, Address
 from gateway.client.errors import ClientError, NotPaired, Unreachable, WrongRobot
 from gateway.client.keys import CERTIFICATE, KEY, keys_folder, server_file
-from gateway.key_making import make, write_file
+from gateway.key_making import alone_in, make, write_file
+from gateway.private import check_private
 from gateway.tables.entries import with_entry
 from gateway.wire.pairing import (
     DESK,
@@ -58,10 +59,15 @@ def typed(where: str, code: str = "") -> tuple[Address, str]:
     """
     if where.strip().startswith(SCHEME):
         where, code = of_link(where)
+    return place(where), normal(code)
+
+
+def place(where: str) -> Address:
+    """Where a robot pairs, as a person typed it; raises `ValueError` where it is no HOST:PORT."""
     found = Address.parse(where.strip())
     if found.path is not None:
         raise ValueError("a robot pairs at HOST:PORT, as it shows it, not at a path")
-    return Address(found.host, PAIRING_PORT if found.port == DEFAULT_PORT else found.port), normal(code)
+    return Address(found.host, PAIRING_PORT if found.port == DEFAULT_PORT else found.port)
 
 
 def pair(
@@ -140,12 +146,14 @@ def _reply(secured: ssl.SSLSocket, where: Address, given_up: Callable[[], bool])
 def own_certificate() -> bytes:
     """A desk's own (PEM), made with its key where there is none; raises `KeyProblem`."""
     folder = keys_folder()
-    if not (folder / KEY).exists():
-        make(own_name(), folder / KEY, folder / CERTIFICATE)
     try:
+        with alone_in(folder.parent):
+            if not (folder / KEY).exists():
+                make(own_name(), folder / KEY, folder / CERTIFICATE)
+        check_private(folder / KEY)
         return (folder / CERTIFICATE).read_bytes()
     except OSError as error:
-        raise KeyProblem(f"{folder / CERTIFICATE} cannot be read: {error.strerror}") from error
+        raise KeyProblem(f"{error.filename or folder} cannot be used: {error.strerror or error}") from error
 
 
 def own_name() -> str:
@@ -168,23 +176,27 @@ def pin(robot: str, address: Address, file: Path | None = None) -> str:
 
     """
     file = file or server_file()
-    entry = {"address": str(address), "pin": address.pin or ""}
     try:
-        before = file.read_text(encoding="utf-8") if file.exists() else ""
-        name, known = _entry_of(tomllib.loads(before), robot, address)
-        if known not in (None, address.pin):
-            raise WrongRobot(
-                f"{name} IS PINNED TO ANOTHER KEY in {file}: {known}, and this robot has {address.pin}. "
-                "Where its keys were made anew, remove that line and pair again"
-            )
-        text = with_entry(before, "robots", name, entry)
-        file.parent.mkdir(parents=True, exist_ok=True)
-        if text != before:
-            write_file(file, text.encode("utf-8"), file.stat().st_mode & 0o777 if file.exists() else 0o644)
+        with alone_in(file.parent):
+            return _pin(robot, address, file)
     except ClientError:
         raise
     except (OSError, ValueError) as error:
         raise ClientError(f"{file} cannot be changed: {error}") from error
+
+
+def _pin(robot: str, address: Address, file: Path) -> str:
+    entry = {"address": str(address), "pin": address.pin or ""}
+    before = file.read_text(encoding="utf-8") if file.exists() else ""
+    name, known = _entry_of(tomllib.loads(before), robot, address)
+    if known not in (None, address.pin):
+        raise WrongRobot(
+            f"{name} IS PINNED TO ANOTHER KEY in {file}: {known}, and this robot has {address.pin}. "
+            "Where its keys were made anew, remove that line and pair again"
+        )
+    text = with_entry(before, "robots", name, entry)
+    if text != before:
+        write_file(file, text.encode("utf-8"), file.stat().st_mode & 0o777 if file.exists() else 0o644)
     return name
 
 

@@ -65,7 +65,7 @@ def without_keys(where: str) -> str:
     return (
         f"this robot has no keys, and {where} is open to other computers: without keys it is served on "
         "127.0.0.1 and its Unix socket only. Two commands lead on: `gwrms keys pair ROBOT.toml` here, which "
-        "makes its key and shows a code, then `gwrms pair HOST:PORT CODE` on the desk"
+        "makes its key and shows a code, then `gwrms pair HOST:PORT` on the desk"
     )
 
 

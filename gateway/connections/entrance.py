@@ -12,7 +12,9 @@ from gateway.connections.intake import Admit, Came
 from gateway.wire import framing
 
 if TYPE_CHECKING:
+    from gateway.access.identity import Peer
     from gateway.access.known import Access, Known
+    from gateway.connections.accounts import Accounts
     from gateway.connections.handshakes import Handshakes
 
 log = logging.getLogger(__name__)
@@ -39,7 +41,9 @@ class Entrance:
         """
         self._complain = complain
         self._folder = folder
+        self._finished = finished
         self._people: Access | None = None
+        self._accounts: Accounts | None = None
         self._admit: Admit = _nobody
         kinds = {one: kind_of(one, has_keys=folder.has_keys) for one in listeners}
         self._handshakes = self._made(finished) if Kind.TLS in kinds.values() else None
@@ -59,17 +63,29 @@ class Entrance:
 
     def end(self) -> None:
         """Join what was started."""
+        if self._accounts is not None:
+            self._accounts.end()
         if self._handshakes is not None:
             self._handshakes.end()
 
     @property
     def busy(self) -> bool:
         """Whether somebody is at a door, and neither in nor gone yet."""
-        return self._handshakes is not None and self._handshakes.busy
+        parts = (self._handshakes, self._accounts)
+        return any(part is not None and part.busy for part in parts)
 
     def known(self) -> "Known":
         """Everybody who may come in, as the files say now."""
         return self._access.now()
+
+    @property
+    def _asked_for(self) -> "Accounts":
+        """For who comes locally; in the thread that accepts."""
+        if self._accounts is None:
+            from gateway.connections.accounts import Accounts
+
+            self._accounts = Accounts(self._finished)
+        return self._accounts
 
     @property
     def _access(self) -> "Access":
@@ -92,9 +108,17 @@ class Entrance:
             self._handshakes.take(connection, _peer(address))
 
     def _came_locally(self, connection: socket.socket, _address: Any) -> None:
-        from gateway.access.users import identity_of, peer_of
+        from gateway.access.users import peer_of
 
-        peer = peer_of(connection)
+        peer, _ = peer_of(connection), self._access  # made by one thread
+        if not self._asked_for.take(peer, lambda named: self._decide(connection, named)):
+            connection.close()
+            self._complain(f"uid {peer.uid}", "comes while too many others are asked for")
+
+    def _decide(self, connection: socket.socket, peer: "Peer") -> None:
+        """In a thread of its own."""
+        from gateway.access.users import identity_of
+
         identity = identity_of(peer, self.known().table)
         if identity is None:
             self._refuse(connection, f"uid {peer.uid}")

@@ -1,7 +1,6 @@
 """TLS 1.3 on one connection, and what a robot says and asks for in it. Imported only where there are keys."""
 
 import logging
-import resource
 import socket
 import ssl
 import stat
@@ -12,6 +11,7 @@ from drivers.urgency import lent_urgency
 from gateway.access.folder import AccessFolder
 from gateway.access.known import Known
 from gateway.certificates import KeyProblem
+from gateway.private import forbid_core_dumps
 
 log = logging.getLogger(__name__)
 
@@ -139,7 +139,7 @@ def context_of(folder: AccessFolder, known: Known) -> ssl.SSLContext:
     context.num_tickets = 0  # nobody comes back by another way than their key
     context.verify_mode = ssl.CERT_REQUIRED
     context.verify_flags = ssl.VerifyFlags(context.verify_flags | _VERIFY)
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # a dump would hold the key
+    forbid_core_dumps()
     try:
         context.load_cert_chain(folder.certificate, folder.key, password=_no_password)
         if folder.key.stat().st_mode & stat.S_IROTH:

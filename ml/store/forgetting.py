@@ -3,7 +3,6 @@
 A wearer is known by the session's own field or by a label, however that is spelled (`labels.person`).
 """
 
-import functools
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -18,10 +17,10 @@ import pyarrow.parquet as pq
 from ml.store import reading, tables, upkeep
 from ml.store.errors import NoSuchTable, StoreError
 from ml.store.labels import holding, person, wearer
-from ml.store.store import NO_HOOKS, Store
+from ml.store.store import Store
 from ml.store.tables import EVENTS, LABELS, PREDICTIONS, RESOURCES, SESSIONS, TELEMETRY, Table
 from ml.store.translation import translated
-from ml.store.upkeep import Pin, again, pins
+from ml.store.upkeep import Pin, pins
 
 # What says whose a session is goes last, so that an interrupted deletion is found again and goes on.
 TABLES: Final = (TELEMETRY, RESOURCES, EVENTS, PREDICTIONS, LABELS, SESSIONS)
@@ -55,6 +54,16 @@ def told(store: Store, table: Table) -> list[dict[str, object]]:
     """Return the rows of `sessions` or `labels`."""
     with translated(f"{store.url}/{table.name} cannot be read"):
         found: list[dict[str, object]] = reading.dataset(store, table).to_table().to_pylist()
+    return found
+
+
+def writers(store: Store) -> set[str]:
+    """Return the spools that have brought sessions, events or labels, by the names of their folders."""
+    found: set[str] = set()
+    for table in (SESSIONS, EVENTS, LABELS):
+        with translated(f"{store.url}/{table.name} cannot be read"):
+            rows = reading.dataset(store, table).to_table(columns=["spool"])
+        found.update(name.partition("/")[0] for name in pc.unique(rows["spool"]).to_pylist() if name)
     return found
 
 
@@ -95,7 +104,7 @@ def delete(store: Store, sessions: Sequence[Name]) -> None:
         store.mend(location)
         with translated(f"{store.url}/{location} cannot be changed"):
             for at in range(0, len(mine), AT_ONCE):
-                again(store, location, functools.partial(_delete, store, location, mine[at : at + AT_ONCE]))
+                upkeep.remove(store, location, _is_of(mine[at : at + AT_ONCE]))
     there = {location for location, _ in _locations(store, sessions)}
     concerned = [table for table in TABLES if there & set(table.locations(store.about.shards))]
     upkeep.vacuum(store, concerned, timedelta(0))
@@ -103,12 +112,11 @@ def delete(store: Store, sessions: Sequence[Name]) -> None:
         store.objects.remove(path)
 
 
-def _delete(store: Store, location: str, sessions: Sequence[Name]) -> None:
-    delta = store.table(location)
-    with store.unfinished(location):
-        each = (f"(robot = {_quoted(robot)} AND session = {_quoted(name)})" for robot, name in sessions)
-        delta.delete(" OR ".join(each), post_commithook_properties=NO_HOOKS)
-        store.make_last(location, delta, checkpoint=True)
+def _is_of(sessions: Sequence[Name]) -> str:
+    """In SQL."""
+    return " OR ".join(
+        f"(robot = {_quoted(robot)} AND session = {_quoted(name)})" for robot, name in sessions
+    )
 
 
 def left(store: Store, sessions: Sequence[Name]) -> list[str]:

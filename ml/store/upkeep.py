@@ -19,6 +19,7 @@ import pyarrow as pa
 import pyarrow.dataset
 from deltalake import DeltaTable
 from deltalake.exceptions import CommitFailedError
+from pyarrow.dataset import ParquetFileFragment, get_partition_keys
 
 from ml.store import reading
 from ml.store.compaction_lock import alone
@@ -169,20 +170,31 @@ def retain(
                     filter=pyarrow.dataset.field("utc") < before
                 )
                 continue
-            went[location] = again(store, location, functools.partial(_retain, store, location, before))
+            _note(store, location, before)
+            went[location] = remove(store, location, f"utc < '{before.isoformat()}'")
     return went
 
 
-def _retain(store: Store, location: str, before: datetime) -> int:
+def remove(store: Store, location: str, condition: str) -> int:
+    """Remove the rows of which this SQL is so, which stay in old versions; how many went."""
+    went, made = again(store, location, functools.partial(_remove, store, location, condition))
+    if any(map(_has_views, made)):
+        with contextlib.suppress(StoreError), alone(store, location):  # who compacts it does the same
+            again(store, location, functools.partial(_with_plain_texts, store, location, made))
+    return went
+
+
+def _remove(store: Store, location: str, condition: str) -> tuple[int, Sequence[ParquetFileFragment]]:
+    """How many went, and the files that were made of those that had some."""
     delta = store.table(location)
-    _note(store, location, before)
+    before = set(delta.file_uris())
     with store.unfinished(location):
-        found = delta.delete(
-            f"utc < '{before.isoformat()}'",
-            post_commithook_properties=NO_HOOKS,
-        )
+        found = delta.delete(condition, post_commithook_properties=NO_HOOKS)
         store.make_last(location, delta, checkpoint=True)
-    return int(found["num_deleted_rows"] or 0)
+    new = tuple(unquote(uri) for uri in set(delta.file_uris()) - before)
+    files: list[ParquetFileFragment] = list(store.dataset(location).get_fragments()) if new else []
+    made = [file for file in files if any(uri.endswith(f"/{file.path}") for uri in new)]
+    return int(found["num_deleted_rows"] or 0), made
 
 
 def again(store: Store, location: str, work: Callable[[], Done]) -> Done:
@@ -300,7 +312,35 @@ def _put_together(store: Store, location: str) -> Compacted:
             post_commithook_properties=NO_HOOKS,
         )
         store.make_last(location, delta, checkpoint=True)
+    if not delta.metadata().partition_columns:
+        _with_plain_texts(store, location, list(store.dataset(location).get_fragments()))
     return Compacted(location, before, len(delta.file_uris()))
+
+
+def _with_plain_texts(store: Store, location: str, files: Sequence[ParquetFileFragment]) -> None:
+    """Write anew what the table format's library has removed rows of, and nobody compacts.
+
+    It writes texts as Arrow's `string_view` then, and Arrow cannot look for one in a file with several.
+    """
+    delta, views = store.table(location), filter(_has_views, files)
+    partitions = {tuple(get_partition_keys(file.partition_expression).items()) for file in views}
+    for partition in sorted(partitions):
+        with store.unfinished(location):
+            delta.optimize.z_order(
+                ["utc"],
+                partition_filters=[(name, "=", value) for name, value in partition] or None,
+                target_size=TARGET_BYTES,
+                writer_properties=writer_properties(pa.schema(delta.schema().to_arrow())),
+                post_commithook_properties=NO_HOOKS,
+            )
+            store.make_last(location, delta, checkpoint=True)
+
+
+def _has_views(file: ParquetFileFragment) -> bool:
+    """Whether a text that has several values in it is written so."""
+    views = {column.name for column in file.physical_schema if column.type == pa.string_view()}
+    told = (known for group in file.row_groups for name, known in group.statistics.items() if name in views)
+    return any(known["min"] != known["max"] for known in told)
 
 
 def _mend(store: Store, tables: Sequence[Table]) -> None:

@@ -2,7 +2,7 @@
 
 import argparse
 import functools
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from gateway.amounts import counted
 from gateway.cli.connect import ask
@@ -12,6 +12,7 @@ from ml.store import Store, StoreError, UnsafeStore
 from ml.store.forgetting import Name
 from server_gui.cli.cloud_options import add_url, parser, progress, reach, spool
 from server_gui.core.cloud import forget as forgetting
+from server_gui.core.cloud.exports import State
 from server_gui.core.cloud.forget import CannotForget, Plan
 from server_gui.core.recording.errors import RecordingError
 from server_gui.core.recording.spool import Spool
@@ -26,10 +27,14 @@ that only older versions need are deleted at once, and second copies in the spoo
 An event in the recording says that it was done, and names the wearer by a hash alone. Then every file is
 read again.
 
+Files that this user has exported on this computer are removed where they are as they were made; those that
+have changed, and copies of the store (cloud download), are named, as are the spools of other computers that
+have written to this store: run the same command there too.
+
 Versions that models name keep what was in them: with such it is refused, and --unpin lets these
 versions go. A model that learned from these sessions stays, and is named. Not known here, and yours to
-remove: exported files, copies of the store, backups, spools of other servers, and old versions that a
-bucket itself keeps.
+remove: what others have exported, what was saved from a window's plots or a query, backups, and old versions
+that a bucket itself keeps.
 
 Interrupted, the same command goes on. Exit status 0: gone, as is proven; 1: something is left, or was not
 removed, and it says what; 2: not looked."""
@@ -71,7 +76,7 @@ def _forget(arguments: argparse.Namespace) -> int:
         _say(arguments, known)
         if not known.sessions or not ask(_question(store, known), yes=arguments.yes):
             return 1
-        forgetting.upload(store, opened, arguments.wearer, looking)
+        forgetting.upload(store, opened, known, arguments.wearer, looking)
         known = forgetting.plan(store, folder, arguments.wearer, learned)
         left = forgetting.forget(store, opened, known, arguments.wearer, looking)
     return _tell(arguments, known, left)
@@ -112,6 +117,20 @@ def _say(arguments: argparse.Namespace, known: Plan) -> None:
         say(f"kept for {pin.by}: {pin.location}, version {pin.version}\n")
     for model in known.learned:
         say(f"learned from these sessions, and stays: {model}\n")
+    for each in known.exported:
+        say(f"exported: {each.place} ({each.state.value})\n")
+
+
+def _not_reached(known: Plan) -> Iterator[str]:
+    """What nobody here can look into."""
+    if known.others:
+        yield (
+            f"not looked into: the spools of other computers that write to this store "
+            f"({', '.join(known.others)}): run the same command there, before they record or mend again"
+        )
+    for each in known.exported:
+        if each.state is State.GONE:
+            yield f"not looked into: what was exported to {each.place}, which {each.state.value}"
 
 
 def _tell(arguments: argparse.Namespace, known: Plan, left: Sequence[str]) -> int:
@@ -125,6 +144,8 @@ def _tell(arguments: argparse.Namespace, known: Plan, left: Sequence[str]) -> in
     else:
         for problem in left:
             warn("cloud", problem)
+        for note in _not_reached(known):
+            warn("cloud", note)
         if not left:
-            say("gone: no file of this store or of this spool has a row of theirs\n")
+            say("gone: no file of this store, of this spool or of this desk's exports has a row of theirs\n")
     return 1 if left or not known.sessions else 0

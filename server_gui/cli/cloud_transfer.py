@@ -14,7 +14,7 @@ from ml.store.sessions import Session
 from ml.store.store import Store
 from ml.store.url import checked_url
 from server_gui.cli.cloud_options import add_url, parser, progress, reach, url
-from server_gui.core.cloud import moved_store, partial_copy, spool_upload, transfer
+from server_gui.core.cloud import exports, moved_store, partial_copy, spool_upload, transfer
 from server_gui.core.fleet.control_socket import NobodyCollects, ask, why_not_uploaded
 from server_gui.core.recording.errors import SpoolUnusable
 from server_gui.core.recording.receipts import RECEIPTS
@@ -47,6 +47,7 @@ def upload(argv: list[str]) -> int:
     made.add_argument("--from", dest="source", metavar="URL", help="the store to copy")
     arguments = made.parse_args(argv)
     if arguments.source is not None:
+        exports.note_copy(checked_url(arguments.source))  # what goes on elsewhere has a copy there
         status = _copy(checked_url(arguments.source), checked_url(url(arguments)), arguments)
         _note(arguments)
         return status
@@ -125,6 +126,7 @@ def _copy(source: str, target: str, arguments: argparse.Namespace) -> int:
     """A whole store."""
     store = Store.existing(source)
     from_, to = store.objects, transfer.open_target(store, target)
+    exports.note_copy(target)
     wanted = transfer.missing(from_, to)
     with progress("bytes", sum(found.size_bytes for found in wanted), bytes_=True) as advance:
         done = transfer.copy(from_, to, wanted, advance)
@@ -144,6 +146,7 @@ def _copy(source: str, target: str, arguments: argparse.Namespace) -> int:
 
 def _copy_parts(source: Store, target: Store, arguments: argparse.Namespace) -> int:
     wanted, robots = _chosen(source, arguments)
+    exports.note_copy(target.url, {(each.robot, each.session) for each in wanted})
     with progress("rows", sum(session.rows for session in wanted)) as advance:
         rows = partial_copy.copy(source, target, wanted, robots, advance)
     text = f"{target.url}: {len(wanted)} sessions, {rows} rows of telemetry copied and counted"

@@ -29,6 +29,7 @@ from server_gui.cli.cloud_options import (
 )
 from server_gui.cli.sessions_gait import gait
 from server_gui.cli.sessions_resources import compare, resources
+from server_gui.core.cloud import exports
 from server_gui.core.cloud.mcap import write_mcap
 from server_gui.core.cloud.recordings import Recorded, Recordings
 from server_gui.core.cloud.selection import Choice, choose
@@ -247,9 +248,9 @@ def _export(known: Recordings, kind: str, arguments: argparse.Namespace) -> int:
     )
     chosen = choose(known, recorded, choice)
     with progress("rows", session.rows) as advance:
-        return FORMATS[kind](
-            arguments.out, dataclasses.replace(chosen, tables=_counted(chosen.tables, advance))
-        )
+        counted = dataclasses.replace(chosen, tables=_counted(chosen.tables, advance))
+        with exports.noted(arguments.out, (session.robot, session.session)):
+            return FORMATS[kind](arguments.out, counted)
 
 
 def _counted(tables: Iterable[pa.Table], advance: Advance) -> Iterator[pa.Table]:

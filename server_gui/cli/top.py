@@ -19,6 +19,7 @@ EPILOG: Final = """keys
   ← →          lower or raise it; the lease is held only while it is written
   q            end
 
+What one may not do on this robot is grey, with the reason below; STOP is for everybody.
 Angles are in degrees and lengths in millimetres, as in the window. What is old is grey, and says
 how old. q waits until it is known what became of a STOP.
 Without a terminal: gwrms watch, gwrms describe.

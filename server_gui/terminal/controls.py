@@ -6,7 +6,9 @@ import time
 from collections.abc import Callable
 
 from gateway.units import Units
-from gateway.wire.parameter import ParameterInfo
+from gateway.wire.control import CONTROL_ACQUIRE
+from gateway.wire.parameter import PARAMETER_WRITE, ParameterInfo
+from gateway.wire.stop import ROBOT_RESET
 from server_gui.core.desk.station import Station
 from server_gui.core.tuning.edits import Change, refusal, unit_of
 from server_gui.core.tuning.stop import StopState
@@ -15,6 +17,7 @@ from server_gui.terminal.keys import Key
 
 STEPS = 20  # from one end of a parameter's range to the other
 AGAIN_S = 3.0  # within which a reset is asked for twice
+SAID_S = 5.0  # for so long a refused key is told: what matters more comes back
 
 
 class Controls:
@@ -24,6 +27,7 @@ class Controls:
         self.wants_to_quit = False
         self.stop_sent = False
         self.note = ""
+        self._refusal, self._refused_until_s = "", 0.0
         self._reset_until_s = 0.0  # a second press until then is one
         self._station = station
         self._row = 0
@@ -49,6 +53,21 @@ class Controls:
         return names[min(self._row, len(names) - 1)] if names else None
 
     @property
+    def no_change(self) -> str:
+        """Why we may not change parameters; empty where we may, as far as is known."""
+        return self._station.refused(CONTROL_ACQUIRE) or self._station.refused(PARAMETER_WRITE)
+
+    @property
+    def no_reset(self) -> str:
+        """Why we may not end a held stop."""
+        return self._station.refused(ROBOT_RESET)
+
+    @property
+    def refusal(self) -> str:
+        """Why the last key has done nothing, for some seconds."""
+        return self._refusal if time.monotonic() < self._refused_until_s else ""
+
+    @property
     def asks_again(self) -> bool:
         """Whether a second press of the same key is waited for."""
         return time.monotonic() < self._reset_until_s
@@ -66,7 +85,15 @@ class Controls:
     def press(self, key: Key) -> None:
         """Do what a key stands for; a STOP is shown until a key is pressed after it was answered, or not."""
         self.stop_sent = key is Key.STOP or (self.stop_sent and self._stop_is_open)
-        self._does[key]()
+        self._refusal, self._refused_until_s = self._refused(key), time.monotonic() + SAID_S
+        if not self._refusal:
+            self._does[key]()
+
+    def _refused(self, key: Key) -> str:
+        """Moving about, ending and a STOP are nothing that anybody may not do."""
+        if key in (Key.LEFT, Key.RIGHT):
+            return self.no_change
+        return self.no_reset if key is Key.RESET else ""
 
     @property
     def _stop_is_open(self) -> bool:

@@ -225,7 +225,8 @@ def parameters(robot: Robot, controls: Controls, look: Look, rows: int) -> Rende
         grid.add_row("", words("not known yet", style=OLD), "", "", "")
     hidden = len(names) > rows and controls.selected is not None
     place = f" {names.index(controls.selected or names[0]) + 1} of {len(names)}" if hidden else ""
-    return _panel(grid, f"Parameters{place}", robot, _age(robot.parameters_at_ns))
+    notes = filter(None, (_age(robot.parameters_at_ns), controls.no_change))
+    return _panel(grid, f"Parameters{place}", robot, plain(", ".join(notes)))
 
 
 def _around(names: Sequence[str], chosen: str | None, rows: int) -> Sequence[str]:
@@ -273,8 +274,9 @@ def resources(station: Station, look: Look) -> RenderableType:
     return _panel(grid, "Computer", robot, _age(robot.resources_at_ns))
 
 
-def footer(station: Station, controls: Controls, where: str) -> RenderableType:
-    """Return the keys, and the last thing that was said."""
+def footer(station: Station, controls: Controls, where: str) -> Group:
+    """Return the keys, grey where one may not, and the last thing that was said."""
+    change, reset = (OLD if no else "" for no in (controls.no_change, controls.no_reset))
     keys = Text.assemble(
         (" s ", "bold white on red"),
         " STOP ",
@@ -282,10 +284,10 @@ def footer(station: Station, controls: Controls, where: str) -> RenderableType:
         "  ",
         ("↑↓", "bold"),
         " choose  ",
-        ("←→", "bold"),
-        " change  ",
-        ("r r", "bold"),
-        " reset  ",
+        ("←→", change or "bold"),
+        (" change  ", change),
+        ("r r", reset or "bold"),
+        (" reset  ", reset),
         ("q", "bold"),
         " quit",
     )
@@ -300,6 +302,8 @@ def _news(station: Station, controls: Controls, where: str) -> Text:
     robot, writing = station.robot, station.writing
     if controls.stop_sent:
         return words(station.stopping.text, style=f"bold {STOP_STYLES.get(station.stopping.state, BAD)}")
+    if controls.refusal:
+        return words(f"✕ {controls.refusal}", style=WARN)
     if controls.asks_again:
         return words(controls.note, style=WARN)
     if writing.state in NOT_WRITTEN:
@@ -308,7 +312,7 @@ def _news(station: Station, controls: Controls, where: str) -> Text:
     if newest is not None and newest.kind is NewsKind.STOP and time.time() - newest.utc_s < SAID_S:
         return words(newest.text, style=WARN)
     if active and active[0].alarm.mark.colour in ("bad", "warn"):
-        return _alarm(active)
+        return _alarm(active, controls)
     if robot.last_failure is not None:
         return words(f"✕ {robot.last_failure.what}: {robot.last_failure.reason}", style=BAD)
     if controls.writing:
@@ -316,16 +320,16 @@ def _news(station: Station, controls: Controls, where: str) -> Text:
     if writing.state is WriteState.DONE:
         return words(f"✓ {writing.text}", style=GOOD)
     if active:
-        return _alarm(active)
-    hint = f"or in another terminal: gwrms set --robot {where} gait.step_length=0.5"
+        return _alarm(active, controls)
+    hint = controls.no_reset or f"or in another terminal: gwrms set --robot {where} gait.step_length=0.5"
     return words(controls.note or hint, style=DIM)
 
 
-def _alarm(active: Sequence[Active]) -> Text:
+def _alarm(active: Sequence[Active], controls: Controls) -> Text:
     """The worst: what, then what to check, and how many more there are."""
     alarm, more = active[0].alarm, len(active) - 1
     others = f"  (+{more} more)" if more else ""
-    key = "  r r clears it" if alarm.clears else ""
+    key = "  r r clears it" if alarm.clears and not controls.no_reset else ""
     check = f"  → {alarm.check}" if alarm.check else ""
     style = COLOURS[alarm.mark.colour]
     return words(f"{GLYPHS[alarm.mark.shape]} {alarm.line}{others}{key}{check}", style=style)

@@ -224,6 +224,11 @@ _DEFECTS: Final[dict[str, Defect]] = {
         "rows rows send export",
         "lacks|other rows",
     ),
+    "forget-spares-events": Defect(
+        "the events of a wearer who is forgotten stay in the store",
+        "teach mark send forget",
+        "is forgotten is there",
+    ),
     "pointers-by-size": Defect(
         "model pointers are skipped or overwritten by size alone when a store is copied",
         test="cloud/test_transfer.py::test_another_pointer_or_pin_by_the_same_name_is_refused",

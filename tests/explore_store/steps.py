@@ -14,7 +14,7 @@ from ml.store import NoSuchTable, Store, StoreError, reading, upkeep
 from ml.store.query import query
 from ml.store.tables import TELEMETRY
 from server_gui.core.cloud import spool_reader
-from tests.explore_store import exporting, judging
+from tests.explore_store import exporting, forgetting, judging
 from tests.explore_store.damages import NAMES
 from tests.explore_store.disk import Ended
 from tests.explore_store.ledger import Begun
@@ -134,6 +134,8 @@ def _relabel(world: World, s: int, back: int, what: int) -> None:
     if len(begun) > back:
         with world.alive(SERVERS[s]) as server:
             of = begun[-1 - back]
+            if (of.robot, of.session) in world.forgotten:
+                return
             server.say(of.robot, of.session, world.number(), LABELS[what % 2], removed=what >= 2)
 
 
@@ -377,6 +379,7 @@ KINDS: Final = {
     "copy": Kind(_copy, (2,), 1),
     "roll-back": Kind(_roll_back, (2,), 1),
     "damage": Kind(_damage, (len(NAMES),), 2),
+    "forget": Kind(forgetting.play, (len(forgetting.PERSONS),), 2),
     "compact": Kind(_kept_up(upkeep.compact), (), 2),
     "vacuum": Kind(_kept_up(lambda store: upkeep.vacuum(store, grace=timedelta(0))), (), 1),
     "retain": Kind(_retain, (6,), 1),

@@ -52,6 +52,7 @@ class World:
         self.s3 = s3
         self.url = (folder / "store").as_uri() if s3 is None else f"s3://{BUCKET}/store"
         self.pinned: list[tuple[str, int, int]] = []  # location, version, rows
+        self.forgotten: set[tuple[str, str]] = set()  # robots and sessions of wearers who are
         self.retained_ns: int | None = None  # rows that are older may be gone
         self.known = known  # what may be wrong, as regular expressions
         self.known_wrong = 0  # and how often it was

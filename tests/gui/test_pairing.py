@@ -66,6 +66,7 @@ class Shown:
 def shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Shown]:
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "desk"))
     keys_folder().mkdir(parents=True)
+    keys_folder().chmod(0o700)
     for file, name in zip(keys.pair("desk"), ("desk.key", "desk.crt"), strict=True):
         shutil.copy(file, keys_folder() / name)
     made = Shown(tmp_path)

@@ -14,7 +14,7 @@ from gateway.amounts import counted, size
 from ml.store import Store, StoreError
 from ml.store.sessions import Session
 from ml.store.url import checked_url
-from server_gui.core.cloud import partial_copy, spool_upload, transfer, verify
+from server_gui.core.cloud import exports, partial_copy, spool_upload, transfer, verify
 from server_gui.core.cloud.jobs import Job, Work
 from server_gui.core.cloud.mcap import write_mcap
 from server_gui.core.cloud.recordings import Recordings
@@ -41,7 +41,8 @@ def export(settings: ServerSettings, session: Session, choice: Choice, kind: str
         job.expect(recorded.session.rows, "rows")
         chosen = choose(known, recorded, choice)
         counted = dataclasses.replace(chosen, tables=_counted(chosen.tables, job))
-        count = FORMATS[kind](file, counted)
+        with exports.noted(file, (session.robot, session.session)):
+            count = FORMATS[kind](file, counted)
         more = f"; of this computer's spool alone: {known.problem}" if known.problem else ""
         return f"{file}: {count} {'messages' if kind == 'mcap' else 'rows'}{more}"
 
@@ -69,6 +70,7 @@ def download(url: str, folder: Path, wanted: Sequence[Session] = ()) -> Work:
 
     def work(job: Job) -> str:
         source, target = Store.existing(url), folder.absolute().as_uri()
+        exports.note_copy(target, {(each.robot, each.session) for each in wanted} or None)
         if wanted:
             job.expect(sum(session.rows for session in wanted), "rows")
             rows = partial_copy.copy(source, Store(target), wanted, (), job.advance)

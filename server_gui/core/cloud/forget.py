@@ -18,11 +18,14 @@ from ml.store.forgetting import Name, Worn
 from ml.store.labels import person
 from ml.store.tables import EVENTS, LABELS, SESSIONS
 from ml.store.upkeep import Pin
-from server_gui.core.cloud import mend, spool_reader
+from server_gui.core.cloud import exports, mend, spool_reader
 from server_gui.core.cloud.counting import Advance
+from server_gui.core.cloud.exports import Exported
+from server_gui.core.cloud.repeated_upload import Again
 from server_gui.core.recording.batching import EventKind
 from server_gui.core.recording.rows import Record
 from server_gui.core.recording.spool import Spool
+from server_gui.core.recording.spool_files import identity
 from server_gui.core.recording.upload import send
 
 Expect = Callable[[int], AbstractContextManager[Advance]]
@@ -45,6 +48,8 @@ class Plan:
     aside: Sequence[Path]  # files of the spool that were set aside, which nobody can look into
     pins: Sequence[Pin]  # versions that models name, with rows of theirs
     learned: Sequence[str]  # models
+    exported: Sequence[Exported]  # files and copies that were made on this desk
+    others: Sequence[str]  # spools of other computers that have written to this store
 
 
 def plan(store: Store, spool: Path, name: str, learned: Callable[[Sequence[Name]], Sequence[str]]) -> Plan:
@@ -77,17 +82,21 @@ def plan(store: Store, spool: Path, name: str, learned: Callable[[Sequence[Name]
         [file for _, file in spool_reader.damaged(spool)],
         forgetting.pinned(store, names),
         learned(names),
+        exports.found(names, store.url),
+        sorted(forgetting.writers(store) - {identity(spool)}),
     )
 
 
 def _worn(store: Store, spool: Path, name: str) -> Worn:
+    """Also by second copies of the spool: another computer may have removed the store's rows already."""
     stored = (forgetting.told(store, table) for table in (SESSIONS, LABELS))
-    here = (spool_reader.rows(spool, table) for table in (SESSIONS, LABELS))
+    kept = spool_reader.kept(spool)
+    here = (spool_reader.rows(spool, table, kept) for table in (SESSIONS, LABELS))
     sessions, labels = ([*there, *mine] for there, mine in zip(stored, here, strict=True))
     return forgetting.worn(sessions, labels, name)
 
 
-def upload(store: Store, spool: Spool, name: str, expect: Expect) -> None:
+def upload(store: Store, spool: Spool, known: Plan, name: str, expect: Expect) -> None:
     """Bring what waits into the store, and see that it is whole: what is missing later is known to be theirs.
 
     Where it was begun before, that was seen then.
@@ -102,8 +111,24 @@ def upload(store: Store, spool: Spool, name: str, expect: Expect) -> None:
     if _begun(spool.folder, name):
         return
     found = mend.plan(store, spool, expect)
+    if _are_theirs(found, spool.folder, known):
+        mend.mend(Again.existing(store.url), spool, found, lambda _: None)
+        found = mend.plan(store, spool, expect)
     if found.files or found.batches or found.lost:
-        raise CannotForget("rows of others are missing in the store already: gwrms cloud mend comes first")
+        raise CannotForget(
+            "rows are missing in the store already, and whether they are theirs is not known: gwrms cloud "
+            "mend comes first"
+        )
+
+
+def _are_theirs(found: mend.Plan, spool: Path, known: Plan) -> bool:
+    """Whether all that is missing is in batches with rows of theirs: another computer has forgotten them.
+
+    It comes back whole, with what is missing of others, and then goes with all else of theirs.
+    """
+    if found.files or found.lost:
+        return False
+    return all(not spool_reader.named(spool, one).isdisjoint(known.sessions) for one in found.batches)
 
 
 def forget(store: Store, spool: Spool, known: Plan, name: str, expect: Expect) -> list[str]:
@@ -121,7 +146,7 @@ def forget(store: Store, spool: Spool, known: Plan, name: str, expect: Expect) -
     forgetting.delete(store, known.sessions)
     mend.accept(store, spool, expect, MADE)
     _tell(store, spool, known, name)
-    left = proof(store, spool.folder, known)
+    left = [*proof(store, spool.folder, known), *exports.remove(known.exported)]
     (spool.folder / _BEGUN).unlink()
     return left
 

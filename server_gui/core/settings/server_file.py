@@ -64,6 +64,11 @@ def default_spool() -> Path:
     return _user_folder("XDG_DATA_HOME", ".local/share") / "spool"
 
 
+def exports_folder() -> Path:
+    """Beside that: what was exported by this user on this computer."""
+    return default_spool().with_name("exports")
+
+
 class RobotSettings(Struct, frozen=True, forbid_unknown_fields=True):
     """An entry of `[robots]`, which may be just the address; `gwrms pair` adds the pin of the robot's key."""
 

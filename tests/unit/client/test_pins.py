@@ -26,6 +26,7 @@ def address(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Address
     monkeypatch.setattr("gateway.modules.component.module.assemble", bench.assemble)
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "desk"))
     keys_folder().mkdir(parents=True)
+    keys_folder().chmod(0o700)
     for file, name in zip(keys.pair("operator"), ("desk.key", "desk.crt"), strict=True):
         shutil.copy(file, keys_folder() / name)
     with serving(config(keyed(tmp_path))) as (host, port):

@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import pyarrow.dataset
 import pyarrow.parquet as pq
 import pytest
 
@@ -49,6 +50,9 @@ class Server:
 
     def run(self, *words: str, status: int = 0) -> str:
         assert main(["cloud", *words, "--config", str(self.config)]) == status
+        return self.told()
+
+    def told(self) -> str:
         said = self._capsys.readouterr()
         return said.out + said.err
 
@@ -106,7 +110,7 @@ def test_nothing_of_a_wearer_is_left_and_others_keep_all(server: Server) -> None
     before = rows_of(server.store, next(s for s in sessions(server.store) if s.session == HIS), LABELS)
     upkeep.compact(server.store)  # their rows are in files of older versions, too
     said = server.run("forget", "--wearer", "p 1", "--yes")
-    assert "gone: no file of this store or of this spool has a row of theirs" in said
+    assert "gone: no file of this store, of this spool or of this desk's exports has a row of theirs" in said
     assert server.rows() == {HIS}
     assert server.rows(LABELS.name) == server.rows(SESSIONS.name) == {HIS}
     for name in (HERS, HERS_TOO, WAITS, f"{WEARER}P01"):
@@ -188,3 +192,20 @@ def test_what_an_interrupted_writer_has_left_is_found(server: Server) -> None:
     (some.parent / "left.parquet").write_bytes(some.read_bytes())
     server.run("forget", "--wearer", "P01", "--yes")
     assert server.bytes_of(HERS) == []
+
+
+def test_what_stays_beside_theirs_is_found_by_whose_it_is(server: Server) -> None:
+    """A file that is written anew has texts as others have: else nothing is found by them any more."""
+    for number, robot in enumerate(("left", "right", "exo")):
+        began = BEGAN_UTC + 9000 * S + number
+        with Spool(server.spool, reserve_bytes=0) as opened:
+            opened.append(
+                [], [records.Session(robot, f"{HIS[:-1]}{number}", began, Facts(), began + S).record()]
+            )
+    server.run("upload")
+    upkeep.compact(server.store)
+    server.run("forget", "--wearer", "P01", "--yes")
+    column = pyarrow.dataset.field
+    found = server.store.dataset(SESSIONS.name)
+    for robot, count in (("left", 1), ("exo", 2), ("nobody", 0)):
+        assert found.count_rows(filter=column("robot") == robot) == count

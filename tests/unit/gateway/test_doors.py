@@ -8,6 +8,7 @@ import stat
 import subprocess
 import sys
 import tempfile
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -16,12 +17,14 @@ import pytest
 
 from gateway.access.identity import Identity, Peer
 from gateway.access.table import AccessTable
-from gateway.access.users import identity_of, peer_of
+from gateway.access.users import identity_of, peer_of, resolved
 from gateway.cli.serve import _local
+from gateway.connections import accounts
 from gateway.connections.doors import DoorProblem, Kind, kind_of
 from gateway.connections.listeners import Listeners, inherited, listen, listen_locally
 from gateway.daemon import Daemon
 from gateway.main import main
+from gateway.wire.limits import HANDSHAKES
 from gateway.wire.role import Role
 from tests.support.waiting import WAIT_S, until
 from tests.unit.gateway.harness import HEAD, STOP, Bench, Client, config, serving
@@ -67,9 +70,7 @@ def test_this_computer_is_served_with_keys_and_without(host: str, has_keys: bool
 def test_other_computers_are_served_with_keys_only(host: str) -> None:
     with listen(host, 0) as listener:
         assert kind_of(listener, has_keys=True) is Kind.TLS
-        with pytest.raises(
-            DoorProblem, match=r"`gwrms keys pair ROBOT.toml` here.*`gwrms pair HOST:PORT CODE`"
-        ):
+        with pytest.raises(DoorProblem, match=r"`gwrms keys pair ROBOT.toml` here.*`gwrms pair HOST:PORT`"):
             kind_of(listener, has_keys=False)
 
 
@@ -80,7 +81,7 @@ def test_without_keys_the_command_refuses_other_computers_and_says_what_leads_on
     assert main(["gateway", str(tmp_path / "robot.toml"), "--host", "0.0.0.0"]) == 1
     error = capsys.readouterr().err
     assert "gwrms keys pair" in error
-    assert "gwrms pair HOST:PORT CODE" in error
+    assert "`gwrms pair HOST:PORT`" in error
 
 
 def test_a_socket_that_was_handed_over_is_judged_by_where_it_listens(bench: Bench, tmp_path: Path) -> None:
@@ -209,6 +210,49 @@ def test_who_is_in_the_table_is_let_in_and_goes_when_taken_out(
         until(lambda: client.line() is None, "it is closed")
 
 
+@pytest.fixture
+def hanging(monkeypatch: pytest.MonkeyPatch) -> Iterator[threading.Event]:
+    """The computer's directory of accounts answers nobody, until this is set."""
+    answers = threading.Event()
+    monkeypatch.setattr(accounts, "resolved", lambda peer: [answers.wait(WAIT_S), peer][1])
+    yield answers
+    answers.set()
+    until(lambda: not any(one.name == "directory" for one in threading.enumerate()), "it has answered")
+
+
+def test_a_directory_that_hangs_holds_up_nobody_and_the_gateway_s_own_account_comes_in(
+    bench: Bench, local: Path, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
+) -> None:
+    with LocalClient(local) as early:
+        early.call("clock.read")
+        answers = request.getfixturevalue("hanging")
+        monkeypatch.setattr(accounts, "SHORT_S", WAIT_S)
+        with LocalClient(local) as late:
+            asked = late.request("hello", client="test")
+            assert early.call("robot.stop", reason="now")["held"] is True
+            monkeypatch.setattr(accounts, "SHORT_S", 0.0)
+            with LocalClient(local) as later:
+                assert later.call("hello", client="test")["role"] == "maintainer"
+                assert later.call("hello", client="test")["identity"] == str(os.geteuid())
+            answers.set()
+            assert late.answer(asked)["role"] == "maintainer"
+
+
+def test_who_is_let_in_by_a_name_that_nobody_tells_is_sent_away(
+    bench: Bench, local: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, hanging: threading.Event
+) -> None:
+    monkeypatch.setattr("gateway.access.users.peer_of", lambda _connection: SOMEBODY)
+    monkeypatch.setattr(accounts, "HANDSHAKE_S", 0.0)
+    (tmp_path / "access.toml").write_text('[users]\nsomebody = "viewer"\n', encoding="utf-8")
+    for _ in range(2 * HANDSHAKES):  # of which only so many are asked for at once
+        with LocalClient(local) as client:
+            assert (client.line() or {})["error"]["data"]["kind"] == "not_allowed"
+    assert sum(one.name == "directory" for one in threading.enumerate()) == HANDSHAKES
+    (tmp_path / "access.toml").write_text('[users]\n12345 = "viewer"\n', encoding="utf-8")
+    with LocalClient(local) as client:
+        assert client.call("hello", client="test")["role"] == "viewer"
+
+
 @pytest.mark.parametrize(
     ("table", "role"),
     [
@@ -222,6 +266,15 @@ def test_who_is_in_the_table_is_let_in_and_goes_when_taken_out(
 def test_the_highest_role_of_user_and_groups_counts(table: dict[str, Any], role: Role | None) -> None:
     found = identity_of(SOMEBODY, AccessTable(**table))
     assert found == (None if role is None else Identity(role, "12345", peer=SOMEBODY))
+
+
+def test_names_of_user_and_groups_are_those_of_the_computer() -> None:
+    found = resolved(Peer(0, 0))
+    assert (found.name, "root" in found.groups, "0" in found.groups) == ("root", True, True)
+    assert resolved(SOMEBODY) == SOMEBODY
+    named = Peer(12_345, 12_345, "somebody", ("12345", "exo"))
+    who = identity_of(named, AccessTable(groups={"exo": Role.OPERATOR}))
+    assert who == Identity(Role.OPERATOR, "somebody", peer=named)
 
 
 def test_who_is_at_the_other_end_is_what_the_kernel_says() -> None:

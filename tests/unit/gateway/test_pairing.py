@@ -1,8 +1,7 @@
 """Pairing, both sides over real sockets: who proves the code is let in, once, and nobody in between."""
 
-import io
+import contextlib
 import itertools
-import shutil
 import socket
 import ssl
 import threading
@@ -13,51 +12,18 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from gateway.access import changes
-from gateway.access.folder import AccessFolder
 from gateway.access.known import known_in
-from gateway.access.pairing import Candidate, Pairing, PairingEnded
-from gateway.certificates import KeyProblem, der_of, grouped
-from gateway.cli import qr_code
-from gateway.cli.keys import _show as show
-from gateway.client import Address, ClientError, NotPaired, Unreachable, WrongRobot
+from gateway.access.pairing import Pairing, PairingEnded
+from gateway.certificates import der_of
+from gateway.client import Address, NotPaired, Unreachable, WrongRobot
 from gateway.client import pairing as desk
-from gateway.client.keys import keys_folder, pin_of, server_file
+from gateway.client.keys import keys_folder, pin_of
 from gateway.connections.listeners import listen
-from gateway.main import main
-from gateway.wire.pairing import DESK, TRIES, Offer, Reply, link, new_code, normal, proof
+from gateway.wire.pairing import DESK, SAY_S, TRIES, Offer, Reply, link, new_code, normal, proof
 from gateway.wire.role import Role
+from tests.support.waiting import WAIT_S
 from tests.unit.gateway import keyed as keys
-from tests.unit.gateway import processes
-from tests.unit.gateway.keyed import keyed
-
-CODE = "0123-4567-89AB-CDEF"
-
-
-class Shown:
-    """A robot that shows `CODE`, and takes whoever proves it for an operator."""
-
-    def __init__(self, folder: Path) -> None:
-        self.folder = AccessFolder(keyed(folder, {}), {})
-        self.listener = listen("127.0.0.1", 0)
-        self.time_s = 0.0
-        self.own = keys.pin(keys.ROBOT)
-        self.pairing = Pairing(self.folder, self.listener, CODE, self.own, clock=lambda: self.time_s)
-        self.where = Address("127.0.0.1", self.listener.getsockname()[1])
-        self._pool = ThreadPoolExecutor(1)
-
-    def wait(self) -> "Future[Candidate]":
-        return self._pool.submit(self.pairing.wait)
-
-    def take(self, waiting: "Future[Candidate]", name: str = "anna") -> None:
-        candidate = waiting.result()
-        changes.add(self.folder, name, candidate.der, Role.OPERATOR)
-        candidate.answer(Reply(self.pairing.proof(candidate), "exo-01", 7420, name, "operator"))
-
-    def close(self) -> None:
-        self.time_s = 1e9
-        self._pool.shutdown()
-        self.listener.close()
+from tests.unit.gateway.pairing_robot import CODE, Shown
 
 
 @pytest.fixture
@@ -213,6 +179,24 @@ def test_who_says_nothing_or_rubbish_is_no_try_and_in_nobody_s_way(
         assert paired.result().name == "anna"
 
 
+@pytest.mark.parametrize("says", [b"", b"\x16\x03\x01\x02\x00\x01"])
+def test_silence_by_the_dozen_keeps_no_desk_out_and_nobody_waiting(
+    shown: Shown, asked: Callable[[str], "Future[desk.Paired]"], says: bytes
+) -> None:
+    """Of an address of its own here; each would have a place for ten seconds."""
+    waiting = shown.wait()
+    with contextlib.ExitStack() as open_:
+        for number in range(30):
+            source = ("127.0.0.2", 0)
+            slow = socket.create_connection(("127.0.0.1", shown.where.port), WAIT_S, source)
+            open_.enter_context(slow).sendall(says)
+            if number == 15:
+                paired = asked(CODE)
+        candidate = waiting.result(SAY_S - 1.0)
+        shown.take(waiting)
+        assert (paired.result().name, candidate.name) == ("anna", desk.own_name())
+
+
 def test_where_nobody_pairs_that_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
     with listen("127.0.0.1", 0) as taken:
@@ -268,36 +252,6 @@ def test_what_is_neither_is_refused_before_anything_is_sent(typed: tuple[str, ..
         desk.typed(*typed)
 
 
-# What is written
-
-
-def test_another_key_under_a_name_that_is_pinned_is_refused_loudly(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
-    desk.pin("exo-01", Address("192.0.2.7", 7420, "a" * 64))
-    before = server_file().read_text("utf-8")
-    for name, host in (("exo-01", "192.0.2.8"), ("exo-02", "192.0.2.7")):
-        with pytest.raises(WrongRobot, match="IS PINNED TO ANOTHER KEY"):
-            desk.pin(name, Address(host, 7420, "b" * 64))
-    assert server_file().read_text("utf-8") == before
-
-
-@pytest.mark.parametrize("line", ['"192.0.2.7:7420"', f'{{ address = "192.0.2.7", pin = "{"a" * 64}" }}'])
-@pytest.mark.parametrize("says", ["exo-01", "exo 01", "-exo-01"])
-def test_a_robot_that_says_it_is_another_one_does_not_get_its_line(
-    says: str, line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
-    server_file().parent.mkdir()
-    server_file().write_text(f"[robots]\nexo-01 = {line}\n", encoding="utf-8")
-    try:
-        assert desk.pin(says, Address("192.0.2.9", 7420, "b" * 64)) == "exo-01-2"
-    except WrongRobot:
-        assert "pin" in line
-    assert f"exo-01 = {line}\n" in server_file().read_text("utf-8")
-
-
 def test_a_port_that_is_none_is_not_written(
     shown: Shown, asked: Callable[[str], "Future[desk.Paired]"]
 ) -> None:
@@ -308,127 +262,3 @@ def test_a_port_that_is_none_is_not_written(
     candidate.answer(Reply(shown.pairing.proof(candidate), "exo-01", 70_000, "anna", "operator"))
     with pytest.raises(NotPaired, match="70000"):
         paired.result()
-
-
-def test_what_else_stands_in_the_server_s_file_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
-    server_file().parent.mkdir()
-    server_file().write_text(
-        '# ours\n[robots]\nleft = "192.0.2.7:7420"  # its own name\n[store]\nurl = "x"\n'
-    )
-    assert desk.pin("exo-01", Address("192.0.2.7", 7420, "a" * 64)) == "left"
-    line = f'"left" = {{ address = "192.0.2.7:7420", pin = "{"a" * 64}" }}'
-    assert server_file().read_text("utf-8") == f'# ours\n[robots]\n{line}\n[store]\nurl = "x"\n'
-    server_file().write_text("[robots.exo-01]\naddress = '192.0.2.7'\n")
-    with pytest.raises(ClientError, match="by hand"):
-        desk.pin("exo-01", Address("192.0.2.7", 7420, "a" * 64))
-
-
-def test_a_name_and_a_key_are_known_once(tmp_path: Path) -> None:
-    folder, der = AccessFolder(tmp_path, {}), der_of(keys.pair("anna")[1].read_bytes())
-    changes.add(folder, "anna", der, Role.VIEWER)
-    for name, said in (
-        ("anna", "anna is known already"),
-        ("eve", "known already, as anna"),
-        ("../x", "no name"),
-    ):
-        with pytest.raises(KeyProblem, match=said):
-            changes.add(folder, name, der, Role.MAINTAINER)
-    (who,) = known_in(folder).by_key.values()
-    assert who.role is Role.VIEWER
-
-
-def test_who_is_removed_is_nobody_and_the_table_is_as_before(tmp_path: Path) -> None:
-    folder, der = AccessFolder(tmp_path, {}), der_of(keys.pair("anna")[1].read_bytes())
-    changes.add(folder, "eve", der_of(keys.pair("eve")[1].read_bytes()), Role.VIEWER)
-    before = folder.table.read_text("utf-8")
-    changes.add(folder, "anna", der, Role.VIEWER)
-    changes.remove(folder, "anna")
-    assert folder.table.read_text("utf-8") == before
-    assert [one.name for one in known_in(folder).by_key.values()] == ["eve"]
-    with pytest.raises(KeyProblem, match="there is no anna; known are eve"):
-        changes.remove(folder, "anna")
-
-
-def test_who_is_removed_is_nobody_under_another_name_either(tmp_path: Path) -> None:
-    folder = AccessFolder(keyed(tmp_path, {"anna": Role.OPERATOR, "eve": Role.VIEWER}), {})
-    shutil.copy(folder.clients / "anna.crt", folder.clients / "zoe.crt")
-    changes.remove(folder, "anna")
-    assert [one.name for one in known_in(folder).by_key.values()] == ["eve"]
-
-
-def test_nothing_is_removed_but_a_client(tmp_path: Path) -> None:
-    folder = AccessFolder(keyed(tmp_path), {})
-    with pytest.raises(KeyProblem, match="there is no"):
-        changes.remove(folder, "../keys/robot")
-    assert folder.certificate.exists()
-
-
-def test_what_is_no_certificate_is_known_for_none_in_no_time(tmp_path: Path) -> None:
-    """Whoever reaches the port may send it; where it took the square of its length, it took minutes."""
-    with pytest.raises(KeyProblem):
-        der_of(b"-----BEGIN CERTIFICATE-----" + b" " * 400_000)
-
-
-# The two commands
-
-
-def test_two_commands_let_a_desk_in_and_a_third_sends_it_away(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "desk"))
-    file = tmp_path / "robot.toml"
-    file.write_text('[robot]\nname = "exo-01"\n', encoding="utf-8")
-    options = ("--port", "0", "--name", "anna", "--role", "operator", "--yes")
-    with processes.process(*processes.GATEWAY[:-1], "keys", "pair", str(file), *options) as robot:
-        assert robot.stdout is not None
-        typed = next(line for line in robot.stdout if line.startswith("  gwrms pair")).split()[1:]
-        assert main(["pair", link(*typed[1:])]) == 0
-        assert "anna is let in from now on, as operator." in robot.stdout.read()
-        assert robot.wait() == 0
-    assert "Paired with exo-01: it calls this desk anna, as operator." in capsys.readouterr().out
-    assert main(["keys", "list", str(file)]) == 0
-    listed = capsys.readouterr().out
-    assert f"robot  {grouped(pin_of(Address()) or '')}" in listed
-    assert "anna  operator" in listed
-    assert main(["keys", "revoke", str(file), "anna"]) == 0
-    assert main(["keys", "revoke", str(file), "anna"]) == 1
-    assert "there is no anna" in capsys.readouterr().err
-
-
-def test_without_a_terminal_nobody_is_asked_and_nobody_let_in(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    file = tmp_path / "robot.toml"
-    file.write_text('[robot]\nname = "exo-01"\n', encoding="utf-8")
-    with pytest.raises(SystemExit):
-        main(["keys", "pair", str(file), "--yes"])
-    monkeypatch.setattr("sys.stdin", io.StringIO())
-    assert main(["keys", "pair", str(file), "--port", "0"]) == 1
-    assert "there is no terminal to ask on" in capsys.readouterr().err
-    assert not (tmp_path / "keys").exists()
-
-
-class Terminal(io.StringIO):
-    """A terminal with some letters."""
-
-    encoding = "utf-8"
-
-    def isatty(self) -> bool:
-        return True
-
-
-def test_a_terminal_shows_the_link_for_a_camera_and_a_pipe_does_not(
-    shown: Shown, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("sys.stdout", terminal := Terminal())
-    show(shown.listener, CODE, shown.own)
-    lines = [line for line in terminal.getvalue().splitlines() if set(line) <= set(" █▀▄") and line]
-    assert lines == qr_code.lines(link(str(shown.where), CODE))
-    for letters, is_terminal in (("ascii", True), ("utf-8", False)):
-        monkeypatch.setattr(Terminal, "encoding", letters)
-        monkeypatch.setattr(Terminal, "isatty", lambda _self, is_terminal=is_terminal: is_terminal)
-        monkeypatch.setattr("sys.stdout", terminal := Terminal())
-        show(shown.listener, CODE, shown.own)
-        assert f"gwrms pair {shown.where} {CODE}" in terminal.getvalue()
-        assert "█" not in terminal.getvalue()

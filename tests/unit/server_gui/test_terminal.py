@@ -1,7 +1,6 @@
 """Keys, controls, drawings: what the terminal does with a robot's state."""
 
 import dataclasses
-import io
 import math
 from collections.abc import Callable
 from concurrent.futures import Future
@@ -10,75 +9,23 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 from msgspec.structs import replace
-from rich.console import Console
 
 from gateway.client import Batch, ConnectionState, LinkLost
-from gateway.wire.component import ChannelInfo, ComponentInfo, QualityInfo, Snapshot
-from gateway.wire.parameter import ParameterInfo, ParameterValue, ParameterValues, Written
+from gateway.wire.component import ChannelInfo, QualityInfo, Snapshot
+from gateway.wire.parameter import ParameterValue, Written
 from gateway.wire.resource import MemoryUse
-from gateway.wire.robot import Clock, Description, GuardInfo, Hello
-from gateway.wire.stop import Reset, StopInfo, Stopped
+from gateway.wire.stop import Reset, Stopped
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.events import Described, LinkChanged, Looked, Telemetry
-from server_gui.core.follow.news import News
 from server_gui.core.follow.robot import Robot
 from server_gui.core.processing.component import Derived
 from server_gui.core.processing.gait_events import Leg
 from server_gui.core.processing.gait_measures import Gait, LegGait
 from server_gui.terminal import headless, marks
 from server_gui.terminal.controls import Controls, neighbour, step_of
-from server_gui.terminal.dashboard import draw
 from server_gui.terminal.keys import Key, KeyParser
 from tests.support.desk import FakeCommands, resources
-
-
-def parameter(
-    name: str, low: float | None, high: float | None, largest: float | None = None
-) -> ParameterInfo:
-    return ParameterInfo(name, "m", low, high, largest, True, None, "gait", "0x2001:0", "rw", False)
-
-
-def a_station(asked: FakeCommands | None = None) -> Station:
-    """With a robot; answers come at once."""
-    station = Station("exo-01", "127.0.0.1:7420", asked or FakeCommands(), lambda call: call(), News())
-    station.robot = a_robot()
-    return station
-
-
-def a_robot(at_ns: int = 0) -> Robot:
-    robot = Robot()
-    robot.apply(LinkChanged(ConnectionState.CONNECTED, None, at_ns))
-    parts = [("left_knee", "joint"), ("left_insole", "insole"), ("trunk", "imu"), ("gait", "device")]
-    parameters = [parameter("gait.step_length", 0.2, 0.6, 0.1), parameter("gait.free", None, None)]
-    robot.apply(
-        Described(
-            Description(
-                robot="exo-01",
-                boot_id="b",
-                role="observer",
-                components=[ComponentInfo(name, kind, "ok") for name, kind in parts],
-                channels=[],
-                parameters=parameters,
-                modules={},
-                clock=Clock(0, 0, "b"),
-                stop=StopInfo(False, None, None, {}, {}),
-                guard=GuardInfo(),
-            )
-        )
-    )
-    values = {
-        "gait.step_length": ParameterValue(0.4, "m", 0.2, 0.6, 0),
-        "gait.free": ParameterValue(1.0, "", None, None, 0),
-    }
-    robot.apply(Looked(Snapshot(0, {}, {}, {}), ParameterValues(values), at_ns))
-    return robot
-
-
-def screen(station: Station, controls: Controls | None = None, size: tuple[int, int] = (118, 27)) -> str:
-    controls = controls or Controls(station)
-    console = Console(width=size[0], height=size[1], file=io.StringIO(), record=True, force_terminal=True)
-    console.print(draw(station, controls, "127.0.0.1:7420", size), height=size[1])
-    return console.export_text()
+from tests.support.terminal_robot import a_station, parameter, screen
 
 
 @pytest.mark.parametrize("size", [(80, 24), (118, 27)])
@@ -458,11 +405,3 @@ def test_dashboard_shows_how_the_wearer_walks(
 
 def _feed(station: Station, columns: dict[str, list[float | None]]) -> None:
     station.take([Telemetry(1, Batch([0], columns, 0, 0, 0, 1, 0), None)])
-
-
-@pytest.mark.parametrize("size", [(118, 27), (80, 24)])
-def test_the_dashboard_says_who_one_is(size: tuple[int, int]) -> None:
-    station = a_station()
-    assert " as " not in screen(station, size=size).splitlines()[1]
-    station.robot.hello = Hello(1, "exo-01", "viewer", "b", identity="anna")
-    assert "anna, as viewer" in screen(station, size=size)

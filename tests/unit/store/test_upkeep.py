@@ -10,11 +10,12 @@ from typing import cast
 import msgspec
 import pytest
 from deltalake import DeltaTable
+from pyarrow.dataset import field
 
 from ml.store import NoSuchTable, Store, StoreError, durable
 from ml.store.compaction_lock import COUNTS, PLACE, Claim, alone
 from ml.store.objects import Object
-from ml.store.tables import TELEMETRY
+from ml.store.tables import EVENTS, TELEMETRY
 from ml.store.upkeep import GRACE, Compacted, Pin, compact, pin, pins, retain, unpin, vacuum
 from tests.unit.store.test_store import HERE, numbers, telemetry
 
@@ -288,3 +289,26 @@ def test_compaction_disturbs_nobody_who_writes(store_url: str) -> None:
     writer.join()
     compact(Store(store_url))
     assert len(numbers(Store(store_url))) == 4 * 3 + 8 * 2
+
+
+@pytest.mark.parametrize("is_compacted_meanwhile", [False, True])
+def test_what_retention_leaves_in_a_file_is_found_by_its_texts(
+    new_store_url: str, is_compacted_meanwhile: bool
+) -> None:
+    """Of several robots; where somebody compacts just then, the next compaction does it."""
+    store, began_ns = Store(new_store_url), 1_795_000_000_000_000_000
+    named = {"session": "s", "kind": "marker", "text": "x", "spool": "w", "batch": 1}
+    times_ns = [began_ns + number * 10**9 for number in range(4)]
+    rows = EVENTS.rows(
+        [
+            {**named, "robot": robot, "utc": utc_ns, "number": number}
+            for number, (robot, utc_ns) in enumerate(zip("abcd", times_ns, strict=True))
+        ]
+    )
+    store.append(EVENTS, EVENTS.name, rows.schema, lambda: iter(rows.to_batches()), "w", 1)
+    with alone(store, EVENTS.name) if is_compacted_meanwhile else contextlib.nullcontext():
+        assert retain(store, [EVENTS], datetime.fromtimestamp(times_ns[1] / 1e9, UTC)) == {"events": 1}
+    if is_compacted_meanwhile:
+        compact(store, [EVENTS])
+    found = [store.dataset(EVENTS.name).count_rows(filter=field("robot") == name) for name in "abcd"]
+    assert found == [0, 1, 1, 1]

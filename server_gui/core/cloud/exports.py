@@ -1,0 +1,172 @@
+"""What was exported or copied on this desk: a list, so that it is found where a wearer is forgotten.
+
+A file of the list for each place, in the user's own data; whatever is made is noted before it is there.
+"""
+
+import contextlib
+import hashlib
+from collections.abc import Collection, Iterator, Sequence, Set
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
+
+import msgspec
+
+from ml.store import Store, StoreError, durable, forgetting
+from ml.store.forgetting import Name
+from ml.store.private import private_folder
+from server_gui.core.atomic_files import draft
+from server_gui.core.settings.server_file import exports_folder
+
+
+class State(Enum):
+    """Of an exported file or a copy, when it is looked for again."""
+
+    AS_MADE = "as it was made"
+    CHANGED = "has changed since, or was not ended"
+    GONE = "has gone from there: moved, or removed"
+    HAS_ROWS = "a copy that has rows of theirs"
+    UNKNOWN = "a copy that cannot be looked into"
+    UNREADABLE = "an entry of the list of exports that cannot be read"
+
+
+class _Note(msgspec.Struct, frozen=True):
+    place: str  # of a file its path, of a store its URL
+    sessions: list[Name] | None = None  # None: whatever the store had
+    sha256: str = ""  # of a file that is whole
+    is_store: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Exported:
+    """A place with something of somebody."""
+
+    place: str
+    state: State
+    why: str = ""
+
+
+@contextlib.contextmanager
+def noted(file: Path, session: Name) -> Iterator[None]:
+    """Export a session to a file within the block.
+
+    Raises:
+        OSError: it cannot be noted, so that nobody would find it again; then nothing is made.
+
+    """
+    place = _text(file.parent.resolve() / file.name)
+    known = _known(place)
+    before = known.sessions or [] if known is not None else []
+    _write(_Note(place, sorted({*before, session})))  # where this is interrupted, what was there is there
+    yield
+    _write(_Note(place, [session], _sha256(Path(place))))
+
+
+def note_copy(url: str, sessions: Collection[Name] | None = None) -> None:
+    """Note that a store gets these sessions, or all that another one has; raises `OSError`."""
+    known = _known(url)
+    if known is not None and (known.sessions is None or sessions is None):
+        sessions = None
+    elif known is not None and sessions is not None:
+        sessions = {*sessions, *(known.sessions or ())}
+    _write(_Note(url, None if sessions is None else sorted(sessions), is_store=True))
+
+
+def found(sessions: Collection[Name], but: str) -> list[Exported]:
+    """Return every place that may have some of these, and how it is there now; without the store `but`."""
+    looked = (_in(file, set(sessions), but) for file in sorted(exports_folder().glob("*.json")))
+    return [each for each in looked if each is not None]
+
+
+def _in(file: Path, wanted: Set[Name], but: str) -> Exported | None:
+    """What an entry of the list says, where it is of somebody's sessions."""
+    try:
+        note = _read(file)
+    except msgspec.MsgspecError as error:
+        return Exported(str(file), State.UNREADABLE, str(error))
+    is_theirs = note.sessions is None or not wanted.isdisjoint(note.sessions)
+    return _looked(note, sorted(wanted)) if is_theirs and note.place != but else None
+
+
+def remove(exported: Sequence[Exported]) -> list[str]:
+    """Remove the files that are as they were made; of all others, say what is left, in words."""
+    for each in exported:
+        if each.state is State.AS_MADE:
+            Path(each.place).unlink(missing_ok=True)
+            _note_of(each.place).unlink(missing_ok=True)
+    return [_told(each) for each in exported if each.state not in (State.AS_MADE, State.GONE)]
+
+
+def _told(each: Exported) -> str:
+    if each.state is State.CHANGED:
+        return f"{each.place} was exported with rows of theirs, and {each.state.value}: look, and remove it"
+    if each.state is State.UNREADABLE:
+        return f"{each.place} is {each.state.value} ({each.why}): what was exported there is unknown"
+    why = f" ({each.why})" if each.why else ""
+    return f"{each.place} is {each.state.value}{why}: gwrms cloud forget --url {each.place}, or remove it"
+
+
+def _looked(note: _Note, wanted: Sequence[Name]) -> Exported | None:
+    if note.is_store:
+        return _store(note, wanted)
+    file = Path(note.place)
+    if file.is_symlink() or not file.exists():
+        return Exported(note.place, State.CHANGED if file.is_symlink() else State.GONE)
+    try:
+        same = bool(note.sha256) and file.is_file() and _sha256(file) == note.sha256
+    except OSError:
+        same = False
+    return Exported(note.place, State.AS_MADE if same else State.CHANGED)
+
+
+def _store(note: _Note, wanted: Sequence[Name]) -> Exported | None:
+    """Nothing where the copy has none of it."""
+    try:
+        store = Store.existing(note.place)
+        has_some = forgetting.counted(store, wanted) or forgetting.left(store, wanted)
+    except StoreError as error:
+        parts = urlsplit(note.place)
+        is_gone = parts.scheme == "file" and not Path(unquote(parts.path)).exists()
+        return Exported(note.place, State.GONE if is_gone else State.UNKNOWN, str(error))
+    return Exported(note.place, State.HAS_ROWS) if has_some else None
+
+
+def _text(file: Path) -> str:
+    """A name that can be written down."""
+    name = str(file)
+    try:
+        name.encode()
+    except UnicodeEncodeError as error:
+        raise OSError(f"{name!r} is no name that can be noted: name it otherwise") from error
+    return name
+
+
+def _sha256(file: Path) -> str:
+    with file.open("rb") as opened:
+        return hashlib.file_digest(opened, "sha256").hexdigest()
+
+
+def _note_of(place: str) -> Path:
+    return exports_folder() / f"{hashlib.sha256(place.encode()).hexdigest()[:32]}.json"
+
+
+def _read(file: Path) -> _Note:
+    return msgspec.json.decode(file.read_bytes(), type=_Note)
+
+
+def _known(place: str) -> _Note | None:
+    """What was noted of it before; one that cannot be read is written anew."""
+    try:
+        return _read(_note_of(place))
+    except (FileNotFoundError, msgspec.MsgspecError):
+        return None
+
+
+def _write(note: _Note) -> None:
+    private_folder(exports_folder())
+    file = _note_of(note.place)
+    with draft(file) as written:
+        written.write_bytes(msgspec.json.encode(note))
+        durable.sync(written)
+    durable.sync(file.parent)

@@ -1,0 +1,148 @@
+"""What was exported on this desk is found where a wearer is forgotten: removed, or named."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from gateway.main import main
+from server_gui.core.cloud import actions, exports
+from server_gui.core.cloud.jobs import Job
+from server_gui.core.cloud.recordings import Recordings
+from server_gui.core.cloud.selection import Choice
+from server_gui.core.recording.spool import Spool
+from server_gui.core.recording.spool_files import identity
+from server_gui.core.recording.upload import send
+from server_gui.core.settings.server_file import exports_folder, load
+from tests.unit.cloud.test_forget import HERS, HERS_TOO, HIS, Server, recorded, run, server
+
+__all__ = ["server"]  # a fixture
+FORGET = ("forget", "--wearer", "P01", "--yes")
+
+
+def export(server: Server, session: str, file: Path, status: int = 0) -> Path:
+    assert main(["sessions", "export", session, "--out", str(file), "--config", str(server.config)]) == status
+    server.told()
+    return file
+
+
+def test_files_as_they_were_made_are_removed_and_those_of_others_stay(server: Server, tmp_path: Path) -> None:
+    hers = [export(server, HERS, tmp_path / f"hers.{kind}") for kind in ("csv", "parquet", "mcap")]
+    his = export(server, HIS, tmp_path / "his.csv")
+    told = server.run("forget", "--wearer", "P01", "--dry-run")
+    assert all(f"exported: {file} (as it was made)" in told for file in hers)
+    assert str(his) not in told
+    assert all(file.exists() for file in hers)
+    server.run(*FORGET)
+    assert [file.exists() for file in (*hers, his)] == [False, False, False, True]
+    assert len(list(exports_folder().iterdir())) == 1
+    assert exports_folder().stat().st_mode & 0o077 == 0
+
+
+def test_the_window_s_exports_are_known_too(server: Server, tmp_path: Path) -> None:
+    settings, file, copied = load(server.config), tmp_path / "hers.csv", tmp_path / "copied"
+    (session,) = [each for each in Recordings(server.url, server.spool).sessions() if each.session == HERS]
+    actions.export(settings, session, Choice(), "csv", file)(Job("export"))
+    actions.download(server.url, copied, [session])(Job("download"))
+    said = server.run(*FORGET, status=1)
+    assert not file.exists()
+    assert f"{copied.as_uri()} is a copy that has rows of theirs" in said
+
+
+def _edited(file: Path) -> None:
+    file.write_bytes(file.read_bytes() + b"more")
+
+
+def _linked(file: Path) -> None:
+    file.rename(file.with_name("elsewhere.csv"))
+    file.symlink_to(file.with_name("elsewhere.csv"))
+
+
+@pytest.mark.parametrize("change", [_edited, _linked])
+def test_a_file_that_is_another_one_now_is_named_and_stays(
+    change: Callable[[Path], None], server: Server, tmp_path: Path
+) -> None:
+    file = export(server, HERS, tmp_path / "hers.csv")
+    change(file)
+    said = server.run(*FORGET, status=1)
+    assert f"{file} was exported with rows of theirs, and has changed since" in said
+    assert "gone:" not in said
+    assert file.read_bytes()
+
+
+def test_a_file_that_was_moved_is_said_to_be_out_of_reach(server: Server, tmp_path: Path) -> None:
+    file = export(server, HERS, tmp_path / "hers.csv")
+    file.rename(tmp_path / "elsewhere.csv")
+    assert f"not looked into: what was exported to {file}" in server.run(*FORGET)
+
+
+def test_an_export_that_ends_early_is_known_with_what_was_there(
+    server: Server, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An older export of hers is still there, where that of his was cut off."""
+    file = export(server, HERS, tmp_path / "some.csv")
+    with monkeypatch.context() as cut:
+        cut.setattr("server_gui.core.cloud.tabular._write", lambda *_: 1 / 0)
+        export(server, HIS, file, status=1)
+    assert f"{file} was exported with rows of theirs" in server.run(*FORGET, status=1)
+
+
+def test_a_place_that_has_something_else_now_is_not_hers(server: Server, tmp_path: Path) -> None:
+    file = export(server, HERS, tmp_path / "some.csv")
+    export(server, HIS, file)
+    server.run(*FORGET)
+    assert file.exists()
+
+
+def test_a_copy_of_the_store_is_named_until_it_has_forgotten_too(server: Server, tmp_path: Path) -> None:
+    copied = tmp_path / "a copy"
+    server.run("download", "--out", str(copied))
+    said = server.run(*FORGET, status=1)
+    assert f"{copied.as_uri()} is a copy that has rows of theirs" in said
+    (found,) = exports.found([("exo", HERS)], server.url)
+    assert found.state is exports.State.HAS_ROWS
+    server.config.write_text(f'[recorder]\nspool = "{tmp_path / "none"}"\n')
+    server.run("forget", "--url", copied.as_uri(), "--wearer", "P01", "--yes")
+    assert exports.found([("exo", HERS)], server.url) == []
+
+
+def test_an_entry_that_cannot_be_read_is_named(server: Server, tmp_path: Path) -> None:
+    export(server, HIS, tmp_path / "his.csv")
+    (entry,) = exports_folder().iterdir()
+    entry.write_bytes(b"{")
+    assert f"{entry} is an entry of the list of exports that cannot be read" in server.run(*FORGET, status=1)
+
+
+def test_what_cannot_be_noted_is_not_exported(server: Server, tmp_path: Path) -> None:
+    exports_folder().parent.mkdir(parents=True, exist_ok=True)
+    exports_folder().write_text("no folder")
+    file = export(server, HERS, tmp_path / "hers.csv", status=1)
+    assert not file.exists()
+
+
+def test_other_computers_are_named_and_their_second_copies_forgotten_there(
+    server: Server, tmp_path: Path
+) -> None:
+    """Whose store has nothing of her any more: what is left of her is in that computer's spool alone."""
+    there, name = tmp_path / "there", "20261121T193000Z-eeeeee"
+    with Spool(there, reserve_bytes=0) as opened:
+        opened.append([run(name)], recorded(name, "P01"))
+        opened.freeze()
+        for number in opened.waiting():
+            send(opened, number, server.store)
+    assert f"other computers that write to this store ({identity(there)})" in server.run(*FORGET)
+    assert any(name.encode() in file.read_bytes() for file in there.glob("*.db"))
+    server.config.write_text(f'[recorder]\nspool = "{there}"\n[store]\nurl = "{server.url}"\n')
+    server.run(*FORGET)
+    assert not any(name.encode() in file.read_bytes() for file in there.glob("*.db"))
+    server.run("verify")
+    server.run("mend")
+    assert server.rows() == {HIS}
+
+
+def test_machines_are_told_of_both(server: Server, tmp_path: Path) -> None:
+    file = export(server, HERS_TOO, tmp_path / "hers.csv")
+    plan = json.loads(server.run("forget", "--wearer", "P01", "--dry-run", "--json"))["plan"]
+    assert plan["exported"] == [{"place": str(file), "state": "as it was made", "why": ""}]
+    assert plan["others"] == []

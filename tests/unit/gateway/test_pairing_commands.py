@@ -1,0 +1,158 @@
+"""`gwrms keys pair` and `gwrms pair`: what is typed where, and what a terminal shows."""
+
+import io
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from gateway.certificates import grouped
+from gateway.cli import qr_code
+from gateway.cli.keys import _show as show
+from gateway.client import Address
+from gateway.client.keys import pin_of
+from gateway.main import main
+from gateway.wire.pairing import link
+from tests.unit.gateway import processes
+from tests.unit.gateway.pairing_robot import CODE, Shown
+
+
+@pytest.fixture
+def shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Shown]:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "desk"))
+    made = Shown(tmp_path)
+    yield made
+    made.close()
+
+
+class Typing(io.TextIOWrapper):
+    """A standard input with these lines in it."""
+
+    def __init__(self, lines: str, *, is_terminal: bool) -> None:
+        super().__init__(io.BytesIO(lines.encode()))
+        self._is_terminal = is_terminal
+
+    def isatty(self) -> bool:
+        return self._is_terminal
+
+
+def types(monkeypatch: pytest.MonkeyPatch, lines: str, *, is_terminal: bool = False) -> None:
+    monkeypatch.setattr("sys.stdin", Typing(lines, is_terminal=is_terminal))
+
+
+def asked_for(shown: Shown, *arguments: str) -> int:
+    """`gwrms pair` with these, and a person on the robot who confirms it."""
+    waiting = shown.wait()
+    with ThreadPoolExecutor(1) as pool:
+        command = pool.submit(main, ["pair", *arguments])
+        shown.take(waiting)
+        return command.result()
+
+
+def test_the_code_is_a_line_of_the_input_and_no_argument(
+    shown: Shown, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    types(monkeypatch, f"{CODE.lower()}\nmore")
+    assert asked_for(shown, str(shown.where), "--json") == 0
+    captured = capsys.readouterr()
+    assert msgspec.json.decode(captured.out)["robot"] == "exo-01"
+    assert captured.err == "", "nobody is there to be asked"
+
+
+def test_a_person_who_mistypes_the_code_is_asked_again(
+    shown: Shown, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    types(monkeypatch, f"0123-4567\n{CODE}\n", is_terminal=True)
+    assert asked_for(shown, str(shown.where)) == 0
+    captured = capsys.readouterr()
+    assert captured.out.count("The code that the robot shows: ") == 2
+    assert "gwrms pair: a code has 16 letters and digits" in captured.err
+    assert CODE not in captured.out + captured.err
+
+
+@pytest.mark.parametrize("is_terminal", [False, True])
+def test_who_types_nothing_is_not_waited_for(
+    is_terminal: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    types(monkeypatch, "0123\n" if is_terminal else "", is_terminal=is_terminal)
+    assert main(["pair", "192.0.2.7"]) == 1
+    assert "nothing was typed" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("lines", ["0123\n", "\n", "\N{BLACK HEART SUIT}" * 16 + "\n"])
+def test_what_is_no_code_in_a_pipe_ends_it(
+    lines: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    types(monkeypatch, lines)
+    with pytest.raises(SystemExit, match="2"):
+        main(["pair", "192.0.2.7"])
+    assert "16 letters and digits" in capsys.readouterr().err
+
+
+# From beginning to end
+
+
+def test_two_commands_let_a_desk_in_and_a_third_sends_it_away(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "desk"))
+    file = tmp_path / "robot.toml"
+    file.write_text('[robot]\nname = "exo-01"\n', encoding="utf-8")
+    options = ("--port", "0", "--name", "anna", "--role", "operator", "--yes")
+    with processes.process(*processes.GATEWAY[:-1], "keys", "pair", str(file), *options) as robot:
+        assert robot.stdout is not None
+        where = next(line for line in robot.stdout if line.startswith("  gwrms pair")).split()[-1]
+        code = next(line for line in robot.stdout if line.startswith("  ")).strip()
+        types(monkeypatch, f"{link(where, code)}\n")
+        assert main(["pair"]) == 0
+        assert "anna is let in from now on, as operator." in robot.stdout.read()
+        assert robot.wait() == 0
+    assert "Paired with exo-01: it calls this desk anna, as operator." in capsys.readouterr().out
+    assert main(["keys", "list", str(file)]) == 0
+    listed = capsys.readouterr().out
+    assert f"robot  {grouped(pin_of(Address()) or '')}" in listed
+    assert "anna  operator" in listed
+    assert main(["keys", "revoke", str(file), "anna"]) == 0
+    assert main(["keys", "revoke", str(file), "anna"]) == 1
+    assert "there is no anna" in capsys.readouterr().err
+
+
+def test_without_a_terminal_nobody_is_asked_and_nobody_let_in(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "robot.toml"
+    file.write_text('[robot]\nname = "exo-01"\n', encoding="utf-8")
+    with pytest.raises(SystemExit):
+        main(["keys", "pair", str(file), "--yes"])
+    monkeypatch.setattr("sys.stdin", io.StringIO())
+    assert main(["keys", "pair", str(file), "--port", "0"]) == 1
+    assert "there is no terminal to ask on" in capsys.readouterr().err
+    assert not (tmp_path / "keys").exists()
+
+
+class Terminal(io.StringIO):
+    """A terminal with some letters."""
+
+    encoding = "utf-8"
+
+    def isatty(self) -> bool:
+        return True
+
+
+def test_a_terminal_shows_the_link_for_a_camera_and_a_pipe_does_not(
+    shown: Shown, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sys.stdout", terminal := Terminal())
+    show(shown.listener, CODE, shown.own)
+    lines = [line for line in terminal.getvalue().splitlines() if set(line) <= set(" █▀▄") and line]
+    assert lines == qr_code.lines(link(str(shown.where), CODE))
+    for letters, is_terminal in (("ascii", True), ("utf-8", False)):
+        monkeypatch.setattr(Terminal, "encoding", letters)
+        monkeypatch.setattr(Terminal, "isatty", lambda _self, is_terminal=is_terminal: is_terminal)
+        monkeypatch.setattr("sys.stdout", terminal := Terminal())
+        show(shown.listener, CODE, shown.own)
+        assert f"\n  gwrms pair {shown.where}\n" in terminal.getvalue()
+        assert f"\n  {CODE}\n" in terminal.getvalue()
+        assert "█" not in terminal.getvalue()
