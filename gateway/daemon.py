@@ -15,7 +15,8 @@ from gateway.config.robot import RobotConfig
 from gateway.connections.classic import ClassicPort
 from gateway.connections.doors import check_classic
 from gateway.connections.entrance import Entrance
-from gateway.connections.intake import Inlet, Intake
+from gateway.connections.inlet import Inlet
+from gateway.connections.intake import Intake
 from gateway.connections.places import Places
 from gateway.connections.session import Session
 from gateway.connections.sharing import Sharing

@@ -16,7 +16,7 @@ from typing import Concatenate, ParamSpec, Protocol
 import msgspec
 from msgspec import UNSET, UnsetType
 
-from gateway.connections.intake import FOREIGN, Heard, Inlet
+from gateway.connections.inlet import FOREIGN, Heard, Inlet
 from gateway.connections.sharing import Sharing
 from gateway.connections.stop_lines import STOP
 from gateway.process.futures import outcome

@@ -5,6 +5,7 @@ left out; then it learns from all.
 """
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -37,7 +38,20 @@ MOST_ABSTAINED: Final = 0.1  # of what is decided
 LEAST_SURE: Final = 0.5  # what is as likely wrong as right is never said
 
 Groups = npt.NDArray[Any]
-Network = Callable[[], Any]
+Network = Callable[[Task, int], Any]  # for a task, from a seed
+
+
+@dataclass(frozen=True, slots=True)
+class _Lesson:
+    """What `learn` is asked."""
+
+    task: Task
+    recipe: Recipe
+    features: Features
+    truth: npt.NDArray[Any]
+    group: Groups
+    seed: int
+    told: Tell
 
 
 def learn(
@@ -61,20 +75,13 @@ def learn(
     """
     if not np.isfinite(features).all():
         raise UnusableData(f"{recipe.name}: features that are not finite cannot be learned from")
-    teach = _classes if task.fold else _phases
-    return teach(task, recipe, features, truth, np.asarray(group), seed, told)
+    lesson = _Lesson(task, recipe, features, truth, np.asarray(group), seed, told)
+    return _classes(lesson) if task.fold else _phases(lesson)
 
 
-def _classes(
-    task: Task,
-    recipe: Recipe,
-    features: Features,
-    truth: npt.NDArray[Any],
-    group: Groups,
-    seed: int,
-    told: Tell,
-) -> Learned:
-    can = task.classes(recipe)
+def _classes(lesson: _Lesson) -> Learned:
+    recipe, truth = lesson.recipe, lesson.truth
+    can = lesson.task.classes(recipe)
     rows = np.flatnonzero(np.isin(truth, can))
     classes = tuple(name for name in can if (truth[rows] == name).any())
     if len(classes) < 2:
@@ -85,33 +92,22 @@ def _classes(
     for name in classes:
         _enough(name, int((truth == name).sum()))
     targets = (truth[rows, None] == np.array(classes)).argmax(axis=1)
-    model, unseen, limits = _taught(
-        features[rows], targets, group[rows], lambda: _classifier(task, seed), len(classes), seed, told
-    )
+    model, unseen, limits = _taught(lesson, rows, targets, _classifier, len(classes))
     temperature = _temperature(unseen, targets)
     probabilities = softmax(unseen / temperature)
     right = probabilities.argmax(axis=1) == targets
     threshold = _threshold(probabilities.max(axis=1), right)
     numbers = {"temperature": temperature, "threshold": threshold, **limits}
-    return Learned(task, recipe, classes, model, numbers)
+    return Learned(lesson.task, recipe, classes, model, numbers)
 
 
-def _phases(
-    task: Task,
-    recipe: Recipe,
-    features: Features,
-    truth: npt.NDArray[Any],
-    group: Groups,
-    seed: int,
-    told: Tell,
-) -> Learned:
-    rows = np.flatnonzero(np.isnan(truth).all(axis=1) | ~np.isnan(truth).any(axis=1))
-    truth = truth[rows].astype(np.float64)
+def _phases(lesson: _Lesson) -> Learned:
+    missing = np.isnan(lesson.truth)
+    rows = np.flatnonzero(missing.all(axis=1) | ~missing.any(axis=1))
+    truth = lesson.truth[rows].astype(np.float64)
     steps = ~np.isnan(truth[:, 0])
     _enough("steps", int(steps.sum()))
-    model, unseen, limits = _taught(
-        features[rows], pointers(truth), group[rows], lambda: _regressor(task, seed), 4, seed, told
-    )
+    model, unseen, limits = _taught(lesson, rows, pointers(truth), _regressor, 4)
     phases, lengths = on_circle(unseen.astype(np.float32))
     error = np.abs((phases - np.where(steps[:, None], truth, 0.0) + 0.5) % 1.0 - 0.5)
     right = steps & (error <= WITHIN).all(axis=1)
@@ -119,7 +115,7 @@ def _phases(
     model |= {"length": trust.X_thresholds_, "trust": trust.y_thresholds_}
     sure = np.interp(lengths.min(axis=1), model["length"], model["trust"])
     numbers = {"threshold": _threshold(sure, right), **limits}
-    return Learned(task, recipe, (STRIDE,), model, numbers)
+    return Learned(lesson.task, lesson.recipe, (STRIDE,), model, numbers)
 
 
 def pointers(truth: Floats) -> Rows:
@@ -131,15 +127,14 @@ def pointers(truth: Floats) -> Rows:
 
 
 def _taught(
-    features: Features,
-    targets: npt.NDArray[Any],
-    group: Groups,
-    network: Network,
-    columns: int,
-    seed: int,
-    told: Tell,
+    lesson: _Lesson, rows: npt.NDArray[np.intp], targets: npt.NDArray[Any], network: Network, columns: int
 ) -> tuple[dict[str, Any], Floats, dict[str, float]]:
     """Parts that learned from all; what was said of left-out people (n, columns); the novelty's limits."""
+    features, group = lesson.features[rows], lesson.group[rows]
+
+    def parts_of(features: Features, targets: npt.NDArray[Any]) -> dict[str, Any]:
+        return _parts(features, targets, network(lesson.task, lesson.seed), lesson.seed)
+
     people = len(np.unique(group))
     if people < 2:
         raise UnusableData(
@@ -149,25 +144,25 @@ def _taught(
     far = np.zeros((2, len(features)))
     folds = min(FOLDS, people)
     for fold, (train, held_out) in enumerate(GroupKFold(folds).split(features, groups=group)):
-        told("learning", fold, folds + 1)
+        lesson.told("learning", fold, folds + 1)
         if len(np.unique(targets[train])) < 2:
             raise UnusableData(
                 "each class has examples of too few people: without some of them one class alone is left"
             )
-        parts = _parts(features[train], targets[train], network, seed)
+        parts = parts_of(features[train], targets[train])
         inputs = scaled(parts["scale"], features[held_out])
         unseen[held_out] = _columns(parts["network"], outputs(parts["network"], inputs), columns)
         far[:, held_out] = novelty.distances(parts, inputs)
-    told("learning", folds, folds + 1)
-    return _parts(features, targets, network, seed), unseen, novelty.limits((far[0], far[1]))
+    lesson.told("learning", folds, folds + 1)
+    return parts_of(features, targets), unseen, novelty.limits((far[0], far[1]))
 
 
-def _parts(features: Features, targets: npt.NDArray[Any], network: Network, seed: int) -> dict[str, Any]:
+def _parts(features: Features, targets: npt.NDArray[Any], network: Any, seed: int) -> dict[str, Any]:
     scale = StandardScaler().fit(features.astype(np.float64))
     inputs = scaled(scale, features)
     with fixed_epochs():
-        fitted = (
-            network().set_params(batch_size=min(BATCH, len(inputs))).fit(np.clip(inputs, -FAR, FAR), targets)
+        fitted = network.set_params(batch_size=min(BATCH, len(inputs))).fit(
+            np.clip(inputs, -FAR, FAR), targets
         )
     for name in ONLY_TO_LEARN:
         del vars(fitted)[name]

@@ -91,7 +91,7 @@ def test_a_job_shows_how_far_it_is_and_can_be_cancelled(shown: Shown, archive: A
         job.done = 4
         while True:
             job.check()
-            time.sleep(0.001)
+            time.sleep(0.001)  # the work, until it is cancelled
 
     job = archive.jobs.add("Verify", long)
     shown.open("Cloud")

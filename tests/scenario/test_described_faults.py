@@ -12,18 +12,23 @@ from tests.scenario.processes import Bench, gwrms
 from tests.support.waiting import until
 
 # By fault: what it is asked for with, where it is to be seen, and the words.
-FAULTS: dict[str, tuple[list[str], str, str]] = {
+Fault = tuple[list[str], str, str]
+# There at once, each at a device of its own.
+DEVICES: dict[str, Fault] = {
     # First, as long as it walks: the gait controller stops when it misses heartbeats.
     "encoder_stuck": (["--on", "left_ankle"], "left_ankle", "stays the same to the count"),
     "sdo_silent": (["--on", "left_knee"], "left_knee", "answers no SDO"),
     "sdo_late": (["--on", "right_knee"], "right_knee", "answers SDO after 8"),
+    "emcy": (["--on", "left_hip", "code=0x2351"], "left_hip", "it reports 0x2351 load level warning"),
+    "sensor_dropout": (["--on", "left_insole"], "left_insole", "% of its frames are missing"),
+    "insole_saturated": (["--on", "right_insole"], "right_insole", "cell at the end of its range"),
+}
+# One after another: each hides the others.
+BUS: dict[str, Fault] = {
     "error_frames": ([], "main", "error frames in the last"),
     "bus_load": ([], "main", "% of its time is taken: send fewer PDOs"),
     "frame_loss": (["percent=20"], "right_hip", "% of its PDOs are missing"),
     "gateway_bus_off": ([], "main", "the CAN controller is bus off"),
-    "sensor_dropout": (["--on", "left_insole"], "left_insole", "% of its frames are missing"),
-    "insole_saturated": (["--on", "right_insole"], "right_insole", "cell at the end of its range"),
-    "emcy": (["--on", "left_hip", "code=0x2351"], "left_hip", "it reports 0x2351 load level warning"),
 }
 
 
@@ -47,15 +52,25 @@ def told(bench: Bench, where: str) -> str:
     return "; ".join(texts)
 
 
-@pytest.mark.parametrize("name", FAULTS)
-def test_a_fault_is_named_with_what_to_check_and_gone_after(watched: Bench, name: str) -> None:
-    arguments, where, words = FAULTS[name]
-    until(lambda: words not in told(watched, where), lambda: told(watched, where))
+@pytest.mark.parametrize(
+    "faults", [DEVICES, *({name: fault} for name, fault in BUS.items())], ids=["devices", *BUS]
+)
+def test_each_fault_is_named_with_what_to_check_and_gone_after(
+    watched: Bench, faults: dict[str, Fault]
+) -> None:
     folder = str(watched.folder)
-    assert sim_fault(["--dir", folder, name, *arguments]) == 0
-    until(lambda: words in told(watched, where), lambda: told(watched, where))
-    assert sim_fault(["--dir", folder, "--clear", name]) == 0
-    until(lambda: words not in told(watched, where), lambda: told(watched, where))
+
+    def are(there: bool) -> None:
+        for _, where, words in faults.values():
+            until(lambda: (words in told(watched, where)) is there, lambda: told(watched, where))  # noqa: B023
+
+    are(False)
+    for name, (arguments, _, _) in faults.items():
+        assert sim_fault(["--dir", folder, name, *arguments]) == 0
+    are(True)
+    for name in faults:
+        assert sim_fault(["--dir", folder, "--clear", name]) == 0
+    are(False)
 
 
 def test_the_command_shows_buses_nodes_and_findings(watched: Bench) -> None:

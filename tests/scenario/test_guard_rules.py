@@ -151,7 +151,7 @@ class Case:
     says: str
     within_s: float = 2.0
     params: dict[str, Any] = field(default_factory=dict)
-    after_s: float = 2.0
+    after_s: float = 0.5
 
 
 CASES = [
@@ -268,7 +268,7 @@ def test_every_rule_is_tripped_here() -> None:
     assert {case.rule for case in CASES} | {"drift", "falling", "falling_fast"} == set(rules)
 
 
-@pytest.mark.parametrize("seconds", [60, 600])
+@pytest.mark.parametrize("seconds", [20, 600])
 def test_walking_trips_nothing_and_nothing_is_blind(watched: Watched, seconds: int) -> None:
     watched.run(float(seconds))
     assert watched.changes == []

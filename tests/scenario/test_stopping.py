@@ -11,6 +11,7 @@ from typing import Any
 import can
 import pytest
 
+from drivers.joint import power
 from gateway.config import load
 from gateway.records.folder import RecordsFolder
 from gateway.records.journal import read_verified
@@ -22,7 +23,7 @@ from hil_sim.node.abort import AbortCode, SdoAbort
 from hil_sim.robot import SimulatedRobot
 from server_gui.processes.children import ChildFailed
 from tests.scenario.processes import Bench, gwrms
-from tests.support.waiting import until
+from tests.support.waiting import WAIT_S, until
 from tests.unit.gateway.harness import Client, serving
 
 ENABLED = PowerState.OPERATION_ENABLED
@@ -303,7 +304,10 @@ class TestMaster:
         assert set(answer["problems"]) == set(JOINTS)
         assert enabled(robot) == 0
 
-    def test_a_stop_overtakes_the_way_up(self, robot: SimulatedRobot, client: Client, tmp_path: Path) -> None:
+    def test_a_stop_overtakes_the_way_up(
+        self, robot: SimulatedRobot, client: Client, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(power, "TRANSITION_S", WAIT_S)  # nothing else ends it, however busy the computer
         client.call("robot.reset")
         knee = robot.exoskeleton.drives["left_knee"]
         take = knee.dictionary[od.CONTROLWORD].on_write

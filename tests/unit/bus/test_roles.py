@@ -54,7 +54,7 @@ def test_an_observer_sends_sdo_requests_and_nothing_else(channel: str, describe:
         FakeNode(channel, 5, dict(IDENTITY)) as fake,
         running(channel, Role.OBSERVER, describe(5), guard_time_s=0.05) as gait,
     ):
-        time.sleep(0.2)
+        time.sleep(0.2)  # four times guard_time_s: a master would have asked by then
         assert {can_id for can_id, _ in fake.seen} == {0x605}
         assert "node guarding is the master's" in str(gait.quality(time.monotonic_ns()).problem)
 

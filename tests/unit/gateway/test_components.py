@@ -228,7 +228,7 @@ def test_modules_start_with_the_first_client_and_stop_after_the_last(
 
 
 def test_a_start_and_stop_that_take_long_hold_nobody_up(bench: Bench, tmp_path: Path) -> None:
-    go = threading.Event()
+    go, stopping = threading.Event(), threading.Event()
     starting, stop = bench.assemble, bench.left.stop
 
     def assemble_slowly(robot: object) -> object:
@@ -236,6 +236,7 @@ def test_a_start_and_stop_that_take_long_hold_nobody_up(bench: Bench, tmp_path: 
         return starting(config(tmp_path, ROBOT))
 
     def stop_slowly() -> None:
+        stopping.set()
         go.wait()
         stop()
 
@@ -250,7 +251,7 @@ def test_a_start_and_stop_that_take_long_hold_nobody_up(bench: Bench, tmp_path: 
             assert slow.answer(id_)["values"] == {"left_knee.position": 0.5}
             go.clear()
             slow.close()
-            time.sleep(0.1)  # it is stopping now, or soon
+            until(stopping.is_set, "it is stopping")
             id_ = other.request("component.snapshot", channels=["left_knee.position"])
             assert other.call("clock.read")
             go.set()

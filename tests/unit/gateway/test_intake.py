@@ -14,9 +14,10 @@ from typing import Any
 import pytest
 
 from gateway.access.identity import ANYBODY
-from gateway.connections import intake, stop_lines
-from gateway.connections.intake import Heard, Inlet, Pace
+from gateway.connections import inlet, intake, pace, stop_lines
+from gateway.connections.inlet import ON_THE_WAY, RECEIVE_BYTES, UNKNOWN_BYTES, Heard, Inlet
 from gateway.connections.listeners import listen
+from gateway.connections.pace import Pace
 from gateway.connections.session import Session
 from gateway.connections.sharing import Sharing
 from gateway.connections.stop_lines import stop_in
@@ -66,7 +67,7 @@ class Turned:
     def says(self, data: bytes) -> None:
         """One read of a client that is known."""
         self.client.sendall(data)
-        self.inlet._receive(intake.RECEIVE_BYTES)
+        self.inlet._receive(RECEIVE_BYTES)
 
     def holds(self, data: bytes) -> None:
         """That has arrived, and nobody has read it."""
@@ -120,9 +121,9 @@ def test_stops_that_come_together_are_one_and_each_is_answered(turned: Turned) -
 
 
 def test_who_floods_with_stops_is_left_alone_and_who_stops_is_not(turned: Turned) -> None:
-    turned.says(STOP % b"a few" * intake.FLOOD)
+    turned.says(STOP % b"a few" * pace.FLOOD)
     assert not turned.inlet._rests
-    turned.says(STOP % b"many" * (intake.FLOOD + 1))
+    turned.says(STOP % b"many" * (pace.FLOOD + 1))
     assert turned.inlet._rests
     assert turned.asked == ["a few", "many"]
 
@@ -134,23 +135,23 @@ def test_single_stops_by_the_dozen_are_a_flood_too_and_its_rest_is_short(turned:
     turned.front.call_later = lambda delay_s, callback: rests.append(delay_s)  # type: ignore[method-assign, assignment, return-value]
     while not rests:
         turned.says(STOP % b"one")
-        assert len(turned.asked) < 10 * intake.FLOOD
-    assert len(turned.asked) > intake.FLOOD
-    assert rests == [intake.FLOOD_S]
+        assert len(turned.asked) < 10 * pace.FLOOD
+    assert len(turned.asked) > pace.FLOOD
+    assert rests == [pace.FLOOD_S]
 
 
 def test_a_flood_of_stops_that_costs_much_rests_no_less(turned: Turned) -> None:
     rests: list[float] = []
     turned.front.call_later = lambda delay_s, callback: rests.append(delay_s)  # type: ignore[method-assign, assignment, return-value]
-    turned.spent = [2 * intake.COSTLY_NS, 0]
-    turned.says(STOP % b"many" * (intake.FLOOD + 1))
-    assert rests == [intake.FLOOD_S]
+    turned.spent = [2 * pace.COSTLY_NS, 0]
+    turned.says(STOP % b"many" * (pace.FLOOD + 1))
+    assert rests == [pace.FLOOD_S]
 
 
 def test_of_what_a_closed_connection_still_holds_only_so_much_is_looked_through(
     turned: Turned, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(intake, "LAST_NS", 0)
+    monkeypatch.setattr(inlet, "LAST_NS", 0)
     turned.holds(STOP % b"early" + NO_STOP)
     turned.inlet.finish()
     assert turned.asked == []
@@ -159,7 +160,7 @@ def test_of_what_a_closed_connection_still_holds_only_so_much_is_looked_through(
 def test_the_last_stop_of_a_closed_connection_acts_however_slow_the_computer_is(
     turned: Turned, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(intake, "LAST_NS", 0)
+    monkeypatch.setattr(inlet, "LAST_NS", 0)
     turned.holds(STOP % b"early" + NO_STOP * 200 + CLOCK % 1 * 500 + STOP % b"last" + CLOCK % 1 * 500)
     turned.inlet.finish()
     assert turned.asked == ["last"]
@@ -168,7 +169,7 @@ def test_the_last_stop_of_a_closed_connection_acts_however_slow_the_computer_is(
 def test_what_others_take_of_the_processor_is_no_time_of_the_last_look(
     turned: Turned, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    clock = itertools.count(0, 10 * intake.LAST_NS)  # each time that it is read, others have had their turn
+    clock = itertools.count(0, 10 * inlet.LAST_NS)  # each time that it is read, others have had their turn
     monkeypatch.setattr(time, "monotonic_ns", lambda: next(clock))
     turned.holds(STOP % b"early" + NO_STOP * 5)
     turned.inlet.finish()
@@ -196,10 +197,10 @@ def test_an_id_without_end_is_not_kept() -> None:
 
 def test_small_costs_add_up(turned: Turned, monkeypatch: pytest.MonkeyPatch) -> None:
     """No single read is dear, and yet they are all that the thread does."""
-    monkeypatch.setattr(intake, "PACE_FACTOR", 1 << 60)  # nothing is forgotten
+    monkeypatch.setattr(pace, "PACE_FACTOR", 1 << 60)  # nothing is forgotten
     reads = 0
     while not turned.inlet._rests:
-        turned.spent = [intake.COSTLY_NS // 5, 0]
+        turned.spent = [pace.COSTLY_NS // 5, 0]
         turned.says(CLOCK % 1)
         reads += 1
         assert reads < 100
@@ -237,9 +238,9 @@ def test_who_sends_too_much_is_left_alone_for_a_moment_and_read_again(turned: Tu
     assert watched_for == {READ, HANGUP}
     assert turned.turn_loop() is None
     assert sum(len(one.lines) for one in heard) == QUEUED_LINES
-    assert sum(len(one.refusals) for one in heard) == intake.ON_THE_WAY
+    assert sum(len(one.refusals) for one in heard) == ON_THE_WAY
     inlet.done(
-        QUEUED_LINES + intake.ON_THE_WAY,
+        QUEUED_LINES + ON_THE_WAY,
         sum(framing.size(line) for one in heard for _, line in one.lines),
     )
     assert not inlet._is_full
@@ -261,7 +262,7 @@ def test_who_has_cost_nothing_does_not_rest_for_others(turned: Turned) -> None:
 
 def test_no_rest_is_long(turned: Turned) -> None:
     turned.inlet._pace.resting = 100
-    assert turned.inlet._pace.rest_s(50_000_000) == intake.LONGEST_REST_S
+    assert turned.inlet._pace.rest_s(50_000_000) == pace.LONGEST_REST_S
 
 
 def test_who_has_just_come_is_read_in_turn_and_only_a_little(turned: Turned) -> None:
@@ -270,7 +271,7 @@ def test_who_has_just_come_is_read_in_turn_and_only_a_little(turned: Turned) -> 
     assert turned.inlet.received_bytes == 0  # whoever is known comes first
     turned.front.call_later(0, lambda: None)
     turned.front._turn()
-    assert turned.inlet.received_bytes == intake.UNKNOWN_BYTES
+    assert turned.inlet.received_bytes == UNKNOWN_BYTES
 
 
 def test_beyond_a_turns_time_also_those_that_are_known_take_turns(
@@ -278,7 +279,7 @@ def test_beyond_a_turns_time_also_those_that_are_known_take_turns(
 ) -> None:
     """Fifty that each send a little at the same moment would keep the next one's stop waiting for all."""
     turned.says(CLOCK % 1)
-    monkeypatch.setattr(intake, "TURN_NS", 0)
+    monkeypatch.setattr(pace, "TURN_NS", 0)
     turned.client.sendall(STOP % b"in turn")
     turned.inlet._on_ready(READ)
     assert turned.asked == []
@@ -307,7 +308,7 @@ def test_a_rest_is_the_last_one_that_was_said(turned: Turned) -> None:
 def test_who_costs_something_takes_turns_again(turned: Turned) -> None:
     turned.says(CLOCK % 1)
     assert turned.inlet._is_known
-    turned.spent = [intake.COSTLY_NS // 2, 0]
+    turned.spent = [pace.COSTLY_NS // 2, 0]
     turned.says(CLOCK % 1)
     assert not turned.inlet._is_known
 

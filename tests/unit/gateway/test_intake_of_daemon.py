@@ -11,7 +11,7 @@ from typing import Any, cast
 
 import pytest
 
-from gateway.connections import intake
+from gateway.connections.inlet import ON_THE_WAY
 from gateway.connections.listeners import listen
 from gateway.connections.session import Session
 from gateway.daemon import Daemon
@@ -263,11 +263,11 @@ def test_what_waits_for_a_loop_that_hangs_is_bounded_too(serving: Serving) -> No
     client = serving.connect()
     client.call("clock.read")
     with serving.hung():
-        client.send((CLOCK % 1 + STOP % b"many") * (QUEUED_LINES + intake.ON_THE_WAY))
+        client.send((CLOCK % 1 + STOP % b"many") * (QUEUED_LINES + ON_THE_WAY))
         client.send(STOP % b"last")
         serving.wait_for_stop("last")
         inlet = serving.session_of(client)._inlet
-        assert inlet._handed - inlet._done <= QUEUED_LINES + intake.ON_THE_WAY
+        assert inlet._handed - inlet._done <= QUEUED_LINES + ON_THE_WAY
         assert inlet.unanswered > 0
     assert client.answer("stop")["held"] is True
 

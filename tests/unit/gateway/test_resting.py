@@ -48,7 +48,7 @@ def test_at_rest_it_uses_no_tick_and_is_never_woken(running: Running) -> None:
         client.call("resource.snapshot")
     until(lambda: processes.rests(running.pid), "it rests")
     before = processes.kernel_saw(running.pid)
-    time.sleep(1.0)
+    time.sleep(1.0)  # in which a hundred ticks would come
     assert processes.kernel_saw(running.pid) == before
 
 
@@ -67,7 +67,7 @@ def test_nobody_is_lost_who_comes_while_it_goes_to_rest_or_comes_back(running: R
         with socket.create_connection(address, WAIT_S) as one:
             one.sendall(CLOCK)
             answered += one.makefile().readline().startswith('{"id":1,"result"')
-        time.sleep(0.05 + turn / 50)
+        time.sleep(0.05 + turn / 50)  # they are what is tried, not waited for
     assert answered == 8
 
 
@@ -88,7 +88,7 @@ def test_a_signal_is_met_on_the_way_there_and_back(tmp_path: Path) -> None:
             if turn % 2:
                 until(lambda: processes.rests(running.pid), "it rests")
                 socket.create_connection(address, WAIT_S).close()
-            time.sleep(turn * 0.05)
+            time.sleep(turn * 0.05)  # another moment of the way each time
             running.terminate()
             assert running.wait(WAIT_S) == 0
 

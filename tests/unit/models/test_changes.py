@@ -1,6 +1,5 @@
 """What serves is changed only as it was confirmed; what the command refuses, the window refuses."""
 
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -125,7 +124,7 @@ class Desk:
                 self.posted.pop(0)()
             return bool(so())
 
-        until(done, step=lambda: time.sleep(0.001))
+        until(done)
 
 
 @pytest.fixture

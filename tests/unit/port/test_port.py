@@ -106,7 +106,7 @@ def test_an_idle_port_uses_no_processor_time_and_stops_at_once(terminal: Termina
         until(lambda: port.opened_ns is not None, "the port to open")
         thread = next(thread for thread in threading.enumerate() if thread.name == f"serial {terminal.path}")
         before = _switches(thread)
-        time.sleep(0.3)
+        time.sleep(0.3)  # what is asked is what it does while nothing comes
         assert _switches(thread) - before <= 3
     finally:
         port.stop()

@@ -40,7 +40,7 @@ def left(tmp_path_factory: pytest.TempPathFactory) -> Path:
                 recorder.record("exo-01", 1, batch(seq))
                 recorder.flush(WAIT_S)
             os.write(writer, b"!")
-            time.sleep(600)
+            time.sleep(600)  # until it is killed
     assert os.read(reader, 1) == b"!"
     os.kill(child, signal.SIGKILL)
     os.waitpid(child, 0)

@@ -4,7 +4,6 @@ import datetime
 import os
 import signal
 import threading
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -16,6 +15,7 @@ from ml.store import Store, StoreError, StoreRefused
 from ml.store.query import QueryError, query
 from ml.store.tables import EVENTS, TABLES, TELEMETRY, field
 from tests.stores import KEY, SeaweedFS
+from tests.support.waiting import until
 
 HOUR_US = 3_600_000_000
 ENDLESS = "SELECT count(*) FROM range(100000000000) numbers(n) WHERE n % 7 = 3"
@@ -179,8 +179,7 @@ def test_ctrl_c_ends_a_query_that_takes_long(folder_url: str) -> None:
         return any(thread.name == "query" and thread.is_alive() for thread in threading.enumerate())
 
     def press() -> None:
-        while not runs():
-            time.sleep(0.01)
+        until(runs, "the query runs")
         os.kill(os.getpid(), signal.SIGINT)
 
     presser = threading.Thread(target=press)
