@@ -10,7 +10,7 @@ from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.tuning.writing import Trial
 from server_gui.views.marks import Mark, drives_mark, enabled_text
-from server_gui.views.predictions import activity
+from server_gui.views.predictions import STOPPED, activity
 from server_gui.views.theme import Theme
 from server_gui.views.trial_words import changes, ends
 from server_gui.views.widgets.fitted import FittedLabel
@@ -100,7 +100,7 @@ class NowLine(QFrame):
         line = activity(station)
         gait = station.processing.derived().gait
         walks = (
-            station.is_live and line.mark.word != "stopped" and gait.walking and gait.cadence_spm is not None
+            station.is_live and line.mark.word != STOPPED and gait.walking and gait.cadence_spm is not None
         )
         cadence = f"  {gait.cadence_spm:.0f} steps/min" if walks else ""
         details = tuple(dict.fromkeys((line.detail, line.short or line.detail)))
