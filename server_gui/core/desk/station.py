@@ -18,6 +18,7 @@ from gateway.wire.resource import ResourceSnapshot
 from gateway.wire.robot import Description
 from gateway.wire.stop import Stopped
 from server_gui.core.alarms.alarm import Alarms
+from server_gui.core.alarms.causes import Stalls, gathered
 from server_gui.core.alarms.found import Facts, any_enabled
 from server_gui.core.alarms.found import alarms as found
 from server_gui.core.alarms.marks import Mark
@@ -95,6 +96,7 @@ class Station:
         self._watch = RobotNews(self.tell)
         self._watched_ns = 0
         self._states = StateWatch()
+        self._stalls = Stalls()
 
     @property
     def called(self) -> str:
@@ -143,10 +145,13 @@ class Station:
     @property
     def alarms(self) -> Alarms:
         """What is wrong with it, as of now."""
-        facts = Facts(self.robot, self.stopping, self.address, self.audit.entries)
+        stalls, now_s = self._stalls.latest, self.robot.now_s()
+        facts = Facts(self.robot, self.stopping, self.address, self.audit.entries, stalls)
         if self.stopping.was_ended and any_enabled(self.robot) and self.is_live:
             self.stopping.was_ended = False
-        self._alarms.look(found(facts), self.robot.now_s(), self.rings.newest_ns)
+        self._alarms.look(
+            found(facts), now_s, self.rings.newest_ns, lambda active: gathered(active, stalls, now_s)
+        )
         return self._alarms
 
     @property
@@ -176,6 +181,7 @@ class Station:
             self.processing.apply(event)
             match event:
                 case Telemetry():
+                    self._look_for_stalls(event)
                     self.rings.take(event.batch.stamps_ns, event.batch.columns)
                     self.flags.add(
                         *self._states.take(event.batch.stamps_ns, event.batch.columns, self.robot.state_words)
@@ -197,12 +203,23 @@ class Station:
                     self.cost = None  # it was of the link that there was
                     self.predictions.clear()
                     self.flash.forget()
+                    self._stalls.forget()
         now_ns = time.monotonic_ns()
         if now_ns - self._watched_ns >= WATCH_NS:
             self._watched_ns = now_ns
             self._watch.look(self.robot)
             self.alarms  # noqa: B018 - seen now, so that it is known since when
             self.end_trial_if_over(now_ns)
+
+    def _look_for_stalls(self, event: Telemetry) -> None:
+        batch = event.batch
+        if self.robot.is_recording:
+            return
+        ago_s = (time.monotonic_ns() - batch.received_ns) / 1e9
+        stamps_ns, received_s = batch.stamps_ns, self.robot.now_s() - ago_s
+        stall = self._stalls.take(event.stream, stamps_ns, batch.received_ns, received_s)
+        if stall is not None:
+            self.tell(NewsKind.WARNING, f"the robot's computer stood still for {stall.lasted_s:.1f} s")
 
     def _described(self, description: Description, before: Description | None) -> None:
         if before is not None and before.boot_id != description.boot_id:

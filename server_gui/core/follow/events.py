@@ -41,6 +41,7 @@ class Telemetry:
     stream: int
     batch: Batch
     clock: ClockOffset | None
+    asked_hz: float = 0.0  # rows that were asked for a second; 0: each source's own
 
     @property
     def age_ns(self) -> int | None:

@@ -24,6 +24,7 @@ from server_gui.core.follow.events import (
 
 STALE_NS = 500_000_000  # older than this is shown as old
 RATE_WINDOW_NS = 2_000_000_000
+SLOW = 0.8  # of the rate that was asked for: below that it is said
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,12 +72,14 @@ class Robot:
     buses: tuple[BusInfo, ...] | None = None  # None: not known
     buses_at_ns: int | None = None
     last_failure: Failed | None = None
+    asked_hz: float = 0.0  # rows a second; 0: as they come
     is_recording: bool = False  # then there is nobody whose state could be good
     _newest_ns: int | None = None  # when the newest row was taken, on our clock
     _arrivals: collections.deque[tuple[int, int]] = field(
         default_factory=lambda: collections.deque(maxlen=4096)
     )
     _dropped_seen: int = 0
+    _flows_since_ns: int = 0  # the first rows of this link
     _words: dict[str, dict[str, str]] = field(default_factory=dict)
 
     def apply(self, event: Event) -> None:
@@ -117,6 +120,16 @@ class Robot:
         recent = sum(rows for at_ns, rows in self._arrivals if now_ns - at_ns <= RATE_WINDOW_NS)
         return recent / (RATE_WINDOW_NS / 1e9)
 
+    def is_slow(self, now_ns: int | None = None) -> bool:
+        """Return whether fewer rows come than were asked for; not before a link has lasted for a while."""
+        now_ns = time.monotonic_ns() if now_ns is None else now_ns
+        return now_ns - self._flows_since_ns > RATE_WINDOW_NS and self.rate_hz(now_ns) < SLOW * self.asked_hz
+
+    def rate_text(self, now_ns: int | None = None) -> str:
+        """Return how many rows come a second, of how many where these are fewer."""
+        of = f" of {self.asked_hz:.0f}" if self.is_slow(now_ns) else ""
+        return f"{self.rate_hz(now_ns):.0f}{of} Hz"
+
     def now_s(self) -> float:
         """Return the instant that is shown, UTC."""
         return time.time()
@@ -150,6 +163,7 @@ class Robot:
     def _link_changed(self, event: LinkChanged) -> None:
         link = self.link
         link.links += event.state is ConnectionState.CONNECTED
+        self._flows_since_ns = 0
         link.state, link.problem, link.since_ns = event.state, event.problem, event.at_ns
         if event.problem is not None or event.state is ConnectionState.CONNECTED:
             link.is_another = event.is_another
@@ -171,6 +185,8 @@ class Robot:
             self.values[name] = column[-1]
         self._newest_ns = batch.received_ns - (event.age_ns or 0)
         self._arrivals.append((batch.received_ns, rows))
+        self.asked_hz = event.asked_hz
+        self._flows_since_ns = self._flows_since_ns or batch.received_ns
         self.link.missed += batch.missed
         self.link.dropped += max(0, batch.dropped - self._dropped_seen)
         self._dropped_seen = batch.dropped
