@@ -85,7 +85,9 @@ class KeyPlot(Card):
         ]
         limits = _limit_texts(self._limits(station), unit)
         if limits:
-            parts.append((css(self._theme, "bad"), "┅", f"limit {limits}"))
+            red = css(self._theme, "bad")
+            full = [*parts, (red, "┅", f"limit {limits}")]
+            parts = full if self.legend.is_one_line(full) else [*parts, (red, "┅", limits)]
         self.legend.say(parts)
         self.plot.setAccessibleDescription(
             ", ".join(f"{word} {text} {unit.symbol}" for word, text in told.items())
@@ -138,7 +140,7 @@ class KeyPlot(Card):
         return self._desk.shown.units.unit("", self._kind.si)
 
     def _resize(self) -> None:
-        self.plot.setMinimumHeight(self._theme.px(58))
+        self.plot.setMinimumHeight(self._theme.px(48))
 
 
 def _limit_texts(limits: Sequence[float], unit: Unit) -> str:

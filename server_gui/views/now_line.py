@@ -77,7 +77,7 @@ class NowLine(QFrame):
         self.trial.row.addWidget(self.take_back)
         self.trial.row.addWidget(self.keep)
         self._grid = QGridLayout(self)
-        self._grid.setContentsMargins(10, 6, 10, 6)
+        self._grid.setContentsMargins(10, 3, 10, 3)
         self._grid.setHorizontalSpacing(18)
         self._placed: tuple[int, bool] = (0, False)
         self._arrange(2, on_trial=False)

@@ -32,7 +32,7 @@ from server_gui.views.widgets.pressure_map import PressureMap
 
 SHARES: Final = (10, 9, 11)  # of the width, where three cards stand beside each other
 A_COLUMN: Final = 190  # wide at least, at text of 100 %
-STATUS_LINES: Final = 4
+STATUS_LINES: Final = 3
 READ_S: Final = 0.2  # between changes of what is read rather than seen
 SIDES: Final = ("left", "right")
 PLOTS: Final = (

@@ -24,10 +24,12 @@ from server_gui.core.follow.news import NewsKind
 from server_gui.core.tuning.stop import StopProgress
 from server_gui.views.alarms import AlarmRow
 from server_gui.views.ask import Question
+from server_gui.views.joint_table import JointTable
 from server_gui.views.main_window import MainWindow
 from server_gui.views.theme import Theme
 from tests.gui import rules
 from tests.gui.fakes import Bench, stop_is_whole
+from tests.gui.foreseen import predicted
 from tests.support.desk import JOINTS, described, looked, telemetry, walking
 
 CAUSE = "0x2310 continuous overcurrent at the output (register: generic, current)"
@@ -36,11 +38,11 @@ WHY = "there is no link to 127.0.0.1:7420 now (127.0.0.1:7420 did not answer hel
 
 def fault(bench: Bench) -> None:
     """The left knee's drive in fault; the others stopped."""
-    now_ns = time.monotonic_ns()
+    now_ns = time.monotonic_ns() + 60_000_000_000  # not stale while the test lasts
     columns: dict[str, list[float | None]] = {f"{joint}.state": [5.0] for joint in JOINTS}
     columns["left_knee.state"] = [7.0]
     columns["left_knee.current"] = [9.0]
-    bench.station.take([walking(100)])
+    bench.station.take([walking(100, -60.0)])
     found = looked(state="fault", problem=f"the drive is in fault: {CAUSE}")
     bench.look_again([telemetry([now_ns + 1], columns, now_ns), found])
 
@@ -137,6 +139,19 @@ def test_nothing_that_is_clicked_moves_while_alarms_come_and_go(
         moved = [rules._path(one) for one, place in now.items() if before.get(one, place) != place]
         assert not moved, f"{what}: {moved}"
         assert stop_is_whole(window)
+
+
+@pytest.mark.parametrize(("width", "height"), [(1024, 700), (1366, 768), (1920, 1080)])
+def test_the_joint_table_is_whole_beside_an_alarm(
+    window: MainWindow, bench: Bench, width: int, height: int
+) -> None:
+    window.resize(width, height)
+    fault(bench)
+    bench.station.take_prediction(predicted("steady", {"steady": 0.99, "fall": 0.01}, "falling"))
+    settle(window, bench)
+    table = window.overview.findChild(JointTable)
+    assert isinstance(table, JointTable)
+    assert table.visibleRegion().boundingRect().height() == table.height()
 
 
 def test_without_an_alarm_the_strip_says_so_where_that_is_known(window: MainWindow, bench: Bench) -> None:

@@ -2,7 +2,7 @@
 
 import dataclasses
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Future
 from typing import Final
 
@@ -12,9 +12,9 @@ from gateway.client import ConnectionState
 from gateway.units import Units
 from gateway.wire.control import Lease
 from gateway.wire.cost import GatewayCost
-from gateway.wire.method import AnyMethod
+from gateway.wire.method import AnyMethod, Number
 from gateway.wire.parameter import ParameterInfo, Stored, Written
-from gateway.wire.resource import ResourceSnapshot
+from gateway.wire.resource import ProcessUse, ResourceSnapshot
 from gateway.wire.robot import Description
 from gateway.wire.stop import Stopped
 from server_gui.core.alarms.alarm import Alarms
@@ -80,6 +80,7 @@ class Station:
         self.processing = RobotProcessing()
         self.processes: ResourceSnapshot | None = None  # the newest look with a process table
         self.processes_at_ns: int | None = None
+        self.most: tuple[ProcessUse, int] | None = None  # who used most CPU, and when that was seen
         self.cost: GatewayCost | None = None  # what monitoring costs the robot, as long as it is looked at
         self.predictions = StationPredictions()
         self.stopping = StopProgress()
@@ -97,6 +98,7 @@ class Station:
         self._watched_ns = 0
         self._states = StateWatch()
         self._stalls = Stalls()
+        self._back: tuple[Mapping[str, Number], int] | None = None  # what was taken back, when
 
     @property
     def called(self) -> str:
@@ -176,6 +178,8 @@ class Station:
             if isinstance(event, Resources) and isinstance(event.snapshot.processes, list):
                 self._processes(event)
                 continue
+            if isinstance(event, Resources) and event.most is not None:
+                self.most = event.most, event.at_ns
             before = self.robot.description
             self.robot.apply(event)
             self.processing.apply(event)
@@ -190,6 +194,7 @@ class Station:
                     self._show_stop(event)
                 case Looked():
                     self.flash.look(event.quality.quality, event.at_ns)
+                    self._look_what_is_back()
                 case Journalled():
                     self.audit.take(event.journal.entries)
                     self.stopping.read(event.journal.entries)
@@ -239,6 +244,9 @@ class Station:
     def _processes(self, event: Resources) -> None:
         """A look at the process table; of CPU and memory the other looks tell, over their own periods."""
         self.processes, self.processes_at_ns = event.snapshot, event.at_ns
+        table = event.snapshot.processes or []
+        known = max(table, key=lambda one: one.cpu_percent or 0.0, default=None)
+        self.most = None if known is None else (known, event.at_ns)
         seen = self.robot.resources
         if seen is not None:
             snapshot = replace(event.snapshot, cpu=seen.cpu, gateway=seen.gateway)
@@ -365,6 +373,8 @@ class Station:
     def _written(self, changes: tuple[Change, ...], written: Written) -> None:
         self.control.renewed(LEASE_S)
         self.writing.done(written)
+        self.robot.hold(written.after)
+        self._back = None
         self.edits.drop(*(change.name for change in changes))
         self.tell(NewsKind.PARAMETER, ", ".join(_line(change, written) for change in changes))
 
@@ -380,7 +390,10 @@ class Station:
     def end_trial(self) -> None:
         """Take back what is on trial, now."""
         if self.writing.trial is not None:
-            self._ask(self._commands.revert(self.writing.trial.write), lambda _: self._taken_back(), "revert")
+            before = self.writing.trial.before
+            self._ask(
+                self._commands.revert(self.writing.trial.write), lambda _: self._reverted(before), "revert"
+            )
 
     def stage_undo(self) -> None:
         """Stage the inverse of the latest write, to be reviewed and written like any edit."""
@@ -394,7 +407,30 @@ class Station:
         self.writing.kept()
         self.tell(NewsKind.PARAMETER, self.writing.text)
 
-    def _taken_back(self, how: str = "taken back: the values from before are in force") -> None:
+    def _reverted(self, before: Mapping[str, Number]) -> None:
+        """The robot has; what it holds is said, and shown, once it is read."""
+        self._back = before, time.monotonic_ns()
+        self.writing.reverting()
+
+    def _look_what_is_back(self) -> None:
+        """Values that were asked for before its answer may be the trial's still."""
+        read_ns = self.robot.parameters_at_ns
+        if self._back is None or read_ns is None or read_ns <= self._back[1]:
+            return
+        before, at_ns = self._back
+        if self._holds(before):
+            self._back = None
+            self._taken_back("taken back: the values from before are held again")
+        elif read_ns - at_ns > OVERDUE_S * 1e9:
+            self._back = None
+            self.writing.say(WriteState.UNKNOWN, "taken back, but other values are held: look at them")
+            self.tell(NewsKind.WARNING, self.writing.text)
+
+    def _holds(self, values: Mapping[str, Number]) -> bool:
+        held = self.robot.parameters
+        return all(name in held and held[name].value == value for name, value in values.items())
+
+    def _taken_back(self, how: str) -> None:
         self.writing.reverted(how)
         self.tell(NewsKind.PARAMETER, how)
 
@@ -406,9 +442,7 @@ class Station:
         trial, read_ns = self.writing.trial, self.robot.parameters_at_ns
         if trial is None or read_ns is None or min(now_ns, read_ns) - trial.until_ns < OVERDUE_S * 1e9:
             return
-        held = self.robot.parameters
-        back = all(name in held and held[name].value == value for name, value in trial.before.items())
-        if back:
+        if self._holds(trial.before):
             self._taken_back("the trial's time is over: the robot has taken it back")
         else:
             self.writing.trial = None

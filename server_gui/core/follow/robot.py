@@ -5,6 +5,8 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+import msgspec
+
 from gateway.client import ConnectionState
 from gateway.wire.bus import BusInfo
 from gateway.wire.component import QualityInfo
@@ -101,6 +103,12 @@ class Robot:
             case Failed():
                 self.last_failure = event
 
+    def hold(self, values: Mapping[str, float]) -> None:
+        """Take what devices were read to hold just now."""
+        for name, value in values.items():
+            if name in self.parameters:
+                self.parameters[name] = msgspec.structs.replace(self.parameters[name], value=value)
+
     # --- what views ask
 
     def age_s(self, now_ns: int | None = None) -> float | None:
@@ -196,7 +204,7 @@ class Robot:
             if name in self.parts:
                 self.parts[name] = _part(self.parts[name], found)
         if event.parameters is not None:
-            self.parameters = event.parameters.values
+            self.parameters = dict(event.parameters.values)
             self.parameters_at_ns = event.at_ns
 
 

@@ -104,12 +104,12 @@ def trouble(bus: BusInfo) -> tuple[str, str] | None:
     if (load >= BUSY_PERCENT and not bus.findings) or load >= FULL_PERCENT:
         said = "it is full" if load >= FULL_PERCENT else "it is busy"
         full = [(f"{said}: {load_text(bus)} of its time is taken", FEWER)]
-    found = [*bus.findings, *(one for node in bus.nodes for one in node.findings)]
     told = [
         (bus.problem or "", ""),
         (bus.state if bus.state != ACTIVE else "", ""),
         *full,
-        *((one.words, one.check) for one in found),
+        *((one.words, one.check) for one in bus.findings),
+        *((f"{_who(node)}: {one.words}", one.check) for node in bus.nodes for one in node.findings),
         *((_missing(node), "") for node in bus.nodes if not node.findings and _misses(node)),
     ]
     return _joined(words for words, _ in told), _joined(check for _, check in told)
@@ -149,5 +149,8 @@ def _misses(node: NodeInfo) -> bool:
 
 
 def _missing(node: NodeInfo) -> str:
-    names = ", ".join(name.replace("_", " ") for name in node.components) or f"node {node.node_id}"
-    return f"{node.pdos_missing_percent or 0.0:.0f} % of the PDOs of {names} are missing"
+    return f"{node.pdos_missing_percent or 0.0:.0f} % of the PDOs of {_who(node)} are missing"
+
+
+def _who(node: NodeInfo) -> str:
+    return ", ".join(name.replace("_", " ") for name in node.components) or f"node {node.node_id}"

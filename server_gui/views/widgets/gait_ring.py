@@ -45,7 +45,7 @@ class GaitRing(QWidget):
         return self.minimumSize()
 
     def _restyle(self) -> None:
-        side = self._theme.px(112)
+        side = self._theme.px(84)
         self.setMinimumSize(side, side)
 
     def show_phases(self, phases: Phases, modelled: Phases, word: str, below: str, *, live: bool) -> None:
