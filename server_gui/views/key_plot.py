@@ -118,7 +118,21 @@ class KeyPlot(Card):
 
     def _limits(self, station: Station) -> list[float]:
         most = self._held(station, self._kind.most)
-        return [*most, *(-limit for limit in most), *self._held(station, self._kind.ends)]
+        held = [*most, *(-limit for limit in most), *self._held(station, self._kind.ends)]
+        return list(dict.fromkeys([*held, *self._guarded(station)]))
+
+    def _guarded(self, station: Station) -> list[float]:
+        """Where a rule of the guard trips."""
+        rules = () if station.robot.description is None else station.robot.description.guard.rules
+        ends = [
+            (rule.low, rule.high)
+            for rule in rules
+            if any(
+                part in rule.on and quantity in rule.quantities
+                for part, _, quantity in (channel.partition(".") for channel in self.channels)
+            )
+        ]
+        return [end for both in ends for end in both if end is not None]
 
     def _held(self, station: Station, wanted: str) -> list[float]:
         """What drives hold in an object, where the robot's file gives it the plot's unit."""
@@ -146,6 +160,6 @@ class KeyPlot(Card):
 def _limit_texts(limits: Sequence[float], unit: Unit) -> str:
     """`±40 and ±80`, `−5 and 120`."""
     both = [limit for limit in limits if limit > 0 and -limit in limits]
-    said = [f"±{unit.editable(limit)}" for limit in both]
-    said += [unit.editable(limit) for limit in sorted(limits) if abs(limit) not in both]
+    said = [f"±{limit * unit.scale:.4g}" for limit in both]
+    said += [f"{limit * unit.scale:.4g}" for limit in sorted(limits) if abs(limit) not in both]
     return " and ".join(dict.fromkeys(said))
