@@ -69,6 +69,7 @@ class StatusBar(QStatusBar):
         self._bus_icon.show_mark(LEVELS[level])
         self._bus_icon.setVisible(station is not None)
         self.bus.say(*words)
+        set_tip(self.bus, words[0])
         self._refresh_recording(station)
         set_text(self._window, f"{self._rate():.0f} fps")
         set_tip(self._window, "frames that this window draws a second")
