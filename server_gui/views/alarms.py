@@ -266,8 +266,13 @@ class AlarmStrip(Choosable):
             box = QRect(0, 0, max(room.width(), 1), 100_000)
             return label.fontMetrics().boundingRect(box, WRAPPED, text).height() if text else 0
 
-        main = next((text for text in wordings if high(self.headline, text) <= room.height()), wordings[-1])
-        left = room.height() - high(self.headline, main)
+        line = self.details.fontMetrics().lineSpacing()  # that since when, and what to check, have room too
+        sizes = {text: high(self.headline, text) for text in wordings}
+        fits = [
+            text for most in (room.height() - line, room.height()) for text in wordings if sizes[text] <= most
+        ]
+        main = next(iter(fits), wordings[-1])
+        left = room.height() - sizes[main]
         rest = next((text for text in fuller if high(self.details, text) <= left), "")
         set_text(self.headline, main)
         set_text(self.details, rest)

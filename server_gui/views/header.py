@@ -190,7 +190,8 @@ def _status(station: Station) -> Words:
         return Words(Mark("ring", "old"), "Status not known", ("no live data",))
     line = status(station)
     if line is not None:
-        return Words(line.mark, line.text, (line.detail,))
+        parts = ("predicted", line.short) if line.detail.startswith("predicted") else (line.detail,)
+        return Words(line.mark, line.text, tuple(filter(None, parts)), f"{line.text}\n{line.detail}")
     gait, why = station.processing.derived().gait, f"by steps; not predicted: {station.predictions.problem}"
     if not gait.walking:
         return Words(Mark("ring", "dim"), "Not walking", (why,))

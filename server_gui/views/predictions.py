@@ -107,7 +107,7 @@ def lines(station: Station) -> Iterator[Line]:
     """Yield the overview's lines: balance and stride, rules that hold, devices in trouble."""
     predictions, stopped = station.predictions, not_judged(station)
     for task, title in TITLES.items():
-        shown = predictions.told.get(task)
+        shown = None if stopped and task == GAIT_PHASE else predictions.told.get(task)
         if shown is not None and not (task == GAIT_PHASE and shown.is_stale()):
             line = said(shown, stopped=stopped)
             if task == GAIT_PHASE and line.mark.colour == "accent":

@@ -59,7 +59,9 @@ def alarms(facts: Facts) -> Iterator[Alarm]:
     for name in robot.names("joint"):
         yield from _of_drive(robot, name, facts.stopping)
     for part in robot.parts.values():
-        yield from _of_part(robot, part, facts.stopping)
+        if not part.comes_up:
+            yield from _of_part(robot, part, facts.stopping)
+    yield from _of_those_that_come_up(robot)
     yield from _of_guard(facts)
     yield from _of_buses(robot)
     if not robot.is_recording:
@@ -244,6 +246,19 @@ def _of_part(robot: Robot, part: Part, stopping: StopProgress) -> Iterator[Alarm
         is_now=is_now,
         node=_bus(robot, part.name),
     )
+
+
+def _of_those_that_come_up(robot: Robot) -> Iterator[Alarm]:
+    """One alarm, not one a device, while a gateway that was asked just now begins to read."""
+    names = [part.name for part in robot.parts.values() if part.comes_up]
+    if names and not robot.is_recording:
+        yield Alarm(
+            Kind.NO_DATA,
+            "devices",
+            f"not read yet: {_listed(names)}",
+            check=check_of(Kind.NO_DATA),
+            is_now=not robot.is_stale(),
+        )
 
 
 # --- guard and buses

@@ -26,6 +26,7 @@ from server_gui.core.follow.events import (
 
 STALE_NS = 500_000_000  # older than this is shown as old
 RATE_WINDOW_NS = 2_000_000_000
+COMES_UP = "it was not read yet"  # as a gateway says of what it has asked for the first time just now
 SLOW = 0.8  # of the rate that was asked for: below that it is said
 
 
@@ -38,6 +39,11 @@ class Part:
     state: str
     age_ms: float | None
     problem: str | None
+
+    @property
+    def comes_up(self) -> bool:
+        """Whether the robot has only begun to read it."""
+        return (self.problem or "").startswith(COMES_UP)
 
 
 @dataclass(slots=True)

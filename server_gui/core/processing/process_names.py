@@ -28,6 +28,8 @@ def short_name(process: ProcessUse) -> str:
     """Return it in few words: of an interpreter what it runs, `gwrms gateway`; else its own name."""
     if not _is_interpreter(process.name) and process.name != "gwrms":
         return plain(process.name)
+    if process.cmdline is UNSET or not process.cmdline:
+        return f"{plain(process.name)} {process.pid}"
     words = [word.rpartition("/")[2] for word in arguments_of(process).split()[:2]]
     said = plain(" ".join(word for word in words if not word.startswith("-")) or process.name)
     return said if len(said) <= MOST_LETTERS else f"{said[: MOST_LETTERS - 1]}…"
