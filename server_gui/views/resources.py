@@ -148,8 +148,8 @@ class Resources(QWidget):
         top = seen.top(TOP)
         times, columns = seen.over_time(top)
         colours = ("accent", "good", *OTHERS[1:3])
-        names = told_apart([(one.label, one.pid) for one in top])
-        named = [Curve(name, colour) for name, colour in zip(names, colours, strict=False)]
+        labels = told_apart([(one.label, one.pid) for one in top])
+        named = [Curve(name, colour) for name, colour in zip(labels, colours, strict=False)]
         self.top.show_rows(seen, times, named, columns, live=live)
 
     def _refresh_notes(self, station: Station) -> None:
