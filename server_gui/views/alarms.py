@@ -1,124 +1,26 @@
-"""Active alarms, pinned above everything: what is wrong, since when, what the robot did, what to check."""
+"""The active alarms' line: the worst, always in the same place, so that nothing moves when one comes."""
 
-import datetime
 import time
 from typing import Final
 
 from PySide6.QtCore import QRect, QSize, Qt, Signal
 from PySide6.QtGui import QFontMetrics, QResizeEvent
-from PySide6.QtWidgets import (
-    QFrame,
-    QHBoxLayout,
-    QPushButton,
-    QScrollArea,
-    QSizePolicy,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtWidgets import QHBoxLayout, QPushButton, QScrollArea, QVBoxLayout, QWidget
 
-from server_gui.core.alarms.alarm import Active
-from server_gui.core.alarms.marks import age_text
 from server_gui.core.alarms.texts import Kind
 from server_gui.core.desk.desk import Desk
-from server_gui.core.desk.station import Station
-from server_gui.views.marks import Mark
+from server_gui.views.alarm_list import AlarmButtons, AlarmList, style
+from server_gui.views.alarm_words import Told, details, headline, key_of, now_s, quiet
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text, set_tone
 from server_gui.views.widgets.choosable import Choosable
 from server_gui.views.widgets.mark import MarkIcon
 from server_gui.views.widgets.plain import set_tip
-from server_gui.views.widgets.sheet import Sheet
 from server_gui.views.widgets.whole import WholeLabel
 
 WIDE: Final = 1200  # at text of 100 %: then two lines are enough, and the buttons have room beside them
-WIDEST: Final = 900  # of the list, likewise
 HOLD_S: Final = 0.8  # nobody reads faster: until then a click was meant for the alarm before
 WRAPPED: Final = Qt.TextFlag.TextWordWrap.value
-OVER: Final = Mark("ring", "dim", "over")
-Told = tuple[Station | None, Active]  # without a robot: of what this window records
-Key = tuple[str, tuple[Kind, str]]
-
-
-class AlarmRow(QFrame):
-    """One alarm in full, as it stands in the list."""
-
-    cleared = Signal()
-    signal = Signal()
-    acknowledged = Signal()
-
-    def __init__(self, theme: Theme) -> None:
-        super().__init__()
-        self._theme = theme
-        self.setObjectName("alarm")
-        self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Maximum)
-        self._icon = MarkIcon(theme, 13)
-        self.headline, self.details = WholeLabel(), WholeLabel("dim")
-        words = QVBoxLayout()
-        words.setSpacing(1)
-        words.addWidget(self.headline)
-        words.addWidget(self.details)
-        said = QHBoxLayout()
-        said.setSpacing(8)
-        said.addWidget(self._icon, 0, Qt.AlignmentFlag.AlignTop)
-        said.addLayout(words, 1)
-        self.buttons = AlarmButtons()
-        self.clear, self.show_signal = self.buttons.clear, self.buttons.show_signal
-        self.acknowledge = self.buttons.acknowledge
-        self.clear.clicked.connect(self.cleared)
-        self.show_signal.clicked.connect(self.signal)
-        self.acknowledge.clicked.connect(self.acknowledged)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(9, 5, 8, 5)
-        column.setSpacing(6)
-        column.addLayout(said)
-        column.addWidget(self.buttons, 0, Qt.AlignmentFlag.AlignLeft)
-        theme.changed.connect(self._restyle)
-        self._restyle()
-
-    def say(self, told: Told, *, named: bool, is_over: bool = False) -> None:
-        """Show this alarm, or that it `is_over`."""
-        station, one = told
-        mark = OVER if is_over else one.alarm.mark
-        self._icon.show_mark(mark)
-        set_tone(self, mark.colour)
-        set_text(self.headline, headline(told, named=named, more="over" if is_over else ""))
-        set_text(self.details, "\n".join(details(one, now_s(station), each=True)))
-        self.buttons.offer(told)
-        self.buttons.setVisible(not is_over)
-        self.setAccessibleName(self.headline.text())
-        self.setAccessibleDescription(self.details.text())
-
-    def _restyle(self) -> None:
-        self.headline.setFont(self._theme.text_font(bold=True))
-        self.setStyleSheet(style(self._theme))
-
-
-class AlarmButtons(QWidget):
-    """What may be done about an alarm; what does not concern it is not there."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.clear = QPushButton("Clear fault…")
-        self.clear.setToolTip("Reset the drives' fault: they are led to switch on disabled, none is enabled")
-        self.show_signal = QPushButton("Show the signal ± 5 s")
-        self.acknowledge = QPushButton("Acknowledge")
-        self.acknowledge.setToolTip("It is read: it gives way to others until it is over")
-        row = QHBoxLayout(self)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(6)
-        for button in (self.clear, self.show_signal, self.acknowledge):
-            row.addWidget(button)
-
-    def offer(self, told: Told | None, *, all_of_them: bool = True) -> None:
-        """Offer what there is for this one; what is not offered at once stands in the list."""
-        station, one = told or (None, None)
-        alarm = None if one is None else one.alarm
-        self.clear.setVisible(alarm is not None and alarm.clears)
-        self.clear.setEnabled(station is not None and station.is_linked)
-        shows = one is not None and one.alarm.channel is not None and one.at_ns is not None
-        self.show_signal.setVisible(all_of_them and shows)
-        unread = one is not None and not one.is_acknowledged and one.alarm.kind is not Kind.NOT_STOPPED
-        self.acknowledge.setVisible(all_of_them and unread)
 
 
 class AlarmStrip(Choosable):
@@ -177,7 +79,7 @@ class AlarmStrip(Choosable):
         """Show what is wrong now."""
         before, self.told = self.told, tuple(self._active())
         first = self.told[0] if self.told else None
-        if before and first is not None and _key(before[0]) != _key(first):
+        if before and first is not None and key_of(before[0]) != key_of(first):
             self._changed_s = time.monotonic()
         self._say(first)
         self.buttons.offer(first, all_of_them=self._is_wide)
@@ -188,7 +90,7 @@ class AlarmStrip(Choosable):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        self._restyle()
+        self._size()
 
     # --- what is done about one
 
@@ -240,8 +142,8 @@ class AlarmStrip(Choosable):
     def _say(self, first: Told | None) -> None:
         """As much of it as has room, the cause before all; laid out only when it says something else."""
         if first is None:
-            mark, lines, rest = quiet(self._desk.selected)
-            wordings: tuple[str, ...] = (lines,)
+            mark, main, rest = quiet(self._desk.selected)
+            wordings: tuple[str, ...] = (main,)
             fuller: tuple[str, ...] = (rest,)
         else:
             mark = first[1].alarm.mark
@@ -283,63 +185,18 @@ class AlarmStrip(Choosable):
         return self.width() >= self._theme.px(WIDE)
 
     def _restyle(self) -> None:
-        """As high as so many lines of text, whatever stands in them."""
         self.headline.setFont(self._theme.text_font(bold=True))
         self.details.setFont(self._theme.text_font())
+        self.setStyleSheet(style(self._theme))
+        self._size()
+
+    def _size(self) -> None:
+        """As high as so many lines of text, whatever stands in them."""
         line = max(QFontMetrics(self.headline.font()).lineSpacing(), self.details.fontMetrics().lineSpacing())
         high = line * (2 if self._is_wide else 3) + 8
         if self.height() != high or self.minimumHeight() != high:
             self.setFixedHeight(high)
-        self.setStyleSheet(style(self._theme))
         self._said = None
-
-
-class AlarmList(Sheet):
-    """Every alarm in full. While it is open no row moves: new ones come last, and what is over stays."""
-
-    def __init__(self, strip: AlarmStrip, theme: Theme, below: QWidget) -> None:
-        words = QWidget()
-        super().__init__("All alarms", words, theme, below, WIDEST)
-        self._strip = strip
-        self._shown: dict[Key, Told] = {}
-        self.rows: list[AlarmRow] = []
-        self._column = QVBoxLayout(words)
-        self._column.setContentsMargins(0, 0, 0, 0)
-        self._column.setSpacing(4)
-        self._none = WholeLabel("dim")
-        self._none.setText("No alarms.")
-        self._column.addWidget(self._none)
-        self._column.addStretch(1)
-
-    def turn(self) -> None:
-        self._shown.clear()
-        super().turn()
-        self.refresh()
-
-    def refresh(self) -> None:
-        """Show how each is now."""
-        if not self.isVisible():
-            return
-        now = {_key(told): told for told in self._strip.told}
-        self._shown |= now
-        while len(self.rows) < len(self._shown):
-            self._add_row()
-        for row, (key, told) in zip(self.rows, self._shown.items(), strict=False):
-            row.say(told, named=self._strip.named, is_over=key not in now)
-        for place, row in enumerate(self.rows):
-            row.setVisible(place < len(self._shown))
-        self._none.setVisible(not self._shown)
-
-    def _add_row(self) -> None:
-        row, place = AlarmRow(self._theme), len(self.rows)
-        row.cleared.connect(lambda: self._strip.clear(self._at(place)))
-        row.signal.connect(lambda: self._strip.show_signal(self._at(place)))
-        row.acknowledged.connect(lambda: self._strip.acknowledge(self._at(place)))
-        self.rows.append(row)
-        self._column.insertWidget(place, row)
-
-    def _at(self, place: int) -> Told:
-        return list(self._shown.values())[place]
 
 
 class _Words(QScrollArea):
@@ -364,68 +221,6 @@ class _Words(QScrollArea):
 
     def sizeHint(self) -> QSize:
         return QSize(1, 1)
-
-
-def quiet(station: Station | None) -> tuple[Mark, str, str]:
-    """Return that there is no alarm, where that is known."""
-    if station is None:
-        return Mark("ring", "dim"), "No robot", ""
-    if station.robot.is_recording:
-        return Mark("diamond", "accent"), "A recording", "no fault shown"
-    if not station.is_live or not station.robot.parts:
-        return Mark("ring", "old"), "Alarms not known", "no live data"
-    return Mark("disc", "good"), "No alarms", "all ok"
-
-
-def headline(told: Told, *, named: bool, more: str = "", is_brief: bool = False) -> str:
-    """Whose it is, what is wrong, and whether that is now."""
-    station, one = told
-    alarm = one.alarm
-    line = " · ".join(
-        filter(None, (station.title if station and named else "", alarm.brief if is_brief else alarm.line))
-    )
-    marks = [more, "" if alarm.is_now else "last known", "acknowledged" if one.is_acknowledged else ""]
-    said = ", ".join(filter(None, marks))
-    return f"{line} ({said})" if said else line
-
-
-def now_s(station: Station | None) -> float:
-    """The instant that is shown, UTC."""
-    return time.time() if station is None else station.robot.now_s()
-
-
-def style(theme: Theme) -> str:
-    """The frame of an alarm, by its tone."""
-    colours = theme.colours
-    return (
-        f"QFrame#alarm {{ background: {colours.card}; border: 1px solid {colours.border}; "
-        f"border-left: 4px solid {colours.warn}; border-radius: 4px; }}"
-        f'QFrame#alarm[tone="bad"] {{ border-color: {colours.bad}; }}'
-        f'QFrame#alarm[tone="good"] {{ border-left-color: {colours.border}; }}'
-        f'QFrame#alarm[tone="dim"], QFrame#alarm[tone="old"] {{ border-left-color: {colours.dim}; }}'
-        f"QFrame#alarm:focus {{ border-color: {colours.accent}; }}"
-    )
-
-
-def _key(told: Told) -> Key:
-    station, one = told
-    return "" if station is None else station.name, one.alarm.key
-
-
-def details(one: Active, now_s: float, *, each: bool = False) -> list[str]:
-    """Since when (UTC) and what the robot did, what it explains (`each` in full), and what to check."""
-    alarm = one.alarm
-    since = datetime.datetime.fromtimestamp(one.since_s, datetime.UTC).astimezone()
-    first = f"since {since:%H:%M:%S}, for {lasting(max(0.0, now_s - one.since_s))}"
-    lines = [f"{first} · robot: {alarm.did}" if alarm.did else first]
-    if alarm.under:
-        lines += [f"with it: {under.line}" for under in alarm.under] if each else [alarm.consequences]
-    return [*lines, f"→ {alarm.check}"] if alarm.check else lines
-
-
-def lasting(for_s: float) -> str:
-    """A time that grows, in whole seconds as long as these matter."""
-    return f"{for_s:.0f} s" if for_s < 120 else age_text(for_s)
 
 
 def set_button(button: QPushButton, text: str) -> None:

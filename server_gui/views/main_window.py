@@ -179,6 +179,7 @@ class MainWindow(QMainWindow):
         self.robots.refresh()
         self.parameters.refresh()
         elsewhere = (self.parameters.trial, self.overview.now.trial)
+        self.overview.now.offer(not _is_seen(self.parameters.trial))
         self.trial.refresh(shown=not any(_is_seen(one) for one in elsewhere))
         self.events.refresh()
         self._bar.refresh()

@@ -89,6 +89,11 @@ class NowLine(QFrame):
         super().resizeEvent(event)
         self._fit(on_trial=self._placed[1])
 
+    def offer(self, wanted: bool) -> None:
+        """Whether what is on trial is kept or taken back here: not where its own panel is in sight."""
+        for button in (self.keep, self.take_back):
+            button.setVisible(wanted)
+
     def refresh(self) -> None:
         """Show how it is now."""
         station = self._desk.selected

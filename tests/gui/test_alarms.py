@@ -22,7 +22,7 @@ from server_gui.core.alarms.texts import Kind
 from server_gui.core.follow.events import LinkChanged, Looked
 from server_gui.core.follow.news import NewsKind
 from server_gui.core.tuning.stop import StopProgress
-from server_gui.views.alarms import AlarmRow
+from server_gui.views.alarm_list import AlarmRow
 from server_gui.views.ask import Question
 from server_gui.views.joint_table import JointTable
 from server_gui.views.main_window import MainWindow

@@ -2,7 +2,7 @@
 
 import dataclasses
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Future
 from typing import Final
 
@@ -12,7 +12,7 @@ from gateway.client import ConnectionState
 from gateway.units import Units
 from gateway.wire.control import Lease
 from gateway.wire.cost import GatewayCost
-from gateway.wire.method import AnyMethod, Number
+from gateway.wire.method import AnyMethod
 from gateway.wire.parameter import ParameterInfo, Stored, Written
 from gateway.wire.resource import ProcessUse, ResourceSnapshot
 from gateway.wire.robot import Description
@@ -51,10 +51,10 @@ from server_gui.core.tuning.flash import Flash
 from server_gui.core.tuning.lease import LeaseState
 from server_gui.core.tuning.link import LEASE_S
 from server_gui.core.tuning.stop import StopProgress, StopState
+from server_gui.core.tuning.taken_back import OVERDUE_S, TakenBack
 from server_gui.core.tuning.writing import WriteProgress, WriteState
 
 WATCH_NS: Final = 200_000_000  # between looks for news
-OVERDUE_S: Final = 2.0  # after a trial's end its values are looked at again
 
 
 class Station:
@@ -98,7 +98,7 @@ class Station:
         self._watched_ns = 0
         self._states = StateWatch()
         self._stalls = Stalls()
-        self._back: tuple[Mapping[str, Number], int] | None = None  # what was taken back, when
+        self._back = TakenBack(self.robot, self.writing, self.tell)
 
     @property
     def called(self) -> str:
@@ -194,7 +194,7 @@ class Station:
                     self._show_stop(event)
                 case Looked():
                     self.flash.look(event.quality.quality, event.at_ns)
-                    self._look_what_is_back()
+                    self._back.look()
                 case Journalled():
                     self.audit.take(event.journal.entries)
                     self.stopping.read(event.journal.entries)
@@ -374,7 +374,7 @@ class Station:
         self.control.renewed(LEASE_S)
         self.writing.done(written)
         self.robot.hold(written.after)
-        self._back = None
+        self._back.forget()
         self.edits.drop(*(change.name for change in changes))
         self.tell(NewsKind.PARAMETER, ", ".join(_line(change, written) for change in changes))
 
@@ -392,7 +392,7 @@ class Station:
         if self.writing.trial is not None:
             before = self.writing.trial.before
             self._ask(
-                self._commands.revert(self.writing.trial.write), lambda _: self._reverted(before), "revert"
+                self._commands.revert(self.writing.trial.write), lambda _: self._back.began(before), "revert"
             )
 
     def stage_undo(self) -> None:
@@ -407,29 +407,6 @@ class Station:
         self.writing.kept()
         self.tell(NewsKind.PARAMETER, self.writing.text)
 
-    def _reverted(self, before: Mapping[str, Number]) -> None:
-        """The robot has; what it holds is said, and shown, once it is read."""
-        self._back = before, time.monotonic_ns()
-        self.writing.reverting()
-
-    def _look_what_is_back(self) -> None:
-        """Values that were asked for before its answer may be the trial's still."""
-        read_ns = self.robot.parameters_at_ns
-        if self._back is None or read_ns is None or read_ns <= self._back[1]:
-            return
-        before, at_ns = self._back
-        if self._holds(before):
-            self._back = None
-            self._taken_back("taken back: the values from before are held again")
-        elif read_ns - at_ns > OVERDUE_S * 1e9:
-            self._back = None
-            self.writing.say(WriteState.UNKNOWN, "taken back, but other values are held: look at them")
-            self.tell(NewsKind.WARNING, self.writing.text)
-
-    def _holds(self, values: Mapping[str, Number]) -> bool:
-        held = self.robot.parameters
-        return all(name in held and held[name].value == value for name, value in values.items())
-
     def _taken_back(self, how: str) -> None:
         self.writing.reverted(how)
         self.tell(NewsKind.PARAMETER, how)
@@ -442,7 +419,7 @@ class Station:
         trial, read_ns = self.writing.trial, self.robot.parameters_at_ns
         if trial is None or read_ns is None or min(now_ns, read_ns) - trial.until_ns < OVERDUE_S * 1e9:
             return
-        if self._holds(trial.before):
+        if self.robot.holds(trial.before):
             self._taken_back("the trial's time is over: the robot has taken it back")
         else:
             self.writing.trial = None

@@ -115,6 +115,11 @@ class Robot:
             if name in self.parameters:
                 self.parameters[name] = msgspec.structs.replace(self.parameters[name], value=value)
 
+    def holds(self, values: Mapping[str, float]) -> bool:
+        """Return whether its parameters were read to have just these values."""
+        held = self.parameters
+        return all(name in held and held[name].value == value for name, value in values.items())
+
     # --- what views ask
 
     def age_s(self, now_ns: int | None = None) -> float | None:
