@@ -14,7 +14,8 @@ from typing import Final
 from server_gui.core.alarms.alarm import Active, Alarm
 from server_gui.core.alarms.texts import Kind, check_of
 
-STOOD_S: Final = 0.5  # without a row
+LATE_S: Final = 0.2  # without a row: so long is enough to miss heartbeats and PDOs
+STOOD_S: Final = 0.5  # so long is told also where nothing is wrong after it
 AT_ONCE: Final = 0.6  # of it, that the rows are of which then come in one piece
 CATCHES_UP_S: Final = 1.0  # a gateway sends what it is late with only as far back
 BEFORE_S: Final = 0.5  # clocks, and looks at a robot, are no more exact
@@ -70,7 +71,7 @@ class Stalls:
         if before is None or before[0] != stream or stamps_ns[0] <= before[1]:
             return None
         silent_s, span_s = (received_ns - before[2]) / 1e9, (stamps_ns[-1] - stamps_ns[0]) / 1e9
-        if silent_s < STOOD_S or span_s < AT_ONCE * min(silent_s, CATCHES_UP_S):
+        if silent_s < LATE_S or span_s < AT_ONCE * min(silent_s, CATCHES_UP_S):
             return None
         stall = Stall(received_s - silent_s, silent_s)
         if self._known and stall.began_s - self._known[-1].ended_s > EPISODE_S:
@@ -138,7 +139,8 @@ def _is_of_node(one: Active, cause: Active) -> bool:
 def _is_told(
     stood: Active, under: dict[tuple[Kind, str], list[Active]], stalls: Sequence[Stall], now_s: float
 ) -> bool:
-    return stood.alarm.key in under or now_s <= stalls[-1].ended_s + TOLD_S if stalls else False
+    long = [stall for stall in stalls if stall.lasted_s >= STOOD_S]
+    return stood.alarm.key in under or any(now_s <= stall.ended_s + TOLD_S for stall in long)
 
 
 def _above(one: Active, under: Sequence[Active]) -> Active:

@@ -18,7 +18,7 @@ from gateway.wire.resource import ProcessUse, ResourceSnapshot
 from gateway.wire.robot import Description
 from gateway.wire.stop import Stopped
 from server_gui.core.alarms.alarm import Alarms
-from server_gui.core.alarms.causes import Stalls, gathered
+from server_gui.core.alarms.causes import STOOD_S, Stalls, gathered
 from server_gui.core.alarms.found import Facts, any_enabled
 from server_gui.core.alarms.found import alarms as found
 from server_gui.core.alarms.marks import Mark
@@ -223,7 +223,7 @@ class Station:
         ago_s = (time.monotonic_ns() - batch.received_ns) / 1e9
         stamps_ns, received_s = batch.stamps_ns, self.robot.now_s() - ago_s
         stall = self._stalls.take(event.stream, stamps_ns, batch.received_ns, received_s)
-        if stall is not None:
+        if stall is not None and stall.lasted_s >= STOOD_S:
             self.tell(NewsKind.WARNING, f"the robot's computer stood still for {stall.lasted_s:.1f} s")
 
     def _described(self, description: Description, before: Description | None) -> None:

@@ -87,6 +87,13 @@ def test_a_stall_after_which_nothing_is_wrong_is_told_for_a_while() -> None:
     assert gathered([stood()], (STALL,), STALL.ended_s + TOLD_S + 0.1) == []
 
 
+def test_a_short_stall_is_told_only_of_what_it_explains() -> None:
+    short = (Stall(100.0, 0.3),)
+    assert gathered([stood(short)], short, 101.0) == []
+    (one,) = gathered([stood(short), active(Kind.IMPLAUSIBLE, "left_knee", 101.0)], short, 102.0)
+    assert one.alarm.what == "the robot's computer stood still for 0.3 s"
+
+
 @pytest.mark.parametrize("kind", [Kind.IMPLAUSIBLE, Kind.REPORTS, Kind.FAULT])
 def test_a_node_that_has_gone_stands_above_those_that_miss_its_heartbeat(kind: Kind) -> None:
     lost = active(Kind.LOST, "left_knee", 100.0, "its heartbeat is missing for 2.2 s", "main")
