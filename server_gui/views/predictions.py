@@ -163,7 +163,7 @@ def _stride(station: Station, line: Line) -> Line:
     if max(differences) <= AGREES:
         return replace(line, text="steps and model agree")
     mark = Mark("triangle", "warn", "differs")
-    return replace(line, mark=mark, text=f"model and steps differ by {max(differences):.0f} %")
+    return replace(line, mark=mark, text=f"steps, model {max(differences):.0f} % apart")
 
 
 def _knows(shown: Told) -> bool:
