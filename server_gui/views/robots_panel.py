@@ -29,6 +29,16 @@ from server_gui.views.widgets.mark import MarkIcon
 from server_gui.views.widgets.plain import PlainLabel, set_tip
 from server_gui.views.widgets.stop_button import StopButton
 
+# Where a card has no room for a state's own words.
+SHORTER: Final = {
+    "operation enabled": "enabled",
+    "switch on disabled": "disabled",
+    "ready to switch on": "ready",
+    "not to be believed": "not believed",
+    "ANOTHER ROBOT ANSWERS": "ANOTHER ROBOT",
+    "STOP NOT CONFIRMED": "NOT CONFIRMED",
+    "component stale": "stale",
+}
 PAIRING_ENDS_S: Final = 1.0  # how long the window waits for that when it closes
 
 
@@ -79,7 +89,9 @@ class RobotCard(Choosable):
         self.remove.setAccessibleName(f"Remove {station.title}")
         worst = station.alarms.worst
         said = () if worst is None else (worst.brief, f"{mark.word}: {worst.spoken}" if worst.spoken else "")
-        self._state.say(*filter(None, said), mark.word)  # one line: its STOP does not move with what is wrong
+        short = SHORTER.get(mark.word, mark.word)
+        # One line: its STOP does not move with what is wrong.
+        self._state.say(*filter(None, (*said, mark.word, short)))
         set_tip(self._state, "" if worst is None else worst.line)
         age = f"{age_text(robot.age_s())}{' old' if robot.age_s() is not None else ''}"
         live = "" if robot.is_stale() else f" · {robot.rate_text()}"
