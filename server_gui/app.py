@@ -46,7 +46,8 @@ FOLLOWING: Final = FollowSettings(
     channels=("*",),
     rate_hz=100.0,
     look_s=1.0,
-    resources=ResourceSnapshotParams(processes=False),
+    resources=ResourceSnapshotParams(limit=1),  # who uses most
+    resources_s=2.0,
     journal_s=2.0,
     buses_s=1.0,
 )

@@ -136,6 +136,13 @@ def limit(rule: Rule) -> str:
     return rule.words(WATCHES[rule.watch].unit)
 
 
+def ends(rule: Rule) -> tuple[float | None, float | None]:
+    """Between what its quantities may be (SI), where nothing else matters but how long; else nothing."""
+    if type(rule) is RangeRule:
+        return rule.min, rule.max
+    return (-rule.above, rule.above) if type(rule) is LevelRule else (None, None)
+
+
 def quantities(rule: Rule) -> tuple[str, ...]:
     """The channels that a rule looks at."""
     if isinstance(rule, HeatRule):

@@ -9,7 +9,7 @@ from functools import partial
 from typing import TYPE_CHECKING, cast
 
 from drivers.bus.arming import Arming
-from gateway.config.guard import GuardSettings, limit
+from gateway.config.guard import GuardSettings, ends, limit, quantities
 from gateway.config.guard_rules import Action
 from gateway.guard.alarms import ALARM, WHO, Alarms, GuardSource
 from gateway.guard.armings import Armings
@@ -181,6 +181,8 @@ def _worst(wiring: Wiring) -> Watcher:
 
 def _info(name: str, wiring: Wiring) -> GuardRuleInfo:
     rule, worst = wiring.rule, _worst(wiring)
+    low, high = ends(rule)
+    has_ends = low is not None or high is not None
     return GuardRuleInfo(
         name=name,
         watch=rule.watch,
@@ -193,4 +195,7 @@ def _info(name: str, wiring: Wiring) -> GuardRuleInfo:
         reason=worst.last.reason or None,
         trips=sum(watcher.trips for watcher in wiring.watchers),
         problems=[watcher.last.reason for watcher in wiring.watchers if watcher.state is State.BLIND],
+        quantities=list(quantities(rule)) if has_ends else [],
+        low=low,
+        high=high,
     )

@@ -65,6 +65,9 @@ class GuardRuleInfo(Struct, frozen=True):
     reason: str | None
     trips: int
     problems: list[str]
+    quantities: list[str] = []  # of which `low` and `high` are the limits, where these are all that it judges
+    low: float | None = None  # SI
+    high: float | None = None
 
 
 class GuardInfo(Struct, frozen=True):

@@ -29,7 +29,7 @@ def _link(robot: Robot) -> str:
     age = NONE if age_s is None else f"{age_s * 1000:.0f} ms"
     if robot.link.state is not ConnectionState.CONNECTED:
         return f"{robot.link.state.value}, {age} old"
-    return f"{'STALE ' if robot.is_stale() else ''}age {age} {robot.rate_hz():.0f} Hz"
+    return f"{'STALE ' if robot.is_stale() else ''}age {age} {robot.rate_text()}"
 
 
 def table(summary: Summary, gait: Gait, robot: Robot) -> str:

@@ -99,7 +99,7 @@ def _link(robot: Robot, look: Look) -> Text:
     age = NONE if age_s is None else f"{age_s * 1000:.0f} ms"
     trip = NONE if link.round_trip_ns is None else f"{link.round_trip_ns / 1e6:.1f} ms"
     text = Text.assemble(
-        f"age {age}  {robot.rate_hz():.0f} Hz  ",
+        f"age {age}  {robot.rate_text()}  ",
         f"round trip {trip}  " if look.roomy else "",
     )
     lost = link.missed + link.dropped

@@ -1,247 +1,226 @@
-"""Active alarms, pinned above the tabs: what is wrong, since when, what the robot did, what to check."""
+"""The active alarms' line: the worst, always in the same place, so that nothing moves when one comes."""
 
-import datetime
 import time
 from typing import Final
 
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QPushButton, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtCore import QRect, QSize, Qt, Signal
+from PySide6.QtGui import QFontMetrics, QResizeEvent
+from PySide6.QtWidgets import QHBoxLayout, QPushButton, QScrollArea, QVBoxLayout, QWidget
 
-from server_gui.core.alarms.alarm import Active
-from server_gui.core.alarms.marks import age_text
 from server_gui.core.alarms.texts import Kind
 from server_gui.core.desk.desk import Desk
-from server_gui.core.desk.station import Station
+from server_gui.views.alarm_list import AlarmButtons, AlarmList, style
+from server_gui.views.alarm_words import Told, details, headline, key_of, now_s, quiet
 from server_gui.views.theme import Theme
-from server_gui.views.widgets.card import set_text
+from server_gui.views.widgets.card import set_text, set_tone
 from server_gui.views.widgets.choosable import Choosable
 from server_gui.views.widgets.mark import MarkIcon
+from server_gui.views.widgets.plain import set_tip
 from server_gui.views.widgets.whole import WholeLabel
 
-WIDE: Final = 760  # at text of 100 %: then the buttons stand beside the words
-MOST: Final = 4  # rows before the others are asked for
-Told = tuple[Station | None, Active]  # without a robot: of what this window records
+WIDE: Final = 1200  # at text of 100 %: then two lines are enough, and the buttons have room beside them
+HOLD_S: Final = 0.8  # nobody reads faster: until then a click was meant for the alarm before
+WRAPPED: Final = Qt.TextFlag.TextWordWrap.value
 
 
-class AlarmRow(Choosable):
-    """One alarm. `chosen` when it is clicked, or Return or Space is pressed on it."""
-
-    cleared = Signal()
-    signal = Signal()
-    acknowledged = Signal()
-
-    def __init__(self, theme: Theme) -> None:
-        super().__init__("alarm")
-        self._theme = theme
-        self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Maximum)
-        self._icon = MarkIcon(theme, 13)
-        self.headline, self.details = WholeLabel(), WholeLabel("dim")
-        words = QVBoxLayout()
-        words.setSpacing(1)
-        words.addWidget(self.headline)
-        words.addWidget(self.details)
-        said = QHBoxLayout()
-        said.setSpacing(8)
-        said.addWidget(self._icon, 0, Qt.AlignmentFlag.AlignTop)
-        said.addLayout(words, 1)
-        self.clear = QPushButton("Clear fault…")
-        self.clear.setToolTip("Reset the drives' fault: they are led to switch on disabled, none is enabled")
-        self.show_signal = QPushButton("Show the signal ± 5 s")
-        self.acknowledge = QPushButton("Acknowledge")
-        self.acknowledge.setToolTip("It is read: shown in one line until it is over")
-        self.clear.clicked.connect(self.cleared)
-        self.show_signal.clicked.connect(self.signal)
-        self.acknowledge.clicked.connect(self.acknowledged)
-        buttons = QHBoxLayout()
-        buttons.setSpacing(6)
-        for button in (self.clear, self.show_signal, self.acknowledge):
-            buttons.addWidget(button)
-        buttons.addStretch(0)
-        self._row = QBoxLayout(QBoxLayout.Direction.LeftToRight, self)
-        self._row.setContentsMargins(9, 5, 8, 5)
-        self._row.setSpacing(6)
-        self._row.addLayout(said, 1)
-        self._row.addLayout(buttons)
-        theme.changed.connect(self._restyle)
-        self._restyle()
-
-    def say(self, station: Station | None, one: Active, *, named: bool, is_open: bool) -> None:
-        """Show this alarm; in full where it `is_open`, else what it is alone."""
-        alarm = one.alarm
-        self._icon.show_mark(alarm.mark)
-        self._tone(alarm.mark.colour)
-        line = alarm.line if is_open else alarm.brief
-        headline = " · ".join(filter(None, (station.title if station and named else "", line)))
-        more = [] if alarm.is_now else ["last known"]
-        more += ["acknowledged"] if one.is_acknowledged else []
-        headline += f" ({', '.join(more)})" if more else ""
-        set_text(self.headline, headline)
-        now_s = time.time() if station is None else station.robot.now_s()
-        set_text(self.details, details(one, now_s) if is_open else "")
-        self.details.setVisible(is_open)
-        self.clear.setVisible(is_open and alarm.clears)
-        self.clear.setEnabled(station is not None and station.is_linked)
-        self.show_signal.setVisible(is_open and alarm.channel is not None and one.at_ns is not None)
-        self.acknowledge.setVisible(
-            is_open and not one.is_acknowledged and alarm.kind is not Kind.NOT_STOPPED
-        )
-        self.setAccessibleName(headline)
-        self.setAccessibleDescription(self.details.text())
-
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
-        wide = self.width() >= self._theme.px(WIDE)
-        way = QBoxLayout.Direction.LeftToRight if wide else QBoxLayout.Direction.TopToBottom
-        if self._row.direction() != way:
-            self._row.setDirection(way)
-
-    def _tone(self, tone: str) -> None:
-        if self.property("tone") != tone:
-            self.setProperty("tone", tone)
-            self.style().polish(self)
-
-    def _restyle(self) -> None:
-        self.headline.setFont(self._theme.text_font(bold=True))
-        colours = self._theme.colours
-        self.setStyleSheet(
-            f"QFrame#alarm {{ background: {colours.card}; border: 1px solid {colours.border}; "
-            f"border-left: 4px solid {colours.warn}; border-radius: 4px; }}"
-            f'QFrame#alarm[tone="bad"] {{ border-color: {colours.bad}; }}'
-            f'QFrame#alarm[tone="dim"], QFrame#alarm[tone="old"] {{ border-left-color: {colours.dim}; }}'
-            f"QFrame#alarm:focus {{ border-color: {colours.accent}; }}"
-        )
-
-
-class AlarmStrip(QWidget):
-    """No height while nothing is wrong.
+class AlarmStrip(Choosable):
+    """One line that is always there: the worst alarm, or that there is none. It never changes its height.
 
     `cleared` asks for a reset of a station's fault; `shown` brings a station, a channel and an instant on the
-    axis of its signals (ns).
+    axis of its signals (ns). `list` is over `below` when it is asked for: everything there is, in full.
     """
 
     cleared = Signal(object)
     shown = Signal(object, str, object)
 
-    def __init__(self, desk: Desk, theme: Theme) -> None:
-        super().__init__()
+    def __init__(self, desk: Desk, theme: Theme, below: QWidget) -> None:
+        super().__init__("alarm")
         self._desk = desk
         self._theme = theme
-        self._open: tuple[str, tuple[Kind, str]] | None = None  # the one that was chosen
-        self._all = False
-        self._told: tuple[Told, ...] = ()
-        self.rows: list[AlarmRow] = []
+        self._said: object = None  # what was fitted last
+        self._changed_s = -HOLD_S  # when another alarm took the place of one
+        self.told: tuple[Told, ...] = ()
         self.setAccessibleName("Active alarms")
-        self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Maximum)
-        self._column = QVBoxLayout(self)
-        self._column.setContentsMargins(8, 6, 8, 0)
-        self._column.setSpacing(4)
-        self.more = QPushButton()
-        self.more.clicked.connect(self._toggle)
-        self._column.addWidget(self.more, 0, Qt.AlignmentFlag.AlignLeft)
-        self.hide()
+        self._icon, self._words = MarkIcon(theme, 13), _Words()
+        self.headline, self.details = WholeLabel(), WholeLabel("dim")
+        self._words.hold(self.headline, self.details)
+        self.buttons, self.more = AlarmButtons(), QPushButton()
+        self.more.setToolTip("Every alarm in full, and what may be done about it")
+        row = QHBoxLayout(self)
+        row.setContentsMargins(12, 3, 12, 3)
+        row.setSpacing(8)
+        row.addWidget(self._icon)
+        row.addWidget(self._words, 1)
+        row.addWidget(self.buttons)
+        row.addWidget(self.more)
+        self.list = AlarmList(self, theme, below)
+        self.chosen.connect(self._turn)
+        self.more.clicked.connect(self.list.turn)
+        self.buttons.clear.clicked.connect(lambda: self.clear(self._first))
+        self.buttons.show_signal.clicked.connect(lambda: self.show_signal(self._first))
+        self.buttons.acknowledge.clicked.connect(lambda: self.acknowledge(self._first))
+        theme.changed.connect(self._restyle)
+        self._restyle()
 
     @property
     def texts(self) -> list[str]:
-        """What each row says, in full."""
+        """What there is to say of each alarm, in full."""
         return [
-            "\n".join(filter(None, (row.headline.text(), row.details.text())))
-            for row in self.rows
-            if not row.isHidden()
+            "\n".join((headline(told, named=self.named), *details(told[1], now_s(told[0]), each=True)))
+            for told in self.told
         ]
+
+    @property
+    def named(self) -> bool:
+        """Whether it must be said whose an alarm is."""
+        return len(self._desk.stations) > 1
 
     def refresh(self) -> None:
         """Show what is wrong now."""
-        told = self._told = tuple(self._active())
-        shown = told if self._all else told[:MOST]
-        while len(self.rows) < len(shown):
-            self._add_row()
-        opened = self._opened(shown)
-        for place, row in enumerate(self.rows):
-            row.setVisible(place < len(shown))
-            if place < len(shown):
-                station, one = shown[place]
-                row.say(station, one, named=len(self._desk.stations) > 1, is_open=place == opened)
-        hidden = len(told) - MOST
-        self.more.setVisible(hidden > 0)
-        set_button(self.more, "Show fewer alarms" if self._all else f"Show {hidden} more alarms")
-        self.setVisible(bool(told))
+        before, self.told = self.told, tuple(self._active())
+        first = self.told[0] if self.told else None
+        if before and first is not None and key_of(before[0]) != key_of(first):
+            self._changed_s = time.monotonic()
+        self._say(first)
+        self.buttons.offer(first, all_of_them=self._is_wide)
+        self.buttons.acknowledge.setEnabled(time.monotonic() - self._changed_s >= HOLD_S)
+        self.more.setVisible(bool(self.told))
+        set_button(self.more, "Details …" if len(self.told) == 1 else f"All {len(self.told)} …")
+        self.list.refresh()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._size()
+
+    # --- what is done about one
+
+    def clear(self, told: Told) -> None:
+        """Ask for a reset of its robot's faults."""
+        self.cleared.emit(told[0])
+
+    def show_signal(self, told: Told) -> None:
+        """Bring what shows it, around the instant that it began."""
+        station, one = told
+        if station is not None and one.alarm.channel is not None and one.at_ns is not None:
+            self.list.hide()
+            self.shown.emit(station, one.alarm.channel, one.at_ns)
+
+    def acknowledge(self, told: Told) -> None:
+        """It is read."""
+        station, one = told
+        (self._desk.recording if station is None else station).alarms.acknowledge(one.alarm.key)
+        if station is not None and one.alarm.kind is Kind.RESET:
+            station.stopping.was_ended = False
+        self.refresh()
+
+    # --- inside
+
+    @property
+    def _first(self) -> Told:
+        return self.told[0]
+
+    def _turn(self) -> None:
+        if self.told or self.list.isVisible():
+            self.list.turn()
 
     def _active(self) -> list[Told]:
         """Of all robots and the recording; of the one that is looked at first, where they are as bad."""
         selected = self._desk.selected
         found: list[Told] = [(None, one) for one in self._desk.recording.alarms.active]
         found += [(station, one) for station in self._desk.stations for one in station.alarms.active]
-        places = {kind: place for place, kind in enumerate(Kind)}
         return sorted(
             found,
             key=lambda told: (
                 told[1].is_acknowledged,
                 told[1].alarm.kind is not Kind.NOT_STOPPED,
                 told[0] is not None and told[0] is not selected,
-                places[told[1].alarm.kind],
+                told[1].alarm.rank,
                 told[1].since_s,
             ),
         )
 
-    def _opened(self, shown: tuple[Told, ...]) -> int:
-        """Which row is shown in full: the chosen one, else the worst."""
-        keys = [_key(told) for told in shown]
-        if self._open in keys:
-            return keys.index(self._open)
-        return 0 if shown and not shown[0][1].is_acknowledged else -1
+    def _say(self, first: Told | None) -> None:
+        """As much of it as has room, the cause before all; laid out only when it says something else."""
+        if first is None:
+            mark, main, rest = quiet(self._desk.selected)
+            wordings: tuple[str, ...] = (main,)
+            fuller: tuple[str, ...] = (rest,)
+        else:
+            mark = first[1].alarm.mark
+            wordings = headline(first, named=self.named), headline(first, named=self.named, is_brief=True)
+            wordings = wordings[:1] if first[1].alarm.kind is Kind.NOT_STOPPED else wordings
+            said = details(first[1], now_s(first[0]))
+            since = said[0].partition(" · ")[0]
+            fuller = " · ".join(said), " · ".join((since, *said[1:])), " · ".join(said[1:]), since, ""
+        self._icon.show_mark(mark)
+        set_tone(self, mark.colour)
+        self.setAccessibleDescription("; ".join(filter(None, (wordings[0], fuller[0]))))
+        set_tip(self, "\n".join(filter(None, (wordings[0], fuller[0]))) if first is not None else "")
+        said_now = (wordings, fuller, self._words.viewport().size(), self.headline.font().key())
+        if said_now != self._said:
+            self._said = said_now
+            self._fit(wordings, fuller)
 
-    def _add_row(self) -> None:
-        row, place = AlarmRow(self._theme), len(self.rows)
-        row.chosen.connect(lambda: self._choose(place))
-        row.cleared.connect(lambda: self.cleared.emit(self._told[place][0]))
-        row.signal.connect(lambda: self._show(place))
-        row.acknowledged.connect(lambda: self._acknowledge(place))
-        self.rows.append(row)
-        self._column.insertWidget(place, row)
+    def _fit(self, wordings: tuple[str, ...], fuller: tuple[str, ...]) -> None:
+        room = self._words.viewport().size()
 
-    def _choose(self, place: int) -> None:
-        chosen = _key(self._told[place])
-        self._open = None if self._open == chosen else chosen
-        self.refresh()
+        def high(label: WholeLabel, text: str) -> int:
+            box = QRect(0, 0, max(room.width(), 1), 100_000)
+            return label.fontMetrics().boundingRect(box, WRAPPED, text).height() if text else 0
 
-    def _show(self, place: int) -> None:
-        station, one = self._told[place]
-        if station is not None and one.alarm.channel is not None and one.at_ns is not None:
-            self.shown.emit(station, one.alarm.channel, one.at_ns)
+        line = self.details.fontMetrics().lineSpacing()  # that since when, and what to check, have room too
+        sizes = {text: high(self.headline, text) for text in wordings}
+        fits = [
+            text for most in (room.height() - line, room.height()) for text in wordings if sizes[text] <= most
+        ]
+        main = next(iter(fits), wordings[-1])
+        left = room.height() - sizes[main]
+        rest = next((text for text in fuller if high(self.details, text) <= left), "")
+        set_text(self.headline, main)
+        set_text(self.details, rest)
+        self.details.setVisible(bool(rest))
 
-    def _acknowledge(self, place: int) -> None:
-        station, one = self._told[place]
-        (self._desk.recording if station is None else station).alarms.acknowledge(one.alarm.key)
-        if station is not None and one.alarm.kind is Kind.RESET:
-            station.stopping.was_ended = False
-        self._open = None
-        self.refresh()
+    @property
+    def _is_wide(self) -> bool:
+        return self.width() >= self._theme.px(WIDE)
 
-    def _toggle(self) -> None:
-        self._all = not self._all
-        self.refresh()
+    def _restyle(self) -> None:
+        self.headline.setFont(self._theme.text_font(bold=True))
+        self.details.setFont(self._theme.text_font())
+        self.setStyleSheet(style(self._theme))
+        self._size()
 
-
-def _key(told: Told) -> tuple[str, tuple[Kind, str]]:
-    station, one = told
-    return "" if station is None else station.name, one.alarm.key
-
-
-def details(one: Active, now_s: float) -> str:
-    """Since when (UTC), what the robot did, and what to check."""
-    alarm = one.alarm
-    since = datetime.datetime.fromtimestamp(one.since_s, datetime.UTC).astimezone()
-    for_s = max(0.0, now_s - one.since_s)
-    lines = [f"since {since:%H:%M:%S}, for {lasting(for_s)}"]
-    lines += [f"robot: {alarm.did}"] if alarm.did else []
-    lines += [f"→ {alarm.check}"] if alarm.check else []
-    return "\n".join((" · ".join(lines[:2]), *lines[2:]))
+    def _size(self) -> None:
+        """As high as so many lines of text, whatever stands in them."""
+        line = max(QFontMetrics(self.headline.font()).lineSpacing(), self.details.fontMetrics().lineSpacing())
+        high = line * (2 if self._is_wide else 3) + 8
+        if self.height() != high or self.minimumHeight() != high:
+            self.setFixedHeight(high)
+        self._said = None
 
 
-def lasting(for_s: float) -> str:
-    """A time that grows, in whole seconds as long as these matter."""
-    return f"{for_s:.0f} s" if for_s < 120 else age_text(for_s)
+class _Words(QScrollArea):
+    """What has no room is scrolled, and changes the size of nothing around."""
+
+    def hold(self, *labels: QWidget) -> None:
+        """Show these below each other."""
+        inner = QWidget()
+        inner.setObjectName("page")
+        column = QVBoxLayout(inner)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        column.addStretch(1)
+        for label in labels:
+            column.addWidget(label)
+        column.addStretch(1)
+        self.setWidget(inner)
+        self.setWidgetResizable(True)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.setMinimumSize(1, 1)
+
+    def sizeHint(self) -> QSize:
+        return QSize(1, 1)
 
 
 def set_button(button: QPushButton, text: str) -> None:

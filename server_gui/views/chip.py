@@ -13,6 +13,7 @@ from server_gui.views.widgets.elided import ElidedLabel
 from server_gui.views.widgets.mark import MarkIcon
 from server_gui.views.widgets.plain import set_tip
 
+SHORT: Final = 22  # letters: so few are not cut either
 LEAST: Final = 84  # wide, at text of 100 %: a chip with less says nothing
 
 
@@ -55,9 +56,11 @@ class Chip(QFrame):
 
     @property
     def needs(self) -> int:
-        """How wide it is with all of its first line."""
-        bold = QFontMetrics(self._theme.text_font(bold=True))
-        return max(bold.horizontalAdvance(self._words.main) + self._around, self._theme.px(LEAST))
+        """How wide it is with all of its first line, and what is short of the second."""
+        bold, plain = QFontMetrics(self._theme.text_font(bold=True)), QFontMetrics(self._theme.text_font())
+        short = next((part for part in self._words.parts[:1] if len(part) <= SHORT), "")
+        words = max(bold.horizontalAdvance(self._words.main), plain.horizontalAdvance(short))
+        return max(words + self._around, self._theme.px(LEAST))
 
     @property
     def wants(self) -> int:

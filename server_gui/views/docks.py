@@ -13,6 +13,8 @@ LAYOUT: Final = 1  # rises when a stored layout no longer fits
 # with range and default.
 WIDTHS: Final = ((1600, (225, 600)), (1340, (190, 474)), (0, (225, 400)))
 ROOMY: Final = 1100  # wide, at text of 100 %: what is narrower has no room for everything at once
+BELOW: Final = (120, 96)  # high, likewise: events, where the window is `HIGH` and where it is not
+HIGH: Final = 820
 STACK: Final = 340  # wide, likewise: panels that are one behind the other
 MOVES: Final = (QEvent.Type.Move, QEvent.Type.Resize, QEvent.Type.Show)
 Area = Qt.DockWidgetArea
@@ -125,7 +127,8 @@ class Docks(QObject):
             return
         self._widths = self._usual_widths
         self._window.resizeDocks(self.all[:2], [px(wide) for wide in self._widths], Qt.Orientation.Horizontal)
-        self._window.resizeDocks(self.all[2:3], [px(120)], Qt.Orientation.Vertical)
+        high = BELOW[0] if self._window.height() >= px(HIGH) else BELOW[1]
+        self._window.resizeDocks(self.all[2:3], [px(high)], Qt.Orientation.Vertical)
 
     @property
     def _usual_widths(self) -> tuple[int, int]:

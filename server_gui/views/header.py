@@ -1,4 +1,4 @@
-"""Always in sight: robot, drives, status, link, alarms, what became of a STOP, and STOP itself."""
+"""Always in sight: robot, drives, status, link, what became of a STOP, and STOP itself."""
 
 from collections.abc import Callable
 from typing import Final
@@ -26,8 +26,8 @@ STOP_MARKS: Final = {
 }
 STOP_SHARE: Final = 0.3  # of the width, which STOP may take at most
 RESETTING: Final = "Ends a held stop. Every drive stays switched off: nothing is enabled."
-# Left out in this order where there is less room; alarms stand below the header too.
-SPARE: Final = ("status", "robot", "recording", "link", "drives", "warnings")
+# Left out in this order where there is less room; alarms stand below the header.
+SPARE: Final = ("status", "robot", "recording", "link", "drives")
 
 
 class Header(QWidget):
@@ -190,7 +190,8 @@ def _status(station: Station) -> Words:
         return Words(Mark("ring", "old"), "Status not known", ("no live data",))
     line = status(station)
     if line is not None:
-        return Words(line.mark, line.text, (line.detail,))
+        parts = ("predicted", line.short) if line.detail.startswith("predicted") else (line.detail,)
+        return Words(line.mark, line.text, tuple(filter(None, parts)), f"{line.text}\n{line.detail}")
     gait, why = station.processing.derived().gait, f"by steps; not predicted: {station.predictions.problem}"
     if not gait.walking:
         return Words(Mark("ring", "dim"), "Not walking", (why,))
@@ -213,22 +214,8 @@ def _link(station: Station) -> Words:
         return Words(Mark("ring", "old"), "Linked, no data yet", parts)
     if robot.is_stale():
         return Words(Mark("triangle", "warn"), f"STALE · {age} old", parts)
-    return Words(Mark("disc", "warn" if lost else "good"), f"{age} old · {robot.rate_hz():.0f} Hz", parts)
-
-
-def _alarms(station: Station) -> Words:
-    active = station.alarms.active
-    said = "\n".join(one.alarm.line for one in active)
-    if active:
-        first = station.alarms.worst or active[0].alarm
-        count = f"{len(active)} alarms" if len(active) > 1 else "1 alarm"
-        where = first.where.partition(",")[0] or first.what
-        return Words(first.mark, f"{count}: {first.mark.word}", (where,), said)
-    if station.robot.is_recording:
-        return Words(Mark("diamond", "accent"), "A recording", ("no fault shown",))
-    if not station.is_live or not station.robot.parts:
-        return Words(Mark("ring", "old"), "Alarms not known", ("no live data",))
-    return Words(Mark("disc", "good"), "No alarms", ("all ok",))
+    mark = Mark("triangle", "warn") if robot.is_slow() else Mark("disc", "warn" if lost else "good")
+    return Words(mark, f"{age} old · {robot.rate_text()}", parts)
 
 
 _WORDS: Final[dict[str, Callable[[Station], Words]]] = {
@@ -236,5 +223,4 @@ _WORDS: Final[dict[str, Callable[[Station], Words]]] = {
     "drives": _drives,
     "status": _status,
     "link": _link,
-    "warnings": _alarms,
 }

@@ -203,7 +203,7 @@ class JointTable(QTableView):
         self._fit()
 
     def _restyle(self) -> None:
-        self.verticalHeader().setDefaultSectionSize(self._theme.px(20))
+        self.verticalHeader().setDefaultSectionSize(self._theme.px(19))
         self.setFixedHeight(self.sizeHint().height())
         self._fit()
 

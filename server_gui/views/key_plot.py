@@ -85,7 +85,9 @@ class KeyPlot(Card):
         ]
         limits = _limit_texts(self._limits(station), unit)
         if limits:
-            parts.append((css(self._theme, "bad"), "┅", f"limit {limits}"))
+            red = css(self._theme, "bad")
+            full = [*parts, (red, "┅", f"limit {limits}")]
+            parts = full if self.legend.is_one_line(full) else [*parts, (red, "┅", limits)]
         self.legend.say(parts)
         self.plot.setAccessibleDescription(
             ", ".join(f"{word} {text} {unit.symbol}" for word, text in told.items())
@@ -116,7 +118,21 @@ class KeyPlot(Card):
 
     def _limits(self, station: Station) -> list[float]:
         most = self._held(station, self._kind.most)
-        return [*most, *(-limit for limit in most), *self._held(station, self._kind.ends)]
+        held = [*most, *(-limit for limit in most), *self._held(station, self._kind.ends)]
+        return list(dict.fromkeys([*held, *self._guarded(station)]))
+
+    def _guarded(self, station: Station) -> list[float]:
+        """Where a rule of the guard trips."""
+        rules = () if station.robot.description is None else station.robot.description.guard.rules
+        ends = [
+            (rule.low, rule.high)
+            for rule in rules
+            if any(
+                part in rule.on and quantity in rule.quantities
+                for part, _, quantity in (channel.partition(".") for channel in self.channels)
+            )
+        ]
+        return [end for both in ends for end in both if end is not None]
 
     def _held(self, station: Station, wanted: str) -> list[float]:
         """What drives hold in an object, where the robot's file gives it the plot's unit."""
@@ -138,12 +154,12 @@ class KeyPlot(Card):
         return self._desk.shown.units.unit("", self._kind.si)
 
     def _resize(self) -> None:
-        self.plot.setMinimumHeight(self._theme.px(58))
+        self.plot.setMinimumHeight(self._theme.px(48))
 
 
 def _limit_texts(limits: Sequence[float], unit: Unit) -> str:
     """`±40 and ±80`, `−5 and 120`."""
     both = [limit for limit in limits if limit > 0 and -limit in limits]
-    said = [f"±{unit.editable(limit)}" for limit in both]
-    said += [unit.editable(limit) for limit in sorted(limits) if abs(limit) not in both]
+    said = [f"±{limit * unit.scale:.4g}" for limit in both]
+    said += [f"{limit * unit.scale:.4g}" for limit in sorted(limits) if abs(limit) not in both]
     return " and ".join(dict.fromkeys(said))

@@ -1,13 +1,14 @@
-"""Every key of the window, on a sheet over the tabs: STOP stays in sight beside it."""
+"""Every key of the window, on a sheet over the tabs: alarms and every STOP stay in sight."""
 
 from typing import Final
 
-from PySide6.QtCore import QEvent, QObject, Qt
-from PySide6.QtGui import QKeySequence, QShortcut
-from PySide6.QtWidgets import QFrame, QGridLayout, QPushButton, QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QGridLayout, QWidget
 
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.plain import PlainLabel
+from server_gui.views.widgets.sheet import Sheet
+
+WIDEST: Final = 560  # at text of 100 %
 
 # What a key is pressed for, by where it holds. A test compares the first three groups with the window's own.
 KEYS: Final[dict[str, dict[str, str]]] = {
@@ -59,54 +60,18 @@ KEYS: Final[dict[str, dict[str, str]]] = {
 }
 
 
-class KeysSheet(QFrame):
-    """Over `below`, as large as there is room; `turn` shows it or puts it away."""
+class KeysSheet(Sheet):
+    """Over `below`; `turn` shows it or puts it away."""
 
     def __init__(self, theme: Theme, below: QWidget) -> None:
-        super().__init__(below)
-        self._theme = theme
-        self._below = below
-        self.setObjectName("card")
-        self.setAccessibleName("Keys")
         words = QWidget()
-        words.setObjectName("page")
         grid = QGridLayout(words)
         grid.setColumnStretch(1, 1)
         row = 0
         for group, keys in KEYS.items():
             row = _fill(grid, row, group, keys)
         grid.setRowStretch(row, 1)
-        scrolled = QScrollArea()
-        scrolled.setWidgetResizable(True)
-        scrolled.setWidget(words)
-        scrolled.setAccessibleName("Keys")
-        self.close_button = QPushButton("Close")
-        self.close_button.clicked.connect(self.turn)
-        everything = QVBoxLayout(self)
-        everything.addWidget(scrolled, 1)
-        everything.addWidget(self.close_button, 0, Qt.AlignmentFlag.AlignRight)
-        away = QShortcut(QKeySequence(Qt.Key.Key_Escape), self, self.turn)
-        away.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
-        below.installEventFilter(self)
-        self.hide()
-
-    def turn(self) -> None:
-        """Show it, or put it away."""
-        self.setVisible(self.isHidden())
-        if self.isVisible():
-            self._fit()
-            self.raise_()
-            self.close_button.setFocus()
-
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        if event.type() == QEvent.Type.Resize and self.isVisible():
-            self._fit()
-        return False
-
-    def _fit(self) -> None:
-        room = self._below.rect().adjusted(8, 8, -8, -8)
-        width = min(room.width(), self._theme.px(560))
-        self.setGeometry(room.x() + (room.width() - width) // 2, room.y(), width, room.height())
+        super().__init__("Keys", words, theme, below, WIDEST)
 
 
 def _fill(grid: QGridLayout, row: int, group: str, keys: dict[str, str]) -> int:

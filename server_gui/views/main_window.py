@@ -104,7 +104,8 @@ class MainWindow(QMainWindow):
         self.header = Header(desk, theme, menu)
         self.header.stopped.connect(self.stopped)
         self.header.reset.connect(lambda station: ask_reset(self, station))
-        self.alarms = AlarmStrip(desk, theme)
+        self._middle = QWidget()
+        self.alarms = AlarmStrip(desk, theme, self._middle)
         self.alarms.cleared.connect(lambda station: ask_clear(self, station))
         self.alarms.shown.connect(self.show_around)
         self.robots = RobotsPanel(desk, theme)
@@ -178,6 +179,7 @@ class MainWindow(QMainWindow):
         self.robots.refresh()
         self.parameters.refresh()
         elsewhere = (self.parameters.trial, self.overview.now.trial)
+        self.overview.now.offer(not _is_seen(self.parameters.trial))
         self.trial.refresh(shown=not any(_is_seen(one) for one in elsewhere))
         self.events.refresh()
         self._bar.refresh()
@@ -259,16 +261,16 @@ class MainWindow(QMainWindow):
     # --- how it is put together
 
     def _build(self) -> None:
-        middle = QWidget()
-        column = QVBoxLayout(middle)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(0)
-        column.addWidget(self.alarms)
-        column.addWidget(self.trial)
+        column = _column(self._middle)
         column.addWidget(self._pages, 1)
-        self.keys = KeysSheet(self._theme, middle)
-        self.setCentralWidget(middle)
-        self.setMenuWidget(self.header)
+        column.addWidget(self.trial)  # below: when it comes or goes, no tab moves
+        self.keys = KeysSheet(self._theme, self._middle)
+        self.setCentralWidget(self._middle)
+        above = QWidget()
+        top = _column(above)
+        top.addWidget(self.header)
+        top.addWidget(self.alarms)
+        self.setMenuWidget(above)
         left, right, below = Area.LeftDockWidgetArea, Area.RightDockWidgetArea, Area.BottomDockWidgetArea
         panels = {
             "Robots": (self.robots, left),
@@ -276,7 +278,7 @@ class MainWindow(QMainWindow):
             "Events": (self.events, below),
             "Help": (self.help, right),
         }
-        self._panels = Docks(self, self._theme, panels, self.header)
+        self._panels = Docks(self, self._theme, panels, above)
         *self.docks, self._manual = self._panels.all
 
     def _scaled(self) -> None:
@@ -389,6 +391,14 @@ class MainWindow(QMainWindow):
         top = min(max(frame.top(), room.top()), room.bottom() + 1 - frame.height())
         if frame.topLeft() != QPoint(left, top):
             self.move(left, top)
+
+
+def _column(widget: QWidget) -> QVBoxLayout:
+    """Nothing around, nothing between."""
+    column = QVBoxLayout(widget)
+    column.setContentsMargins(0, 0, 0, 0)
+    column.setSpacing(0)
+    return column
 
 
 def _within(panel: QWidget) -> bool:

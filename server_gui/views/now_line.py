@@ -10,7 +10,7 @@ from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.tuning.writing import Trial
 from server_gui.views.marks import Mark, drives_mark, enabled_text
-from server_gui.views.predictions import activity
+from server_gui.views.predictions import STOPPED, activity
 from server_gui.views.theme import Theme
 from server_gui.views.trial_words import changes, ends
 from server_gui.views.widgets.fitted import FittedLabel
@@ -77,7 +77,7 @@ class NowLine(QFrame):
         self.trial.row.addWidget(self.take_back)
         self.trial.row.addWidget(self.keep)
         self._grid = QGridLayout(self)
-        self._grid.setContentsMargins(10, 6, 10, 6)
+        self._grid.setContentsMargins(10, 3, 10, 3)
         self._grid.setHorizontalSpacing(18)
         self._placed: tuple[int, bool] = (0, False)
         self._arrange(2, on_trial=False)
@@ -88,6 +88,11 @@ class NowLine(QFrame):
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self._fit(on_trial=self._placed[1])
+
+    def offer(self, wanted: bool) -> None:
+        """Whether what is on trial is kept or taken back here: not where its own panel is in sight."""
+        for button in (self.keep, self.take_back):
+            button.setVisible(wanted)
 
     def refresh(self) -> None:
         """Show how it is now."""
@@ -100,7 +105,7 @@ class NowLine(QFrame):
         line = activity(station)
         gait = station.processing.derived().gait
         walks = (
-            station.is_live and line.mark.word != "stopped" and gait.walking and gait.cadence_spm is not None
+            station.is_live and line.mark.word != STOPPED and gait.walking and gait.cadence_spm is not None
         )
         cadence = f"  {gait.cadence_spm:.0f} steps/min" if walks else ""
         details = tuple(dict.fromkeys((line.detail, line.short or line.detail)))

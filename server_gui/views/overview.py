@@ -9,6 +9,7 @@ from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QVBoxLayout, QWidget
 
 from gateway.units import Unit, rounded
+from server_gui.core.desk.belief import not_judged
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.leg_phase import leg_phase
 from server_gui.core.desk.soles import Load, Sole, loads, sole
@@ -18,7 +19,7 @@ from server_gui.views.joint_table import JointModel, JointTable
 from server_gui.views.key_plot import SECONDS, KeyPlot, Kind
 from server_gui.views.marks import age_text, old_text
 from server_gui.views.now_line import NowLine
-from server_gui.views.predictions import activity, lines, model_phases
+from server_gui.views.predictions import STOPPED, activity, lines, model_phases
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_tone
 from server_gui.views.widgets.colour_bar import ColourBar
@@ -31,7 +32,7 @@ from server_gui.views.widgets.pressure_map import PressureMap
 
 SHARES: Final = (10, 9, 11)  # of the width, where three cards stand beside each other
 A_COLUMN: Final = 190  # wide at least, at text of 100 %
-STATUS_LINES: Final = 4
+STATUS_LINES: Final = 3
 READ_S: Final = 0.2  # between changes of what is read rather than seen
 SIDES: Final = ("left", "right")
 PLOTS: Final = (
@@ -179,8 +180,9 @@ class Overview(QWidget):
     def _refresh_status(self, station: Station, *, slow: bool) -> None:
         derived = station.processing.derived()
         live = station.is_live
-        phases = {leg: leg_phase(derived, leg, derived.stamp_ns) if live else None for leg in Leg}
-        modelled = model_phases(station) if live else dict.fromkeys(Leg)
+        judged = live and not not_judged(station)
+        phases = {leg: leg_phase(derived, leg, derived.stamp_ns) if judged else None for leg in Leg}
+        modelled = model_phases(station) if judged else dict.fromkeys(Leg)
         word, below = self._words(station)
         self._ring.show_phases(phases, modelled, word, below, live=live)
         if slow:
@@ -192,6 +194,8 @@ class Overview(QWidget):
     def _words(self, station: Station) -> tuple[str, str]:
         """What the wearer does, and how fast."""
         line, gait = activity(station), station.processing.derived().gait
+        if line.mark.word == STOPPED:
+            return line.short_text, "not judged"
         walks = station.is_live and gait.walking and gait.cadence_spm is not None
         word = line.short_text if station.is_live else "Not known"
         return word, f"{gait.cadence_spm:.0f} steps/min" if walks else ""

@@ -6,7 +6,7 @@ from typing import Final
 
 from ml.robot.task import ABNORMAL, UNKNOWN
 from ml.serving.trust import Level
-from server_gui.core.desk.belief import belief, is_stopped
+from server_gui.core.desk.belief import belief, not_judged
 from server_gui.core.desk.leg_phase import LegPhase, apart, leg_phase, phase_at
 from server_gui.core.desk.station import Station
 from server_gui.core.models.names import model_name, told_name
@@ -19,7 +19,8 @@ STEADY: Final = "steady"
 LEAST: Final = 0.01  # what is less probable is not worth a word
 TITLES: Final = {FALLING: "Balance", GAIT_PHASE: "Stride"}
 AGREES: Final = 8.0  # % of a stride, that steps and a model may be apart
-ON_PURPOSE: Final = "a stop is held: what a model says of it counts for nothing"
+STOPPED: Final = "stopped"
+NOT_JUDGED: Final = "Not judged while stopped"
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +36,7 @@ class Line:
     @property
     def short_text(self) -> str:
         """Without what is said elsewhere."""
-        return "Stopped" if self.mark.word == "stopped" else self.text
+        return "Stopped" if self.mark.word == STOPPED else self.text
 
     @property
     def wordings(self) -> tuple[str, ...]:
@@ -44,17 +45,17 @@ class Line:
         return tuple(dict.fromkeys(" · ".join(filter(None, (self.text, one))) for one in details))
 
 
-def said(shown: Told, *, stopped: bool = False) -> Line:
+def said(shown: Told, *, stopped: str = "") -> Line:
     """Return what a model says now: the label and how probable, or that it does not know.
 
-    Of a robot that is `stopped` on purpose nothing is called unlike what is known.
+    Of a robot that does not drive its wearer, by what `stopped` says, nothing is called unlike what is known.
     """
     prediction = shown.prediction
     if shown.is_stale():
         return Line(Mark("ring", "old", "old"), "No prediction now", f"the last {shown.age_s():.0f} s ago")
     falls = prediction.task == FALLING and prediction.label not in (STEADY, ABNORMAL, UNKNOWN)
     if stopped and not falls and (prediction.task == ACTIVITY or not _knows(shown)):
-        return Line(Mark("ring", "dim", "stopped"), "Stopped on purpose", ON_PURPOSE, "a stop is held")
+        return unjudged(stopped)
     word, worth = label_text(prediction.label), belief(shown)
     details = (" · ".join(filter(None, (worth.wordings[0], _runner_up(shown)))), worth.wordings[-1])
     if prediction.label == ABNORMAL:
@@ -69,15 +70,22 @@ def said(shown: Told, *, stopped: bool = False) -> Line:
     return Line(Mark(*shape, prediction.label), text, *details, _tip(shown))
 
 
+def unjudged(why: str) -> Line:
+    """Return that nothing is said of what the wearer does, and why."""
+    return Line(Mark("ring", "dim", STOPPED), NOT_JUDGED, why, why)
+
+
 def status(station: Station) -> Line | None:
     """Return the one line of the header: a fall before all, then activity; None without a model."""
     shown = station.predictions.told
-    falling, stopped = shown.get(FALLING), is_stopped(station)
+    falling, stopped = shown.get(FALLING), not_judged(station)
     if falling is not None and not falling.is_stale():
         line = said(falling, stopped=stopped)
         if line.mark.colour == "bad":
             return _as_predicted(line)
-    return _as_predicted(said(shown[ACTIVITY], stopped=stopped)) if ACTIVITY in shown else None
+    if stopped:
+        return unjudged(stopped)
+    return _as_predicted(said(shown[ACTIVITY])) if ACTIVITY in shown else None
 
 
 def activity(station: Station) -> Line:
@@ -86,10 +94,10 @@ def activity(station: Station) -> Line:
     if not station.is_live:
         return Line(Mark("ring", "old", "not known"), "Activity not known", "no live data")
     if shown is not None and not shown.is_stale():
-        return said(shown, stopped=is_stopped(station))
+        return said(shown, stopped=not_judged(station))
     why = station.predictions.problem or "the model says nothing now"
-    if is_stopped(station):
-        return Line(Mark("ring", "dim", "stopped"), "Stopped on purpose", "a stop is held")
+    if stopped := not_judged(station):
+        return unjudged(stopped)
     if not gait.walking:
         return Line(Mark("ring", "dim", "not walking"), "Not walking", "by the steps seen", "by steps", why)
     return Line(Mark("diamond", "accent", "walking"), "Walking", "by the steps seen", "by steps", why)
@@ -97,9 +105,9 @@ def activity(station: Station) -> Line:
 
 def lines(station: Station) -> Iterator[Line]:
     """Yield the overview's lines: balance and stride, rules that hold, devices in trouble."""
-    predictions, stopped = station.predictions, is_stopped(station)
+    predictions, stopped = station.predictions, not_judged(station)
     for task, title in TITLES.items():
-        shown = predictions.told.get(task)
+        shown = None if stopped and task == GAIT_PHASE else predictions.told.get(task)
         if shown is not None and not (task == GAIT_PHASE and shown.is_stale()):
             line = said(shown, stopped=stopped)
             if task == GAIT_PHASE and line.mark.colour == "accent":
@@ -111,7 +119,7 @@ def lines(station: Station) -> Iterator[Line]:
         )
     for rule in predictions.rules:
         yield Line(Mark("triangle", "warn", "rule"), f"Rule {rule.rule.action.value}", rule.text)
-    told = {one.alarm.subject: one.alarm.mark for one in station.alarms.active}
+    told = {alarm.subject: alarm.mark for alarm in station.alarms.each}
     for part in station.robot.not_ok():
         why = part.problem or "no reason known"
         name = part.name.replace("_", " ")
@@ -155,7 +163,7 @@ def _stride(station: Station, line: Line) -> Line:
     if max(differences) <= AGREES:
         return replace(line, text="steps and model agree")
     mark = Mark("triangle", "warn", "differs")
-    return replace(line, mark=mark, text=f"model and steps differ by {max(differences):.0f} %")
+    return replace(line, mark=mark, text=f"steps, model {max(differences):.0f} % apart")
 
 
 def _knows(shown: Told) -> bool:

@@ -2,13 +2,13 @@
 
 from typing import Any, Final
 
-from msgspec import UNSET
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView
 
 from gateway.plain import plain
 from gateway.wire.resource import ProcessUse
+from server_gui.core.processing.process_names import arguments_of, command_of
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.plain import tip
 from server_gui.views.widgets.rows import SORT_ROLE, Filtered, Index, RowsModel, RowsTable
@@ -72,23 +72,6 @@ class ProcessTable(RowsTable):
         for column, width in ((NAME, 96), (PID, 62), (CPU, 68), (MEMORY, 104)):
             self.setColumnWidth(column, self._theme.px(width))
         self._make_room()
-
-
-def command_of(process: ProcessUse) -> str:
-    """Return the command line; the name where the robot does not tell it, as of a kernel's thread."""
-    return process.name if process.cmdline is UNSET or not process.cmdline else process.cmdline
-
-
-def arguments_of(process: ProcessUse) -> str:
-    """Return what tells processes of one name apart: the command without the path of its interpreter."""
-    words = command_of(process).split()
-    while len(words) > 1 and (_is_interpreter(words[0]) or words[0].startswith("-")):
-        words.pop(0)
-    return " ".join([words[0].rpartition("/")[2], *words[1:]]) if words else ""
-
-
-def _is_interpreter(word: str) -> bool:
-    return word.rpartition("/")[2].startswith(("python", "sh", "bash", "perl", "node"))
 
 
 def _text(process: ProcessUse, column: int) -> str:

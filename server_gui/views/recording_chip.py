@@ -38,7 +38,7 @@ class RecordingChip(Chip):
         """Show how it is now."""
         recording, station = self._desk.recording, self._desk.selected
         address = None if station is None else station.address
-        said = recording.said(address)
+        said = recording.said(address, is_live=station is None or station.is_live)
         self.say(_words(recording, said, address))
         text = "Start…" if recording.is_paused else "Stop…"
         if self.turn.text() != text:

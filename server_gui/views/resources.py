@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QBoxLayout, QGridLayout, QLineEdit, QWidget
 from gateway.wire.resource import ResourceSnapshot
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
+from server_gui.core.processing.process_names import told_apart
 from server_gui.core.processing.resource import DEVICES, SERIES
 from server_gui.views.computer import facts, held_back
 from server_gui.views.marks import age_text
@@ -117,9 +118,8 @@ class Resources(QWidget):
         age_s = _age_s(station.processes_at_ns)
         old = age_s is not None and age_s > OLD_S
         count = self.table.processes.rowCount()
-        self._processes.set_note(
-            *(f"STALE, {age_text(age_s)} old", "STALE") if old else (f"{count} processes",)
-        )
+        known = "no data yet" if age_s is None else f"{count} processes"
+        self._processes.set_note(*(f"STALE, {age_text(age_s)} old", "STALE") if old else (known,))
         self.table.setEnabled(not old)
 
     def _watch(self) -> None:
@@ -148,7 +148,8 @@ class Resources(QWidget):
         top = seen.top(TOP)
         times, columns = seen.over_time(top)
         colours = ("accent", "good", *OTHERS[1:3])
-        named = [Curve(one.name, colour) for one, colour in zip(top, colours, strict=False)]
+        labels = told_apart([(one.label, one.pid) for one in top])
+        named = [Curve(name, colour) for name, colour in zip(labels, colours, strict=False)]
         self.top.show_rows(seen, times, named, columns, live=live)
 
     def _refresh_notes(self, station: Station) -> None:

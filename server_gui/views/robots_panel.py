@@ -28,8 +28,17 @@ from server_gui.views.widgets.fitted import FittedLabel
 from server_gui.views.widgets.mark import MarkIcon
 from server_gui.views.widgets.plain import PlainLabel, set_tip
 from server_gui.views.widgets.stop_button import StopButton
-from server_gui.views.widgets.whole import WholeLabel
 
+# Where a card has no room for a state's own words.
+SHORTER: Final = {
+    "operation enabled": "enabled",
+    "switch on disabled": "disabled",
+    "ready to switch on": "ready",
+    "not to be believed": "not believed",
+    "ANOTHER ROBOT ANSWERS": "ANOTHER ROBOT",
+    "STOP NOT CONFIRMED": "NOT CONFIRMED",
+    "component stale": "stale",
+}
 PAIRING_ENDS_S: Final = 1.0  # how long the window waits for that when it closes
 
 
@@ -43,7 +52,8 @@ class RobotCard(Choosable):
         self.station = station
         self.setAccessibleName(f"Robot {station.name}")
         self._icon = MarkIcon(theme, 12)
-        self._name, self._state, self._link = ElidedLabel("title"), WholeLabel("dim"), FittedLabel("dim")
+        self._name, self._state, self._link = ElidedLabel("title"), FittedLabel("dim"), FittedLabel("dim")
+        self._state.setMinimumWidth(1)
         self.stop = StopButton("robot_stop")
         self.remove = QToolButton()
         self.remove.setText("✕")
@@ -78,10 +88,13 @@ class RobotCard(Choosable):
         self.stop.name(station.title)
         self.remove.setAccessibleName(f"Remove {station.title}")
         worst = station.alarms.worst
-        set_text(self._state, mark.word if worst is None else worst.brief)
+        said = () if worst is None else (worst.brief, f"{mark.word}: {worst.spoken}" if worst.spoken else "")
+        short = SHORTER.get(mark.word, mark.word)
+        # One line: its STOP does not move with what is wrong.
+        self._state.say(*filter(None, (*said, mark.word, short)))
         set_tip(self._state, "" if worst is None else worst.line)
         age = f"{age_text(robot.age_s())}{' old' if robot.age_s() is not None else ''}"
-        live = "" if robot.is_stale() else f" · {robot.rate_hz():.0f} Hz"
+        live = "" if robot.is_stale() else f" · {robot.rate_text()}"
         self._link.say(*dict.fromkeys((f"{age}{live}", age)))
         set_tip(self, f"You are {station.who} here." if station.who else "")
         if self.property("selected") != selected:

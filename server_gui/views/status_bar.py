@@ -69,12 +69,14 @@ class StatusBar(QStatusBar):
         self._bus_icon.show_mark(LEVELS[level])
         self._bus_icon.setVisible(station is not None)
         self.bus.say(*words)
-        self._refresh_recording(None if station is None else station.address)
+        set_tip(self.bus, words[0])
+        self._refresh_recording(station)
         set_text(self._window, f"{self._rate():.0f} fps")
         set_tip(self._window, "frames that this window draws a second")
 
-    def _refresh_recording(self, address: str | None) -> None:
-        said = self._desk.recording.said(address)
+    def _refresh_recording(self, station: Station | None) -> None:
+        address, is_live = (None, True) if station is None else (station.address, station.is_live)
+        said = self._desk.recording.said(address, is_live=is_live)
         self._icon.show_mark(TONES[said.tone])
         first = said.detail.partition("\n")[0]
         wrong = said.tone in (Tone.WARNING, Tone.BAD) and first

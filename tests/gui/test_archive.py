@@ -11,7 +11,9 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from gateway.units import Units
 from gateway.wire.stop import Stopped
+from ml.store.sessions import Session
 from server_gui.core.archive.archive import Archive
 from server_gui.core.cloud.jobs import JobState
 from server_gui.core.recording.recorder import Recorder
@@ -255,3 +257,14 @@ def test_both_tabs_are_drawn_dark_and_light(
             seen = {image.pixel(x, y) for x, y in places}
             assert len(seen) > 40
             assert theme.colour("card").rgb() in seen
+
+
+def test_what_a_recording_began_with_is_in_the_window_s_units(archive: Archive, bench: Bench) -> None:
+    held = {"gait.step_length": 0.43, "gait.trunk_angle": None, "gone.gain": 2.0}
+    assert archive.held_then(Session("exo-01", "s", parameters=held)) == [
+        "gait.step_length = 430 mm",
+        "gone.gain = 2 (SI)",
+    ]
+    bench.desk.shown.change(Units(by_si={"m": "m"}))
+    assert archive.held_then(Session("exo-01", "s", parameters=held))[0] == "gait.step_length = 0.43 m"
+    assert archive.held_then(Session("elsewhere", "s", parameters=held))[0] == "gait.step_length = 0.43 (SI)"

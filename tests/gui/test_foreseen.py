@@ -23,7 +23,7 @@ from server_gui.views.predictions import activity, lines, model_phases, status
 from tests.gui.fakes import Bench
 from tests.gui.foreseen import predicted
 from tests.gui.running import wait
-from tests.support.desk import looked, walking
+from tests.support.desk import JOINTS, looked, telemetry, walking
 
 HOUR_S = 3600.0
 UNCHECKED = "not yet checked on this robot, learned in the simulator 3 days ago"
@@ -107,14 +107,32 @@ def test_a_robot_that_differs_from_what_was_learned_is_said_to(station: Station)
     assert "unlike what it has learned (left_hip.position): do not rely on it" in line.detail
 
 
-def test_a_robot_that_somebody_has_stopped_is_not_called_abnormal(station: Station) -> None:
+@pytest.mark.parametrize(
+    ("states", "held", "why"),
+    [
+        ({}, True, "a stop is held"),
+        (dict.fromkeys(JOINTS, 5.0), False, "drives stop"),
+        (dict.fromkeys(JOINTS, 6.0), False, "no drive is enabled"),
+        ({"left_knee": 7.0}, False, "a drive is in fault"),
+    ],
+)
+def test_a_robot_that_does_not_drive_its_wearer_is_not_judged(
+    window: MainWindow, station: Station, states: dict[str, float], held: bool, why: str
+) -> None:
     drifted = Trust(600, 0.9, 0.0, 3.5, {"left_hip.position": 0.4})
     station.take_prediction(predicted("abnormal", {"walk": 0.41}, novelty=3.5, trust=drifted))
-    station.stopping.held = True
+    station.stopping.held = held
+    now_ns = time.monotonic_ns()
+    columns: dict[str, list[float | None]] = {f"{name}.state": [state] for name, state in states.items()}
+    if columns:
+        station.take([telemetry([now_ns], columns, now_ns)])
     line = status(station)
     assert line is not None
-    assert (line.text, line.mark.colour) == ("Stopped on purpose", "dim")
-    assert "unlike" not in line.detail
+    assert (line.text, line.mark.colour, line.detail) == ("Not judged while stopped", "dim", why)
+    window.overview.refresh()
+    ring = window.overview._ring
+    assert (ring._word, ring._below) == ("Stopped", "not judged")
+    assert not any((*ring._phases.values(), *ring._modelled.values())), "a share of a stride is shown"
     station.take_prediction(predicted("fall", {"steady": 0.03, "fall": 0.97}, "falling"))
     line = status(station)
     assert line is not None
@@ -152,7 +170,7 @@ def test_steps_and_model_are_one_number_and_said_to_differ_where_they_do(station
     seen = leg_phase(derived, Leg.LEFT, derived.stamp_ns)
     assert seen is not None
     share = seen.percent / 100
-    for late_s, off, said in ((0.0, 0.0, "agree"), (0.2, -0.2, "agree"), (0.0, 0.14, "differ by 14 %")):
+    for late_s, off, said in ((0.0, 0.0, "agree"), (0.2, -0.2, "agree"), (0.0, 0.14, "14 % apart")):
         values = {"left": (share + off) % 1.0}
         news = predicted("stride", {"stride": 0.9}, "gait_phase", values=values)
         stamp_ns = derived.stamp_ns - round(late_s * 1e9)

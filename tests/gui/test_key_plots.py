@@ -3,6 +3,7 @@
 import time
 from collections.abc import Iterator
 
+import msgspec
 import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, QPointF, Qt
@@ -10,14 +11,16 @@ from PySide6.QtGui import QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
+from gateway.wire.robot import GuardInfo, GuardRuleInfo
 from server_gui.core.desk.flags import Flag, FlagKind
+from server_gui.core.follow.events import Described
 from server_gui.views.key_plot import SECONDS, KeyPlot
 from server_gui.views.main_window import MainWindow
 from server_gui.views.overview import Overview
 from server_gui.views.theme import Theme
 from tests.gui.fakes import Bench, destroy
 from tests.gui.running import wait
-from tests.support.desk import looked, telemetry, walking
+from tests.support.desk import described, looked, telemetry, walking
 
 HOUR_S = 3600.0
 
@@ -126,6 +129,19 @@ def test_a_limit_is_a_line_where_it_is_in_sight(overview: Overview, bench: Bench
     shares: list[float] = list(torque.plot._marks._shown.limits)
     assert len(shares) == 1
     assert 0.0 < shares[0] < 0.5
+
+
+def test_where_the_guard_trips_is_a_line_too(overview: Overview, bench: Bench) -> None:
+    about = ("knee_range", "joint_limit", "outside", ["left_knee"], ["quick_stop"], "alarm", "watching")
+    knee = GuardRuleInfo(*about, 0, None, 0, [], ["position"], -0.1, 0.2)
+    hip = msgspec.structs.replace(knee, on=["right_hip"], low=-9.0)
+    guard = GuardInfo(configured=True, rules=[knee, hip])
+    bench.station.take([Described(msgspec.structs.replace(described().description, guard=guard))])
+    draw(overview)
+    draw(overview)
+    angle = overview._plots[0]
+    assert angle.legend.accessibleDescription().endswith("-5.73 and 11.46")
+    assert len(angle.plot._marks._shown.limits) == 2
 
 
 def test_what_happened_is_flagged_in_every_plot_at_its_instant(overview: Overview, bench: Bench) -> None:

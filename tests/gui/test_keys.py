@@ -9,13 +9,15 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QApplication
 
 from gateway.wire.resource import ProcessUse
+from server_gui.core.processing.process_names import arguments_of
 from server_gui.core.tuning.writing import Trial
 from server_gui.views.keys_sheet import KEYS
 from server_gui.views.main_window import MainWindow
 from server_gui.views.parameters.tree import NEW, SAID
-from server_gui.views.processes import COMMAND, CPU, NAME, ProcessTable, arguments_of
+from server_gui.views.processes import COMMAND, CPU, NAME, ProcessTable
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.sort_header import SortHeader
+from server_gui.views.widgets.stop_button import StopButton
 from tests.gui.fakes import Bench, destroy, stop_is_whole
 from tests.support.desk import HELD, described, looked, walking
 
@@ -46,6 +48,24 @@ def test_the_sheet_comes_and_goes_with_a_key_and_leaves_stop_alone(window: MainW
     assert not window.keys.isVisible()
 
 
+@pytest.mark.parametrize(("width", "height", "scale"), [(1024, 700, 1.0), (1366, 768, 1.5)])
+def test_no_sheet_covers_an_alarm_or_a_stop(
+    window: MainWindow, bench: Bench, theme: Theme, width: int, height: int, scale: float
+) -> None:
+    theme.set(scale=scale)
+    window.resize(width, height)
+    bench.look_again([looked(state="fault", problem="overcurrent, 0x2310")])
+    bench.draw(window)
+    kept = [window.header, window.alarms, *window.findChildren(StopButton)]
+    before = [part.visibleRegion().boundingRect() for part in kept]
+    for sheet in (window.keys, window.alarms.list):
+        sheet.turn()
+        bench.draw(window)
+        assert sheet.isVisible()
+        assert [part.visibleRegion().boundingRect() for part in kept] == before
+        sheet.turn()
+
+
 def test_ctrl_f_shows_the_panel_that_it_types_into(window: MainWindow, bench: Bench) -> None:
     window._panels.put_away()
     QTest.keyClick(window, Qt.Key.Key_F, Qt.KeyboardModifier.ControlModifier)
@@ -64,7 +84,11 @@ def test_a_trial_is_in_sight_whatever_panel_is_hidden(window: MainWindow, bench:
     bench.draw(window)
     assert window.parameters.trial.isVisible()
     assert not window.trial.isVisible(), "it is told twice"
+    assert not window.overview.now.keep.isVisible(), "it is asked twice"
     window._panels.put_away()
+    bench.draw(window)
+    assert window.overview.now.keep.isVisible()
+    assert not window.trial.isVisible()
     window.tabs.setCurrentIndex(1)  # the overview shows it itself
     bench.draw(window)
     assert window.trial.isVisible()

@@ -131,6 +131,13 @@ def test_a_recording_to_which_nothing_comes_is_not_all_well(age_s: float | None)
     assert said.text.startswith("Recording · nothing comes · ")
 
 
+def test_a_recording_is_not_all_well_once_the_link_is_old() -> None:
+    recording, _ = looked(FakeKeeper(report()))
+    assert recording.said(ADDRESS).tone is Tone.GOOD
+    said = recording.said(ADDRESS, is_live=False)
+    assert (said.tone, said.text[:26]) == (Tone.WARNING, "Recording · nothing comes ")
+
+
 def test_rows_come_before_there_is_a_rate_of_them() -> None:
     recording, _ = looked(FakeKeeper(report(rows_per_s=0.0)))
     said = recording.said(ADDRESS)

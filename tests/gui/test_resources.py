@@ -12,7 +12,8 @@ from PySide6.QtCore import Qt
 from gateway.client import ConnectionState
 from gateway.wire.cost import BudgetInfo, ClientCost, GatewayCost
 from gateway.wire.resource import ProcessUse, Throttling
-from server_gui.core.follow.events import Costs, LinkChanged
+from server_gui.core.desk.busiest import Busiest, busiest
+from server_gui.core.follow.events import Costs, LinkChanged, without_processes
 from server_gui.views.computer import held_back
 from server_gui.views.processes import CPU, MEMORY, NAME, PID
 from server_gui.views.resources import Resources
@@ -45,6 +46,31 @@ def show(view: Resources, bench: Bench, *uses: ProcessUse) -> list[str]:
 
 def use(name: str, pid: int, cpu: float | None, memory: int = MIB) -> ProcessUse:
     return ProcessUse(pid, name, cpu, memory)
+
+
+def test_before_the_first_look_nothing_is_counted(view: Resources) -> None:
+    view.refresh()
+    assert view._processes.note == "no data yet"
+
+
+def test_two_of_one_interpreter_are_told_apart_by_what_they_run(view: Resources, bench: Bench) -> None:
+    lines = (
+        "/usr/bin/python3 -m gwrms gateway r.toml",
+        "/usr/bin/python3 walk.py",
+        "/usr/bin/python3 walk.py",
+    )
+    bench.station.take([resources()])
+    show(view, bench, *(ProcessUse(pid, "python3", 9.0, MIB, line) for pid, line in enumerate(lines, 7)))
+    names = [curve.channel for curve in view.top.plot._curves]
+    assert names == ["gwrms gateway", "walk.py 8", "walk.py 9"]
+
+
+def test_who_uses_most_is_known_without_the_table(bench: Bench) -> None:
+    most = ProcessUse(7, "python3", 88.0, MIB, "/usr/bin/python3 /opt/bin/gwrms gateway")
+    looked = resources([use("idle", 1, 0.1), most])
+    bench.station.take([without_processes(looked)])
+    assert bench.station.processes is None
+    assert busiest(bench.station) == Busiest("gwrms gateway", 88.0)
 
 
 def test_processes_are_asked_for_only_while_they_are_visible(view: Resources, bench: Bench) -> None:

@@ -31,7 +31,7 @@ from server_gui.core.follow.events import Described, Event, LinkChanged, Looked,
 from server_gui.core.tuning.commands import Commands
 
 JOINTS = tuple(f"{side}_{joint}" for side in ("left", "right") for joint in ("hip", "knee", "ankle"))
-STATES = {"4": "operation enabled", "5": "quick stop active", "7": "fault"}
+STATES = {"4": "operation enabled", "5": "quick stop active", "6": "switch on disabled", "7": "fault"}
 UNITS = {"position": "rad", "velocity": "rad/s", "torque": "N·m", "current": "A", "temperature": "°C"}
 HELD = {"gait.step_length": 0.4, "gait.trunk_angle": 0.05, "left_knee.max_torque": 80.0}
 

@@ -1,7 +1,7 @@
 """An active alarm: what is wrong, where, since when, what the robot did, and what to check."""
 
 import dataclasses
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -29,6 +29,8 @@ class Alarm:
     channel: str | None = None
     clears: bool = False
     is_now: bool = True  # else it is what was last known
+    node: str = ""  # the bus of what is a node
+    under: "tuple[Alarm, ...]" = ()  # what it explains
 
     @property
     def key(self) -> tuple[Kind, str]:
@@ -37,8 +39,28 @@ class Alarm:
 
     @property
     def mark(self) -> Mark:
-        """How it is shown, wherever that is."""
-        return TEXTS[self.kind].mark
+        """How it is shown, wherever that is: in its own word, as bad as the worst that it explains."""
+        own, worst = TEXTS[self.kind].mark, min((self, *self.under), key=lambda one: _RANK[one.kind])
+        shown = TEXTS[worst.kind].mark
+        return own if worst is self else Mark(shown.shape, shown.colour, own.word)
+
+    @property
+    def rank(self) -> int:
+        """The less the worse."""
+        return min(_RANK[one.kind] for one in (self, *self.under))
+
+    @property
+    def consequences(self) -> str:
+        """What it explains, by kind: `not to be believed: left hip, right knee; stale: gait`."""
+        names: dict[str, list[str]] = {}
+        for one in self.under:
+            names.setdefault(one.mark.word, []).append(one.spoken or one.what)
+        return "; ".join(f"{word}: {', '.join(found)}" for word, found in names.items())
+
+    @property
+    def spoken(self) -> str:
+        """What it is about, for people."""
+        return self.where.partition(",")[0] or self.subject.replace("_", " ")
 
     @property
     def line(self) -> str:
@@ -65,6 +87,9 @@ class Active:
     is_acknowledged: bool = False
 
 
+Gather = Callable[[Iterable[Active]], Iterable[Active]]
+
+
 class Alarms:
     """The alarms of one robot, worst first and in each kind the oldest; `revision` rises with each change."""
 
@@ -81,25 +106,43 @@ class Alarms:
     @property
     def worst(self) -> Alarm | None:
         """The worst of the robot itself, acknowledged or not: that it is known does not make it better."""
-        of_robot = (one.alarm for one in self._active.values() if one.alarm.kind not in _NOT_ITS_STATE)
-        return min(of_robot, key=lambda alarm: _RANK[alarm.kind], default=None)
+        of_robot = (one.alarm for one in self._shown if one.alarm.kind not in _NOT_ITS_STATE)
+        return min(of_robot, key=lambda alarm: alarm.rank, default=None)
 
-    def look(self, found: Iterable[Alarm], now_s: float, newest_ns: int | None = None) -> None:
-        """Take what is wrong now (UTC); `newest_ns` is the newest row, on the axis of the signals."""
+    @property
+    def each(self) -> Sequence[Alarm]:
+        """Every one, also what another explains."""
+        return [alarm for one in self._shown for alarm in (one.alarm, *one.alarm.under)]
+
+    def look(
+        self,
+        found: Iterable[Alarm],
+        now_s: float,
+        newest_ns: int | None = None,
+        gather: Gather = list,
+    ) -> None:
+        """Take what is wrong now (UTC); `newest_ns` is the newest row, on the axis of the signals.
+
+        `gather` puts what has one cause under it.
+        """
         before = self._active
         self._active = {alarm.key: _kept(before.get(alarm.key), alarm, now_s, newest_ns) for alarm in found}
-        if self._active != before:
-            self._changed()
+        self._show(gather(self._active.values()))
 
     def acknowledge(self, key: tuple[Kind, str]) -> None:
-        """Somebody has read it; it is shown smaller until it is over."""
-        if key in self._active:
-            self._active[key] = dataclasses.replace(self._active[key], is_acknowledged=True)
-            self._changed()
+        """Somebody has read it, and what it explains; it is shown smaller until it is over."""
+        read = {key} | {under.key for one in self._shown if one.alarm.key == key for under in one.alarm.under}
+        for each in read & self._active.keys():
+            self._active[each] = dataclasses.replace(self._active[each], is_acknowledged=True)
+        self._show(
+            dataclasses.replace(one, is_acknowledged=True) if one.alarm.key == key else one
+            for one in self._shown
+        )
 
-    def _changed(self) -> None:
-        self.revision += 1
-        self._shown = tuple(sorted(self._active.values(), key=_order))
+    def _show(self, shown: Iterable[Active]) -> None:
+        before, self._shown = self._shown, tuple(sorted(shown, key=_order))
+        if self._shown != before:
+            self.revision += 1
 
 
 def _kept(before: Active | None, alarm: Alarm, now_s: float, newest_ns: int | None) -> Active:
@@ -112,7 +155,7 @@ def _kept(before: Active | None, alarm: Alarm, now_s: float, newest_ns: int | No
 
 
 def _order(one: Active) -> tuple[bool, int, float]:
-    return one.is_acknowledged, _RANK[one.alarm.kind], one.since_s
+    return one.is_acknowledged, one.alarm.rank, one.since_s
 
 
 _RANK = {kind: place for place, kind in enumerate(Kind)}

@@ -2,7 +2,7 @@
 
 import re
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -10,6 +10,7 @@ from gateway.client import ConnectionState
 from gateway.wire.bus import CLOSED
 from gateway.wire.robot import GuardRuleInfo
 from server_gui.core.alarms.alarm import Alarm
+from server_gui.core.alarms.causes import Stall, stood_still
 from server_gui.core.alarms.marks import ENABLED, age_text
 from server_gui.core.alarms.texts import Kind, check_of, error_check, error_text
 from server_gui.core.follow.robot import Part, Robot
@@ -46,6 +47,7 @@ class Facts:
     stopping: StopProgress
     address: str
     journal: Iterable[Mapping[str, Any]] = ()
+    stalls: Sequence[Stall] = ()
 
 
 def alarms(facts: Facts) -> Iterator[Alarm]:
@@ -57,9 +59,13 @@ def alarms(facts: Facts) -> Iterator[Alarm]:
     for name in robot.names("joint"):
         yield from _of_drive(robot, name, facts.stopping)
     for part in robot.parts.values():
-        yield from _of_part(robot, part, facts.stopping)
+        if not part.comes_up:
+            yield from _of_part(robot, part, facts.stopping)
+    yield from _of_those_that_come_up(robot)
     yield from _of_guard(facts)
     yield from _of_buses(robot)
+    if not robot.is_recording:
+        yield from stood_still(facts.stalls)
 
 
 # --- STOP
@@ -238,7 +244,21 @@ def _of_part(robot: Robot, part: Part, stopping: StopProgress) -> Iterator[Alarm
         since_s if kind is not Kind.IMPLAUSIBLE else None,
         channel,
         is_now=is_now,
+        node=_bus(robot, part.name),
     )
+
+
+def _of_those_that_come_up(robot: Robot) -> Iterator[Alarm]:
+    """One alarm, not one a device, while a gateway that was asked just now begins to read."""
+    names = [part.name for part in robot.parts.values() if part.comes_up]
+    if names and not robot.is_recording:
+        yield Alarm(
+            Kind.NO_DATA,
+            "devices",
+            f"not read yet: {_listed(names)}",
+            check=check_of(Kind.NO_DATA),
+            is_now=not robot.is_stale(),
+        )
 
 
 # --- guard and buses
@@ -300,12 +320,20 @@ def _of_buses(robot: Robot) -> Iterator[Alarm]:
 
 def _where(robot: Robot, name: str) -> str:
     """`left knee, node 2 on can0`."""
-    spoken = name.replace("_", " ")
+    spoken, bus = name.replace("_", " "), _bus(robot, name)
+    return f"{spoken}, node {_device(robot, name)['node_id']} on {bus}" if bus else spoken
+
+
+def _bus(robot: Robot, name: str) -> str:
+    """The bus of a component that is a node."""
+    device = _device(robot, name)
+    return str(device.get("bus", "its bus")) if "node_id" in device else ""
+
+
+def _device(robot: Robot, name: str) -> Mapping[str, Any]:
     known = () if robot.description is None else robot.description.components
     device = next((part.device for part in known if part.name == name), None)
-    if not isinstance(device, dict) or "node_id" not in device:
-        return spoken
-    return f"{spoken}, node {device['node_id']} on {device.get('bus', 'its bus')}"
+    return device if isinstance(device, dict) else {}
 
 
 def _channel(robot: Robot, name: str, code: int | None, first: tuple[str, ...] = ()) -> str | None:

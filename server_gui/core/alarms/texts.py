@@ -27,6 +27,7 @@ class Kind(Enum):
     NOT_RECORDED = "not recorded"
     STOPPED = "STOPPED"
     PART_STALE = "component stale"
+    STALLED = "stood still"
     UNKNOWN = "state not known"
     BUS = "bus"
     BLIND = "guard blind"
@@ -95,6 +96,12 @@ TEXTS: Final = dict(
             "(gwrms enable, or the robot's controller)",
         ),
         _text(Kind.PART_STALE, "triangle", "warn", "check its power, and its cable or radio"),
+        _text(
+            Kind.STALLED,
+            "triangle",
+            "warn",
+            "see what keeps the robot's computer busy (gwrms describe); nothing was measured meanwhile",
+        ),
         _text(
             Kind.UNKNOWN,
             "ring",

@@ -17,6 +17,7 @@ from server_gui.core.models.models import Models
 from server_gui.core.settings.server_file import ServerSettings
 from server_gui.core.threads.answers import Deliver, when_done
 from server_gui.core.threads.background import Background
+from server_gui.core.tuning.edits import unit_of
 
 WHO = "recordings"  # what the news name instead of a robot
 
@@ -75,6 +76,25 @@ class Archive:
     def _robots(self) -> set[str]:
         """Those of the server's file, and those that are shown."""
         return {*self.settings.robots, *(station.name for station in self._desk)}
+
+    @property
+    def shown_units(self) -> object:
+        """Another one where people have chosen other units."""
+        return self._desk.shown.units
+
+    def held_then(self, session: Session) -> list[str]:
+        """The parameters that it began with, in the window's units; in SI where the robot is not there."""
+        found = (station.robot.description for station in self._desk if station.name == session.robot)
+        described = next((one for one in found if one is not None), None)
+        si = {} if described is None else {one.name: one.unit for one in described.parameters}
+        said = []
+        for name, value in session.parameters.items():
+            if value is not None and name in si:
+                unit = unit_of(name, si[name], self._desk.shown.units)
+                said.append(f"{name} = {unit.editable(value)} {unit.symbol}".rstrip())
+            elif value is not None:
+                said.append(f"{name} = {value:g} (SI)")
+        return said
 
     def _words(self, robot: str) -> dict[str, dict[str, str]]:
         """The words of states, which recordings do not have: of the live robot, if it is there."""

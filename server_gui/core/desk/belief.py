@@ -7,12 +7,14 @@ from typing import Final
 
 from ml.registry.card import Source
 from ml.serving.trust import Level
+from server_gui.core.alarms.marks import ENABLED
 from server_gui.core.desk.station import Station
 from server_gui.core.models.names import told_name
 from server_gui.core.prediction.current import Recalled, Shown, Told
 from server_gui.core.prediction.state import Quality
 
 QUICK_STOP: Final = "quick stop active"
+IN_FAULT: Final = ("fault", "fault reaction active")
 SOURCES: Final = {
     Source.SIMULATED: "learned in the simulator",
     Source.RECORDED: "learned from recordings",
@@ -53,11 +55,17 @@ def belief(told: Told) -> Belief:
     return Belief(Worth.CHECKED, _checked(quality))
 
 
-def is_stopped(station: Station) -> bool:
-    """Return whether a stop is held or under way: what a robot does then is no sign of anything."""
+def not_judged(station: Station) -> str:
+    """Return why what the robot does now is no sign of anything: it does not drive its wearer."""
     robot = station.robot
-    words = (robot.word(f"{joint}.state") or "" for joint in robot.names("joint"))
-    return station.stopping.held or any(word.lower() == QUICK_STOP for word in words)
+    words = [(robot.word(f"{joint}.state") or "").lower() for joint in robot.names("joint")]
+    if station.stopping.held:
+        return "a stop is held"
+    if QUICK_STOP in words:
+        return "drives stop"
+    if any(word in IN_FAULT for word in words):
+        return "a drive is in fault"
+    return "no drive is enabled" if words and all(words) and ENABLED not in words else ""
 
 
 def _checked(quality: Quality) -> tuple[str, ...]:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from server_gui.core.desk.station import Station
+from server_gui.core.processing.process_names import short_name
 
 OLD_S: Final = 10.0  # a look before says nothing of now
 
@@ -19,11 +20,9 @@ class Busiest:
 
 def busiest(station: Station) -> Busiest | None:
     """Return the one that takes most, None where nobody has looked."""
-    table, at_ns = station.processes, station.processes_at_ns
-    if table is None or at_ns is None or not isinstance(table.processes, list) or not station.is_linked:
+    if station.most is None or not station.is_linked:
         return None
-    if time.monotonic_ns() - at_ns > OLD_S * 1e9:
+    most, at_ns = station.most
+    if most.cpu_percent is None or time.monotonic_ns() - at_ns > OLD_S * 1e9:
         return None
-    known = [(one.cpu_percent, one.name) for one in table.processes if one.cpu_percent is not None]
-    percent, name = max(known, default=(0.0, ""))
-    return Busiest(name, percent) if name else None
+    return Busiest(short_name(most), most.cpu_percent)

@@ -202,7 +202,7 @@ class Feeds:
             return
         if predicting is not None:
             predicting.take(robot, event)
-        self._show(robot, event)
+        self._show(robot, without_processes(event))
 
     def _kept(self, robot: str, event: Event) -> None:
         """What was kept is shown. The table of processes has a look of its own."""

@@ -223,8 +223,11 @@ class Recording:
         for text in (*uploader.lost, *uploader.ahead):
             yield Alarm(Kind.UPLOAD, text, text, "what is kept", check=DAMAGED)
 
-    def said(self, address: str | None) -> Said:
-        """Return how it goes, for who looks at the robot with this address."""
+    def said(self, address: str | None, *, is_live: bool = True) -> Said:
+        """Return how it goes, for who looks at the robot with this address.
+
+        A report is a second old; whether this window's own link `is_live` is known at once.
+        """
         report = self.report
         if self._keeper is None:
             return Said(Tone.OFF, "Not recording", self.why)
@@ -246,9 +249,9 @@ class Recording:
         addresses = {link.address for link in report.robots.values()}
         if self.by is By.OTHER and address is not None and address not in addresses:
             return Said(Tone.WARNING, "This robot is NOT recorded", _not_followed(report))
-        return self._going_on(report, address)
+        return self._going_on(report, address, comes=is_live or self.by is not By.WINDOW)
 
-    def _going_on(self, report: CollectorReport, address: str | None) -> Said:
+    def _going_on(self, report: CollectorReport, address: str | None, *, comes: bool) -> Said:
         who = "" if self.by is By.WINDOW else f" by process {report.pid}"
         rows = sum(link.rows_per_s for link in report.robots.values())
         problems = [trouble.text for threads in self._threads.values() for trouble in threads]
@@ -257,7 +260,9 @@ class Recording:
         problems += (*report.uploader.lost, *report.uploader.ahead)
         facts = [
             f"Recording{who}",
-            _coming(rows, [link for link in report.robots.values() if address in (None, link.address)]),
+            _coming(rows, [link for link in report.robots.values() if address in (None, link.address)])
+            if comes
+            else NOTHING,
             *_queue(report),
             f"{size(report.disk_free_bytes)} free",
         ]

@@ -14,10 +14,11 @@ from gateway.wire.control import Lease
 from gateway.wire.cost import GatewayCost
 from gateway.wire.method import AnyMethod
 from gateway.wire.parameter import ParameterInfo, Stored, Written
-from gateway.wire.resource import ResourceSnapshot
+from gateway.wire.resource import ProcessUse, ResourceSnapshot
 from gateway.wire.robot import Description
 from gateway.wire.stop import Stopped
 from server_gui.core.alarms.alarm import Alarms
+from server_gui.core.alarms.causes import STOOD_S, Stalls, gathered
 from server_gui.core.alarms.found import Facts, any_enabled
 from server_gui.core.alarms.found import alarms as found
 from server_gui.core.alarms.marks import Mark
@@ -50,10 +51,10 @@ from server_gui.core.tuning.flash import Flash
 from server_gui.core.tuning.lease import LeaseState
 from server_gui.core.tuning.link import LEASE_S
 from server_gui.core.tuning.stop import StopProgress, StopState
+from server_gui.core.tuning.taken_back import OVERDUE_S, TakenBack
 from server_gui.core.tuning.writing import WriteProgress, WriteState
 
 WATCH_NS: Final = 200_000_000  # between looks for news
-OVERDUE_S: Final = 2.0  # after a trial's end its values are looked at again
 
 
 class Station:
@@ -79,6 +80,7 @@ class Station:
         self.processing = RobotProcessing()
         self.processes: ResourceSnapshot | None = None  # the newest look with a process table
         self.processes_at_ns: int | None = None
+        self.most: tuple[ProcessUse, int] | None = None  # who used most CPU, and when that was seen
         self.cost: GatewayCost | None = None  # what monitoring costs the robot, as long as it is looked at
         self.predictions = StationPredictions()
         self.stopping = StopProgress()
@@ -95,6 +97,8 @@ class Station:
         self._watch = RobotNews(self.tell)
         self._watched_ns = 0
         self._states = StateWatch()
+        self._stalls = Stalls()
+        self._back = TakenBack(self.robot, self.writing, self.tell)
 
     @property
     def called(self) -> str:
@@ -143,10 +147,13 @@ class Station:
     @property
     def alarms(self) -> Alarms:
         """What is wrong with it, as of now."""
-        facts = Facts(self.robot, self.stopping, self.address, self.audit.entries)
+        stalls, now_s = self._stalls.latest, self.robot.now_s()
+        facts = Facts(self.robot, self.stopping, self.address, self.audit.entries, stalls)
         if self.stopping.was_ended and any_enabled(self.robot) and self.is_live:
             self.stopping.was_ended = False
-        self._alarms.look(found(facts), self.robot.now_s(), self.rings.newest_ns)
+        self._alarms.look(
+            found(facts), now_s, self.rings.newest_ns, lambda active: gathered(active, stalls, now_s)
+        )
         return self._alarms
 
     @property
@@ -171,11 +178,14 @@ class Station:
             if isinstance(event, Resources) and isinstance(event.snapshot.processes, list):
                 self._processes(event)
                 continue
+            if isinstance(event, Resources) and event.most is not None:
+                self.most = event.most, event.at_ns
             before = self.robot.description
             self.robot.apply(event)
             self.processing.apply(event)
             match event:
                 case Telemetry():
+                    self._look_for_stalls(event)
                     self.rings.take(event.batch.stamps_ns, event.batch.columns)
                     self.flags.add(
                         *self._states.take(event.batch.stamps_ns, event.batch.columns, self.robot.state_words)
@@ -184,6 +194,7 @@ class Station:
                     self._show_stop(event)
                 case Looked():
                     self.flash.look(event.quality.quality, event.at_ns)
+                    self._back.look()
                 case Journalled():
                     self.audit.take(event.journal.entries)
                     self.stopping.read(event.journal.entries)
@@ -197,12 +208,23 @@ class Station:
                     self.cost = None  # it was of the link that there was
                     self.predictions.clear()
                     self.flash.forget()
+                    self._stalls.forget()
         now_ns = time.monotonic_ns()
         if now_ns - self._watched_ns >= WATCH_NS:
             self._watched_ns = now_ns
             self._watch.look(self.robot)
             self.alarms  # noqa: B018 - seen now, so that it is known since when
             self.end_trial_if_over(now_ns)
+
+    def _look_for_stalls(self, event: Telemetry) -> None:
+        batch = event.batch
+        if self.robot.is_recording:
+            return
+        ago_s = (time.monotonic_ns() - batch.received_ns) / 1e9
+        stamps_ns, received_s = batch.stamps_ns, self.robot.now_s() - ago_s
+        stall = self._stalls.take(event.stream, stamps_ns, batch.received_ns, received_s)
+        if stall is not None and stall.lasted_s >= STOOD_S:
+            self.tell(NewsKind.WARNING, f"the robot's computer stood still for {stall.lasted_s:.1f} s")
 
     def _described(self, description: Description, before: Description | None) -> None:
         if before is not None and before.boot_id != description.boot_id:
@@ -222,6 +244,9 @@ class Station:
     def _processes(self, event: Resources) -> None:
         """A look at the process table; of CPU and memory the other looks tell, over their own periods."""
         self.processes, self.processes_at_ns = event.snapshot, event.at_ns
+        table = event.snapshot.processes or []
+        known = max(table, key=lambda one: one.cpu_percent or 0.0, default=None)
+        self.most = None if known is None else (known, event.at_ns)
         seen = self.robot.resources
         if seen is not None:
             snapshot = replace(event.snapshot, cpu=seen.cpu, gateway=seen.gateway)
@@ -348,6 +373,8 @@ class Station:
     def _written(self, changes: tuple[Change, ...], written: Written) -> None:
         self.control.renewed(LEASE_S)
         self.writing.done(written)
+        self.robot.hold(written.after)
+        self._back.forget()
         self.edits.drop(*(change.name for change in changes))
         self.tell(NewsKind.PARAMETER, ", ".join(_line(change, written) for change in changes))
 
@@ -363,7 +390,10 @@ class Station:
     def end_trial(self) -> None:
         """Take back what is on trial, now."""
         if self.writing.trial is not None:
-            self._ask(self._commands.revert(self.writing.trial.write), lambda _: self._taken_back(), "revert")
+            before = self.writing.trial.before
+            self._ask(
+                self._commands.revert(self.writing.trial.write), lambda _: self._back.began(before), "revert"
+            )
 
     def stage_undo(self) -> None:
         """Stage the inverse of the latest write, to be reviewed and written like any edit."""
@@ -377,7 +407,7 @@ class Station:
         self.writing.kept()
         self.tell(NewsKind.PARAMETER, self.writing.text)
 
-    def _taken_back(self, how: str = "taken back: the values from before are in force") -> None:
+    def _taken_back(self, how: str) -> None:
         self.writing.reverted(how)
         self.tell(NewsKind.PARAMETER, how)
 
@@ -389,9 +419,7 @@ class Station:
         trial, read_ns = self.writing.trial, self.robot.parameters_at_ns
         if trial is None or read_ns is None or min(now_ns, read_ns) - trial.until_ns < OVERDUE_S * 1e9:
             return
-        held = self.robot.parameters
-        back = all(name in held and held[name].value == value for name, value in trial.before.items())
-        if back:
+        if self.robot.holds(trial.before):
             self._taken_back("the trial's time is over: the robot has taken it back")
         else:
             self.writing.trial = None

@@ -11,7 +11,7 @@ from gateway.wire.component import Snapshot
 from gateway.wire.control import JournalEntries, SignedHead
 from gateway.wire.cost import GatewayCost
 from gateway.wire.parameter import ParameterValues
-from gateway.wire.resource import ResourceSnapshot
+from gateway.wire.resource import ProcessUse, ResourceSnapshot
 from gateway.wire.robot import Description, Hello
 
 
@@ -41,6 +41,7 @@ class Telemetry:
     stream: int
     batch: Batch
     clock: ClockOffset | None
+    asked_hz: float = 0.0  # rows that were asked for a second; 0: each source's own
 
     @property
     def age_ns(self) -> int | None:
@@ -67,6 +68,7 @@ class Resources:
     round_trip_ns: int | None
     at_ns: int
     received_bytes: int = 0
+    most: ProcessUse | None = None  # who uses most CPU, where the table itself is left out
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,9 +121,10 @@ def replaced(event: Telemetry, stamps_ns: list[int], columns: dict[str, list[flo
 
 
 def without_processes(event: Event) -> Event:
-    """Return the same, without the table of processes."""
+    """Return the same, of the table of processes only who uses most."""
     if not isinstance(event, Resources):
         return event
-    return dataclasses.replace(
-        event, snapshot=msgspec.structs.replace(event.snapshot, processes=msgspec.UNSET)
-    )
+    table = event.snapshot.processes
+    most = max(table, key=lambda one: one.cpu_percent or 0.0, default=None) if table else None
+    left = msgspec.structs.replace(event.snapshot, processes=msgspec.UNSET)
+    return dataclasses.replace(event, snapshot=left, most=most)

@@ -172,7 +172,7 @@ class Feed:
         async with self._client.subscribe(*channels, rate_hz=rate_hz, depth=DEPTH) as stream:
             async for batch in stream:
                 try:
-                    self._admit(Telemetry(stream.stream or 0, batch, clock.offset))
+                    self._admit(Telemetry(stream.stream or 0, batch, clock.offset, rate_hz))
                 except Unfit as error:
                     self._tell(Refused("its rows are refused", str(error)))
 

@@ -5,6 +5,8 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+import msgspec
+
 from gateway.client import ConnectionState
 from gateway.wire.bus import BusInfo
 from gateway.wire.component import QualityInfo
@@ -24,6 +26,8 @@ from server_gui.core.follow.events import (
 
 STALE_NS = 500_000_000  # older than this is shown as old
 RATE_WINDOW_NS = 2_000_000_000
+COMES_UP = "it was not read yet"  # as a gateway says of what it has asked for the first time just now
+SLOW = 0.8  # of the rate that was asked for: below that it is said
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +39,11 @@ class Part:
     state: str
     age_ms: float | None
     problem: str | None
+
+    @property
+    def comes_up(self) -> bool:
+        """Whether the robot has only begun to read it."""
+        return (self.problem or "").startswith(COMES_UP)
 
 
 @dataclass(slots=True)
@@ -71,12 +80,14 @@ class Robot:
     buses: tuple[BusInfo, ...] | None = None  # None: not known
     buses_at_ns: int | None = None
     last_failure: Failed | None = None
+    asked_hz: float = 0.0  # rows a second; 0: as they come
     is_recording: bool = False  # then there is nobody whose state could be good
     _newest_ns: int | None = None  # when the newest row was taken, on our clock
     _arrivals: collections.deque[tuple[int, int]] = field(
         default_factory=lambda: collections.deque(maxlen=4096)
     )
     _dropped_seen: int = 0
+    _flows_since_ns: int = 0  # the first rows of this link
     _words: dict[str, dict[str, str]] = field(default_factory=dict)
 
     def apply(self, event: Event) -> None:
@@ -98,6 +109,17 @@ class Robot:
             case Failed():
                 self.last_failure = event
 
+    def hold(self, values: Mapping[str, float]) -> None:
+        """Take what devices were read to hold just now."""
+        for name, value in values.items():
+            if name in self.parameters:
+                self.parameters[name] = msgspec.structs.replace(self.parameters[name], value=value)
+
+    def holds(self, values: Mapping[str, float]) -> bool:
+        """Return whether its parameters were read to have just these values."""
+        held = self.parameters
+        return all(name in held and held[name].value == value for name, value in values.items())
+
     # --- what views ask
 
     def age_s(self, now_ns: int | None = None) -> float | None:
@@ -116,6 +138,16 @@ class Robot:
         now_ns = time.monotonic_ns() if now_ns is None else now_ns
         recent = sum(rows for at_ns, rows in self._arrivals if now_ns - at_ns <= RATE_WINDOW_NS)
         return recent / (RATE_WINDOW_NS / 1e9)
+
+    def is_slow(self, now_ns: int | None = None) -> bool:
+        """Return whether fewer rows come than were asked for; not before a link has lasted for a while."""
+        now_ns = time.monotonic_ns() if now_ns is None else now_ns
+        return now_ns - self._flows_since_ns > RATE_WINDOW_NS and self.rate_hz(now_ns) < SLOW * self.asked_hz
+
+    def rate_text(self, now_ns: int | None = None) -> str:
+        """Return how many rows come a second, of how many where these are fewer."""
+        of = f" of {self.asked_hz:.0f}" if self.is_slow(now_ns) else ""
+        return f"{self.rate_hz(now_ns):.0f}{of} Hz"
 
     def now_s(self) -> float:
         """Return the instant that is shown, UTC."""
@@ -150,6 +182,7 @@ class Robot:
     def _link_changed(self, event: LinkChanged) -> None:
         link = self.link
         link.links += event.state is ConnectionState.CONNECTED
+        self._flows_since_ns = 0
         link.state, link.problem, link.since_ns = event.state, event.problem, event.at_ns
         if event.problem is not None or event.state is ConnectionState.CONNECTED:
             link.is_another = event.is_another
@@ -171,6 +204,8 @@ class Robot:
             self.values[name] = column[-1]
         self._newest_ns = batch.received_ns - (event.age_ns or 0)
         self._arrivals.append((batch.received_ns, rows))
+        self.asked_hz = event.asked_hz
+        self._flows_since_ns = self._flows_since_ns or batch.received_ns
         self.link.missed += batch.missed
         self.link.dropped += max(0, batch.dropped - self._dropped_seen)
         self._dropped_seen = batch.dropped
@@ -180,7 +215,7 @@ class Robot:
             if name in self.parts:
                 self.parts[name] = _part(self.parts[name], found)
         if event.parameters is not None:
-            self.parameters = event.parameters.values
+            self.parameters = dict(event.parameters.values)
             self.parameters_at_ns = event.at_ns
 
 

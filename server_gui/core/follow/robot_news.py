@@ -55,6 +55,8 @@ class RobotNews:
 
     def _look_at_parts(self, robot: Robot) -> None:
         for part in robot.parts.values():
+            if part.comes_up:
+                continue
             before = self._parts.get(part.name, "ok")
             if part.state != before:
                 why = f": {part.problem}" if part.problem else ""

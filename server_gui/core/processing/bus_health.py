@@ -86,14 +86,13 @@ def worst(robot: Robot) -> tuple[Level, tuple[str, ...]]:
         return Level.UNKNOWN, ("no CAN bus", "no bus")
     bus = max(buses, key=lambda one: (ORDER.index(level(one)), one.load_percent or 0.0))
     load = f"CAN {bus.name} {load_text(bus)}"
-    state = "" if bus.state == ACTIVE else f", {bus.state}"
     most = next((one for one in talking(bus) if one.names), None)
-    full = () if most is None else (f"{load}, {errors_text(bus)}{state} · most: {_names(most)}",)
-    return level(bus), (
-        *full,
-        f"{load}, {errors_text(bus)}{state}",
-        f"CAN {load_text(bus)}, {errors_text(bus)}",
-    )
+    who = "" if most is None else f" · most: {_names(most)}"
+    if (why := reason(bus)) is not None:
+        said = [f"{load}, {errors_text(bus)}: {why[0]}{who}", *(f"{load}: {one}" for one in why)]
+        return level(bus), (*said, f"CAN {load_text(bus)}: {why[-1]}")
+    said = [f"{load}, {errors_text(bus)}{who}", f"{load}, {errors_text(bus)}"]
+    return level(bus), tuple(dict.fromkeys((*said, f"CAN {load_text(bus)}, {errors_text(bus)}")))
 
 
 def trouble(bus: BusInfo) -> tuple[str, str] | None:
@@ -104,15 +103,34 @@ def trouble(bus: BusInfo) -> tuple[str, str] | None:
     if (load >= BUSY_PERCENT and not bus.findings) or load >= FULL_PERCENT:
         said = "it is full" if load >= FULL_PERCENT else "it is busy"
         full = [(f"{said}: {load_text(bus)} of its time is taken", FEWER)]
-    found = [*bus.findings, *(one for node in bus.nodes for one in node.findings)]
     told = [
         (bus.problem or "", ""),
         (bus.state if bus.state != ACTIVE else "", ""),
         *full,
-        *((one.words, one.check) for one in found),
+        *((one.words, one.check) for one in bus.findings),
+        *((f"{_who(node)}: {one.words}", one.check) for node in bus.nodes for one in node.findings),
         *((_missing(node), "") for node in bus.nodes if not node.findings and _misses(node)),
     ]
     return _joined(words for words, _ in told), _joined(check for _, check in told)
+
+
+def reason(bus: BusInfo) -> tuple[str, ...] | None:
+    """Return why a bus is not as it should be, the fullest wording first; None: it is."""
+    said = trouble(bus)
+    if said is None:
+        return None
+    load = bus.load_percent or 0.0
+    short = {
+        "no answer": any("no SDO" in one.words for node in bus.nodes for one in node.findings),
+        "PDOs missing": any(_misses(node) for node in bus.nodes),
+        "errors": bool(bus.findings),
+        "busy": load >= BUSY_PERCENT,
+        "full": load >= FULL_PERCENT,
+        bus.state: bus.state != ACTIVE,
+        "it fails": bus.problem is not None,
+    }
+    first = said[0].partition("; ")[0]
+    return first, next((word for word, so in reversed(short.items()) if so), "a node is in trouble")
 
 
 def talking(bus: BusInfo) -> list[Talking]:
@@ -149,5 +167,8 @@ def _misses(node: NodeInfo) -> bool:
 
 
 def _missing(node: NodeInfo) -> str:
-    names = ", ".join(name.replace("_", " ") for name in node.components) or f"node {node.node_id}"
-    return f"{node.pdos_missing_percent or 0.0:.0f} % of the PDOs of {names} are missing"
+    return f"{node.pdos_missing_percent or 0.0:.0f} % of the PDOs of {_who(node)} are missing"
+
+
+def _who(node: NodeInfo) -> str:
+    return ", ".join(name.replace("_", " ") for name in node.components) or f"node {node.node_id}"

@@ -10,6 +10,7 @@ from msgspec import UNSET
 
 from gateway.wire.resource import ProcessUse, ResourceSnapshot
 from server_gui.core.processing.history import COARSE_S, Floats, History
+from server_gui.core.processing.process_names import short_name
 from server_gui.core.processing.trend import Slope, theil_sen
 
 PROCESSES = 256  # that are followed at a time; the longest unseen goes
@@ -41,6 +42,7 @@ class Consumer:
     name: str
     cpu_percent: float | None
     memory_bytes: int
+    label: str = ""  # what people call it
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,7 +138,7 @@ class ResourceProcessing:
         if process is None:
             if len(self._processes) >= PROCESSES:
                 self._processes.popitem(last=False)
-            process = self._processes[key] = _Process(use.pid, use.name)
+            process = self._processes[key] = _Process(use)
         self._processes.move_to_end(key)
         process.take(self._now_s, use)
 
@@ -144,8 +146,8 @@ class ResourceProcessing:
 class _Process:
     """What is kept of one process: a minute of CPU, two hours of memory, a median a minute."""
 
-    def __init__(self, pid: int, name: str) -> None:
-        self._pid, self._name = pid, name
+    def __init__(self, first: ProcessUse) -> None:
+        self._pid, self._name, self._label = first.pid, first.name, short_name(first)
         self._cpu: collections.deque[tuple[float, float]] = collections.deque(maxlen=PERCENTAGES)
         self._minutes: collections.deque[tuple[float, float]] = collections.deque(maxlen=LEAK_MINUTES)
         self._minute: list[int] = []
@@ -182,7 +184,7 @@ class _Process:
     def consumer(self) -> Consumer:
         recent = [percent for at_s, percent in self._cpu if self._seen_s - at_s <= TOP_S]
         cpu = statistics.fmean(recent) if recent else None
-        return Consumer(self._pid, self._name, cpu, self._memory)
+        return Consumer(self._pid, self._name, cpu, self._memory, self._label)
 
     def leak(self) -> Leak | None:
         """Judged anew once a minute."""

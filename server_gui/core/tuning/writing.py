@@ -97,6 +97,11 @@ class WriteProgress:
             self.undo.append(self.trial.before)
             self._end_trial("kept: the trial's values stay")
 
+    def reverting(self) -> None:
+        """The robot says that what was on trial has gone back; it is not read yet."""
+        self.trial = None
+        self._set(WriteState.WRITING, "taken back: reading what is held …")
+
     def reverted(self, how: str) -> None:
         """What was on trial has gone back."""
         self._end_trial(how)

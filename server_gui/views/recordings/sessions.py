@@ -1,6 +1,6 @@
 """Every recorded session, newest first: what is known of it, what happened in it; to be played."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from datetime import datetime
 from typing import Any, Final
 
@@ -139,11 +139,12 @@ class SessionsPage(QWidget):
     def _refresh_details(self) -> None:
         archive, session = self._archive, self.chosen
         self.play.setEnabled(archive.tape is not None)
-        known = (session, archive.tape, archive.problem)
+        known = (session, archive.tape, archive.problem, archive.shown_units)
         if known != self._told:
             self._told = known
             self._card.set_title("Recording" if session is None else session.session)
-            self.details.setPlainText(_told(session, archive.tape, archive.problem))
+            held = [] if session is None else archive.held_then(session)
+            self.details.setPlainText(_told(session, archive.tape, archive.problem, held))
 
     # --- how it is put together
 
@@ -210,7 +211,7 @@ def _when(time: datetime | None) -> str:
     return "–" if time is None else f"{time.astimezone():%Y-%m-%d %H:%M:%S}"
 
 
-def _told(session: Session | None, tape: Tape | None, problem: str) -> str:
+def _told(session: Session | None, tape: Tape | None, problem: str, held: Sequence[str]) -> str:
     """What is known of it, as text."""
     if session is None:
         return "Choose a recording to see what is in it."
@@ -229,7 +230,6 @@ def _told(session: Session | None, tape: Tape | None, problem: str) -> str:
         lines += ["", "looking into it …"]
     else:
         lines += ["", *_inside(tape)]
-    held = [f"{name} = {value:g}" for name, value in session.parameters.items() if value is not None]
     return "\n".join([*lines, *(["", "Parameters when it began:", *held] if held else [])])
 
 

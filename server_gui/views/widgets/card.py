@@ -52,8 +52,8 @@ def set_text(label: QLabel, text: str) -> None:
         label.setText(text)
 
 
-def set_tone(label: QLabel, tone: str) -> None:
-    """Change the colour of a label, by its name in the style sheet, only where it is another."""
+def set_tone(label: QWidget, tone: str) -> None:
+    """Change the colour of a label or a frame, by its name in the style sheet, only where it is another."""
     if label.property("tone") != tone:
         label.setProperty("tone", tone)
         label.style().polish(label)

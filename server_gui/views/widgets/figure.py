@@ -43,7 +43,7 @@ class StickFigure(QWidget):
         self._live = False
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-        self.setMinimumSize(130, 120)
+        self.setMinimumSize(130, 96)
         self.setAccessibleName("Posture from the right side")
 
     def sizeHint(self) -> QSize:

@@ -1,10 +1,14 @@
-"""A label that says less where there is less room: no number is ever cut, the last wording stays whole."""
+"""A label that says less where there is less room: no number is ever cut, only words are."""
 
-from PySide6.QtCore import QSize
+from typing import Final
+
+from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import QSizePolicy
 
 from server_gui.views.widgets.plain import PlainLabel
+
+MIDDLE: Final = Qt.TextElideMode.ElideMiddle
 
 
 class FittedLabel(PlainLabel):
@@ -44,8 +48,10 @@ class FittedLabel(PlainLabel):
         return self._size(min(self._width(text) for text in self._wordings))
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        painter.drawText(self.contentsRect(), self.alignment(), self.shown)
+        painter, text = QPainter(self), self.shown
+        if not self.is_whole and not any(sign.isdigit() for sign in text):
+            text = self.fontMetrics().elidedText(text, MIDDLE, self.contentsRect().width())
+        painter.drawText(self.contentsRect(), self.alignment(), text)
         painter.end()
 
     def _width(self, text: str) -> int:

@@ -45,7 +45,7 @@ class GaitRing(QWidget):
         return self.minimumSize()
 
     def _restyle(self) -> None:
-        side = self._theme.px(112)
+        side = self._theme.px(84)
         self.setMinimumSize(side, side)
 
     def show_phases(self, phases: Phases, modelled: Phases, word: str, below: str, *, live: bool) -> None:
@@ -141,6 +141,8 @@ class GaitRing(QWidget):
             said = "" if now is None else self._phase_text(leg, now, box.width(), is_short=is_short)
             rows.append((said, leg.value if self._live else "old", 0.9 * size, False))
         rows = [row for row in rows if row[0]]
+        line = max(line, QFontMetricsF(theme.text_font(0.8 * size)).height())
+        rows = rows[: max(1, int(box.height() / line))]
         top = box.center().y() - line * len(rows) / 2
         for text, colour, factor, bold in rows:
             spare = 0.0 if is_short else 12.0

@@ -57,7 +57,7 @@ class PressureMap(QWidget):
         self._template_made = QPixmap()
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-        self.setMinimumSize(60, 100)
+        self.setMinimumSize(60, 76)
         self.setAccessibleName(f"Pressure under the {side} foot")
 
     def sizeHint(self) -> QSize:

@@ -28,6 +28,11 @@ class Wrapped(QLabel):
         set_text(self, "&nbsp; ".join(said))
         self.setAccessibleDescription(", ".join(text for _, _, text in parts))
 
+    def is_one_line(self, parts: Sequence[tuple[str, str, str]]) -> bool:
+        """Return whether all of these have room in one line."""
+        text = "\N{NO-BREAK SPACE} ".join(f"{glyph} {words}" for _, glyph, words in parts)
+        return self.fontMetrics().horizontalAdvance(text) <= self.width()
+
 
 def _unbroken(text: str) -> str:
     return rich(text.strip()).replace(" ", "&nbsp;")

@@ -9,7 +9,7 @@ from msgspec.structs import replace
 from drivers.error_codes import error_check
 from gateway.client import ConnectionState, NotConnected
 from gateway.wire.bus import BusInfo
-from gateway.wire.component import Snapshot
+from gateway.wire.component import QualityInfo, Snapshot
 from gateway.wire.control import JournalEntries
 from gateway.wire.robot import GuardInfo, GuardRuleInfo
 from gateway.wire.stop import Reset, Stopped
@@ -313,3 +313,16 @@ def test_a_guard_that_does_not_run_is_blind_though_it_has_rules(bench: Bench) ->
     bench.station.take([Described(replace(described().description, guard=guard)), walking(5)])
     (one,) = bench.station.alarms.active
     assert one.alarm.line == "guard blind: the guard: it does not run: its thread has ended"
+
+
+def test_devices_that_a_gateway_begins_to_read_are_one_alarm_and_not_lost(bench: Bench) -> None:
+    bench.station.take([described(), walking(10)])
+    quality: dict[str, QualityInfo] = {
+        name: {"state": "lost", "age_ms": None, "problem": "it was not read yet: look again in a moment"}
+        for name in ("left_hip", "left_knee")
+    }
+    bench.look_again([Looked(Snapshot(0, {}, {}, quality), None, time.monotonic_ns())])
+    (one,) = bench.station.alarms.active
+    assert one.alarm.line == "no data yet: devices: not read yet: left hip, left knee"
+    assert bench.station.mark.colour == "old"
+    assert not [item for item in bench.station.news.items if item.kind is NewsKind.LOST]

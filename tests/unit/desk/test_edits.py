@@ -1,5 +1,7 @@
 """Edits: staged and not sent, exactly the difference, never over what somebody else changed unseen."""
 
+import time
+
 import pytest
 
 from gateway.client import CallTimeout, RemoteError
@@ -164,3 +166,30 @@ def test_a_trial_is_kept_or_taken_back_by_its_number(bench: Bench) -> None:
         bench.first.answer(answer)
         assert bench.station.writing.trial is None
     assert bench.first.asked == [("confirm", (7,)), ("revert", (7,))]
+
+
+@pytest.mark.parametrize(
+    ("holds", "after_s", "said"),
+    [
+        (0.43, 0.1, "taken back: reading what is held …"),  # asked for before the answer
+        (0.4, 0.1, "taken back: the values from before are held again"),
+        (0.43, 5.0, "taken back, but other values are held: look at them"),
+    ],
+)
+def test_what_was_taken_back_is_said_to_be_when_it_is_shown_so(
+    bench: Bench, holds: float, after_s: float, said: str
+) -> None:
+    on_trial(bench)
+    bench.station.end_trial()
+    bench.first.answer(Reverted(7, {STEP: "taken back"}))
+    assert bench.station.writing.text == "taken back: reading what is held …"
+    read_ns = time.monotonic_ns() + round(after_s * 1e9)
+    bench.station.take([looked({**HELD, STEP: holds}, at_ns=read_ns)])
+    assert bench.station.writing.text == said
+
+
+def test_what_was_written_and_read_back_is_shown_at_once(bench: Bench) -> None:
+    stage(bench.station, STEP, 0.43)
+    bench.station.write(changes(bench))
+    bench.first.answer(Written(1, {STEP: 0.4}, {STEP: 0.43}))
+    assert bench.station.robot.parameters[STEP].value == 0.43

@@ -362,6 +362,7 @@ class TestOpen:
     def test_a_component_that_could_not_be_built_cannot_be_seen(self, serve: Serve, bench: Bench) -> None:
         bench.absent["left_knee"] = (Kind.JOINT, "its EDS is broken")
         rule = guard(serve(LIMIT))["rules"][0]
+        assert (rule["quantities"], rule["low"], rule["high"]) == (["position"], -0.1, 2.0)
         assert rule["state"] == "blind"
         assert rule["problems"] == ["left_knee: is not there: its EDS is broken"]
 

@@ -71,8 +71,24 @@ def test_the_worst_bus_is_said_with_its_load_its_errors_and_who_talks_most() -> 
     full = replace(BUS, name="legs", load_percent=97.0, error_frames=3, bus_offs=2)
     bad, wordings = worst(robot(BUS, full))
     assert bad is Level.ALARM
-    assert wordings[0] == "CAN legs 97 %, 3 errors, 2 × bus off · most: left knee 90 %"
-    assert wordings[-1] == "CAN 97 %, 3 errors, 2 × bus off"
+    why = "it is full: 97 % of its time is taken"
+    assert wordings[0] == f"CAN legs 97 %, 3 errors, 2 × bus off: {why} · most: left knee 90 %"
+    assert wordings[-1] == "CAN 97 %: full"
+
+
+@pytest.mark.parametrize(
+    ("bus", "why"),
+    [
+        (replace(BUS, load_percent=24.0, state="error passive"), "error passive"),
+        (replace(BUS, load_percent=85.0), "busy"),
+        (replace(BUS, load_percent=24.0, nodes=[replace(NODE, pdos_missing_percent=3.0)]), "PDOs missing"),
+        (replace(BUS, load_percent=24.0, nodes=[replace(NODE, findings=[LOST])]), "no answer"),
+    ],
+)
+def test_a_bus_that_is_marked_says_why_in_every_wording(bus: BusInfo, why: str) -> None:
+    _, wordings = worst(robot(bus))
+    assert wordings[-1].endswith(f": {why}")
+    assert all(": " in said for said in wordings)
 
 
 def test_who_talks_is_told_by_node_and_kind() -> None:

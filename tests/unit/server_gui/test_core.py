@@ -67,6 +67,18 @@ def test_rate_counts_the_rows_of_the_last_two_seconds() -> None:
     assert robot.rate_hz(20 * SECOND_NS) == 0.0
 
 
+@pytest.mark.parametrize(("rows", "said"), [(26, "26 of 100 Hz"), (98, "98 Hz")])
+def test_a_rate_that_is_lower_than_what_was_asked_for_is_said_with_both(rows: int, said: str) -> None:
+    robot = Robot()
+    for second in range(1, 6):
+        batch_of = batch({"a": [0.0] * rows}, at_ns=second * SECOND_NS)
+        robot.apply(Telemetry(1, batch_of, None, asked_hz=100.0))
+        if second == 2:
+            assert not robot.is_slow(2 * SECOND_NS), "it has only begun"
+    assert robot.rate_text(5 * SECOND_NS + 1) == said
+    assert robot.is_slow(5 * SECOND_NS + 1) == (" of " in said)
+
+
 def test_losses_add_up_over_links() -> None:
     robot = Robot()
     robot.apply(telemetry({"a": [1.0]}, dropped=5, missed=1))

@@ -83,7 +83,7 @@ def test_key_during_a_write_is_not_queued() -> None:
     assert len(asked.named("write")) == 1
     asked.answer(Written(1, {"gait.step_length": 0.4}, {"gait.step_length": 0.42}))
     controls.press(Key.LEFT)
-    assert asked.named("write")[1:] == [({"gait.step_length": 0.38}, None)]
+    assert asked.named("write")[1:] == [({"gait.step_length": 0.4}, None)], "from what was read back"
 
 
 def test_parameter_without_limits_is_not_moved() -> None:

@@ -1,0 +1,184 @@
+"""Every active alarm in full, and what may be done about each: a sheet over the tabs, opened by hand."""
+
+from typing import Final, Protocol
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QPushButton, QSizePolicy, QVBoxLayout, QWidget
+
+from server_gui.core.alarms.texts import Kind
+from server_gui.views.alarm_words import Key, Told, details, headline, key_of, now_s
+from server_gui.views.marks import Mark
+from server_gui.views.theme import Theme
+from server_gui.views.widgets.card import set_text, set_tone
+from server_gui.views.widgets.mark import MarkIcon
+from server_gui.views.widgets.sheet import Sheet
+from server_gui.views.widgets.whole import WholeLabel
+
+WIDEST: Final = 900  # at text of 100 %
+OVER: Final = Mark("ring", "dim", "over")
+
+
+class Deeds(Protocol):
+    """What is told, and what may be done about it."""
+
+    told: tuple[Told, ...]
+
+    @property
+    def named(self) -> bool:
+        """Whether it must be said whose an alarm is."""
+        ...
+
+    def clear(self, told: Told) -> None:
+        """Ask for a reset of its robot's faults."""
+        ...
+
+    def show_signal(self, told: Told) -> None:
+        """Bring what shows it, around the instant that it began."""
+        ...
+
+    def acknowledge(self, told: Told) -> None:
+        """It is read."""
+        ...
+
+
+class AlarmRow(QFrame):
+    """One alarm in full, as it stands in the list."""
+
+    cleared = Signal()
+    signal = Signal()
+    acknowledged = Signal()
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self.setObjectName("alarm")
+        self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Maximum)
+        self._icon = MarkIcon(theme, 13)
+        self.headline, self.details = WholeLabel(), WholeLabel("dim")
+        words = QVBoxLayout()
+        words.setSpacing(1)
+        words.addWidget(self.headline)
+        words.addWidget(self.details)
+        said = QHBoxLayout()
+        said.setSpacing(8)
+        said.addWidget(self._icon, 0, Qt.AlignmentFlag.AlignTop)
+        said.addLayout(words, 1)
+        self.buttons = AlarmButtons()
+        self.clear, self.show_signal = self.buttons.clear, self.buttons.show_signal
+        self.acknowledge = self.buttons.acknowledge
+        self.clear.clicked.connect(self.cleared)
+        self.show_signal.clicked.connect(self.signal)
+        self.acknowledge.clicked.connect(self.acknowledged)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(9, 5, 8, 5)
+        column.setSpacing(6)
+        column.addLayout(said)
+        column.addWidget(self.buttons, 0, Qt.AlignmentFlag.AlignLeft)
+        theme.changed.connect(self._restyle)
+        self._restyle()
+
+    def say(self, told: Told, *, named: bool, is_over: bool = False) -> None:
+        """Show this alarm, or that it `is_over`."""
+        station, one = told
+        mark = OVER if is_over else one.alarm.mark
+        self._icon.show_mark(mark)
+        set_tone(self, mark.colour)
+        set_text(self.headline, headline(told, named=named, more="over" if is_over else ""))
+        set_text(self.details, "\n".join(details(one, now_s(station), each=True)))
+        self.buttons.offer(told)
+        self.buttons.setVisible(not is_over)
+        self.setAccessibleName(self.headline.text())
+        self.setAccessibleDescription(self.details.text())
+
+    def _restyle(self) -> None:
+        self.headline.setFont(self._theme.text_font(bold=True))
+        self.setStyleSheet(style(self._theme))
+
+
+class AlarmButtons(QWidget):
+    """What may be done about an alarm; what does not concern it is not there."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.clear = QPushButton("Clear fault…")
+        self.clear.setToolTip("Reset the drives' fault: they are led to switch on disabled, none is enabled")
+        self.show_signal = QPushButton("Show the signal ± 5 s")
+        self.acknowledge = QPushButton("Acknowledge")
+        self.acknowledge.setToolTip("It is read: it gives way to others until it is over")
+        row = QHBoxLayout(self)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(6)
+        for button in (self.clear, self.show_signal, self.acknowledge):
+            row.addWidget(button)
+
+    def offer(self, told: Told | None, *, all_of_them: bool = True) -> None:
+        """Offer what there is for this one; what is not offered at once stands in the list."""
+        station, one = told or (None, None)
+        alarm = None if one is None else one.alarm
+        self.clear.setVisible(alarm is not None and alarm.clears)
+        self.clear.setEnabled(station is not None and station.is_linked)
+        shows = one is not None and one.alarm.channel is not None and one.at_ns is not None
+        self.show_signal.setVisible(all_of_them and shows)
+        unread = one is not None and not one.is_acknowledged and one.alarm.kind is not Kind.NOT_STOPPED
+        self.acknowledge.setVisible(all_of_them and unread)
+
+
+class AlarmList(Sheet):
+    """Every alarm in full. While it is open no row moves: new ones come last, and what is over stays."""
+
+    def __init__(self, strip: Deeds, theme: Theme, below: QWidget) -> None:
+        words = QWidget()
+        super().__init__("All alarms", words, theme, below, WIDEST)
+        self._strip = strip
+        self._shown: dict[Key, Told] = {}
+        self.rows: list[AlarmRow] = []
+        self._column = QVBoxLayout(words)
+        self._column.setContentsMargins(0, 0, 0, 0)
+        self._column.setSpacing(4)
+        self._none = WholeLabel("dim")
+        self._none.setText("No alarms.")
+        self._column.addWidget(self._none)
+        self._column.addStretch(1)
+
+    def turn(self) -> None:
+        self._shown.clear()
+        super().turn()
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Show how each is now."""
+        if not self.isVisible():
+            return
+        now = {key_of(told): told for told in self._strip.told}
+        self._shown |= now
+        while len(self.rows) < len(self._shown):
+            self._add_row()
+        for row, (key, told) in zip(self.rows, self._shown.items(), strict=False):
+            row.say(told, named=self._strip.named, is_over=key not in now)
+        for place, row in enumerate(self.rows):
+            row.setVisible(place < len(self._shown))
+        self._none.setVisible(not self._shown)
+
+    def _add_row(self) -> None:
+        row, place = AlarmRow(self._theme), len(self.rows)
+        row.cleared.connect(lambda: self._strip.clear(self._at(place)))
+        row.signal.connect(lambda: self._strip.show_signal(self._at(place)))
+        row.acknowledged.connect(lambda: self._strip.acknowledge(self._at(place)))
+        self.rows.append(row)
+        self._column.insertWidget(place, row)
+
+    def _at(self, place: int) -> Told:
+        return list(self._shown.values())[place]
+
+
+def style(theme: Theme) -> str:
+    """The frame of an alarm, by its tone."""
+    colours = theme.colours
+    return (
+        f"QFrame#alarm {{ background: {colours.card}; border: 1px solid {colours.border}; "
+        f"border-left: 4px solid {colours.warn}; border-radius: 4px; }}"
+        f'QFrame#alarm[tone="bad"] {{ border-color: {colours.bad}; }}'
+        f'QFrame#alarm[tone="good"] {{ border-left-color: {colours.border}; }}'
+        f'QFrame#alarm[tone="dim"], QFrame#alarm[tone="old"] {{ border-left-color: {colours.dim}; }}'
+        f"QFrame#alarm:focus {{ border-color: {colours.accent}; }}"
+    )

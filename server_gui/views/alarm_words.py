@@ -1,0 +1,62 @@
+"""An alarm in words: whose it is and what is wrong, since when, what follows from it, and what to check."""
+
+import datetime
+import time
+
+from server_gui.core.alarms.alarm import Active
+from server_gui.core.alarms.marks import age_text
+from server_gui.core.alarms.texts import Kind
+from server_gui.core.desk.station import Station
+from server_gui.views.marks import Mark
+
+Told = tuple[Station | None, Active]  # without a robot: of what this window records
+Key = tuple[str, tuple[Kind, str]]
+
+
+def key_of(told: Told) -> Key:
+    station, one = told
+    return "" if station is None else station.name, one.alarm.key
+
+
+def quiet(station: Station | None) -> tuple[Mark, str, str]:
+    """Return that there is no alarm, where that is known."""
+    if station is None:
+        return Mark("ring", "dim"), "No robot", ""
+    if station.robot.is_recording:
+        return Mark("diamond", "accent"), "A recording", "no fault shown"
+    if not station.is_live or not station.robot.parts:
+        return Mark("ring", "old"), "Alarms not known", "no live data"
+    return Mark("disc", "good"), "No alarms", "all ok"
+
+
+def headline(told: Told, *, named: bool, more: str = "", is_brief: bool = False) -> str:
+    """Whose it is, what is wrong, and whether that is now."""
+    station, one = told
+    alarm = one.alarm
+    line = " · ".join(
+        filter(None, (station.title if station and named else "", alarm.brief if is_brief else alarm.line))
+    )
+    marks = [more, "" if alarm.is_now else "last known", "acknowledged" if one.is_acknowledged else ""]
+    said = ", ".join(filter(None, marks))
+    return f"{line} ({said})" if said else line
+
+
+def now_s(station: Station | None) -> float:
+    """The instant that is shown, UTC."""
+    return time.time() if station is None else station.robot.now_s()
+
+
+def details(one: Active, now_s: float, *, each: bool = False) -> list[str]:
+    """Since when (UTC) and what the robot did, what it explains (`each` in full), and what to check."""
+    alarm = one.alarm
+    since = datetime.datetime.fromtimestamp(one.since_s, datetime.UTC).astimezone()
+    first = f"since {since:%H:%M:%S}, for {lasting(max(0.0, now_s - one.since_s))}"
+    lines = [f"{first} · robot: {alarm.did}" if alarm.did else first]
+    if alarm.under:
+        lines += [f"with it: {under.line}" for under in alarm.under] if each else [alarm.consequences]
+    return [*lines, f"→ {alarm.check}"] if alarm.check else lines
+
+
+def lasting(for_s: float) -> str:
+    """A time that grows, in whole seconds as long as these matter."""
+    return f"{for_s:.0f} s" if for_s < 120 else age_text(for_s)
