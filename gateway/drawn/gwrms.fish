@@ -50,8 +50,8 @@ function _shtab_gwrms_using
   test "$_shtab_gwrms_cmdpath" = "$argv"
 end
 
-set -g _shtab_gwrms_commands gateway install-service keys 'keys pair' 'keys list' 'keys revoke' pair check describe snapshot cost bench blame watch top plot get set params 'params save' 'params compare' 'params apply' od store restore journal 'journal tail' 'journal verify' stop reset enable completion docs eds scan lss trace commission sensor 'sensor record' 'sensor replay' 'sensor decode' calibrate 'calibrate insole' 'calibrate imu' collect sessions 'sessions ls' 'sessions show' 'sessions gait' 'sessions resources' 'sessions compare' 'sessions export' label train cloud 'cloud ls' 'cloud du' 'cloud verify' 'cloud mend' 'cloud upload' 'cloud download' 'cloud compact' 'cloud retain' 'cloud vacuum' query models 'models ls' 'models show' 'models promote' 'models rollback' 'models history' 'models export' predict gui evaluate demo sim 'sim run' sim-record sim-fault
-set -g _shtab_gwrms_opts_with_value --activity --adapt-from --author --axes --baud --benchmark --bitrate --bus --channels --clear --cluster --component --config --consent --controller --count --data --days --dir --drive --eds --falling --falls --file --foot --for --format --from --grace --hand --held-out --host --imu --include --insole --instead-of --junit --key --kind --layout --lean --limit --link --look --mark --minutes --model --mount --mounting --name --new-bitrate --node --node-id --notes --object --on --onnx --operator --out --path --picture --port --pseudo-labels --rate --reason --report --requests --robot --role --run-as --saturation --scale --scenario --schema --script --seconds --seed --serial --session --set --sort --speed --stamp --subject --subjects --table --task --timeout --to --trial --truth --unconfigured --url --wearer --who --why --without --witness --write -n
+set -g _shtab_gwrms_commands gateway install-service keys 'keys pair' 'keys list' 'keys revoke' pair check doctor describe snapshot cost bench blame watch top plot get set params 'params save' 'params compare' 'params apply' od store restore journal 'journal tail' 'journal verify' stop reset enable completion docs eds scan lss trace commission sensor 'sensor record' 'sensor replay' 'sensor decode' calibrate 'calibrate insole' 'calibrate imu' collect sessions 'sessions ls' 'sessions show' 'sessions gait' 'sessions resources' 'sessions compare' 'sessions export' label train cloud 'cloud ls' 'cloud du' 'cloud verify' 'cloud mend' 'cloud upload' 'cloud download' 'cloud compact' 'cloud retain' 'cloud vacuum' query models 'models ls' 'models show' 'models promote' 'models rollback' 'models history' 'models export' predict gui evaluate demo sim 'sim run' sim-record sim-fault
+set -g _shtab_gwrms_opts_with_value --activity --adapt-from --author --axes --baud --benchmark --bitrate --bus --channels --clear --cluster --component --computer --config --consent --controller --count --data --days --dir --drive --eds --falling --falls --file --foot --for --format --from --grace --hand --held-out --host --imu --include --insole --instead-of --junit --key --kind --layout --lean --limit --link --look --mark --minutes --mistake --model --mount --mounting --name --new-bitrate --node --node-id --notes --object --on --onnx --operator --out --path --picture --port --pseudo-labels --rate --reason --report --requests --robot --role --run-as --saturation --scale --scenario --schema --script --seconds --seed --serial --session --set --sort --speed --stamp --subject --subjects --table --task --timeout --to --trial --truth --unconfigured --url --wearer --who --why --without --witness --write -n
 
 complete -c gwrms -e
 complete -c gwrms -f
@@ -98,6 +98,19 @@ complete -c gwrms -n '_shtab_gwrms_using check' -l strict -d 'exit status 1 for 
 complete -c gwrms -n '_shtab_gwrms_using check' -l json -d 'one JSON object a file and line'
 complete -c gwrms -n '_shtab_gwrms_using check' -l schema -xka "robot server scenario" -d 'print the JSON Schema of such files, for editors, instead'
 complete -c gwrms -n '_shtab_gwrms_using check; and test $_shtab_gwrms_npos -ge 0' -ka "(__fish_complete_path (commandline -ct))" -d 'a file to check'
+complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a doctor -d 'Finds what is wrong with a robot: by its file, its buses, its sensors and its computer, through its gateway'
+complete -c gwrms -n '_shtab_gwrms_using doctor' -s h -l help -d 'show this help message and exit'
+complete -c gwrms -n '_shtab_gwrms_using doctor' -l robot -x -d 'ask this gateway, and not the one that the file means'
+complete -c gwrms -n '_shtab_gwrms_using doctor' -l seconds -x -d 'how long to watch (default 20)'
+complete -c gwrms -n '_shtab_gwrms_using doctor' -l silent -d 'ask no gateway'
+complete -c gwrms -n '_shtab_gwrms_using doctor' -l active -d 'where no gateway runs, ask devices by SDO'
+complete -c gwrms -n '_shtab_gwrms_using doctor' -l eds -xka "(__fish_complete_path (commandline -ct))" -d 'folder of EDS files'
+complete -c gwrms -n '_shtab_gwrms_using doctor' -l computer -xka "(__fish_complete_path (commandline -ct))" -d 'a copy of /sys, /proc and /run (default /)'
+complete -c gwrms -n '_shtab_gwrms_using doctor' -l fix -d 'mend what is safe to mend, asking for each'
+complete -c gwrms -n '_shtab_gwrms_using doctor' -l yes -d 'with --fix: do not ask'
+complete -c gwrms -n '_shtab_gwrms_using doctor' -l rules -d 'tell what is looked for, and by what'
+complete -c gwrms -n '_shtab_gwrms_using doctor' -l json -d 'one JSON object, for machines'
+complete -c gwrms -n '_shtab_gwrms_using doctor; and test $_shtab_gwrms_npos -eq 0' -ka "(__fish_complete_path (commandline -ct))" -d 'the robot'"'"'s file'
 complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a describe -d 'What a robot is made of: its components and buses and what is wrong with them, since when and what'
 complete -c gwrms -n '_shtab_gwrms_using describe' -s h -l help -d 'show this help message and exit'
 complete -c gwrms -n '_shtab_gwrms_using describe' -l robot -x -d 'the gateway to ask (default 127.0.0.1:7420)'
@@ -566,6 +579,7 @@ complete -c gwrms -n '_shtab_gwrms_using sim' -l seed -x -d 'of noise, losses an
 complete -c gwrms -n '_shtab_gwrms_using sim' -l subject -x -d 'who wears the robot (default: 0, nominal)'
 complete -c gwrms -n '_shtab_gwrms_using sim' -l drive -x -d 'the EDS or DCF of the drives, or of one joint'"'"'s (again for another one)'
 complete -c gwrms -n '_shtab_gwrms_using sim' -l mount -x -d 'a drive'"'"'s node id, 1 or -1 (its motor built in the other way round), counts at zero'
+complete -c gwrms -n '_shtab_gwrms_using sim' -l mistake -xka "none bit_rate terminator double_node_id second_sdo_client bus_load sync eds_product gear counts sign joints_swapped insoles_swapped zero heartbeat_slow velocity_unit imu_axes heartbeat pdo_mapping mode current_limit following_window reaction coasting sync_slow insole_scale imu_frozen latency_timer clock governor realtime txqueuelen" -d 'make a mistake for gwrms doctor to find (again for more); none: make none'
 complete -c gwrms -n '_shtab_gwrms_using sim' -l truth -xka "(__fish_complete_path (commandline -ct))" -d 'write the ground truth there'
 complete -c gwrms -n '_shtab_gwrms_using sim; and test $_shtab_gwrms_npos -eq 0' -a run -d 'Runs scenario files: each with a simulated robot and a gateway of its own, as a process. What the files say'
 complete -c gwrms -n '_shtab_gwrms_using sim run' -s h -l help -d 'show this help message and exit'

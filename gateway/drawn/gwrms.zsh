@@ -22,6 +22,7 @@ _shtab_gwrms_commands() {
     demo:'A simulated exoskeleton, its gateway and a live view, with one command.'
     describe:'What a robot is made of: its components and buses and what is wrong with them, since when and what'
     docs:'Prints a page of the docs, which are installed with GWRMS; without a name, the list of all. A page'"'"'s own name'
+    doctor:'Finds what is wrong with a robot: by its file, its buses, its sensors and its computer, through its gateway'
     eds:'Read EDS and DCF files (CiA 306) as a gateway would: the device, whether it can be a joint, its PDOs as the'
     enable:'Enable drives, one confirmed transition at a time.'
     evaluate:'How well predictions hold for people, real or simulated, whom no model has seen.'
@@ -35,7 +36,7 @@ _shtab_gwrms_commands() {
     lss:'Finds CANopen devices that have no node id yet; gives node ids and bit rates (CiA 305).'
     models:'learned models: look at, promote, roll back, export'
     od:'Look into a device'"'"'s object dictionary: names, types, limits, values.'
-    pair:'Pairs this desk with the robot on which `gwrms keys pair` shows CODE: this desk'"'"'s key is made where it'
+    pair:'Pairs this desk with the robot on which `gwrms keys pair` shows a code. The code is asked for, so that it'
     params:'parameters as files: save, compare, apply'
     plot:'Channels over time, live, until q, or Ctrl-C.'
     predict:'What robot and wearer are doing, and how far to believe that.'
@@ -85,7 +86,7 @@ _shtab_gwrms_cloud_commands() {
 
 _shtab_gwrms_journal_commands() {
   local _commands=(
-    tail:'The newest entries: who did what, when, and what came of it. WHO is the program, by the name that'
+    tail:'The newest entries: who did what, when, and what came of it. WHO is known by their key or account'
     verify:'Check every entry of a journal, in itself and against what desks have seen of it.'
   )
   _describe 'gwrms journal commands' _commands
@@ -94,7 +95,7 @@ _shtab_gwrms_journal_commands() {
 _shtab_gwrms_keys_commands() {
   local _commands=(
     list:'Who is let in on this robot, and as what.'
-    pair:'Shows HOST:PORT and a code. On the desk, `gwrms pair HOST:PORT CODE` proves to know it; then you say'
+    pair:'Shows HOST:PORT and a code. On the desk, `gwrms pair HOST:PORT` asks for it and proves to know it; then you'
     revoke:'Let somebody in no more. A gateway that runs closes their connections at once.'
   )
   _describe 'gwrms keys commands' _commands
@@ -424,6 +425,24 @@ _shtab_gwrms_docs_options=(
 # guard to ensure default positional specs are added only once per session
 _shtab_gwrms_docs_defaults_added=0
 
+_shtab_gwrms_doctor_options=(
+  "(- : *)"{-h,--help}"[show this help message and exit]"
+  "--robot[ask this gateway, and not the one that the file means]:HOST:PORT:"
+  "--seconds[how long to watch (default 20)]:seconds:"
+  "--silent[ask no gateway]"
+  "--active[where no gateway runs, ask devices by SDO]"
+  "*--eds[folder of EDS files]:DIR:_files"
+  "--computer[a copy of \/sys, \/proc and \/run (default \/)]:DIR:_files"
+  "--fix[mend what is safe to mend, asking for each]"
+  "--yes[with --fix\: do not ask]"
+  "--rules[tell what is looked for, and by what]"
+  "--json[one JSON object, for machines]"
+  ":the robot\'s file:_files"
+)
+
+# guard to ensure default positional specs are added only once per session
+_shtab_gwrms_doctor_defaults_added=0
+
 _shtab_gwrms_eds_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--node-id[node id for COB-IDs that depend on it (1)]:N:"
@@ -713,8 +732,8 @@ _shtab_gwrms_pair_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--name[that the robot is to call this desk (default\: your user and computer)]:name:"
   "--json[one JSON object, for machines]"
-  ":as the robot shows it\; or its link, gwrms\:\/\/\…:"
-  ":as the robot shows it:"
+  ":as the robot shows it (asked for, if not):"
+  ":instead of being asked\; others here may see it:"
 )
 
 # guard to ensure default positional specs are added only once per session
@@ -998,6 +1017,7 @@ _shtab_gwrms_sim_options=(
   "--subject[who wears the robot (default\: 0, nominal)]:N:"
   "*--drive[the EDS or DCF of the drives, or of one joint\'s (again for another one)]:[JOINT=]FILE:"
   "*--mount[a drive\'s node id, 1 or -1 (its motor built in the other way round), counts at zero]:JOINT=NODE[,DIRECTION[,ZERO]]:"
+  "*--mistake[make a mistake for gwrms doctor to find (again for more)\; none\: make none]:NAME:(none bit_rate terminator double_node_id second_sdo_client bus_load sync eds_product gear counts sign joints_swapped insoles_swapped zero heartbeat_slow velocity_unit imu_axes heartbeat pdo_mapping mode current_limit following_window reaction coasting sync_slow insole_scale imu_frozen latency_timer clock governor realtime txqueuelen)"
   "--truth[write the ground truth there]:FILE:_files"
 )
 
@@ -1177,6 +1197,7 @@ _shtab_gwrms() {
         demo) _arguments -C -s $_shtab_gwrms_demo_options ;;
         describe) _arguments -C -s $_shtab_gwrms_describe_options ;;
         docs) _arguments -C -s $_shtab_gwrms_docs_options ;;
+        doctor) _arguments -C -s $_shtab_gwrms_doctor_options ;;
         eds) _arguments -C -s $_shtab_gwrms_eds_options ;;
         enable) _arguments -C -s $_shtab_gwrms_enable_options ;;
         evaluate) _arguments -C -s $_shtab_gwrms_evaluate_options ;;
