@@ -19,6 +19,7 @@ from server_gui.views.first_run.opening import Opening
 from server_gui.views.first_run.splash import Splash
 from server_gui.views.first_run.tour import STOPS
 from server_gui.views.main_window import MainWindow
+from server_gui.views.pairing import PairingDialog
 from server_gui.views.theme import Theme
 from tests.gui.fakes import Bench, destroy, stop_is_whole
 from tests.gui.running import wait
@@ -134,6 +135,23 @@ def test_an_empty_window_offers_to_add_a_robot_to_simulate_one_and_to_open_a_rec
     assert not empty.start.isEnabled()
     click(empty.open)
     assert asked == ["simulator", "recordings"]
+    destroy(window)
+
+
+@pytest.mark.parametrize("typed", ["192.0.2.7:7420", "gwrms://192.0.2.7:7420#ABCD"])
+def test_an_empty_window_pairs_with_a_robot_by_what_was_typed(
+    qt: QApplication, theme: Theme, tmp_path: Path, typed: str
+) -> None:
+    window = MainWindow(Desk(), theme, QSettings(str(tmp_path / "kept.ini"), QSettings.Format.IniFormat))
+    window.show()
+    added = list[str]()
+    window.added.connect(added.append)
+    window.empty.address.setText(typed)
+    click(window.empty.add if "//" in typed else window.empty.pair)
+    (dialog,) = window.robots.findChildren(PairingDialog)
+    assert (dialog.isVisible(), dialog.address.text(), added) == (True, typed, [])
+    dialog.paired.emit("192.0.2.7:7420")
+    assert added == ["192.0.2.7:7420"]
     destroy(window)
 
 

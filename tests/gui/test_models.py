@@ -13,6 +13,7 @@ from server_gui.core.archive.archive import Archive
 from server_gui.core.cloud.jobs import Job, JobState
 from server_gui.core.models.models import Tone
 from server_gui.core.settings.server_file import ServerSettings
+from server_gui.views.models.models_table import SIGNED
 from server_gui.views.models.panel import ModelsPage
 from tests.gui.archives import Shown
 from tests.unit.registry.models import card, learned
@@ -103,6 +104,9 @@ def test_models_are_listed_and_compared_by_names_instead_of_hashes(
     words = " ".join([*shown, page.compare.said.text(), page.compare.other.currentText()])
     assert all(model.id not in words for model in both)
     assert "Falling of" in words
+    rows = {entry.card.id: row for row, entry in enumerate(page.rows.rows)}
+    signed = {model.id: page.rows.index(rows[model.id], SIGNED).data() for model in both}
+    assert signed == {one.id: "unsigned", other.id: "–"}
     assert page.compare.other.currentData() == one.id
     assert page.compare.other.currentText().endswith("(serves)")
     found = figures(page)

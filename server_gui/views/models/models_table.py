@@ -1,4 +1,4 @@
-"""Every model, newest first: what it predicts, whom it serves, how well it was judged, how old it is."""
+"""Every model, newest first: what it predicts, whom it serves, by whose word, how well judged, how old."""
 
 from typing import Any, Final
 
@@ -15,8 +15,8 @@ from server_gui.views.theme import Theme
 from server_gui.views.widgets.plain import tip
 from server_gui.views.widgets.rows import SORT_ROLE, Filtered, Index, RowsModel, RowsTable
 
-TITLES: Final = ("Model", "Serves", "Judged", "Age, days", "Right last week", "Learned from")
-NAME, SERVES, JUDGED, AGE, WEEK, FROM = range(len(TITLES))
+TITLES: Final = ("Model", "Serves", "Signed", "Judged", "Age, days", "Right last week", "Learned from")
+NAME, SERVES, SIGNED, JUDGED, AGE, WEEK, FROM = range(len(TITLES))
 NUMBERS: Final = frozenset({JUDGED, AGE})
 
 
@@ -35,7 +35,8 @@ class ModelsModel(RowsModel[Entry]):
             case _ if role == SORT_ROLE:
                 return entry.card.made.timestamp() if column == NAME else _keys(entry)[column]
             case Qt.ItemDataRole.ToolTipRole:
-                return tip(f"{_cells(entry)[column]}\n{entry.card.id}, {entry.card.recipe}")
+                words = "; ".join(entry.signed) if column == SIGNED else ""
+                return tip(f"{words or _cells(entry)[column]}\n{entry.card.id}, {entry.card.recipe}")
             case Qt.ItemDataRole.TextAlignmentRole if column in NUMBERS:
                 return Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
             case Qt.ItemDataRole.FontRole if column in NUMBERS:
@@ -68,6 +69,7 @@ def _cells(entry: Entry) -> tuple[str, ...]:
     return (
         entry.name,
         entry.whom,
+        entry.signature,
         headline(card),
         f"{age_days(card):.0f}",
         week_short(entry),

@@ -4,21 +4,20 @@ import argparse
 import sys
 import tempfile
 import traceback
-from collections.abc import Sequence
 from pathlib import Path
 
-from tests.gui.walks.walk import Screen, bench
-from tests.gui.walks.walks import WALKS, Moment
+from tests.gui.walks.walk import Screen
+from tests.gui.walks.walks import WALKS, Walk
 
 
-def walk(moments: Sequence[Moment], screen: Screen, pictures: Path) -> list[str]:
+def walk(chosen: Walk, screen: Screen, pictures: Path) -> list[str]:
     """What went wrong: moments that did not show what they must, and rules that a picture breaks."""
     found = []
     with (
         tempfile.TemporaryDirectory(prefix="gwrms-walk-") as folder,
-        bench(screen, Path(folder), pictures) as there,
+        chosen.made(screen, Path(folder), pictures) as there,
     ):
-        for moment in moments:
+        for moment in chosen.moments:
             try:
                 moment(there)
             except (AssertionError, ConnectionError):

@@ -1,0 +1,174 @@
+"""Moments at the desk: values tried, recordings made and played, models trained, a store that goes away."""
+
+import time
+from collections.abc import Callable
+from typing import Final
+
+from tests.gui.walks.hand import Hand
+from tests.gui.walks.robot import AGAIN_S
+from tests.gui.walks.walk import Bench
+from tests.unit.training.walkers import day, put
+
+NEW_STEP: Final = "430"
+SHORTEST_S: Final = "5"
+WEARERS: Final = 4
+
+
+def tuning(bench: Bench) -> None:
+    """A value beyond the limit is marked; one within it is tried, seen without panels too, and taken back."""
+    hand = bench.hand
+    stage(hand, "step length", "4000")
+    hand.sees("above the largest allowed")
+    hand.keep("refused")
+    stage(hand, "step length", NEW_STEP)
+    hand.click("Review 1 …")
+    hand.sees("Try it for")
+    hand.keep("review")
+    hand.click("Try it for")
+    hand.sees("On trial")
+    hand.key("F9")
+    hand.sees("takes it back in")
+    hand.keep("trial")
+    hand.click("Take it back now")
+    hand.misses("On trial")
+    hand.key("F9")
+    hand.reveal("Filter: name, 0x6072", "Parameters")
+    hand.keep("taken-back")
+
+
+def trial_runs_out(bench: Bench) -> None:
+    """Nobody keeps it: the robot takes it back by itself, and that stands where it is looked for."""
+    hand = bench.hand
+    stage(hand, "step length", NEW_STEP)
+    hand.click("Review 1 …")
+    hand.click("Length of the trial")
+    hand.key("ctrl+a")
+    hand.type(SHORTEST_S)
+    hand.click("Try it for")
+    hand.sees("On trial")
+    hand.misses("On trial")
+    hand.sees("taken back")
+    hand.keep("run-out")
+
+
+def pages(bench: Bench) -> None:
+    """Each tab that only shows something, with what is done there first."""
+    hand = bench.hand
+    for title, does, words in PAGES:
+        hand.click(title)
+        does(hand)
+        hand.sees(words)
+        hand.keep(title.lower())
+    hand.click("Overview")
+
+
+def two_channels(hand: Hand) -> None:
+    """Beside each other, with cursors."""
+    hand.click("Filter channels")
+    hand.type("knee.position")
+    hand.click("Cursors")
+
+
+def recording(bench: Bench) -> None:
+    """It is stopped and begun by hand, with a name; and a disk that refuses is told at once."""
+    hand = bench.hand
+    hand.key("ctrl+r")
+    hand.keep("stop-recording")
+    hand.click("Stop recording", exactly=True, place=-1)
+    hand.sees("Not recording")
+    hand.keep("not-recording")
+    hand.key("ctrl+r")
+    hand.click("Name of the recording")
+    hand.type("new insoles")
+    hand.click("Start", exactly=True)
+    hand.misses("Not recording")
+    bench.spool.rename(bench.folder / "away")
+    hand.sees("RECORDING HAS STOPPED", within_s=AGAIN_S)
+    hand.keep("recording-refused")
+    (bench.folder / "away").rename(bench.spool)
+    hand.misses("RECORDING HAS STOPPED", within_s=AGAIN_S)
+
+
+def replay(bench: Bench) -> None:
+    """A recording is played in the views of a robot, says so, and is labelled; STOP is the live robot's."""
+    hand = bench.hand
+    hand.click("Recordings")
+    today = time.strftime("%Y-%m-%d")
+    hand.sees(today, within_s=AGAIN_S)
+    hand.click(today)
+    hand.click("Play")
+    hand.sees("PLAYBACK, not live", within_s=AGAIN_S)
+    hand.keep("replay")
+    hand.click("The span is the whole recording")
+    hand.click("Label span")
+    hand.sees("walk", "Ada", "person")
+    hand.keep("labelled")
+    hand.click("← All")
+
+
+def learning(bench: Bench) -> None:
+    """What was recorded goes to the store; from labelled sessions a model is trained, compared and signed."""
+    hand = bench.hand
+    days = [day(f"s{number}", number, each_s=5.0) for number in range(WEARERS)]
+    put(bench.store.as_uri(), bench.folder / "walks", days)
+    hand.click("Cloud")
+    hand.click("Upload now")
+    hand.keep("cloud")
+    hand.click("Models")
+    hand.click("Train a model")
+    hand.reach("Start training")
+    hand.keep("train")
+    hand.click("Start training")
+    hand.sees("etter:", within_s=AGAIN_S)
+    hand.keep("trained")
+    hand.click("Train a model")
+    hand.click("Promote…")
+    hand.sees("Serves now")
+    hand.keep("promote")
+    hand.click("Change nothing")
+
+
+def store_gone(bench: Bench) -> None:
+    """It is said on every page that needs it, and what is recorded waits in the spool."""
+    hand, away = bench.hand, bench.folder / "store-away"
+    bench.store.rename(away)
+    bench.store.write_text("no folder")
+    hand.click("Cloud")
+    hand.click("Upload now")
+    hand.sees("store", "not", within_s=AGAIN_S)
+    hand.keep("store-gone")
+    for title in ("Models", "Recordings"):
+        hand.click(title)
+        hand.keep(f"store-gone-{title.lower()}")
+    bench.store.unlink()
+    away.rename(bench.store)
+    hand.click("Overview")
+
+
+def keys(bench: Bench) -> None:
+    """Every key on one sheet."""
+    hand = bench.hand
+    hand.key("question")
+    hand.sees("Ctrl+F")
+    hand.keep("keys")
+    hand.key("question")
+    hand.misses("What the manual says of this")
+
+
+def stage(hand: Hand, words: str, value: str) -> None:
+    """As a newcomer edits: find it, click it, type."""
+    hand.key("ctrl+f")
+    hand.key("ctrl+a")
+    hand.type(words)
+    hand.click(words, place=-1)
+    hand.key("F2")
+    hand.type(value)
+    hand.xdotool("key", "Return")
+
+
+PAGES: Final[tuple[tuple[str, Callable[[Hand], None], str], ...]] = (
+    ("Signals", two_channels, "knee"),
+    ("Resources", lambda hand: hand.click("CPU", exactly=True, place=-1), "processes"),
+    ("Bus", lambda _: None, "main"),
+    ("Audit", lambda _: None, "by"),
+)
