@@ -23,6 +23,7 @@ from server_gui.views.pairing import PairingDialog
 from server_gui.views.theme import Theme
 from tests.gui.fakes import Bench, destroy, stop_is_whole
 from tests.gui.running import wait
+from tests.gui.test_alarms import fault
 
 LEGS = ("left_knee", "right_knee")
 KINDS = {
@@ -227,6 +228,14 @@ def test_walking_begins_again_only_after_a_held_stop_was_reset(demo: Demo, bench
     demo.draw()
     click(demo.bar.walk)
     demo.until(lambda: demo.control.asked == ["walk"], "told it to walk")
+
+
+def test_a_drive_that_tripped_is_not_called_whole_once_its_cause_is_over(demo: Demo, bench: Bench) -> None:
+    fault(bench)
+    demo.draw()
+    assert demo.control.active == ()
+    words = "Simulated robot. Tripped: left knee. Clear fault, then Start walking"
+    assert demo.bar.said.text() == words
 
 
 def test_a_simulator_that_has_ended_says_so(demo: Demo) -> None:

@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from tests.gui.walks.robot import AGAIN_S, ENABLED
+from tests.gui.walks.robot import AGAIN_S, ENABLED, clear_fault
 from tests.gui.walks.walk import Bench
 from tests.support.waiting import until
 
@@ -37,12 +37,14 @@ def break_something(bench: Bench) -> None:
     hand.click("overcurrent")
     hand.keep("break")
     hand.click("left knee", place=0, exactly=True)
-    hand.sees("Broken: overcurrent on left knee")
+    hand.sees("Tripped: left knee", within_s=AGAIN_S)
     hand.sees("0x2310")
     hand.keep("broken")
-    hand.click("Mend all")
+    clear_fault(hand, "fault: left knee")
     hand.sees("nothing is broken")
-    hand.click("STOP  ", place=0)
+    hand.click("Start walking")
+    until(lambda: any(map(hand.reads, ENABLED)), "walked again", AGAIN_S)
+    hand.click("STOP  simulated-exo", place=-1)
     hand.sees("A stop is held: reset it")
     hand.keep("held")
     hand.click("Reset stop…")

@@ -109,14 +109,19 @@ def drive_fault(bench: Bench) -> None:
     hand.sees("right_hip.")
     hand.keep("fault-signal")
     hand.click("Overview")
+    clear_fault(hand, "fault: right hip")
+    none_enabled(hand)
+    walks_again(bench)
+
+
+def clear_fault(hand: Hand, alarm: str) -> None:
+    """By the button of its alarm, which is opened where others stand before it."""
     if not hand.can_see("Clear fault…"):
-        hand.click("fault: right hip")
+        hand.click(alarm)
     hand.click("Clear fault…")
     hand.keep("clear-fault")
     hand.click("Clear fault", exactly=True)
-    hand.misses("fault: right hip")
-    none_enabled(hand)
-    walks_again(bench)
+    hand.misses(alarm)
 
 
 def insole_lost(bench: Bench) -> None:
