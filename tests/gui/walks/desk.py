@@ -83,10 +83,10 @@ def recording(bench: Bench) -> None:
     hand.click("Start", exactly=True)
     hand.misses("Not recording")
     bench.spool.rename(bench.folder / "away")
-    hand.sees("RECORDING HAS STOPPED", within_s=AGAIN_S)
+    hand.sees("NOT RECORDING", within_s=AGAIN_S)
     hand.keep("recording-refused")
     (bench.folder / "away").rename(bench.spool)
-    hand.misses("RECORDING HAS STOPPED", within_s=AGAIN_S)
+    hand.misses("NOT RECORDING", within_s=AGAIN_S)
 
 
 def replay(bench: Bench) -> None:
@@ -98,6 +98,7 @@ def replay(bench: Bench) -> None:
     hand.click(today)
     hand.click("Play")
     hand.sees("PLAYBACK, not live", within_s=AGAIN_S)
+    hand.misses("reading …", within_s=AGAIN_S)
     hand.keep("replay")
     hand.click("The span is the whole recording")
     hand.click("Label span")
@@ -170,5 +171,5 @@ PAGES: Final[tuple[tuple[str, Callable[[Hand], None], str], ...]] = (
     ("Signals", two_channels, "knee"),
     ("Resources", lambda hand: hand.click("CPU", exactly=True, place=-1), "processes"),
     ("Bus", lambda _: None, "main"),
-    ("Audit", lambda _: None, "by"),
+    ("Audit", lambda _: None, "journal"),
 )
