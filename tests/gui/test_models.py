@@ -173,7 +173,11 @@ def test_a_training_shows_how_far_it_is_while_the_window_draws_and_serves_nobody
     whole.until(lambda: job.done > 0, "said how far it is")
     whole.until(lambda: job.is_over, "ended")
     assert (job.state, job.said.split(":")[0]) == (JobState.DONE, "Better")
-    whole.until(lambda: page.rows.rows, "listed it")
+    whole.until(lambda: page.chosen, "listed and chose it")
+    assert page.chosen is not None
+    assert list(archive.models.trained) == [page.chosen.card.id]
+    assert page.said.property("tone") == "good"
+    assert "F1, mean over classes, on held-out people" in page.said.text()
     assert registry.history("activity") == []
 
 
@@ -218,6 +222,10 @@ def test_every_control_of_the_page_fits_into_its_width_at_large_text(
         whole.draw()
         for control in (page.new, page.robot, page.promote, page.back, page.compare.other, page.form.begin):
             corner = control.mapTo(page, control.rect().bottomRight())
+            needed = control.minimumSizeHint().expandedTo(control.sizeHint()).width()
+            assert isinstance(control, QPushButton) or control.width() >= min(needed, page.width() // 3), (
+                control
+            )
             assert corner.x() <= page.visibleRegion().boundingRect().right(), (control, width, scale)
             assert control.height() >= control.minimumSizeHint().height(), (control, width, scale)
 

@@ -77,7 +77,7 @@ class Entry:
     def signature(self) -> str:
         """Return by whom its promotion is signed, in words; what nobody has promoted, nobody has signed."""
         if not self.serves:
-            return f"{UNSIGNED}: it came with GWRMS" if self.shipped else NONE
+            return UNSIGNED if self.shipped else NONE
         said = [KEY.sub(lambda key: f"{key[0][:SHORT]}…", one) for one in self.signed]
         if len(set(said)) == 1:
             return said[0]

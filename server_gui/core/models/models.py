@@ -10,7 +10,7 @@ from typing import Final
 from server_gui.core.cloud.jobs import Job, Jobs, JobState, Work
 from server_gui.core.models.catalogue import Catalogue, Looking
 from server_gui.core.models.changes import Change, carry_out, promotion, way_back
-from server_gui.core.models.training import Trained, TrainingWish
+from server_gui.core.models.training import BETTER, Trained, TrainingWish
 from server_gui.core.threads.answers import Deliver, when_done
 from server_gui.core.threads.background import Background
 
@@ -152,5 +152,6 @@ class Models:
         self._looked(Catalogue(problem=f"internal error, {type(error).__name__}"))
 
     def _over(self, job: Job) -> None:
-        self._say(f"{job.name}: {job.said}", Tone.BAD if job.state is JobState.FAILED else Tone.PLAIN)
+        good = Tone.GOOD if job.said.startswith(BETTER) else Tone.PLAIN
+        self._say(f"{job.name}: {job.said}", Tone.BAD if job.state is JobState.FAILED else good)
         self.look(now=True)

@@ -49,7 +49,8 @@ class ModelsTable(RowsTable):
 
     def __init__(self, model: ModelsModel, theme: Theme) -> None:
         self._theme = theme
-        super().__init__(Filtered(model), "Models", NAME)
+        self._rows, self._filtered = model, Filtered(model)
+        super().__init__(self._filtered, "Models", NAME)
         self.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
         self.setTextElideMode(Qt.TextElideMode.ElideMiddle)
         header = self.horizontalHeader()
@@ -57,6 +58,18 @@ class ModelsTable(RowsTable):
         header.setStretchLastSection(True)
         theme.changed.connect(self._restyle)
         self._restyle()
+
+    @property
+    def chosen(self) -> Entry | None:
+        """The model that is chosen."""
+        rows = [self._filtered.mapToSource(place).row() for place in self.selectionModel().selectedRows()]
+        return self._rows.rows[rows[0]] if rows and rows[0] < len(self._rows.rows) else None
+
+    def choose(self, model: str) -> None:
+        """Choose a model by its id, where it is listed."""
+        for row, entry in enumerate(self._rows.rows):
+            if entry.card.id == model:
+                self.selectRow(self._filtered.mapFromSource(self._rows.index(row, 0)).row())
 
     def _restyle(self) -> None:
         self.verticalHeader().setDefaultSectionSize(self._theme.px(24))

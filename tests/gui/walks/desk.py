@@ -120,7 +120,7 @@ def learning(bench: Bench) -> None:
     hand.reach("Start training")
     hand.keep("train")
     hand.click("Start training")
-    hand.sees("etter:", within_s=AGAIN_S)
+    hand.sees("Better:", within_s=AGAIN_S)
     hand.keep("trained")
     hand.click("Train a model")
     hand.click("Promote…")
@@ -136,7 +136,7 @@ def store_gone(bench: Bench) -> None:
     bench.store.write_text("no folder")
     hand.click("Cloud")
     hand.click("Upload now")
-    hand.sees("store", "not", within_s=AGAIN_S)
+    hand.sees("Not reached", within_s=AGAIN_S)
     hand.keep("store-gone")
     for title in ("Models", "Recordings"):
         hand.click(title)
