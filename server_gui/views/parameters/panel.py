@@ -96,7 +96,13 @@ class ParametersPanel(QWidget):
         self.more.setVisible(is_short)
         for button in self._seldom:
             button.setVisible(not is_short)
-        self.detail.be_short(is_short)
+        for part in (self.detail, self.filters):
+            part.be_short(is_short)
+        for button in (self.review_button, self.more):
+            self._buttons_grid.removeWidget(button)
+        place = {False: ((0, 2), (0, 3)), True: ((1, 0), (1, 1))}[is_short]
+        for button, (row, column) in zip((self.review_button, self.more), place, strict=True):
+            self._buttons_grid.addWidget(button, row, column)
 
     def stage_text(self, name: str, text: str) -> None:
         """Stage what was typed, in the unit that is shown."""
@@ -186,7 +192,7 @@ class ParametersPanel(QWidget):
         self._save.setToolTip("Save what the robot holds as a .toml file")
         self.store_button = QPushButton("Store to flash …")
         set_tip(self.store_button, STORING)
-        grid = QGridLayout()
+        grid = self._buttons_grid = QGridLayout()
         grid.addWidget(self.undo, 0, 0)
         grid.addWidget(self._discard, 0, 1)
         grid.addWidget(self.review_button, 0, 2)

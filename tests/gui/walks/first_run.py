@@ -44,7 +44,7 @@ def break_something(bench: Bench) -> None:
     hand.sees("nothing is broken")
     hand.click("Start walking")
     until(lambda: any(map(hand.reads, ENABLED)), "walked again", AGAIN_S)
-    hand.click("STOP  simulated-exo", place=-1)
+    hand.click("stop", exactly=True)
     hand.sees("A stop is held: reset it")
     hand.keep("held")
     hand.click("Reset stop…")

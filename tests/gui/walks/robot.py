@@ -33,7 +33,7 @@ def one_glance(bench: Bench) -> None:
 def stopped(bench: Bench) -> None:
     """STOP by a click, its proof, and how to go on."""
     hand = bench.hand
-    hand.click("STOP  walker", place=-1)
+    hand.click("stop", exactly=True)
     hand.sees("STOPPED", "confirmed by all 6 drives")
     hand.sees("to go on")
     hand.misses("Abnormal")
@@ -80,7 +80,7 @@ def two_robots(bench: Bench) -> None:
     hand.type(where)
     hand.key("Return")
     hand.key("ctrl+2")
-    hand.sees("STOP  simulated-exo")
+    hand.sees("STOP  ", "exo")
     until(lambda: any(map(hand.reads, ENABLED)), "showed the second robot", AGAIN_S)
     hand.keep("two-robots")
     hand.key("F12")
@@ -141,7 +141,7 @@ def bus_in_trouble(bench: Bench) -> None:
     hand = bench.hand
     hand.click("Bus")
     bench.robot.break_("bus_load", "bus")
-    hand.sees("full", within_s=AGAIN_S)
+    hand.sees("bus main: ", "of its time is taken", within_s=AGAIN_S)
     hand.keep("bus-full")
     bench.robot.mend()
     bench.robot.break_("bus_off", "left_knee")
