@@ -270,6 +270,19 @@ def test_the_tour_has_five_steps_and_is_not_offered_again_once_it_was_left(
     assert again.bar.end(30.0)
 
 
+def test_the_frame_of_the_tour_ends_where_what_it_is_about_is_scrolled_away(
+    demo: Demo, window: MainWindow, theme: Theme
+) -> None:
+    window.resize(1024, 700)
+    theme.set(scale=1.5)
+    for place in range(len(STOPS)):
+        demo.bar.tour.go(place)
+        demo.draw()
+        outline = demo.bar.tour._outline
+        assert outline.isVisible()
+        assert not outline.geometry().intersects(window.statusBar().geometry()), STOPS[place].title
+
+
 @pytest.mark.parametrize(("width", "height", "scale"), [(1024, 700, 1.0), (1024, 700, 1.5), (1366, 768, 1.5)])
 def test_stop_and_every_button_of_the_demo_are_whole_on_small_screens(
     demo: Demo, window: MainWindow, theme: Theme, width: int, height: int, scale: float

@@ -27,7 +27,7 @@ def tuning(bench: Bench) -> None:
     hand.click("Try it for")
     hand.sees("On trial")
     hand.key("F9")
-    hand.sees("takes it back in")
+    hand.sees("taken back in")
     hand.keep("trial")
     hand.click("Take it back now")
     hand.misses("On trial")
@@ -47,7 +47,7 @@ def trial_runs_out(bench: Bench) -> None:
     hand.click("Try it for")
     hand.sees("On trial")
     hand.misses("On trial")
-    hand.sees("taken back")
+    hand.sees("taken it back")
     hand.keep("run-out")
 
 
