@@ -46,6 +46,7 @@ def break_something(bench: Bench) -> None:
     until(lambda: any(map(hand.reads, ENABLED)), "walked again", AGAIN_S)
     hand.click("stop", exactly=True)
     hand.sees("A stop is held: reset it")
+    hand.sees("STOPPED", "confirmed by all 6 drives")
     hand.keep("held")
     hand.click("Reset stop…")
     hand.click("Reset stop", exactly=True)
