@@ -1,5 +1,8 @@
 """Moments at the desk: values tried, recordings made and played, models trained, a store that goes away."""
 
+import shutil
+import subprocess
+import sys
 import time
 from collections.abc import Callable
 from typing import Final
@@ -7,11 +10,13 @@ from typing import Final
 from tests.gui.walks.hand import Hand
 from tests.gui.walks.robot import AGAIN_S
 from tests.gui.walks.walk import Bench
+from tests.support.waiting import until
 from tests.unit.training.walkers import day, put
 
 NEW_STEP: Final = "430"
 SHORTEST_S: Final = "5"
 WEARERS: Final = 4
+EATER: Final = "gait_planner"
 
 
 def tuning(bench: Bench) -> None:
@@ -69,6 +74,21 @@ def two_channels(hand: Hand) -> None:
     hand.click("Cursors")
 
 
+def a_core_is_eaten(bench: Bench) -> None:
+    """Whoever does that stands first in the table."""
+    hand, program = bench.hand, bench.folder / EATER
+    shutil.copy(sys.executable, program)
+    with subprocess.Popen([str(program), "-S", "-c", "while True: pass"]) as process:
+        try:
+            hand.click("Resources")
+            hand.sees(EATER, within_s=AGAIN_S)
+            until(lambda: str(hand.ask(first="Processes")).startswith(EATER), "saw who it is", AGAIN_S)
+            hand.keep("eaten")
+        finally:
+            process.kill()
+    hand.click("Overview")
+
+
 def recording(bench: Bench) -> None:
     """It is stopped and begun by hand, with a name; and a disk that refuses is told at once."""
     hand = bench.hand
@@ -95,11 +115,13 @@ def replay(bench: Bench) -> None:
     hand.click("Recordings")
     today = time.strftime("%Y-%m-%d")
     hand.sees(today, within_s=AGAIN_S)
-    hand.click(today)
-    hand.click("Play")
+    hand.click(today, place=-1)
+    hand.click("Play", exactly=True)
     hand.sees("PLAYBACK, not live", within_s=AGAIN_S)
     hand.misses("reading …", within_s=AGAIN_S)
     hand.keep("replay")
+    hand.click("Play", exactly=True)
+    hand.sees("steps/min", within_s=AGAIN_S)
     hand.click("The span is the whole recording")
     hand.click("Label span")
     hand.sees("walk", "Ada", "person")
@@ -107,14 +129,22 @@ def replay(bench: Bench) -> None:
     hand.click("← All")
 
 
+def uploaded(bench: Bench) -> None:
+    """What was recorded until now is in the store."""
+    hand = bench.hand
+    hand.click("Cloud")
+    hand.click("Upload now")
+    hand.sees("no batches wait", within_s=AGAIN_S)
+    hand.sees("telemetry", within_s=AGAIN_S)
+    hand.keep("cloud")
+    hand.click("Overview")
+
+
 def learning(bench: Bench) -> None:
-    """What was recorded goes to the store; from labelled sessions a model is trained, compared and signed."""
+    """From labelled sessions a model is trained and compared; what would serve, and who signs it, is said."""
     hand = bench.hand
     days = [day(f"s{number}", number, each_s=5.0) for number in range(WEARERS)]
     put(bench.store.as_uri(), bench.folder / "walks", days)
-    hand.click("Cloud")
-    hand.click("Upload now")
-    hand.keep("cloud")
     hand.click("Models")
     hand.click("Train a model")
     hand.reach("Start training")
@@ -169,7 +199,7 @@ def stage(hand: Hand, words: str, value: str) -> None:
 
 PAGES: Final[tuple[tuple[str, Callable[[Hand], None], str], ...]] = (
     ("Signals", two_channels, "knee"),
-    ("Resources", lambda hand: hand.click("CPU", exactly=True, place=-1), "processes"),
+    ("Resources", lambda _: None, "processes"),
     ("Bus", lambda _: None, "main"),
     ("Audit", lambda _: None, "journal"),
 )

@@ -19,6 +19,30 @@ class Walk:
 
 
 SHORT: Final = Walk((robot.alive, robot.stopped))
+IN_DOCS: Final = Walk(
+    (
+        robot.alive,
+        desk.pages,
+        desk.a_core_is_eaten,
+        desk.tuning,
+        desk.trial_runs_out,
+        desk.replay,
+        desk.uploaded,
+        robot.stopped,
+    )
+)
+# What the pictures of the docs are called, by the moment that they keep.
+PICTURES: Final = {
+    "alive": "overview",
+    "signals": "signals",
+    "eaten": "resources",
+    "review": "review",
+    "trial": "trial",
+    "run-out": "reverted",
+    "labelled": "playback",
+    "cloud": "cloud",
+    "stopped": "stopped",
+}
 WALKS: Final = {
     "newcomer": Walk((first_run.starting, first_run.tour, first_run.break_something), demo),
     "integrator": Walk(
@@ -42,5 +66,7 @@ WALKS: Final = {
             robot.bus_in_trouble,
         )
     ),
-    "developer": Walk((robot.alive, desk.pages, desk.recording, desk.replay, desk.learning, desk.store_gone)),
+    "developer": Walk(
+        (robot.alive, desk.pages, desk.recording, desk.replay, desk.uploaded, desk.learning, desk.store_gone)
+    ),
 }
