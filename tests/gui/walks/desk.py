@@ -5,12 +5,12 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Final
 
 from tests.gui.walks.hand import Hand
 from tests.gui.walks.robot import AGAIN_S
 from tests.gui.walks.walk import Bench
-from tests.support.waiting import until
 from tests.unit.training.walkers import day, put
 
 NEW_STEP: Final = "430"
@@ -29,8 +29,7 @@ def tuning(bench: Bench) -> None:
     hand.click("Review 1 …")
     hand.sees("Try it for")
     hand.keep("review")
-    hand.click("Try it for")
-    hand.sees("On trial")
+    hand.insist("Try it for", lambda: hand.reads("On trial"))
     hand.key("F9")
     hand.sees("taken back in")
     hand.keep("trial")
@@ -49,8 +48,7 @@ def trial_runs_out(bench: Bench) -> None:
     hand.click("Length of the trial")
     hand.key("ctrl+a")
     hand.type(SHORTEST_S)
-    hand.click("Try it for")
-    hand.sees("On trial")
+    hand.insist("Try it for", lambda: hand.reads("On trial"))
     hand.misses("On trial")
     hand.sees("taken it back")
     hand.keep("run-out")
@@ -60,9 +58,8 @@ def pages(bench: Bench) -> None:
     """Each tab that only shows something, with what is done there first."""
     hand = bench.hand
     for title, does, words in PAGES:
-        hand.click(title)
+        hand.insist(title, partial(hand.reads, words))
         does(hand)
-        hand.sees(words)
         hand.keep(title.lower())
     hand.click("Overview")
 
@@ -82,7 +79,11 @@ def a_core_is_eaten(bench: Bench) -> None:
         try:
             hand.click("Resources")
             hand.sees(EATER, within_s=AGAIN_S)
-            until(lambda: str(hand.ask(first="Processes")).startswith(EATER), "saw who it is", AGAIN_S)
+            until(
+                lambda: str(hand.ask(first="Processes of the robot's computer")).startswith(EATER),
+                "saw who it is",
+                AGAIN_S,
+            )
             hand.keep("eaten")
         finally:
             process.kill()
@@ -115,9 +116,8 @@ def replay(bench: Bench) -> None:
     hand.click("Recordings")
     today = time.strftime("%Y-%m-%d")
     hand.sees(today, within_s=AGAIN_S)
-    hand.click(today, place=-1)
-    hand.click("Play", exactly=True)
-    hand.sees("PLAYBACK, not live", within_s=AGAIN_S)
+    hand.insist(today, lambda: hand.can_see("Play"), place=-1)
+    hand.insist("Play", lambda: hand.reads("PLAYBACK, not live"), exactly=True)
     hand.misses("reading …", within_s=AGAIN_S)
     hand.keep("replay")
     hand.click("Play", exactly=True)
@@ -198,7 +198,7 @@ def stage(hand: Hand, words: str, value: str) -> None:
 
 
 PAGES: Final[tuple[tuple[str, Callable[[Hand], None], str], ...]] = (
-    ("Signals", two_channels, "knee"),
+    ("Signals", two_channels, "Box zoom"),
     ("Resources", lambda _: None, "processes"),
     ("Bus", lambda _: None, "main"),
     ("Audit", lambda _: None, "journal"),

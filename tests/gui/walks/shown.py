@@ -103,10 +103,6 @@ def _answer(asked: dict[str, Any]) -> object:
             if not found and not more.get("exactly"):
                 found = [area for text, area in there if text.startswith(name)]
             return [(one.center().x(), one.center().y(), one.width(), one.height()) for one in found]
-        case {"first": name}:
-            tables = (one for one in visible() if isinstance(one, QAbstractItemView))
-            table = next((one for one in tables if one.accessibleName() == name), None)
-            return None if table is None else str(table.model().index(0, 0).data())
         case {"picture": path}:
             return QApplication.primaryScreen().grabWindow(0).save(path)
         case {"texts": _}:
