@@ -142,7 +142,6 @@ class SessionsPage(QWidget):
         known = (session, archive.tape, archive.problem)
         if known != self._told:
             self._told = known
-            self._card.set_title("Recording" if session is None else session.session)
             self.details.setPlainText(_told(session, archive.tape, archive.problem))
 
     # --- how it is put together
@@ -215,6 +214,7 @@ def _told(session: Session | None, tape: Tape | None, problem: str) -> str:
     if session is None:
         return "Choose a recording to see what is in it."
     known = {
+        "Session": session.session,
         "Robot": session.robot,
         "Began": _when(session.began),
         "Ended": "it goes on, or its server was killed" if session.ended is None else _when(session.ended),
