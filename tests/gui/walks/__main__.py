@@ -32,10 +32,10 @@ def walk(chosen: Walk, screen: Screen, pictures: Path) -> list[str]:
 
 
 def draw(folder: Path) -> list[str]:
-    """Draw the pictures of the docs anew; what went wrong, with which none is drawn."""
+    """Draw the pictures of the docs anew; what went wrong: then a picture stays as it was."""
     with tempfile.TemporaryDirectory(prefix="gwrms-pictures-") as kept:
         wrong = walk(IN_DOCS, Screen(1480, 900), Path(kept))
-        for picture in sorted(Path(kept).glob("*.png")) if not wrong else ():
+        for picture in sorted(Path(kept).glob("*.png")):
             if (name := PICTURES.get(picture.stem.partition("-")[2])) is not None:
                 shutil.copy(picture, folder / f"window-{name}.png")
     return wrong
