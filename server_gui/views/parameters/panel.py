@@ -10,6 +10,7 @@ from PySide6.QtWidgets import (
     QGridLayout,
     QMenu,
     QPushButton,
+    QSizePolicy,
     QStackedWidget,
     QVBoxLayout,
     QWidget,
@@ -53,7 +54,9 @@ class ParametersPanel(QWidget):
         self.filters, self.file = FilterBar(desk, theme), FileBar(desk)
         self.storing = StorePage(desk, theme)
         self.pages = QStackedWidget()
-        for page in (self._edit_page(), Scrolled(self.review), Scrolled(self.storing)):
+        self.pages.addWidget(self._edit_page())
+        for page in (Scrolled(self.review), Scrolled(self.storing)):
+            page.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Ignored)
             self.pages.addWidget(page)
         self.banner = PlainLabel()
         self.banner.setObjectName("banner")
