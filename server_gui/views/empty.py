@@ -1,26 +1,32 @@
-"""The page before there is a robot: add one, start a simulated one, or open a recording."""
+"""The page before there is a robot: add one, pair with one, start a simulated one, or open a recording."""
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QPushButton, QVBoxLayout, QWidget
 
 from gateway.client import Address, BadAddress
+from gateway.wire.pairing import SCHEME
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card
 from server_gui.views.widgets.plain import PlainLabel
 
 WIDTH = 560  # at text of 100 %: longer lines are not read
 ADD = (
-    "Type where its gateway listens, HOST:PORT, as gwrms gateway prints it. Robots that are always there go "
-    "into ~/.config/gwrms/server.toml."
+    "Type where its gateway listens, HOST:PORT, as gwrms gateway prints it. One that has keys shows a code "
+    "with sudo gwrms keys pair: pair with that. Robots that are always there go into "
+    "~/.config/gwrms/server.toml."
 )
 SIMULATE = "A whole exoskeleton without hardware walks on this computer. It can be stopped, tuned and broken."
 OPEN = "Everything that was recorded, played in the same views; no robot is needed."
 
 
 class EmptyView(QWidget):
-    """`added` brings an address, `simulator` asks for the simulated robot, `recordings` for the past."""
+    """`added` brings an address, `pairing` one to pair with, as far as it was typed.
+
+    `simulator` asks for the simulated robot, `recordings` for the past.
+    """
 
     added = Signal(str)
+    pairing = Signal(str)
     simulator = Signal()
     recordings = Signal()
 
@@ -36,6 +42,8 @@ class EmptyView(QWidget):
         self.address.returnPressed.connect(self._add)
         self.add.setAccessibleName("Add this robot")
         self.add.clicked.connect(self._add)
+        self.pair = QPushButton("Pair with a code…")
+        self.pair.clicked.connect(lambda: self.pairing.emit(self.address.text().strip()))
         self.start, self.open = QPushButton("Start the simulated robot"), QPushButton("Open a recording")
         self.start.setObjectName("primary")
         self.start.clicked.connect(self._start)
@@ -77,12 +85,16 @@ class EmptyView(QWidget):
         row = QHBoxLayout()
         row.addWidget(self.address, 1)
         row.addWidget(self.add)
+        row.addWidget(self.pair)
         card.body.addLayout(row)
         card.body.addWidget(self.wrong)
         return card
 
     def _add(self) -> None:
         text = self.address.text().strip()
+        if text.startswith(SCHEME):
+            self.pairing.emit(text)
+            return
         try:
             where = str(Address.parse(text))
         except BadAddress as error:

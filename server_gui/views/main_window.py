@@ -126,6 +126,7 @@ class MainWindow(QMainWindow):
         self.help, self.help_button = Help(theme), QPushButton("?")
         self.empty = EmptyView(theme)
         self.empty.added.connect(self.added)
+        self.empty.pairing.connect(self.robots.begin_pairing)
         self.empty.simulator.connect(self.simulator)
         self.empty.recordings.connect(self._look_at_recordings)
         self.tabs = QTabWidget()

@@ -66,9 +66,9 @@ class PairingDialog(QDialog):
         self.setModal(False)
         self.attempt: Attempt | None = None
         self.address, self.code, self.name = QLineEdit(where), QLineEdit(), QLineEdit()
-        self.address.setPlaceholderText("HOST:PORT, or the link that begins with gwrms://")
+        self.address.setPlaceholderText("HOST:PORT or gwrms://…")
         self.code.setPlaceholderText("as the robot shows it")
-        self.name.setPlaceholderText(f"{desk.own_name()}, unless you type another")
+        self.name.setPlaceholderText(desk.own_name())
         self.said = PlainLabel()
         self.said.setObjectName("banner")
         self.said.setWordWrap(True)

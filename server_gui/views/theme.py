@@ -133,11 +133,12 @@ QLabel#banner[tone="bad"] {{ border-color: {bad}; }}
 QLabel#banner[tone="good"] {{ background: {card}; border-color: {good}; }}
 QTabWidget::pane {{ border: none; border-top: 1px solid {border}; }}
 QTabBar {{ background: {panel}; }}
-QTabBar::tab {{ background: transparent; color: {dim}; padding: 7px 14px; border: none;
+QTabBar::tab {{ background: transparent; color: {dim}; padding: 7px 11px; border: none;
     border-bottom: 2px solid transparent; }}
 QTabBar::tab:selected {{ color: {text}; border-bottom: 2px solid {accent}; }}
 QTabBar QToolButton {{ padding: 0; border-radius: 0; }}
 QTabBar::tab:focus, QTabBar::tab:hover {{ color: {text}; }}
+QDialog {{ background: {card}; border: 1px solid {edge}; }}
 QPushButton, QToolButton {{ background: {card}; border: 1px solid {edge}; border-radius: 4px;
     padding: 5px 10px; }}
 QPushButton:hover, QToolButton:hover {{ border-color: {accent}; }}

@@ -149,10 +149,12 @@ def test_whether_the_record_holds_is_always_said(view: Audit, bench: Bench, jour
     assert view.verdict.property("tone") == "bad"
 
 
-def test_a_robot_whose_journal_has_not_been_read_says_so(theme: Theme, bench: Bench) -> None:
+def test_a_robot_without_an_entry_in_its_journal_is_not_called_unread(theme: Theme, bench: Bench) -> None:
     made = Audit(bench.desk, theme)
     made.refresh()
-    assert made.verdict.text() == "exo-01: Nothing of the robot's journal has been read yet."
+    assert made.verdict.text() == (
+        "exo-01: No entry of the robot's journal has come yet: none was written, or it is still being read."
+    )
 
 
 # --- what was collected before

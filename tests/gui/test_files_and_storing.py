@@ -9,6 +9,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QDialog
 
 from gateway.wire.parameter import Stored, Written
+from server_gui.views.docks import STACK
 from server_gui.views.main_window import MainWindow
 from server_gui.views.parameters.panel import ParametersPanel
 from server_gui.views.parameters.store_page import SETTLE_MS
@@ -17,6 +18,8 @@ from server_gui.views.theme import Theme
 from tests.gui.fakes import Bench, destroy
 from tests.gui.running import wait
 from tests.support.desk import HELD, described, looked, walking
+
+HIGH = 420  # beside an alarm and a trial on a screen of 700
 
 FILE_TEXT = """
 [robot]
@@ -183,6 +186,26 @@ def test_the_default_of_the_eds_is_shown_and_filtered_by(panel: ParametersPanel)
     assert shown(panel) == ["step length", "trunk angle"]
 
 
+def test_every_button_has_room_where_panels_stand_one_behind_the_other(
+    panel: ParametersPanel, bench: Bench
+) -> None:
+    panel.be_short(True)
+    panel.tree.select_name("gait.step_length")
+    for value in (0.43, 9.0):
+        panel.stage("gait.step_length", value)
+        panel.refresh()
+        panel.begin_review()
+        panel.review.write_it.setText("Overwrite 12")
+        assert panel.minimumSizeHint().width() <= STACK
+        panel.pages.setCurrentIndex(0)
+    assert "above the largest allowed" in panel.detail._facts.text()
+    panel.stage("gait.step_length", 0.43)
+    panel.resize(STACK, 600)
+    panel.refresh()
+    assert panel.detail._brief.is_whole
+    assert panel.heightForWidth(STACK) <= HIGH
+
+
 def test_a_narrow_table_keeps_what_matters_and_the_card_has_the_rest(panel: ParametersPanel) -> None:
     assert not panel.tree.isColumnHidden(DEFAULT)
     panel.resize(400, 900)
@@ -205,7 +228,7 @@ def begin(panel: ParametersPanel) -> None:
 def test_storing_is_a_step_of_its_own_that_says_what_it_is(panel: ParametersPanel, bench: Bench) -> None:
     panel.tree.select_name("left_knee.max_torque")
     panel.store_button.click()
-    assert panel.pages.currentWidget() is panel.storing
+    assert panel.storing.isVisible()
     assert not panel.storing.store_it.isEnabled(), "a click meant for what stood there before counts"
     begin(panel)
     assert panel.storing.store_it.text() == "Store left knee"

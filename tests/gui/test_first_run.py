@@ -19,9 +19,11 @@ from server_gui.views.first_run.opening import Opening
 from server_gui.views.first_run.splash import Splash
 from server_gui.views.first_run.tour import STOPS
 from server_gui.views.main_window import MainWindow
+from server_gui.views.pairing import PairingDialog
 from server_gui.views.theme import Theme
 from tests.gui.fakes import Bench, destroy, stop_is_whole
 from tests.gui.running import wait
+from tests.gui.test_alarms import fault
 
 LEGS = ("left_knee", "right_knee")
 KINDS = {
@@ -137,6 +139,23 @@ def test_an_empty_window_offers_to_add_a_robot_to_simulate_one_and_to_open_a_rec
     destroy(window)
 
 
+@pytest.mark.parametrize("typed", ["192.0.2.7:7420", "gwrms://192.0.2.7:7420#ABCD"])
+def test_an_empty_window_pairs_with_a_robot_by_what_was_typed(
+    qt: QApplication, theme: Theme, tmp_path: Path, typed: str
+) -> None:
+    window = MainWindow(Desk(), theme, QSettings(str(tmp_path / "kept.ini"), QSettings.Format.IniFormat))
+    window.show()
+    added = list[str]()
+    window.added.connect(added.append)
+    window.empty.address.setText(typed)
+    click(window.empty.add if "//" in typed else window.empty.pair)
+    (dialog,) = window.robots.findChildren(PairingDialog)
+    assert (dialog.isVisible(), dialog.address.text(), added) == (True, typed, [])
+    dialog.paired.emit("192.0.2.7:7420")
+    assert added == ["192.0.2.7:7420"]
+    destroy(window)
+
+
 @pytest.mark.parametrize(("width", "height", "scale"), [(1024, 700, 1.0), (1024, 700, 1.5), (1366, 768, 1.5)])
 def test_the_three_offers_are_whole_on_small_screens_and_with_large_text(
     qt: QApplication, theme: Theme, tmp_path: Path, width: int, height: int, scale: float
@@ -211,6 +230,14 @@ def test_walking_begins_again_only_after_a_held_stop_was_reset(demo: Demo, bench
     demo.until(lambda: demo.control.asked == ["walk"], "told it to walk")
 
 
+def test_a_drive_that_tripped_is_not_called_whole_once_its_cause_is_over(demo: Demo, bench: Bench) -> None:
+    fault(bench)
+    demo.draw()
+    assert demo.control.active == ()
+    words = "Simulated robot. Tripped: left knee. Clear fault, then Start walking"
+    assert demo.bar.said.text() == words
+
+
 def test_a_simulator_that_has_ended_says_so(demo: Demo) -> None:
     demo.own.runs, demo.own.problem = False, "the simulator has ended (killed by SIGKILL)"
     demo.draw()
@@ -241,6 +268,19 @@ def test_the_tour_has_five_steps_and_is_not_offered_again_once_it_was_left(
     click(again.bar.tour.skip)
     assert not again.bar.tour.isVisible()
     assert again.bar.end(30.0)
+
+
+def test_the_frame_of_the_tour_ends_where_what_it_is_about_is_scrolled_away(
+    demo: Demo, window: MainWindow, theme: Theme
+) -> None:
+    window.resize(1024, 700)
+    theme.set(scale=1.5)
+    for place in range(len(STOPS)):
+        demo.bar.tour.go(place)
+        demo.draw()
+        outline = demo.bar.tour._outline
+        assert outline.isVisible()
+        assert not outline.geometry().intersects(window.statusBar().geometry()), STOPS[place].title
 
 
 @pytest.mark.parametrize(("width", "height", "scale"), [(1024, 700, 1.0), (1024, 700, 1.5), (1366, 768, 1.5)])

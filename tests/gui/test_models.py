@@ -13,6 +13,7 @@ from server_gui.core.archive.archive import Archive
 from server_gui.core.cloud.jobs import Job, JobState
 from server_gui.core.models.models import Tone
 from server_gui.core.settings.server_file import ServerSettings
+from server_gui.views.models.models_table import SIGNED
 from server_gui.views.models.panel import ModelsPage
 from tests.gui.archives import Shown
 from tests.unit.registry.models import card, learned
@@ -103,6 +104,9 @@ def test_models_are_listed_and_compared_by_names_instead_of_hashes(
     words = " ".join([*shown, page.compare.said.text(), page.compare.other.currentText()])
     assert all(model.id not in words for model in both)
     assert "Falling of" in words
+    rows = {entry.card.id: row for row, entry in enumerate(page.rows.rows)}
+    signed = {model.id: page.rows.index(rows[model.id], SIGNED).data() for model in both}
+    assert signed == {one.id: "unsigned", other.id: "–"}
     assert page.compare.other.currentData() == one.id
     assert page.compare.other.currentText().endswith("(serves)")
     found = figures(page)
@@ -169,7 +173,11 @@ def test_a_training_shows_how_far_it_is_while_the_window_draws_and_serves_nobody
     whole.until(lambda: job.done > 0, "said how far it is")
     whole.until(lambda: job.is_over, "ended")
     assert (job.state, job.said.split(":")[0]) == (JobState.DONE, "Better")
-    whole.until(lambda: page.rows.rows, "listed it")
+    whole.until(lambda: page.chosen, "listed and chose it")
+    assert page.chosen is not None
+    assert list(archive.models.trained) == [page.chosen.card.id]
+    assert page.said.property("tone") == "good"
+    assert "F1, mean over classes, on held-out people" in page.said.text()
     assert registry.history("activity") == []
 
 
@@ -212,6 +220,7 @@ def test_every_control_of_the_page_fits_into_its_width_at_large_text(
         page._theme.set(scale=scale)
         whole.draw()
         whole.draw()
+        assert page.robot.width() >= page.robot.sizeHint().width(), (width, scale)
         for control in (page.new, page.robot, page.promote, page.back, page.compare.other, page.form.begin):
             corner = control.mapTo(page, control.rect().bottomRight())
             assert corner.x() <= page.visibleRegion().boundingRect().right(), (control, width, scale)

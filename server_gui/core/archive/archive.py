@@ -41,7 +41,7 @@ class Archive:
         self.playback = Playback(self._reading.do, deliver, desk.shown)
         self.labels = SessionLabels(settings, self._reading.do, deliver, author)
         self.jobs = Jobs(lambda job: deliver(lambda: self._over(job)))
-        self.models = Models(settings.store.url, deliver, self._robots, author)
+        self.models = Models(settings.store.url, deliver, self._robots, author, settings.promoters)
         self.tape: Tape | None = None  # of the session that is chosen
         self.problem = ""  # why there is none
         self.chosen: Session | None = None

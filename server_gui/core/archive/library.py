@@ -14,6 +14,7 @@ from ml.store.sessions import UNTOLD, Session, in_order, sessions
 from server_gui.core.cloud import spool_reader, usage
 from server_gui.core.cloud.usage import Usage
 from server_gui.core.recording.errors import RecordingError
+from server_gui.core.recording.receipts import RECEIPTS, Receipts
 from server_gui.core.settings.server_file import ServerSettings
 from server_gui.core.threads.answers import Deliver, when_done
 from server_gui.core.threads.background import Background
@@ -97,10 +98,19 @@ def look(settings: ServerSettings) -> Found:
         used = tuple(usage.by_robot(store))
         size_bytes = sum(each.size_bytes for each in store.objects.listing())
     except NoSuchTable:
-        return Found(_joined([], waiting), is_empty=True)
+        gone = _gone(settings)
+        return Found(_joined([], waiting), problem=gone, is_empty=gone is None)
     except StoreError as error:
         return Found(_joined([], waiting), problem=str(error))
     return Found(_joined(stored, waiting), used, size_bytes)
+
+
+def _gone(settings: ServerSettings) -> str | None:
+    """Why there should be a store: this computer has brought something to it."""
+    newest, url = Receipts(settings.recorder.spool / RECEIPTS).newest(), settings.store.url
+    if newest is None or newest.url != url:
+        return None
+    return f"there is no store at {url} any more, and batch {newest.batch} of this computer was in it"
 
 
 def _waiting(settings: ServerSettings) -> list[Session]:

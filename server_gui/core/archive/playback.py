@@ -32,6 +32,7 @@ from server_gui.core.tuning.commands import Commands
 PIECE_NS: Final = 20_000_000_000  # that are read at once
 PIECES: Final = 8  # that are kept
 LEAD_NS: Final = 12_000_000_000  # of the past that are shown after a jump
+FIRST_NS: Final = 1_000_000  # a session's beginning is told in ms, and its first row is seen there
 LATE_S: Final = 0.5  # a frame that took longer does not make the recording jump
 SPEEDS: Final = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
 NOT_PREDICTED: Final = "nothing was said then: gwrms predict --session says it now"
@@ -231,8 +232,9 @@ class Playback:
             return False
         if self._fed_ns is None:
             self._begin_anew(tape)
-        if target_ns > begin_ns:
-            shown = [self._pieces[place].between(begin_ns, target_ns) for place in wanted]
+        end_ns = target_ns if target_ns > tape.first_ns else target_ns + FIRST_NS
+        if end_ns > begin_ns:
+            shown = [self._pieces[place].between(begin_ns, end_ns) for place in wanted]
             self._feed(Rows.joined([piece.rows for piece in shown]))
             self._said |= {one.prediction.task: one for piece in shown for one in piece.said}
         self._fed_ns = target_ns

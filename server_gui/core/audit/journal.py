@@ -57,7 +57,9 @@ class Audit:
     def verdict(self) -> str:
         """In words, how far the journal can be believed."""
         if not self.entries:
-            return "Nothing of the robot's journal has been read yet."
+            return (
+                "No entry of the robot's journal has come yet: none was written, or it is still being read."
+            )
         if self.problem is not None:
             return f"The journal is NOT INTACT: {self.problem}"
         span = f"Entries {self.entries[0]['n']} to {self.entries[-1]['n']}"

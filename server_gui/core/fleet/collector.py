@@ -25,6 +25,7 @@ from server_gui.core.follow.feed import ONCE, FollowSettings
 from server_gui.core.follow.network import Network
 from server_gui.core.prediction.state import PredictingState
 from server_gui.core.recording.compaction import Compaction
+from server_gui.core.recording.errors import SpoolUnusable
 from server_gui.core.recording.recorder import Recorder, RecorderSettings, RecorderState
 from server_gui.core.recording.records import NOBODY, Worn
 from server_gui.core.recording.rows import Record
@@ -241,7 +242,7 @@ class Collector:
             spool=str(self._spool.folder),
             store=settings.store.url,
             upload=settings.recorder.upload,
-            disk_free_bytes=shutil.disk_usage(self._spool.folder).free,
+            disk_free_bytes=self._disk_free(),
             robots=self._fleet.report(),
             recorder=self._recorder.state,
             uploader=self._uploader.state,
@@ -249,6 +250,13 @@ class Collector:
             is_paused=self._fleet.is_paused,
             prediction=None if self._prediction is None else self._prediction.state,
         )
+
+    def _disk_free(self) -> int:
+        folder = self._spool.folder
+        try:
+            return shutil.disk_usage(folder).free
+        except OSError as error:
+            raise SpoolUnusable(f"the spool {folder} cannot be read: {error.strerror}") from error
 
 
 def whole(recorder: RecordingSettings) -> FollowSettings:

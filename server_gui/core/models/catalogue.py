@@ -1,13 +1,15 @@
 """Every model of a store: whom it serves, what it would take the place of, how right it was last week."""
 
+import re
 from collections.abc import Callable, Iterator, Mapping, Set
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 from types import MappingProxyType
-from typing import Self
+from typing import Final, Self
 from urllib.parse import urlsplit
 
+from gateway.amounts import NONE
 from ml.errors import UnusableModel
 from ml.registry.card import Card
 from ml.registry.pointers import Pointer
@@ -18,6 +20,9 @@ from server_gui.core.models.names import EVERY, model_names
 from server_gui.core.prediction.state import Quality
 from server_gui.core.prediction.track_record import TrackRecord
 from server_gui.core.settings.promoters import UNSIGNED, desk_signature, signer
+
+KEY: Final = re.compile(r"\b[0-9a-f]{64}\b")  # a fingerprint
+SHORT: Final = 16  # of its signs, as people compare it
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,11 +66,22 @@ class Entry:
     serves: tuple[str, ...]
     serving: str
     hits: Mapping[str, Quality] = field(default_factory=dict)  # by robot, within the last week
+    signed: tuple[str, ...] = ()  # who has signed that it serves, for each of `serves`
 
     @property
     def whom(self) -> str:
         """Return whom it serves, in words."""
         return "where no other does" if self.shipped else ", ".join(self.serves) or "nobody"
+
+    @property
+    def signature(self) -> str:
+        """Return by whom its promotion is signed, in words; what nobody has promoted, nobody has signed."""
+        if not self.serves:
+            return UNSIGNED if self.shipped else NONE
+        said = [KEY.sub(lambda key: f"{key[0][:SHORT]}…", one) for one in self.signed]
+        if len(set(said)) == 1:
+            return said[0]
+        return "; ".join(f"{whom}: {one}" for whom, one in zip(self.serves, said, strict=True))
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,8 +126,10 @@ def why_it_cannot_serve(registry: Registry, model: str) -> str:
 class Looking:
     """Looks into one store again and again; for one thread."""
 
-    def __init__(self, url: str) -> None:
+    def __init__(self, url: str, promoters: Mapping[str, str] = MappingProxyType({})) -> None:
+        """`promoters` are the fingerprints of keys by whose they are."""
         self._url = url
+        self._promoters = promoters
         self._record: TrackRecord | None = None
 
     def look(self, robots: Set[str], ending: Callable[[], bool] = lambda: False) -> Catalogue:
@@ -119,7 +137,7 @@ class Looking:
         try:
             registry = open_registry(self._url, given=False)
             hits, hits_problem = self._hits(robots, ending)
-            entries = tuple(reversed(list(_entries(registry, hits))))
+            entries = tuple(reversed(list(_entries(registry, hits, self._promoters))))
             return Catalogue(entries, tuple(registry.damaged().values()), "", hits_problem)
         except (StoreError, UnusableModel, OSError) as error:
             return Catalogue(problem=str(error))
@@ -140,8 +158,8 @@ class Looking:
         return found, ""
 
 
-def _entries(registry: Registry, hits: Hits) -> Iterator[Entry]:
-    cards, serving = registry.entries(), Serving.of(registry)
+def _entries(registry: Registry, hits: Hits, promoters: Mapping[str, str]) -> Iterator[Entry]:
+    cards, serving = registry.entries(), Serving.of(registry, promoters)
     names = model_names(cards, serving.shipped)
     for card in cards:
         yield Entry(
@@ -151,6 +169,7 @@ def _entries(registry: Registry, hits: Hits) -> Iterator[Entry]:
             tuple(serving.whom.get(card.id, ())),
             _in_its_place(registry, card),
             hits.get(card.id, {}),
+            tuple(serving.signed.get(card.id, ())),
         )
 
 

@@ -10,8 +10,13 @@ from ml.registry.registry import Registry
 from server_gui.core.models.catalogue import open_registry
 from server_gui.core.models.comparison import headline
 from server_gui.core.models.names import EVERY, model_names, task_name
+from server_gui.core.settings.promoters import UNSIGNED, desk_signature
 
 SOON: Final = "Servers that run take it within seconds, without a restart."
+SIGNED: Final = "It is signed with this desk's key."
+KEYLESS: Final = (
+    f"This desk has no key, so it is {UNSIGNED}: no rule stops a robot by it. gwrms models key makes one."
+)
 OWN: Final = "A robot with a model of its own keeps that."
 
 
@@ -25,11 +30,14 @@ class Change:
     then: Card | None
     is_rollback: bool
     names: Mapping[str, str]  # of models by their ids
+    is_signed: bool  # whether this desk has a key to sign it with
+    is_anew: bool = False  # what serves unsigned is said again, signed
 
     @property
     def changes_nothing(self) -> bool:
         """Whether that serves already."""
-        return self.now is not None and self.then is not None and self.now.id == self.then.id
+        same = self.now is not None and self.then is not None and self.now.id == self.then.id
+        return same and not self.is_anew
 
     @property
     def outcome(self) -> str:
@@ -57,6 +65,8 @@ class Change:
         if self.then is None:
             yield "What serves then is what does so for every robot, or what came with GWRMS."
         yield f"{SOON} {'' if self.robot else OWN}".rstrip()
+        if self.then is not None:
+            yield SIGNED if self.is_signed else KEYLESS
 
     def _told(self, card: Card | None) -> str:
         if card is None:
@@ -75,7 +85,8 @@ def promotion(url: str, model: str, robot: str) -> Change:
     registry = open_registry(url)
     card = registry.promotable(model, robot)
     now = registry.serving(card.task, robot, set(card.channels))
-    return Change(card.task, robot, _card(registry, now), card, False, _names(registry))
+    anew = _signs() and _serves_unsigned(registry, card, robot)
+    return Change(card.task, robot, _card(registry, now), card, False, _names(registry), _signs(), anew)
 
 
 def way_back(url: str, task: str, robot: str) -> Change:
@@ -89,7 +100,8 @@ def way_back(url: str, task: str, robot: str) -> Change:
     registry = open_registry(url)
     before = registry.before(task, robot)
     now = registry.serving(task, robot)
-    return Change(task, robot, _card(registry, now), _card(registry, before), True, _names(registry))
+    then = _card(registry, before)
+    return Change(task, robot, _card(registry, now), then, True, _names(registry), _signs())
 
 
 def carry_out(url: str, change: Change, who: str, why: str) -> Pointer:
@@ -109,6 +121,15 @@ def carry_out(url: str, change: Change, who: str, why: str) -> Pointer:
     if change.then is None:
         raise ValueError("a promotion is of a model")
     return registry.promote(change.then.id, change.robot, who=who, why=why, over=now)
+
+
+def _serves_unsigned(registry: Registry, card: Card, robot: str) -> bool:
+    history = registry.history(card.task, robot)
+    return bool(history) and history[-1].model == card.id and not history[-1].signature
+
+
+def _signs() -> bool:
+    return desk_signature() is not None
 
 
 def _names(registry: Registry) -> Mapping[str, str]:

@@ -2,14 +2,15 @@
 
 import getpass
 import time
-from collections.abc import Callable, Set
+from collections.abc import Callable, Mapping, Set
 from enum import Enum
+from types import MappingProxyType
 from typing import Final
 
 from server_gui.core.cloud.jobs import Job, Jobs, JobState, Work
 from server_gui.core.models.catalogue import Catalogue, Looking
 from server_gui.core.models.changes import Change, carry_out, promotion, way_back
-from server_gui.core.models.training import Trained, TrainingWish
+from server_gui.core.models.training import BETTER, Trained, TrainingWish
 from server_gui.core.threads.answers import Deliver, when_done
 from server_gui.core.threads.background import Background
 
@@ -33,7 +34,14 @@ class Tone(Enum):
 class Models:
     """For the window's thread; `close` ends its own. `revision` rises with every look that came back."""
 
-    def __init__(self, url: str, deliver: Deliver, robots: Callable[[], Set[str]], who: str = "") -> None:
+    def __init__(
+        self,
+        url: str,
+        deliver: Deliver,
+        robots: Callable[[], Set[str]],
+        who: str = "",
+        promoters: Mapping[str, str] = MappingProxyType({}),
+    ) -> None:
         self.url = url
         self.found = Catalogue()
         self.revision = 0
@@ -47,7 +55,7 @@ class Models:
         self._who = who or getpass.getuser()
         self._deliver = deliver
         self._thread = Background("list of models")
-        self._looking = Looking(url)
+        self._looking = Looking(url, promoters)
         self._looks = False
         self._ending = False
 
@@ -144,5 +152,6 @@ class Models:
         self._looked(Catalogue(problem=f"internal error, {type(error).__name__}"))
 
     def _over(self, job: Job) -> None:
-        self._say(f"{job.name}: {job.said}", Tone.BAD if job.state is JobState.FAILED else Tone.PLAIN)
+        good = Tone.GOOD if job.said.startswith(BETTER) else Tone.PLAIN
+        self._say(f"{job.name}: {job.said}", Tone.BAD if job.state is JobState.FAILED else good)
         self.look(now=True)

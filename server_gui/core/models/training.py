@@ -15,6 +15,9 @@ UNITS: Final = {
     "judging": "judged",
 }
 
+BETTER: Final = "Better"
+WORDS: Final = {"macro_f1": "F1, mean over classes,", "rmse_percent": "error, % of the gait cycle,"}
+
 
 class Progress(msgspec.Struct, frozen=True):
     """How far it is."""
@@ -37,7 +40,10 @@ class Trained(msgspec.Struct, frozen=True):
     @property
     def verdict(self) -> str:
         """Return it in words."""
-        return f"{'Better' if self.better else 'Not better'}: {'; '.join(self.why)}"
+        why = "; ".join(self.why)
+        for figure, words in WORDS.items():
+            why = why.replace(figure, words)
+        return f"{BETTER if self.better else 'Not better'}: {why}"
 
 
 class _Wrong(msgspec.Struct, frozen=True):

@@ -13,6 +13,7 @@ from server_gui.core.follow.robot import Robot
 ACTIVE: Final = "error active"
 OFF: Final = "bus off"
 FULL_PERCENT: Final = 95.0  # of its time: hardly a frame more has room
+TAKEN: Final = "of its time is taken"
 BUSY_PERCENT: Final = 80.0  # as the gateway finds it
 MISSING_PERCENT: Final = 1.0  # of a node's PDOs
 OLD_S: Final = 5.0  # what was seen before is not known now
@@ -102,12 +103,13 @@ def trouble(bus: BusInfo) -> tuple[str, str] | None:
     load, full = bus.load_percent or 0.0, []
     if (load >= BUSY_PERCENT and not bus.findings) or load >= FULL_PERCENT:
         said = "it is full" if load >= FULL_PERCENT else "it is busy"
-        full = [(f"{said}: {load_text(bus)} of its time is taken", FEWER)]
+        full = [(f"{said}: {load_text(bus)} {TAKEN}", FEWER)]
+    findings = [one for one in bus.findings if not (full and one.words.endswith(TAKEN))]  # says no more
     told = [
         (bus.problem or "", ""),
         (bus.state if bus.state != ACTIVE else "", ""),
         *full,
-        *((one.words, one.check) for one in bus.findings),
+        *((one.words, one.check) for one in findings),
         *((f"{_who(node)}: {one.words}", one.check) for node in bus.nodes for one in node.findings),
         *((_missing(node), "") for node in bus.nodes if not node.findings and _misses(node)),
     ]

@@ -56,6 +56,7 @@ class AlarmKind(Enum):
         "uncleared"  # nobody can say or see to it that the disk has room; it goes on as long as it has
     )
     SPOOL_FAILED = "spool_failed"  # the spool cannot be written; what waits is tried again
+    UNFROZEN = "unfrozen"  # no new file can be begun: what comes is kept in the old one, and goes nowhere
     BROKEN = "broken"  # a mistake of ours: what was to be kept then is lost; it goes on
 
 
@@ -442,9 +443,9 @@ class Recorder:
         try:
             self._spool.freeze()
         except SpoolUnusable as error:  # tried again with the next turn
-            self._alarm(AlarmKind.SPOOL_FAILED, str(error))
+            self._alarm(AlarmKind.UNFROZEN, f"{error}; what comes is kept in the file before it")
             return
-        self._alarm(AlarmKind.SPOOL_FAILED, None)
+        self._alarm(AlarmKind.UNFROZEN, None)
         cuts, self._cuts = self._cuts, []
         for then in cuts:
             then()

@@ -121,8 +121,16 @@ class DemoBar(QToolBar):
         if self._failed:
             return f"Not done: {self._failed}"
         broken = ", ".join(f"{words(one.name)} on {words(one.on)}" for one in self._listed.active)
+        tripped = ", ".join(map(words, self._tripped()))
         said = f"Broken: {broken}" if broken else "Simulated robot; nothing is broken"
+        if tripped:
+            how = "Mend all, then Clear fault" if broken else "Clear fault"
+            return f"{said if broken else 'Simulated robot'}. Tripped: {tripped}. {how}, then Start walking"
         return f"{said}. A stop is held: reset it, then Start walking" if held else said
+
+    def _tripped(self) -> list[str]:
+        """Drives in fault: they stay so after what had tripped them is over, which may be at once."""
+        return [part.name for part in self._station.robot.not_ok() if "in fault" in (part.problem or "")]
 
     def _ask(self, work: Callable[[], None]) -> None:
         """Do this in the thread, and look then what is broken."""

@@ -20,11 +20,12 @@ GROUPS: Final = (
     ("host", "Robot's computer"),
 )
 OTHERS: Final = "Others"
+ABBREVIATED: Final = {"sto": "safe torque off (STO)"}
 
 
 def words(name: str) -> str:
     """Return a name of the simulator as people read it."""
-    return name.replace("_", " ")
+    return ABBREVIATED.get(name) or name.replace("_", " ")
 
 
 def grouped(faults: Mapping[str, FaultKind]) -> dict[str, dict[str, FaultKind]]:

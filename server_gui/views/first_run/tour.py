@@ -68,10 +68,10 @@ class Outline(QWidget):
         self.hide()
 
     def surround(self, part: QWidget) -> None:
-        """Stand around this part; nowhere while that is not in sight."""
-        self.setVisible(part.isVisible())
-        place = part.mapTo(self._window, part.rect().topLeft())
-        if self.geometry() != (wanted := QRect(place, part.size())):
+        """Stand around what is in sight of this part; nowhere while that is nothing."""
+        seen = part.visibleRegion().boundingRect()
+        self.setVisible(part.isVisible() and not seen.isEmpty())
+        if self.geometry() != (wanted := QRect(part.mapTo(self._window, seen.topLeft()), seen.size())):
             self.setGeometry(wanted)
         self.raise_()
 

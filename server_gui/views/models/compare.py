@@ -145,7 +145,7 @@ class Compare(Card):
             part.setVisible(other is not None)
         for column in (OTHER, DIFFERENCE, VERDICT):
             self.table.setColumnHidden(column, other is None)
-        set_text(self.said, f"{entry.name}; serves {entry.whom}")
+        set_text(self.said, f"{entry.name}; serves {entry.whom}{_signed(entry)}")
         set_text(self.week, f"Last week: {last_week(entry)}{self._its_week(other)}")
         told = " ".join(notes(entry, other))
         set_text(self.notes, told)
@@ -184,6 +184,10 @@ class Compare(Card):
         set_text(
             self._legend, "Calibration: ● this model" + ("" if other is None else "   ○ the other (dashed)")
         )
+
+
+def _signed(entry: Entry) -> str:
+    return "" if entry.signature == NONE else f" ({entry.signature})"
 
 
 def _words() -> PlainLabel:

@@ -1,4 +1,4 @@
-"""Every model, newest first: what it predicts, whom it serves, how well it was judged, how old it is."""
+"""Every model, newest first: what it predicts, whom it serves, by whose word, how well judged, how old."""
 
 from typing import Any, Final
 
@@ -15,8 +15,8 @@ from server_gui.views.theme import Theme
 from server_gui.views.widgets.plain import tip
 from server_gui.views.widgets.rows import SORT_ROLE, Filtered, Index, RowsModel, RowsTable
 
-TITLES: Final = ("Model", "Serves", "Judged", "Age, days", "Right last week", "Learned from")
-NAME, SERVES, JUDGED, AGE, WEEK, FROM = range(len(TITLES))
+TITLES: Final = ("Model", "Serves", "Signed", "Judged", "Age, days", "Right last week", "Learned from")
+NAME, SERVES, SIGNED, JUDGED, AGE, WEEK, FROM = range(len(TITLES))
 NUMBERS: Final = frozenset({JUDGED, AGE})
 
 
@@ -35,7 +35,8 @@ class ModelsModel(RowsModel[Entry]):
             case _ if role == SORT_ROLE:
                 return entry.card.made.timestamp() if column == NAME else _keys(entry)[column]
             case Qt.ItemDataRole.ToolTipRole:
-                return tip(f"{_cells(entry)[column]}\n{entry.card.id}, {entry.card.recipe}")
+                words = "; ".join(entry.signed) if column == SIGNED else ""
+                return tip(f"{words or _cells(entry)[column]}\n{entry.card.id}, {entry.card.recipe}")
             case Qt.ItemDataRole.TextAlignmentRole if column in NUMBERS:
                 return Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
             case Qt.ItemDataRole.FontRole if column in NUMBERS:
@@ -48,7 +49,8 @@ class ModelsTable(RowsTable):
 
     def __init__(self, model: ModelsModel, theme: Theme) -> None:
         self._theme = theme
-        super().__init__(Filtered(model), "Models", NAME)
+        self._rows, self._filtered = model, Filtered(model)
+        super().__init__(self._filtered, "Models", NAME)
         self.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
         self.setTextElideMode(Qt.TextElideMode.ElideMiddle)
         header = self.horizontalHeader()
@@ -56,6 +58,18 @@ class ModelsTable(RowsTable):
         header.setStretchLastSection(True)
         theme.changed.connect(self._restyle)
         self._restyle()
+
+    @property
+    def chosen(self) -> Entry | None:
+        """The model that is chosen."""
+        rows = [self._filtered.mapToSource(place).row() for place in self.selectionModel().selectedRows()]
+        return self._rows.rows[rows[0]] if rows and rows[0] < len(self._rows.rows) else None
+
+    def choose(self, model: str) -> None:
+        """Choose a model by its id, where it is listed."""
+        for row, entry in enumerate(self._rows.rows):
+            if entry.card.id == model:
+                self.selectRow(self._filtered.mapFromSource(self._rows.index(row, 0)).row())
 
     def _restyle(self) -> None:
         self.verticalHeader().setDefaultSectionSize(self._theme.px(24))
@@ -68,6 +82,7 @@ def _cells(entry: Entry) -> tuple[str, ...]:
     return (
         entry.name,
         entry.whom,
+        entry.signature,
         headline(card),
         f"{age_days(card):.0f}",
         week_short(entry),

@@ -35,6 +35,7 @@ class ModelsPage(QWidget):
         self._theme = theme
         self._frame = 0
         self._revision = -1
+        self._known: set[str] = set()  # of what was trained here
         self.setObjectName("page")
         self.rows = ModelsModel(theme)
         self.table = ModelsTable(self.rows, theme)
@@ -46,6 +47,7 @@ class ModelsPage(QWidget):
         self.said.hide()
         self.robot = QComboBox()
         self.robot.setAccessibleName("For which robot")
+        self.robot.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToContents)
         self.promote, self.back = QPushButton("Promote…"), QPushButton("Roll back…")
         self.new = QPushButton("Train a model")
         self.confirm, self.compare = Confirm(models), Compare(theme)
@@ -70,6 +72,7 @@ class ModelsPage(QWidget):
         if models.revision != self._revision:
             self._revision = models.revision
             self.rows.take(models.found.entries)
+            self._choose_trained()
             if models.found.entries and not self.table.selectionModel().hasSelection():
                 self.table.selectRow(0)
         for offered in (self.robot, self.form.robot):
@@ -84,9 +87,7 @@ class ModelsPage(QWidget):
     @property
     def chosen(self) -> Entry | None:
         """The model that is chosen in the list."""
-        places = self.table.selectionModel().selectedRows()
-        source = [self.table.model().mapToSource(place).row() for place in places]  # type: ignore[attr-defined]
-        return self.rows.rows[source[0]] if source and source[0] < len(self.rows.rows) else None
+        return self.table.chosen
 
     # --- inside
 
@@ -120,6 +121,13 @@ class ModelsPage(QWidget):
         self.form.wished.connect(self._train)
         self.promote.clicked.connect(self._promote)
         self.back.clicked.connect(self._roll_back)
+
+    def _choose_trained(self) -> None:
+        """What was trained here is looked at next, once."""
+        for model in self._models.trained.keys() - self._known:
+            if self._models.found.find(model) is not None:
+                self._known.add(model)
+                self.table.choose(model)
 
     def _train(self, wish: TrainingWish) -> None:
         self._models.train(wish, training)

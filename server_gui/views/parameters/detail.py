@@ -16,7 +16,7 @@ from server_gui.core.tuning.edits import refusal, unit_of
 from server_gui.core.tuning.flash import RULE
 from server_gui.views.parameters.tree import brief
 from server_gui.views.widgets.card import Card, set_text
-from server_gui.views.widgets.elided import ElidedLabel
+from server_gui.views.widgets.fitted import FittedLabel
 from server_gui.views.widgets.plain import PlainLabel, set_tip
 
 STEPS: Final = 200
@@ -74,12 +74,12 @@ class Detail(Card):
         self._facts.setWordWrap(True)
         set_tip(self._facts, f"Stored: {RULE}")
         self.body.addWidget(self._facts)
-        self._brief = ElidedLabel("dim")
+        self._brief = FittedLabel("dim")
         self._brief.hide()
         self.body.addWidget(self._brief)
 
     def be_short(self, is_short: bool) -> None:
-        """Take little room: seen when one is chosen; one line says what is known, its tip all."""
+        """Take little room: seen when one is chosen; one line says the most of what is known, its tip all."""
         self._is_short = is_short
         self._facts.setVisible(not is_short)
         self._brief.setVisible(is_short)
@@ -115,8 +115,12 @@ class Detail(Card):
                 self.field.setText(text)
         self._refresh_slider(info, current, value)
         facts = _facts(station, info, unit, current)
-        set_text(self._facts, facts)
-        set_text(self._brief, facts.rpartition("\n")[2])  # a problem stands in a line of its own
+        known, _, problem = facts.partition("\n")
+        parts = known.split(" · ")
+        self._brief.say(*(" · ".join(parts[:count]) for count in range(len(parts), 0, -1)))
+        set_text(self._facts, problem if self._is_short else facts)
+        self._facts.setVisible(bool(problem) or not self._is_short)
+        self._brief.setVisible(self._is_short and not problem)
         if self._brief.toolTip() != facts:
             set_tip(self._brief, facts)
 

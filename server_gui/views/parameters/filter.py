@@ -54,6 +54,7 @@ class FilterBar(QWidget):
         super().__init__()
         self._desk = desk
         self._theme = theme
+        self._is_short = False
         self.words = QLineEdit()
         self.words.setPlaceholderText("Filter: name, 0x6072, unit …   Ctrl+F")
         self.words.setClearButtonEnabled(True)
@@ -89,8 +90,14 @@ class FilterBar(QWidget):
                 chosen = names
         return chosen
 
+    def be_short(self, is_short: bool) -> None:
+        """Take little width."""
+        self._is_short = is_short
+        self._arrange()
+
     def _arrange(self) -> None:
-        columns = len(KINDS) if self._theme.scale <= ROOMY else A_ROW
+        is_roomy = self._theme.scale <= ROOMY and not self._is_short
+        columns = len(KINDS) if is_roomy else A_ROW
         for place, button in enumerate(self.buttons.values()):
             self._grid.addWidget(button, place // columns, place % columns)
 

@@ -10,6 +10,7 @@ from PySide6.QtWidgets import (
     QGridLayout,
     QMenu,
     QPushButton,
+    QSizePolicy,
     QStackedWidget,
     QVBoxLayout,
     QWidget,
@@ -33,7 +34,9 @@ from server_gui.views.parameters.trial_bar import TrialBar
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.files import ask_open, ask_save
 from server_gui.views.widgets.plain import PlainLabel, set_tip
+from server_gui.views.widgets.scrolled import Scrolled
 
+EDIT, REVIEW, STORE = range(3)  # pages; those that are not in front ask for no room
 STORING: Final = "Make a device keep its parameters when its power goes; a step of its own"
 
 
@@ -51,7 +54,9 @@ class ParametersPanel(QWidget):
         self.filters, self.file = FilterBar(desk, theme), FileBar(desk)
         self.storing = StorePage(desk, theme)
         self.pages = QStackedWidget()
-        for page in (self._edit_page(), self.review, self.storing):
+        self.pages.addWidget(self._edit_page())
+        for page in (Scrolled(self.review), Scrolled(self.storing)):
+            page.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Ignored)
             self.pages.addWidget(page)
         self.banner = PlainLabel()
         self.banner.setObjectName("banner")
@@ -71,7 +76,7 @@ class ParametersPanel(QWidget):
             part.refresh()
         station = self._desk.selected
         staged = 0 if station is None else len(station.difference(self._desk.shown.units))
-        editing = self.pages.currentIndex() == 0
+        editing = self.pages.currentIndex() == EDIT
         self.review_button.setText(f"Review {staged} …" if staged else "Review …")
         not_written = "" if station is None else station.refused(PARAMETER_WRITE)
         self.review_button.setEnabled(bool(staged) and editing and not not_written)
@@ -86,9 +91,9 @@ class ParametersPanel(QWidget):
         set_tip(self.store_button, not_stored or STORING)
         self._filter()
         self._refresh_banner(station, staged)
-        if self.pages.currentWidget() is self.review and station is not None:
+        if self.pages.currentIndex() == REVIEW and station is not None:
             self._refresh_review(station)
-        elif self.pages.currentWidget() is self.storing:
+        elif self.pages.currentIndex() == STORE:
             self.storing.refresh()
 
     def be_short(self, is_short: bool) -> None:
@@ -96,7 +101,13 @@ class ParametersPanel(QWidget):
         self.more.setVisible(is_short)
         for button in self._seldom:
             button.setVisible(not is_short)
-        self.detail.be_short(is_short)
+        for part in (self.detail, self.filters):
+            part.be_short(is_short)
+        for button in (self.review_button, self.more):
+            self._buttons_grid.removeWidget(button)
+        place = {False: ((0, 2), (0, 3)), True: ((1, 0), (1, 1))}[is_short]
+        for button, (row, column) in zip((self.review_button, self.more), place, strict=True):
+            self._buttons_grid.addWidget(button, row, column)
 
     def stage_text(self, name: str, text: str) -> None:
         """Stage what was typed, in the unit that is shown."""
@@ -124,11 +135,11 @@ class ParametersPanel(QWidget):
         station = self._desk.selected
         if station is not None:
             self.review.show_changes(station.difference(self._desk.shown.units))
-            self.pages.setCurrentWidget(self.review)
+            self.pages.setCurrentIndex(REVIEW)
 
     def find_parameter(self) -> None:
         """Let words be typed that filter the parameters."""
-        self.pages.setCurrentIndex(0)
+        self.pages.setCurrentIndex(EDIT)
         self.filters.words.setFocus(Qt.FocusReason.ShortcutFocusReason)
         self.filters.words.selectAll()
 
@@ -186,7 +197,7 @@ class ParametersPanel(QWidget):
         self._save.setToolTip("Save what the robot holds as a .toml file")
         self.store_button = QPushButton("Store to flash …")
         set_tip(self.store_button, STORING)
-        grid = QGridLayout()
+        grid = self._buttons_grid = QGridLayout()
         grid.addWidget(self.undo, 0, 0)
         grid.addWidget(self._discard, 0, 1)
         grid.addWidget(self.review_button, 0, 2)
@@ -230,14 +241,14 @@ class ParametersPanel(QWidget):
         self._discard.clicked.connect(lambda: self._with(lambda station: station.edits.drop()))
         self.undo.clicked.connect(self._undo_latest)
         self.review_button.clicked.connect(self.begin_review)
-        self.review.back.connect(lambda: self.pages.setCurrentIndex(0))
+        self.review.back.connect(lambda: self.pages.setCurrentIndex(EDIT))
         self.review.write.connect(self._write)
         self._compare.clicked.connect(lambda: ask_open(self, "Compare with", ("toml", "dcf"), self.open_file))
         self._save.clicked.connect(
             lambda: ask_save(self, "Save parameters", "toml", self.save_file, self._title)
         )
         self.store_button.clicked.connect(self._begin_store)
-        self.storing.back.connect(lambda: self.pages.setCurrentIndex(0))
+        self.storing.back.connect(lambda: self.pages.setCurrentIndex(EDIT))
         self.storing.store.connect(self._store)
         self._desk.on_select.append(self._selected)
 
@@ -254,7 +265,7 @@ class ParametersPanel(QWidget):
 
     def _selected(self, _station: Station | None) -> None:
         self._problem = ""
-        self.pages.setCurrentIndex(0)
+        self.pages.setCurrentIndex(EDIT)
 
     def _pin(self, name: str) -> None:
         station = self._desk.selected
@@ -274,10 +285,10 @@ class ParametersPanel(QWidget):
             else self._desk.selected.known.get(self.tree.current_name or "")
         )
         self.storing.begin(None if chosen is None else chosen.component)
-        self.pages.setCurrentWidget(self.storing)
+        self.pages.setCurrentIndex(STORE)
 
     def _store(self, component: str) -> None:
-        self.pages.setCurrentIndex(0)
+        self.pages.setCurrentIndex(EDIT)
         self._with(lambda station: station.store(component))
 
     def _undo_latest(self) -> None:
@@ -292,7 +303,7 @@ class ParametersPanel(QWidget):
         if changes != station.difference(self._desk.shown.units):
             self.begin_review()
             return
-        self.pages.setCurrentIndex(0)
+        self.pages.setCurrentIndex(EDIT)
         station.write(changes, trial_s)
 
     # --- what is shown
@@ -305,7 +316,7 @@ class ParametersPanel(QWidget):
         if now != self.review.changes:
             self.review.show_changes(now)
         if not now:
-            self.pages.setCurrentIndex(0)
+            self.pages.setCurrentIndex(EDIT)
 
     def _refused(self, station: Station | None) -> str:
         """What of the staged the robot would refuse, as it stands now."""

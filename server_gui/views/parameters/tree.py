@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Iterable
 from typing import Any, Final
 
-from PySide6.QtCore import QModelIndex, QPersistentModelIndex, Qt, Signal
+from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QSize, Qt, Signal
 from PySide6.QtGui import QAction, QKeyEvent, QResizeEvent, QStandardItem, QStandardItemModel
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -61,6 +61,9 @@ class NewValue(QStyledItemDelegate):
             self.typed.emit(str(index.data(NAME_ROLE)), editor.text())
 
 
+LOW: Final = 90  # at text of 100 %: what is below it stays in sight, and where there is more room it grows
+
+
 class ParameterTree(QTreeView):
     """`typed` brings a name and the text for its new value, `chosen` and `pinned` the name."""
 
@@ -106,6 +109,9 @@ class ParameterTree(QTreeView):
         self.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
         self._size_columns()
         theme.changed.connect(self.refresh)
+
+    def sizeHint(self) -> QSize:
+        return QSize(super().sizeHint().width(), self._theme.px(LOW))
 
     def refresh(self) -> None:
         """Show how it is now; rows are made anew only when the robot has others."""

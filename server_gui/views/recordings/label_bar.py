@@ -21,6 +21,7 @@ from server_gui.views.recordings.timeline import SECOND_NS, Timeline, clock_text
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.elided import ElidedLabel
+from server_gui.views.widgets.fitted import FittedLabel
 from server_gui.views.widgets.plain import set_tip
 
 LABEL_ROLE: Final = Qt.ItemDataRole.UserRole + 1
@@ -36,7 +37,7 @@ class LabelBar(QWidget):
         self._theme = theme
         self._tape: Tape | None = None
         self._revision = -1
-        self.span, self.said = ElidedLabel("dim"), ElidedLabel("dim")
+        self.span, self.said = FittedLabel("dim"), ElidedLabel("dim")
         self.list = QListWidget()
         self.list.setAccessibleName("Labels of this recording")
         self.list.setObjectName("framed")
@@ -60,7 +61,7 @@ class LabelBar(QWidget):
     def refresh(self, tape: Tape) -> None:
         """Show how it is now."""
         span = self._timeline.span_ns
-        set_text(self.span, _span_text(tape, span))
+        self.span.say(*_span_texts(tape, span))
         self.give.setEnabled(span is not None)
         self.take_back.setEnabled(bool(self.list.selectedItems()))
         if tape is not self._tape or self._revision != self._labels.revision:
@@ -140,11 +141,13 @@ class LabelBar(QWidget):
         self.text.setMinimumWidth(self._theme.px(90))
 
 
-def _span_text(tape: Tape, span: tuple[int, int] | None) -> str:
+def _span_texts(tape: Tape, span: tuple[int, int] | None) -> tuple[str, ...]:
+    """The span, in fewer words where there is less room."""
     if span is None:
-        return "No span chosen"
+        return "No span chosen", "No span"
     begin, end = ((at - tape.first_ns) / SECOND_NS for at in span)
-    return f"Span {clock_text(begin, 1)}–{clock_text(end, 1)} ({end - begin:.1f} s)"
+    ends, length = f"{clock_text(begin, 1)}–{clock_text(end, 1)}", f"{end - begin:.1f} s"
+    return f"Span {ends} ({length})", f"Span {ends}", ends, length
 
 
 def _line(tape: Tape, label: Label) -> str:

@@ -216,6 +216,7 @@ def _told(session: Session | None, tape: Tape | None, problem: str, held: Sequen
     if session is None:
         return "Choose a recording to see what is in it."
     known = {
+        "Session": session.session,
         "Robot": session.robot,
         "Began": _when(session.began),
         "Ended": "it goes on, or its server was killed" if session.ended is None else _when(session.ended),

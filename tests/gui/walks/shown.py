@@ -18,6 +18,7 @@ from PySide6.QtWidgets import (
     QComboBox,
     QLabel,
     QLineEdit,
+    QListView,
     QMenu,
     QTabBar,
     QTableView,
@@ -142,7 +143,8 @@ def _cells(view: QAbstractItemView) -> Iterator[Place]:
             if not isinstance(view, QTableView)
             else []
         )
-        for column in range(model.columnCount(first.parent())):
+        columns = 1 if isinstance(view, QListView) else model.columnCount(first.parent())
+        for column in range(columns):
             index = first.siblingAtColumn(column)
             area = view.visualRect(index) & port.rect()
             if area.isValid() and area.height() > 4:

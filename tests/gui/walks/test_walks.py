@@ -1,4 +1,4 @@
-"""Newcomers' walks: a short one each time, and at night all three on every screen, in both looks."""
+"""Newcomers' walks: a short one each time, and at night all of them on every screen, in both looks."""
 
 import shutil
 from pathlib import Path

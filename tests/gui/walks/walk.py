@@ -1,13 +1,13 @@
 """A newcomer's bench: a simulated robot, a network to it that can be cut, and the window on it."""
 
 import contextlib
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from server_gui.processes.sim_control import SimControl
 from server_gui.processes.simulated import simulated_robot
-from tests.fake_robot import FakeRobot
 from tests.gui.test_stop_under_x import x_server
 from tests.gui.walks.hand import Hand, opened
 from tests.slow_network import SlowNetwork
@@ -18,6 +18,7 @@ url = "{store}"
 spool = "{spool}"
 batch_s = 5.0
 """
+KEPT = "[General]\nlook={look}\nscale={scale}\n"
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,15 @@ class Bench:
     folder: Path
     network: SlowNetwork
     port: int  # of the gateway itself
-    second: FakeRobot  # which the window is not told of at first
+    ends: contextlib.ExitStack = field(default_factory=contextlib.ExitStack)  # what moments have begun
+
+    @property
+    def store(self) -> Path:
+        return self.folder / "store"
+
+    @property
+    def spool(self) -> Path:
+        return self.folder / "spool"
 
     def cut(self) -> None:
         """The network to the robot is gone."""
@@ -54,11 +63,18 @@ class Bench:
         self.network = SlowNetwork(self.port, 0.0, self.network.port)
         self.network.__enter__()
 
+    def another(self) -> str:
+        """One more robot, which the window is not told of: where it listens."""
+        _, port = self.ends.enter_context(walker(self.folder / "another"))
+        return f"127.0.0.1:{port}"
+
+
+Made = Callable[[Screen, Path, Path], AbstractContextManager[Bench]]
+
 
 @contextlib.contextmanager
-def walker(folder: Path) -> Iterator[tuple[SimControl, int]]:
+def walker(home: Path) -> Iterator[tuple[SimControl, int]]:
     """A simulated robot that walks, and the port of its gateway."""
-    home = folder / "robot"
     home.mkdir(parents=True)
     with simulated_robot(home, "walk", lambda: None) as (address, _):
         yield SimControl(home), address.port
@@ -67,7 +83,7 @@ def walker(folder: Path) -> Iterator[tuple[SimControl, int]]:
 @contextlib.contextmanager
 def bench(screen: Screen, folder: Path, pictures: Path) -> Iterator[Bench]:
     """All of it, ended together."""
-    with walker(folder) as (robot, port), x_server(f"{screen.width}x{screen.height}x24") as display:
+    with walker(folder / "robot") as (robot, port), x_server(f"{screen.width}x{screen.height}x24") as display:
         network = SlowNetwork(port, 0.0)
         config = folder / "server.toml"
         store = (folder / "store").as_uri()
@@ -76,9 +92,25 @@ def bench(screen: Screen, folder: Path, pictures: Path) -> Iterator[Bench]:
             *("gui", "--config", str(config), "--robot", f"walker=127.0.0.1:{network.port}"),
             *("--look", screen.look, "--scale", str(screen.scale), "--operator", "Ada"),
         )
-        with FakeRobot() as second, network, opened(display, folder / "home", pictures, arguments) as hand:
-            made = Bench(hand, robot, folder, network, port, second)
+        with network, opened(display, folder / "home", pictures, arguments) as hand:
+            made = Bench(hand, robot, folder, network, port)
             try:
-                yield made
+                with made.ends:
+                    yield made
             finally:
                 made.network.close()
+
+
+@contextlib.contextmanager
+def demo(screen: Screen, folder: Path, pictures: Path) -> Iterator[Bench]:
+    """`gwrms demo`, which starts a robot of its own; nothing is between that and the window."""
+    kept, robot = folder / "home" / "config" / "gwrms", folder / "robot"
+    for made in (kept, robot):
+        made.mkdir(parents=True)
+    (kept / "gui.conf").write_text(KEPT.format(look=screen.look, scale=screen.scale), encoding="utf-8")
+    with (
+        x_server(f"{screen.width}x{screen.height}x24") as display,
+        opened(display, folder / "home", pictures, ("demo", "--dir", str(robot))) as hand,
+        SlowNetwork(0, 0.0) as nothing,
+    ):
+        yield Bench(hand, SimControl(robot), robot, nothing, 0)

@@ -61,6 +61,17 @@ def test_no_store_yet_is_no_problem(settings: ServerSettings) -> None:
     assert found.problem is None
 
 
+def test_a_store_that_has_gone_is_not_one_that_was_never_there(
+    settings: ServerSettings, recorded: Recorded, tmp_path: Path
+) -> None:
+    (tmp_path / "store").rename(tmp_path / "away")
+    found = look(settings)
+    assert not found.is_empty
+    assert "any more, and batch" in (found.problem or "")
+    another = ServerSettings({}, StoreSettings(f"{settings.store.url}-2"), settings.recorder)
+    assert look(another).is_empty
+
+
 def test_a_store_that_is_away_is_said_tried_again_and_what_waits_is_shown(
     settings: ServerSettings, tmp_path: Path
 ) -> None:

@@ -157,6 +157,17 @@ def test_a_jump_shows_what_was_until_that_instant_and_nothing_later(settings: Se
         assert len(station.rings.times(100.0)) >= before
 
 
+def test_a_recording_begins_with_its_first_row_instead_of_nothing(settings: ServerSettings) -> None:
+    record(settings)
+    tape = tape_of(settings)
+    playback = player(tape)
+    settle(playback)
+    robot, rows = playback.desk.stations[0].robot, tape.read(tape.first_ns, tape.last_ns)
+    assert playback.position_ns == tape.first_ns
+    assert robot.values[CHANNELS[0]] == rows.columns[CHANNELS[0]][0]
+    assert not robot.is_stale()
+
+
 def test_playing_goes_on_with_time_and_stops_at_the_end(
     settings: ServerSettings, monkeypatch: pytest.MonkeyPatch
 ) -> None:

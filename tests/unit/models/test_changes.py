@@ -14,6 +14,7 @@ from server_gui.core.models.catalogue import Looking, open_registry
 from server_gui.core.models.changes import carry_out, promotion, way_back
 from server_gui.core.models.models import Models, Tone
 from server_gui.core.models.training import Trained
+from server_gui.core.settings.promoters import own_line
 from tests.support.waiting import until
 from tests.unit.registry.models import card, learned
 from tests.unit.registry.test_registry import NOWHERE
@@ -93,8 +94,29 @@ def test_a_look_says_whom_each_serves_and_what_is_damaged(registry: Registry) ->
     found = Looking(registry.url).look({"exo-01"})
     (entry,) = found.entries
     assert (set(entry.serves), entry.serving) == ({"every robot", "exo-01"}, one.id)
+    assert entry.signature == "unsigned"
     assert gone.id in found.damaged[0]
     assert found.hits_problem  # nothing was ever uploaded to this store, and that is said
+
+
+def test_what_a_desk_with_a_key_promotes_is_said_to_be_signed_before_and_after(
+    registry: Registry, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "home"))
+    one = publish(registry)
+    assert "has no key, so it is unsigned" in promotion(registry.url, one.id, "").sentences[-1]
+    registry.promote(one.id, who="Ada", why="before there was a key")
+    _, key = own_line()
+    registry.promote(one.id, "exo-01", who="Ada", why="likewise")
+    change = promotion(registry.url, one.id, "exo-01")
+    assert change.sentences[-1] == "It is signed with this desk's key."
+    assert not change.changes_nothing
+    carry_out(registry.url, change, "Ada", "")
+    assert promotion(registry.url, one.id, "exo-01").changes_nothing
+    (entry,) = Looking(registry.url).look(set()).entries
+    assert set(entry.signature.split("; ")) == {"every robot: unsigned", f"exo-01: signed by {key[:16]}…"}
+    (entry,) = Looking(registry.url, {"anna": key}).look(set()).entries
+    assert "exo-01: signed by anna" in entry.signature
 
 
 def test_a_store_that_is_gone_is_a_problem_in_words(

@@ -49,6 +49,8 @@ def test_a_full_bus_is_an_alarm_that_says_what_to_check() -> None:
     assert said is not None
     assert said[0] == "it is full: 100 % of its time is taken"
     assert "send fewer PDOs" in said[1]
+    robots = replace(BUSY, words="97 % of its time is taken")
+    assert trouble(replace(BUS, load_percent=100.0, findings=[robots])) == said
     assert trouble(BUS) is None
     missing = trouble(replace(BUS, nodes=[replace(NODE, pdos_missing_percent=20.0)]))
     assert missing is not None

@@ -209,6 +209,24 @@ def test_who_cuts_a_batch_is_called_when_it_waits_also_where_the_disk_refused_at
         assert recorder.state.alarms == ()
 
 
+def test_a_file_that_cannot_be_begun_is_one_alarm_while_recording_goes_on(
+    spool: Spool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    alarms: list[Alarm] = []
+    with Recorder(spool, alarms.append) as recorder:
+        with monkeypatch.context() as patched:
+            patched.setattr(spool, "freeze", _refuses)
+            recorder.cut(lambda: None)
+            for seq in range(3):
+                recorder.record("exo-01", 1, batch(seq))
+                assert recorder.flush(WAIT_S)
+            assert [alarm.kind for alarm in recorder.state.alarms] == [AlarmKind.UNFROZEN]
+        recorder.record("exo-01", 1, batch(3))
+        assert recorder.flush(WAIT_S)
+        assert (recorder.state.alarms, recorder.state.lost) == ((), 0)
+    assert [alarm.kind for alarm in alarms] == [AlarmKind.UNFROZEN]
+
+
 def test_what_no_file_takes_is_lost_alone_with_an_alarm(spool: Spool) -> None:
     alarms: list[Alarm] = []
     with Recorder(spool, alarms.append) as recorder:

@@ -85,7 +85,7 @@ def test_of_a_phase_the_error_must_fall() -> None:
 def test_the_first_model_must_know_more_than_nothing(figures: Any, serves: bool) -> None:
     decision = decide(ACTIVITY, judged(better(**figures), None), None)
     assert decision.better is serves
-    assert "saying always the same has 0.2; nothing serves yet" in decision.why[0]
+    assert "saying always the same has 0.2; no model that was promoted serves yet" in decision.why[0]
 
 
 def test_where_nothing_could_be_judged_nothing_is_promoted() -> None:
