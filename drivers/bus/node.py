@@ -60,7 +60,7 @@ class Node(BusUser):
         self.bus = bus
         self.node_id = node_id
         self.description = description
-        self.life = NodeLife(times.heartbeat_timeout_s)
+        self.life = NodeLife(times.heartbeat_timeout_s, bus.standstill)
         self.ready = False
         self.arrivals: tuple[Arrivals, ...] = ()  # of the PDOs that its users follow
         self.boots_begun = 0  # attempts to read what is needed of it
@@ -264,8 +264,9 @@ class Node(BusUser):
         if self.probes and self.ready and now_ns >= self._probe_ns and self._unheard_s(now_ns) > PROBE_S:
             self._probe_ns = now_ns + round(PROBE_S * 1e9)
             self.worker.submit(_ask_type)
+        settled = self.bus.standstill.is_settled(now_ns)
         for arrivals in self.arrivals:
-            arrivals.look(now_ns)
+            arrivals.look(now_ns) if settled else arrivals.skip()
 
     def _unheard_s(self, now_ns: int) -> float:
         """For how long a node that is probed has said nothing but PDOs; 0 for those with a heartbeat."""
