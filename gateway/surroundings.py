@@ -9,7 +9,9 @@ import socket
 from collections.abc import Callable, Iterator
 
 from drivers.bus.interfaces.opening import obstacle as bus_obstacle
+from drivers.joint.quantities import AXIS_OFFSET
 from drivers.port import obstacle as port_obstacle
+from eds import Description
 from gateway.coding import CodingError
 from gateway.config.robot import RobotConfig, header
 from gateway.modules.component.assembly import Robot, assemble
@@ -18,12 +20,15 @@ from gateway.modules.control.parameters import WRITABLE, Parameter
 from gateway.modules.stop.controllers import write_of
 from gateway.tables.finding import Finding, warning
 
+_FAR_OFF = 10.0
+
 
 def beside(config: RobotConfig) -> Iterator[Finding]:
     """What is wrong with files that it names, and with limits beside those of the EDS."""
     robot = assemble(config)
     for name, (kind, why) in robot.absent.items():
         yield Finding(header(kind, name), "", why.removeprefix(f"{header(kind, name)}: "))
+    yield from _about_scaling(config, robot)
     absent = {name: why for name, (_kind, why) in robot.absent.items()}
     for parameter in resolve(config, robot.descriptions, absent).values():
         if parameter.component not in absent:
@@ -52,6 +57,34 @@ def _about_parameter(config: RobotConfig, robot: Robot, parameter: Parameter) ->
         if own is not None and counts is not None and own != counts:
             text = f"{own:g} is beyond {file}, where it is {counts:g}: that counts"
             yield warning(where, key, text)
+
+
+def _about_scaling(config: RobotConfig, robot: Robot) -> Iterator[Finding]:
+    """What the drive itself says counts, and is read from it later; here only what is off by far."""
+    for name, joint in config.joint.items():
+        description = robot.descriptions.get(name)
+        if description is None:
+            continue
+        for key, index, own in (
+            ("counts_per_revolution", 0x608F, joint.counts_per_revolution),
+            ("gear_ratio", 0x6091, joint.gear_ratio),
+        ):
+            told = _default_ratio(description, index + joint.axis * AXIS_OFFSET)
+            if told is not None and not 1 / _FAR_OFF < own / told < _FAR_OFF:
+                file = description.path.name
+                text = f"{own:g} is far from {told:g}, as {file} has it in {index:X}h: angles are off by that"
+                yield warning(header("joint", name), key, text)
+
+
+def _default_ratio(description: Description, index: int) -> float | None:
+    """Of an object's two entries, as the file has them; `None` where it knows nothing, as 1:1 stands for."""
+    above, below = (_default(description, index, subindex) for subindex in (1, 2))
+    return above / below if above and below and above != below else None
+
+
+def _default(description: Description, index: int, subindex: int) -> int | None:
+    variable = description.variable(index, subindex)
+    return variable.default if variable is not None and isinstance(variable.default, int) else None
 
 
 def _about_controllers(config: RobotConfig, robot: Robot) -> Iterator[Finding]:
