@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from drivers.bus.interfaces.opening import obstacle as bus_obstacle
 from drivers.joint.quantities import AXIS_OFFSET
 from drivers.port import obstacle as port_obstacle
-from eds import Description
+from eds.report import ratio
 from gateway.coding import CodingError
 from gateway.config.robot import RobotConfig, header
 from gateway.modules.component.assembly import Robot, assemble
@@ -69,22 +69,11 @@ def _about_scaling(config: RobotConfig, robot: Robot) -> Iterator[Finding]:
             ("counts_per_revolution", 0x608F, joint.counts_per_revolution),
             ("gear_ratio", 0x6091, joint.gear_ratio),
         ):
-            told = _default_ratio(description, index + joint.axis * AXIS_OFFSET)
+            told = ratio(description, index + joint.axis * AXIS_OFFSET)
             if told is not None and not 1 / _FAR_OFF < own / told < _FAR_OFF:
                 file = description.path.name
                 text = f"{own:g} is far from {told:g}, as {file} has it in {index:X}h: angles are off by that"
                 yield warning(header("joint", name), key, text)
-
-
-def _default_ratio(description: Description, index: int) -> float | None:
-    """Of an object's two entries, as the file has them; `None` where it knows nothing, as 1:1 stands for."""
-    above, below = (_default(description, index, subindex) for subindex in (1, 2))
-    return above / below if above and below and above != below else None
-
-
-def _default(description: Description, index: int, subindex: int) -> int | None:
-    variable = description.variable(index, subindex)
-    return variable.default if variable is not None and isinstance(variable.default, int) else None
 
 
 def _about_controllers(config: RobotConfig, robot: Robot) -> Iterator[Finding]:
