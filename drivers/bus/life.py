@@ -89,7 +89,8 @@ class NodeLife:
                 listener.on_boot_up(stamp_ns)
         else:
             self.heartbeats += 1
-            if self.heartbeat_ns is not None:
+            # What waited comes in a burst: its intervals are not the device's.
+            if self.heartbeat_ns is not None and self._standstill.is_settled(stamp_ns):
                 self._learn((stamp_ns - self.heartbeat_ns) / 1e9)
         self.heard_ns = self.heartbeat_ns = stamp_ns
         self.nmt_state = state

@@ -10,6 +10,7 @@ STOOD_NS = 100_000_000  # without a look at the bus; it waits half as long for a
 TOLD_S = 0.3  # shorter ones are told only where they are many
 MANY = 5
 SHOWN_S = 10.0
+EXCUSED_NS = 1_000_000_000  # of a silence, at most
 SHORTEST_SETTLING_NS, LONGEST_SETTLING_NS = 100_000_000, 1_000_000_000
 CHECK = "see what keeps it busy (gwrms blame, gwrms snapshot resource), or take load from it"
 
@@ -44,12 +45,13 @@ class Standstill(Noted):
     def silent_ns(self, since_ns: int, now_ns: int) -> int:
         """For how long nothing has come since `since_ns`, as far as somebody looked; 0 at least.
 
-        What passed until the last standstill's end does not count. While it stands still all counts: nobody
-        knows then.
+        What passed until the last standstill's end does not count, up to `EXCUSED_NS`: who stands still again
+        and again would never miss anybody. While it stands still all counts: nobody knows then.
         """
         passed_ns = self._passed_ns
         looked_ns = now_ns if passed_ns is None or now_ns - passed_ns > STOOD_NS else passed_ns
-        return max(0, looked_ns - max(since_ns, self._listening_since_ns))
+        listened_ns = looked_ns - max(since_ns, self._listening_since_ns)
+        return max(0, listened_ns, now_ns - since_ns - EXCUSED_NS)
 
     def is_settled(self, now_ns: int) -> bool:
         """Whether what comes now has not waited, so that its time is its own."""

@@ -59,6 +59,36 @@ def test_what_waited_while_we_stood_still_was_not_missing() -> None:
     assert "its heartbeat is missing for 2.2 s" in (life.problem(reader.now_ns) or "")
 
 
+def test_who_is_gone_is_missed_though_we_stand_still_again_and_again() -> None:
+    reader = Reader()
+    life = NodeLife(0.25, reader.standstill)
+    life.on_heartbeat(reader.now_ns, b"\x05")
+    for _ in range(10):
+        reader.stands(110)
+        reader.runs()
+    assert life.lost(reader.now_ns)
+
+
+def test_a_period_is_not_learned_from_heartbeats_that_waited() -> None:
+    reader = Reader()
+    life = NodeLife(None, reader.standstill)
+
+    def beat(now_ns: int) -> None:
+        life.on_heartbeat(now_ns, b"\x05")
+
+    life.expect_every(0.05)
+    reader.runs(500, beat)
+    reader.stands(600)
+    for _ in range(12):  # all that waited, one after the other
+        reader.now_ns += MS
+        beat(reader.now_ns)
+        reader.standstill.passed(reader.now_ns)
+    assert life.timeout_s == pytest.approx(0.125)
+    reader.stands(70)
+    reader.standstill.passed(reader.now_ns)
+    assert not life.lost(reader.now_ns)
+
+
 def test_between_two_looks_nobody_is_missed() -> None:
     reader = Reader()
     life = NodeLife(0.125, reader.standstill)
