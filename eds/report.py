@@ -1,7 +1,7 @@
 """What an EDS or DCF says about a device, as rows that a person or a program can read."""
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from eds.datatypes import DATA_TYPES
@@ -15,6 +15,8 @@ JOINT_OBJECTS = ((0x6041, "statusword"), (0x6064, "position actual value"))
 _PDOS = (("TPDO", 0x1800, 0x1A00), ("RPDO", 0x1400, 0x1600))
 _NOT_VALID = 0x8000_0000
 MAX_MAPPED = 64  # CiA 301 §7.5.2.36
+
+Objects = Mapping[tuple[int, int], int]  # values by index and sub-index
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,17 +66,17 @@ def pdo_rows(description: Description) -> Iterator[PdoRow]:
     """Every PDO that the file describes."""
     for kind, communication, mapping in _PDOS:
         for number in range(512):
-            cob_id = _number(description, communication + number, 1)
+            cob_id = file_value(description, communication + number, 1)
             if not description.has(communication + number, 1):
                 continue
-            count = _number(description, mapping + number, 0)
+            count = file_value(description, mapping + number, 0)
             last = MAX_MAPPED if count is None else min(count, MAX_MAPPED)  # a file may give entries alone
-            entries = (_number(description, mapping + number, sub) for sub in range(1, last + 1))
+            entries = (file_value(description, mapping + number, sub) for sub in range(1, last + 1))
             yield PdoRow(
                 f"{kind}{number + 1}",
                 None if cob_id is None else cob_id & 0x1FFF_FFFF,
                 None if cob_id is None else not cob_id & _NOT_VALID,
-                _number(description, communication + number, 2),
+                file_value(description, communication + number, 2),
                 tuple((entry >> 16, entry >> 8 & 0xFF, entry & 0xFF) for entry in entries if entry),
             )
 
@@ -107,9 +109,21 @@ def grouped_findings(description: Description) -> list[tuple[str, str, str, int]
     return [(severity, first[severity, text], text, often[severity, text]) for severity, text in first]
 
 
-def _number(description: Description, index: int, subindex: int) -> int | None:
+def file_value(description: Description, index: int, subindex: int) -> int | None:
+    """What the file says that an object holds, a DCF's value before a default; `None` for nothing."""
     variable = description.variable(index, subindex)
     if variable is None:
         return None
     value = variable.default if variable.value is None else variable.value
     return value if isinstance(value, int) else None
+
+
+def ratio(description: Description, index: int, read: Objects | None = None) -> float | None:
+    """Of an object's first entry to its second, as in 608Fh and 6091h; what was `read` of the device counts.
+
+    `None` where nobody knows: 1:1 is what drives hold that were never told.
+    """
+    above, below = (
+        (read or {}).get((index, subindex), file_value(description, index, subindex)) for subindex in (1, 2)
+    )
+    return above / below if above and below and above != below else None

@@ -8,7 +8,7 @@ import importlib
 import os
 import sys
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from gateway import __version__
 
@@ -65,6 +65,9 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "sim-record": ("hil_sim.cli.record:main", "simulated wearers' channels with the truth, to learn from"),
     "sim-fault": ("hil_sim.cli.fault:main", "break something in a simulated robot that runs"),
 }
+
+# The exit status of a failure where 1 is an answer: that of diff(1).
+FAILED: Mapping[tuple[str, ...], int] = {("params", "compare"): 2}
 
 OUR_PACKAGES = frozenset({"gateway", "drivers", "eds", "server_gui", "ml", "hil_sim"})
 
@@ -186,7 +189,7 @@ def _command(name: str, rest: list[str], *, debug: bool) -> int:
 
             kind = getattr(error, "kind", None) or type(error).__name__
             say_json({"error": {"kind": str(kind), "message": explain(error, name)}})
-        return 1
+        return FAILED.get((name, *rest[:1]), 1)
 
 
 if __name__ == "__main__":

@@ -10,7 +10,9 @@ from collections.abc import Callable, Iterator
 
 from drivers.bus.channels import objection
 from drivers.bus.interfaces.opening import obstacle as bus_obstacle
+from drivers.joint.quantities import AXIS_OFFSET
 from drivers.port import obstacle as port_obstacle
+from eds.report import ratio
 from gateway.coding import CodingError
 from gateway.config.robot import RobotConfig, header
 from gateway.modules.component.assembly import Robot, assemble
@@ -19,12 +21,15 @@ from gateway.modules.control.parameters import WRITABLE, Parameter
 from gateway.modules.stop.controllers import write_of
 from gateway.tables.finding import Finding, warning
 
+_FAR_OFF = 10.0
+
 
 def beside(config: RobotConfig) -> Iterator[Finding]:
     """What is wrong with files that it names, and with limits beside those of the EDS."""
     robot = assemble(config)
     for name, (kind, why) in robot.absent.items():
         yield Finding(header(kind, name), "", why.removeprefix(f"{header(kind, name)}: "))
+    yield from _about_scaling(config, robot)
     absent = {name: why for name, (_kind, why) in robot.absent.items()}
     for parameter in resolve(config, robot.descriptions, absent).values():
         if parameter.component not in absent:
@@ -62,6 +67,23 @@ def _about_channels(config: RobotConfig, robot: Robot) -> Iterator[Finding]:
         why = None if description is None else objection(one, description)
         if why is not None:
             yield Finding(header("channel", name), "object", why)
+
+
+def _about_scaling(config: RobotConfig, robot: Robot) -> Iterator[Finding]:
+    """What the drive itself says counts, and is read from it later; here only what is off by far."""
+    for name, joint in config.joint.items():
+        description = robot.descriptions.get(name)
+        if description is None:
+            continue
+        for key, index, own in (
+            ("counts_per_revolution", 0x608F, joint.counts_per_revolution),
+            ("gear_ratio", 0x6091, joint.gear_ratio),
+        ):
+            told = ratio(description, index + joint.axis * AXIS_OFFSET)
+            if told is not None and not 1 / _FAR_OFF < own / told < _FAR_OFF:
+                file = description.path.name
+                text = f"{own:g} is far from {told:g}, as {file} has it in {index:X}h: angles are off by that"
+                yield warning(header("joint", name), key, text)
 
 
 def _about_controllers(config: RobotConfig, robot: Robot) -> Iterator[Finding]:

@@ -29,6 +29,10 @@ class Arrivals(Noted):
         self.stamps.clear()
         self.missing, self._looks = None, 0
 
+    def skip(self) -> None:
+        """What came last has waited: begin to count anew; what was found stays."""
+        self.stamps.clear()
+
     def look(self, now_ns: int) -> None:
         """Judge what came until now; in the thread that appends."""
         if now_ns - self._looked_ns < LOOK_S * 1e9:

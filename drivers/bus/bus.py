@@ -20,9 +20,12 @@ from drivers.bus.interfaces.opening import open_transport
 from drivers.bus.master import NMT_COMMAND, NMT_START, NMT_STOP, MasterCycles
 from drivers.bus.sender import Sender, always
 from drivers.bus.settings import CanSettings, Role
+from drivers.bus.standstill import Standstill
 from drivers.bus.thread_switching import FastSwitching
 from drivers.bus.traffic import Traffic
 from drivers.errors import Unavailable
+from drivers.noted import found
+from drivers.samples import Finding
 from drivers.urgency import make_urgent
 
 TICK_S = 0.05  # how long the thread waits for a frame before it looks at the clock
@@ -65,6 +68,7 @@ class CanBus:
         self.problem: str | None = None  # why it is not open, in words
         self.health = BusHealth(settings.bitrate)
         self.traffic = Traffic()
+        self.standstill = Standstill()
         self.frames = 0  # that came; error frames are none of them
         self.opened = 0  # times
         self.failed_handlers = 0  # those of users' ticks are among them
@@ -94,6 +98,11 @@ class CanBus:
     def state(self) -> BusState:
         """As the controller's error frames say, where the interface has them."""
         return self.health.state
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What is wrong with it, or with who reads it."""
+        return (*self.health.findings, *found((self.standstill,)))
 
     @property
     def is_open(self) -> bool:
@@ -240,6 +249,7 @@ class CanBus:
         """Let go of it in this order; what fails keeps nothing of the rest from being done."""
         self.problem = problem
         self._transport = None
+        self.standstill.closed()
         self._sender.stop()
         with contextlib.ExitStack() as last_to_first:
             for user in reversed(self._users):
@@ -270,6 +280,7 @@ class CanBus:
                 except Exception as error:  # noqa: BLE001 - one wrong handler must not silence every joint
                     self._failed(f"at frame 0x{can_id:X}", error)
             now_ns = time.monotonic_ns()
+            self.standstill.passed(now_ns)
             if now_ns >= next_tick_ns:
                 next_tick_ns = now_ns + tick_ns
                 accepted = self._accept(transport, accepted)

@@ -6,6 +6,7 @@ from typing import Protocol
 
 from drivers.bus.emcy import Emcy, parse_emcy
 from drivers.bus.nmt import NmtState, parse_heartbeat
+from drivers.bus.standstill import Standstill
 
 EMCY_HISTORY = 64
 HEARTBEATS_MISSED = 2.5  # periods without a heartbeat, where no time is configured
@@ -25,7 +26,8 @@ class LifeListener(Protocol):
 class NodeLife:
     """Fed by the bus's thread, read by any. Stamps are ns of the monotonic clock."""
 
-    def __init__(self, configured_timeout_s: float | None) -> None:
+    def __init__(self, configured_timeout_s: float | None, standstill: Standstill | None = None) -> None:
+        """`standstill` is that of the bus on which it is heard."""
         self.emcy_history: deque[Emcy] = deque(maxlen=EMCY_HISTORY)
         self.boots = 0
         self.emcys = 0
@@ -37,6 +39,7 @@ class NodeLife:
         self.timeout_s = configured_timeout_s
         self._configured_timeout_s = configured_timeout_s
         self._period_s: float | None = None
+        self._standstill = standstill or Standstill()
         self._beats: deque[float] = deque(maxlen=BEATS)
         self._listeners: tuple[LifeListener, ...] = ()
 
@@ -86,7 +89,8 @@ class NodeLife:
                 listener.on_boot_up(stamp_ns)
         else:
             self.heartbeats += 1
-            if self.heartbeat_ns is not None:
+            # What waited comes in a burst: its intervals are not the device's.
+            if self.heartbeat_ns is not None and self._standstill.is_settled(stamp_ns):
                 self._learn((stamp_ns - self.heartbeat_ns) / 1e9)
         self.heard_ns = self.heartbeat_ns = stamp_ns
         self.nmt_state = state
@@ -113,11 +117,13 @@ class NodeLife:
         """Whether a heartbeat that came, or is asked for, stays away."""
         if self.timeout_s is None or self.heartbeat_ns is None:
             return False
-        return (now_ns - self.heartbeat_ns) / 1e9 > self.timeout_s
+        return self._standstill.silent_ns(self.heartbeat_ns, now_ns) / 1e9 > self.timeout_s
 
     def problem(self, now_ns: int) -> str | None:
         """What is wrong with a node that came up, in words."""
         if self.lost(now_ns):
+            if (words := self._standstill.words(now_ns)) is not None:
+                return words
             silent_s = (self.silent_ms(now_ns) or 0) / 1000
             return f"its heartbeat is missing for {silent_s:.1f} s: check the node's power and cable"
         # After a boot-up message alone nobody knows: a node may start itself.

@@ -50,7 +50,7 @@ class Node(BusUser):
         self.bus = bus
         self.node_id = node_id
         self.description = description
-        self.life = NodeLife(times.heartbeat_timeout_s)
+        self.life = NodeLife(times.heartbeat_timeout_s, bus.standstill)
         self.arrivals: tuple[Arrivals, ...] = ()  # of the PDOs that its users follow
         self._findings: tuple[str, ...] = ()
         self._stranger: str | None = _NOT_ASKED  # why it may not be the device that it should be
@@ -252,8 +252,9 @@ class Node(BusUser):
         self._booting.retry(now_ns)
         if self.ready:
             self._asking.tick(now_ns)
+        settled = self.bus.standstill.is_settled(now_ns)
         for arrivals in self.arrivals:
-            arrivals.look(now_ns)
+            arrivals.look(now_ns) if settled else arrivals.skip()
 
     def _on_heartbeat(self, stamp_ns: int, data: bytes) -> None:
         first = self.life.heard_ns is None

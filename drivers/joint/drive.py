@@ -6,7 +6,7 @@ on quick stop. What no TPDO brings is polled by SDO.
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 
@@ -71,7 +71,7 @@ class JointDrive(PowerDrive):
         self._description = description
         self._index = {channel.quantity: index for index, channel in enumerate(self.channels)}
         self._freshness = Freshness(settings.stale_after_s, settings.lost_after_s)
-        self._watch = JointWatch(self.latest)
+        self._watch = JointWatch(self.latest, bus.standstill, description)
         self._arrivals = Arrivals()
         self._plan: Plan | None = None
         self._started = False
@@ -116,11 +116,11 @@ class JointDrive(PowerDrive):
             elif implausible:
                 state = State.FAULT
         else:
-            problem = problem or self._silence_text(age_ms)
+            problem = self.node.bus.standstill.words(now_ns) or problem or self._silence_text(age_ms)
         findings = (*implausible, *self.node.trouble)
         objects = self._objects.problems(now_ns) if state is not State.LOST else ()
-        notes = (*objects, *self.node.findings, *(self._plan.notes if self._plan is not None else ()))
-        texts = (problem, self._emcy_text(state, now_ns), *(one.text(now_ns) for one in findings), *notes)
+        notes = (*objects, *self._notes(now_ns, findings))
+        texts = (problem, self._emcy_text(state, now_ns), *notes)
         words = "; ".join(text for text in texts if text)
         return Quality(state, age_ms, words or None, self.counters(), findings)
 
@@ -233,6 +233,15 @@ class JointDrive(PowerDrive):
                 self._freshness.seen(stamp_ns)
 
     # What is wrong, in words.
+
+    def _notes(self, now_ns: int, findings: tuple[Finding, ...]) -> Iterator[str | None]:
+        """What explains something comes before what it explains."""
+        plan = self._plan
+        yield self._watch.held_off.words
+        yield from () if plan is None else plan.contradictions
+        yield from self.node.findings
+        yield from (one.text(now_ns) for one in findings)
+        yield from () if plan is None else plan.notes
 
     def _fresh(self, quantity: str, now_ns: int) -> float | None:
         index = self._index.get(quantity)

@@ -30,6 +30,7 @@ class Plan:
     decoders: tuple[tuple[Tpdo, Decoder], ...]
     polled_often: tuple[Source, ...]  # position and statusword that no TPDO brings
     polled_seldom: tuple[Source, ...]  # all else, and what TPDOs bring only when it changes
+    contradictions: tuple[str, ...]  # of the file and the drive
     notes: tuple[str, ...]
     position_from: Tpdo | None
 
@@ -56,8 +57,8 @@ def make_plan(settings: JointSettings, found: tuple[Quantity, ...], reading: Dri
         ),
         polled_often=often,
         polled_seldom=seldom,
+        contradictions=contradictions(settings, reading.scaling),
         notes=(
-            *contradictions(settings, reading.scaling),
             *_unscaled_notes(found, linears),
             *_polling_notes(settings, often, reading.tpdos),
         ),

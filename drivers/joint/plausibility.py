@@ -123,6 +123,10 @@ class JumpCheck(Noted):
         self.clear()
         self._before = None
 
+    def skip(self) -> None:
+        """Nobody knows how far it went since the last time; what was found stays."""
+        self._before = None
+
     def update(self, now: Motion) -> None:
         before, self._before = self._before, now
         if self.finding is not None and now.stamp_ns - self._jumped_ns > JUMP_SHOWN_S * 1e9:
@@ -199,7 +203,8 @@ class JointCheck:
         self.loaded = LoadedCheck()
         self.mirror: MirrorCheck | None = None
         self._name = name
-        self._own: tuple[FrozenCheck, JumpCheck, LoadedCheck] = (FrozenCheck(), JumpCheck(), self.loaded)
+        self._jump = JumpCheck()
+        self._own: tuple[FrozenCheck, JumpCheck, LoadedCheck] = (FrozenCheck(), self._jump, self.loaded)
         self._last_ns = 0
 
     def compare_with(self, other: str) -> None:
@@ -212,6 +217,10 @@ class JointCheck:
             check.restart()
         if self.mirror is not None:
             self.mirror.restart()
+
+    def skip(self) -> None:
+        """What came last may have waited: at what time it was so is not known."""
+        self._jump.skip()
 
     def update(self, now: Motion, other: Callable[[], float | None]) -> None:
         """What is known now; a position that is as old as the last time says nothing new."""

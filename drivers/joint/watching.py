@@ -3,11 +3,14 @@
 from collections.abc import Callable, Iterable
 
 from drivers.bus.bus import BusUser
+from drivers.bus.standstill import Standstill
 from drivers.joint.cia402 import DriveState
+from drivers.joint.held_off import HeldOff
 from drivers.joint.plausibility import JointCheck, Motion
 from drivers.joint.quantities import POSITION, STATE
 from drivers.latest import Latest
 from drivers.samples import Channel
+from eds import Description
 
 BESIDE_S = 0.03  # PDOs of one SYNC; a velocity that was polled is older the next time
 
@@ -15,9 +18,11 @@ BESIDE_S = 0.03  # PDOs of one SYNC; a velocity that was polled is older the nex
 class JointWatch(BusUser):
     """Feeds `check`, about 20 times a second as long as the bus is open."""
 
-    def __init__(self, latest: Latest) -> None:
+    def __init__(self, latest: Latest, standstill: Standstill, description: Description) -> None:
         self.check = JointCheck(latest.component)
+        self.held_off = HeldOff(description)
         self._latest = latest
+        self._standstill = standstill
         self._index = _index(latest.channels)
         self._other: Callable[[int], float | None] = lambda _now_ns: None
 
@@ -30,11 +35,22 @@ class JointWatch(BusUser):
     def restart(self) -> None:
         """What was seen before is of another life of the drive."""
         self.check.restart()
+        self.held_off.restart()
 
     def bus_closed(self) -> None:
         self.restart()
 
     def tick(self, now_ns: int) -> None:
+        state = self._newest(STATE, now_ns)
+        inputs = self._newest("digital_inputs", now_ns)
+        self.held_off.update(
+            now_ns,
+            None if state is None else DriveState(int(state)),
+            None if inputs is None else int(inputs),
+        )
+        if not self._standstill.is_settled(now_ns):
+            self.check.skip()
+            return
         position, stamp_ns = self._latest.read(self._index[POSITION], now_ns)
         if position is None or stamp_ns is None:
             return
@@ -46,7 +62,7 @@ class JointWatch(BusUser):
             self._newest("torque", now_ns),
             self._newest("following_error", now_ns),
             None if mode is None else int(mode),
-            self._newest(STATE, now_ns) == DriveState.OPERATION_ENABLED,
+            state == DriveState.OPERATION_ENABLED,
         )
         self.check.update(now, lambda: self._other(now_ns))
 

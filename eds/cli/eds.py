@@ -11,11 +11,12 @@ import eds
 from eds.description import Description, EdsError
 from eds.profile import profile_of
 from eds.report import ObjectRow, PdoRow, grouped_findings, joint_text, object_rows, pdo_rows
+from eds.table import joint_table
 
 _DESCRIPTION = """\
 Read EDS and DCF files (CiA 306) as a gateway would: the device, whether it can be a joint, its PDOs as the
-file's defaults have them (a gateway reads them from the device itself), its objects with limits, and what had
-to be repaired.
+file's defaults have them (a gateway reads them from the device itself), its objects with limits, what had to
+be repaired, and the table for robot.toml, to paste; what the file does not tell is a comment to fill in.
 """
 
 _EPILOG = """\
@@ -50,7 +51,10 @@ def _parser() -> argparse.ArgumentParser:
         help="an .eds or .dcf file, or the name of one that ships",
     )
     parser.add_argument(
-        "--node-id", type=_node_id, default=1, metavar="N", help="node id for COB-IDs that depend on it (1)"
+        "--node-id",
+        type=_node_id,
+        metavar="N",
+        help="node id for COB-IDs that depend on it (1), and the table",
     )
     parser.add_argument("--brief", action="store_true", help="leave out the objects")
     parser.add_argument("--json", action="store_true", help="one JSON object a file and line")
@@ -63,15 +67,18 @@ def main(argv: list[str]) -> int:
     failed = False
     for path in arguments.files:
         try:
-            description = eds.load(eds.locate(str(path), Path.cwd() / "here"), arguments.node_id)
+            description = eds.load(eds.locate(str(path), Path.cwd() / "here"), arguments.node_id or 1)
         except EdsError as error:
             failed = True
             sys.stderr.write(f"gwrms eds: {error}\n")
             continue
+        table = joint_table(description, arguments.node_id)
         if arguments.json:
-            sys.stdout.write(json.dumps(_as_json(description, brief=arguments.brief)) + "\n")
+            told = {**_as_json(description, brief=arguments.brief), "table": table}
+            sys.stdout.write(json.dumps(told) + "\n")
         else:
-            sys.stdout.write("\n".join(_as_text(description, brief=arguments.brief)) + "\n\n")
+            said = "\n".join(_as_text(description, brief=arguments.brief))
+            sys.stdout.write(f"{said}\n  for robot.toml\n\n{table}\n")
     return int(failed)
 
 

@@ -24,6 +24,7 @@ def chapters(robot: Description) -> Iterator[str]:
             [_node(bus, node) for bus in robot.buses for node in bus.nodes],
             right=range(2, 8),
         )
+        yield from (_strangers(bus) for bus in robot.buses if bus.strangers)
     now_ns = robot.clock.monotonic_ns
     emcys = [row for part in robot.components for row in _emcy(part, now_ns)]
     if emcys:
@@ -37,6 +38,14 @@ def _bus(bus: BusInfo) -> tuple[str, ...]:
     frames = NONE if bus.frames_per_s is None else f"{bus.frames_per_s:.0f}"
     counted = (bus.error_frames, bus.bus_offs, bus.dropped)
     return (bus.name, bus.state, percent(bus.load_percent), frames, *map(str, counted), bus.problem or "")
+
+
+def _strangers(bus: BusInfo) -> str:
+    nodes = ", ".join(map(str, bus.strangers))
+    return (
+        f"no table of the file has what is heard on {bus.name} as node {nodes}: "
+        "give it one, or correct a node_id; gwrms scan says what it is\n"
+    )
 
 
 def _node(bus: BusInfo, node: NodeInfo) -> tuple[str, ...]:

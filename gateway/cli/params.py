@@ -40,7 +40,12 @@ examples:
   gwrms params save left_knee.dcf --component left_knee --eds my_drive.eds"""
 
 COMPARE_EPILOG = """Values are the same when the device would store the same bytes for both.
-Exit status 0: the robot holds all that the file says; what the file does not name does not count.
+What the file does not name does not count.
+
+exit status, as of diff(1)
+  0  the robot holds all that the file says
+  1  something is different, or the robot does not have it
+  2  nothing was compared: no gateway, a file that cannot be read, wrong usage
 
 example:
   gwrms params compare monday.toml"""

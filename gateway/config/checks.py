@@ -163,6 +163,8 @@ def _about_control_loop(config: RobotConfig) -> Iterator[Finding]:
     loop = config.control_loop
     if loop is None:
         return
+    if not all(name.strip() for name in loop.processes):
+        yield Finding("[control_loop]", "processes", 'one is empty: write names as `ps` shows them, ["walk"]')
     if loop.bus is not None:
         yield from no_bus(config, "[control_loop]", loop.bus)
     if (loop.bus is None) != (loop.period_ms is None):

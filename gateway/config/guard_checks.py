@@ -4,6 +4,8 @@ import fnmatch
 from collections.abc import Iterator
 from functools import singledispatch
 
+import msgspec
+
 from drivers.bus.settings import Role
 from gateway.config.guard import ALARMS, TABLES, WATCHES, GuardSettings
 from gateway.config.guard_rules import (
@@ -21,6 +23,7 @@ from gateway.config.likelihood import implausible
 from gateway.config.robot import RobotConfig
 from gateway.tables.finding import Finding, meant, warning
 
+_LONG_HEARTBEAT_MS = 1000  # a drive goes on for two or three of them after the gateway died
 _LONG_S = 60.0  # longer than what goes wrong with a robot may last before anything is done
 
 
@@ -32,6 +35,7 @@ def complaints(config: RobotConfig, guard: GuardSettings) -> Iterator[Finding]:
         )
     if guard.heartbeat_ms is not None:
         yield from _about_heartbeat(config)
+        yield from _about_period(guard.heartbeat_ms)
     for name, rule in guard.rule.items():
         where = f"[guard.rule.{name}]"
         if name == ALARMS:
@@ -46,6 +50,29 @@ def complaints(config: RobotConfig, guard: GuardSettings) -> Iterator[Finding]:
         for key in ("for_s", "silent_s", "settle_s"):
             if (getattr(rule, key, None) or 0.0) > _LONG_S:
                 yield warning(where, key, _waits(getattr(rule, key)))
+        if rule.clear_s > _LONG_S:
+            text = f"{rule.clear_s:g} s is long: it stays tripped until all has been well for that time"
+            yield warning(where, "clear_s", f"{text}; {rule.clear_s:g} ms is {rule.clear_s / 1000:g}")
+    yield from _about_doubles(guard)
+
+
+def _about_doubles(guard: GuardSettings) -> Iterator[Finding]:
+    """The same twice: who changes one of them believes that it is changed."""
+    seen: dict[bytes, str] = {}
+    for name, rule in guard.rule.items():
+        where = f"[guard.rule.{name}]"
+        other = seen.setdefault(msgspec.json.encode(rule, order="sorted"), where)
+        if other != where:
+            yield warning(where, "", f"says the same as {other}: keep one of them")
+
+
+def _about_period(heartbeat_ms: int) -> Iterator[Finding]:
+    if heartbeat_ms > _LONG_HEARTBEAT_MS:
+        text = (
+            f"{heartbeat_ms} is long: for more than that a drive goes on by itself after the gateway died; "
+            "usual are 50 to 500"
+        )
+        yield warning("[guard]", "heartbeat_ms", text)
 
 
 def _waits(seconds: float) -> str:

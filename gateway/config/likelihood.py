@@ -27,6 +27,8 @@ _LARGEST: Mapping[str, tuple[float, str, float, float]] = {
     "V": (1500.0, " mV", 1e-3, 0.0),
     "°C": (250.0, " K", 1.0, -273.15),
 }
+_GEARS = (1.0, 1000.0)  # of a joint of an exoskeleton: direct drive up to several stages
+_COUNTS = (16.0, 2.0**32)
 _EVERYWHERE = ("", "0.0.0.0", "::", "*")
 _LOCAL = re.compile(r"localhost$|127\.|::1$")
 
@@ -116,6 +118,44 @@ def _about_joints(config: RobotConfig) -> Iterator[Finding]:
                 yield from implausible(where, key, rated, unit)
 
 
+def _about_scaling(config: RobotConfig) -> Iterator[Finding]:
+    """Off by magnitudes: angles would be, and no limit would hold."""
+    for name, joint in config.joint.items():
+        where, gear, counts = header("joint", name), joint.gear_ratio, joint.counts_per_revolution
+        if gear < _GEARS[0]:
+            text = f"{gear:g} would turn the joint faster than its motor: one that slows down is {1 / gear:g}"
+            yield warning(where, "gear_ratio", text)
+        elif gear > _GEARS[1]:
+            text = (
+                f"{gear:g} is more than a joint's gear has, 1 to {_GEARS[1]:g}: it is revolutions of the "
+                "encoder per revolution of the joint, without the counts of the encoder"
+            )
+            yield warning(where, "gear_ratio", text)
+        if not _COUNTS[0] <= counts <= _COUNTS[1]:
+            text = (
+                f"{counts:g} is no encoder's, usual are 1000 to 16777216: counts of 6064h a revolution, four "
+                "times the lines of an incremental one"
+            )
+            yield warning(where, "counts_per_revolution", text)
+
+
+def _about_control_loop(config: RobotConfig) -> Iterator[Finding]:
+    loop = config.control_loop
+    if loop is not None and loop.period_ms is not None and loop.tolerance_ms > loop.period_ms:
+        text = (
+            f"{loop.tolerance_ms:g} is above period_ms {loop.period_ms:g}: one that is missing would be no "
+            f"overrun; half a period is {loop.period_ms / 2:g}"
+        )
+        yield warning("[control_loop]", "late_ms", text)
+
+
+def _about_records(config: RobotConfig) -> Iterator[Finding]:
+    if config.gateway.records is not None and not config.gateway.records.strip():
+        folder = config.path.parent
+        text = f"is empty: journal and held stop go into {folder}; name a folder, or leave the key out"
+        yield warning("[gateway]", "records", text)
+
+
 def _about_guarding(config: RobotConfig) -> Iterator[Finding]:
     for table, devices in (("joint", config.joint), ("device", config.device)):
         for name, device in devices.items():
@@ -172,6 +212,9 @@ _CHECKS = (
     _about_stop_times,
     _about_buses,
     _about_joints,
+    _about_scaling,
+    _about_control_loop,
+    _about_records,
     _about_guarding,
     _about_serial_ports,
     _about_feet,

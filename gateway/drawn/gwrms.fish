@@ -241,7 +241,7 @@ complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a 
 complete -c gwrms -n '_shtab_gwrms_using docs' -s h -l help -d 'show this help message and exit'
 complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a eds -d 'Read EDS and DCF files (CiA 306) as a gateway would: the device, whether it can be a joint, its PDOs as the'
 complete -c gwrms -n '_shtab_gwrms_using eds' -s h -l help -d 'show this help message and exit'
-complete -c gwrms -n '_shtab_gwrms_using eds' -l node-id -x -d 'node id for COB-IDs that depend on it (1)'
+complete -c gwrms -n '_shtab_gwrms_using eds' -l node-id -x -d 'node id for COB-IDs that depend on it (1), and the table'
 complete -c gwrms -n '_shtab_gwrms_using eds' -l brief -d 'leave out the objects'
 complete -c gwrms -n '_shtab_gwrms_using eds' -l json -d 'one JSON object a file and line'
 complete -c gwrms -n '_shtab_gwrms_using eds; and test $_shtab_gwrms_npos -ge 0' -ka "(__fish_complete_path (commandline -ct))" -d 'an .eds or .dcf file, or the name of one that ships'

@@ -445,7 +445,7 @@ _shtab_gwrms_doctor_defaults_added=0
 
 _shtab_gwrms_eds_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--node-id[node id for COB-IDs that depend on it (1)]:N:"
+  "--node-id[node id for COB-IDs that depend on it (1), and the table]:N:"
   "--brief[leave out the objects]"
   "--json[one JSON object a file and line]"
   "(*):an .eds or .dcf file, or the name of one that ships:_files"

@@ -53,6 +53,7 @@ class BusInfo(Struct, frozen=True):
     problem: str | None = None  # why it is not open, or what its controller or its link says
     findings: list[FindingInfo] = []
     talks: list[TalkInfo] = []  # the most first; of frames that came to the gateway
+    strangers: list[int] = []  # node ids that were heard and that no table has
 
 
 class Buses(Struct, frozen=True):

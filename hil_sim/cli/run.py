@@ -93,6 +93,8 @@ def main(argv: list[str]) -> int:
     except ScenarioError as error:
         sys.stderr.write(f"gwrms sim run: {error}\n")
         return 2
+    if arguments.junit is not None:
+        _try_to_write(arguments.junit)
     before = signal.signal(signal.SIGTERM, lambda _signal, _frame: sys.exit(_TERMINATED))
     try:
         runs = [_run(file, script, arguments) for file, script in scripts]
@@ -125,6 +127,20 @@ def _run(file: Path, script: Script, arguments: argparse.Namespace) -> Ran:
 def _say(text: str) -> None:
     sys.stdout.write(text)
     sys.stdout.flush()
+
+
+def _try_to_write(file: Path) -> None:
+    """Minutes before there is something to write; what is there stays until then."""
+    was_there = file.exists()
+    try:
+        with file.open("ab"):
+            pass
+        if not was_there:
+            file.unlink()
+    except OSError as error:
+        raise SimulatorError(
+            f"{file} cannot be written, so nothing was run: {error.strerror}; name another file for --junit"
+        ) from error
 
 
 def _write(file: Path, content: bytes) -> None:

@@ -128,7 +128,7 @@ class _Reading:
             scenario=Scenario(robot.choice("scenario", list(Scenario), Scenario.WALK)),
             seconds=_duration(robot, least_s),
             seed=robot.whole("seed", 0),
-            subject=robot.whole("subject", 0),
+            subject=robot.whole("subject", 0, least=0),
             sensors=SensorChoice(
                 robot.choice("imu", IMUS, SensorChoice().imu),
                 robot.choice("insole", tuple(INSOLES), SensorChoice().insole),

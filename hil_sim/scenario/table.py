@@ -116,10 +116,13 @@ class Table:
             return math.nan
         return float(value)
 
-    def whole(self, key: str, default: int) -> int:
+    def whole(self, key: str, default: int, least: int | None = None) -> int:
         value = self.values.get(key, default)
         if not isinstance(value, int) or isinstance(value, bool):
             self.complain(key, f"{value!r} must be a whole number")
+            return default
+        if least is not None and value < least:
+            self.complain(key, f"{value} must be {least} or more")
             return default
         return value
 

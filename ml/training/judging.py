@@ -82,7 +82,10 @@ def _without_serving(task: Task, held_out: Judged, figure: str) -> Decision:
     """Nothing serves: so it must be better than saying always the same."""
     new, idle = held_out.new.figures[figure], held_out.new.figures["idle"]
     better = new > idle if task.fold else new < idle
-    told = f"{figure} on {held_out.name}: {new:.4g}; saying always the same has {idle:.4g}; no model that was promoted serves yet"
+    told = (
+        f"{figure} on {held_out.name}: {new:.4g}; saying always the same has {idle:.4g}; "
+        "no model that was promoted serves yet"
+    )
     return Decision(better, (told,))
 
 

@@ -3,7 +3,7 @@
 import argparse
 import getpass
 from collections.abc import Iterator, Mapping
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from gateway.amounts import NONE
 from gateway.cli.text import say, say_json, table, warn
@@ -15,11 +15,13 @@ from ml.robot.task import TASKS
 from ml.store.private import private_files
 from ml.training.judging import Judged
 from ml.training.material import Wish
-from ml.training.training import Trained, told, train
 from server_gui.cli.cloud_options import add_url, parser, url
 from server_gui.cli.models import NOTHING
 from server_gui.core.models.training import Progress
 from server_gui.core.settings.promoters import desk_signature
+
+if TYPE_CHECKING:
+    from ml.training.training import Trained
 
 FIGURES: Final = ("macro_f1", "accuracy", "rmse_percent", "abstained", "stepping_where_none_steps")
 EPILOG: Final = """It learns from every session with labels (gwrms label). A quarter of the wearers, by a
@@ -56,7 +58,7 @@ def main(argv: list[str]) -> int:
         arguments.adapt_from,
     )
     registry = Registry(url(arguments), sign=desk_signature())
-    trained = train(registry, wish, arguments.cluster, _teller(arguments))
+    trained = _trained(registry, wish, arguments)
     model = registry.publish(trained.learned.state(), trained.card)
     promoted, overtaken = _promoted(registry, model, trained, arguments)
     if arguments.json:
@@ -66,17 +68,41 @@ def main(argv: list[str]) -> int:
     return 0 if promoted or not arguments.promote else 1
 
 
+def _trained(registry: Registry, wish: Wish, arguments: argparse.Namespace) -> "Trained":
+    """What came of it; says what it does first, for even loading what learns takes its seconds."""
+    tell = _teller(arguments)
+    if not arguments.json:
+        warn("train", f"{wish.task}, from the sessions and labels of {registry.url}")
+    from ml.training.training import train
+
+    return train(registry, wish, arguments.cluster, tell)
+
+
 def _teller(arguments: argparse.Namespace) -> Tell:
     """What tells how far it is: for machines in lines of JSON before the answer."""
-    if not arguments.progress:
-        return untold
     if arguments.json:
+        if not arguments.progress:
+            return untold
         return lambda what, done, total: say_json({"progress": Progress(what, done, total)})
-    return lambda what, done, total: warn("train", f"{what}, {done} of {total}")
+    if arguments.progress:
+        return lambda what, done, total: warn("train", f"{what}, {done} of {total}")
+    return _Stages()
+
+
+class _Stages:
+    """Says what is begun, once each."""
+
+    def __init__(self) -> None:
+        self._what = ""
+
+    def __call__(self, what: str, done: int, total: int) -> None:  # noqa: ARG002 - as a `Tell` hears them
+        if what != self._what:
+            self._what = what
+            warn("train", what)
 
 
 def _promoted(
-    registry: Registry, model: str, trained: Trained, arguments: argparse.Namespace
+    registry: Registry, model: str, trained: "Trained", arguments: argparse.Namespace
 ) -> tuple[bool, str]:
     """Whether it serves now; why not, where it was better but something else serves since it was judged."""
     if not (arguments.promote and trained.decision.better):
@@ -90,8 +116,10 @@ def _promoted(
 
 
 def _text(
-    model: str, trained: Trained, overtaken: str, arguments: argparse.Namespace, *, promoted: bool
+    model: str, trained: "Trained", overtaken: str, arguments: argparse.Namespace, *, promoted: bool
 ) -> Iterator[str]:
+    from ml.training.training import told
+
     card, decision = trained.card, trained.decision
     yield f"{model}: {card.recipe}, from {len(card.learned)} sessions; {card.notes}"
     yield f"compared with: {trained.serving or 'nothing, for nothing serves'}"
@@ -130,7 +158,7 @@ def _flat(metrics: Metrics) -> Mapping[str, float]:
     return found | {f"for {name}": value for name, value in metrics.per_subject.items()}
 
 
-def _answer(model: str, trained: Trained, overtaken: str, *, promoted: bool) -> dict[str, Any]:
+def _answer(model: str, trained: "Trained", overtaken: str, *, promoted: bool) -> dict[str, Any]:
     return {
         "model": model,
         "compared_with": trained.serving,

@@ -27,6 +27,7 @@ _STATISTICS = Path("/sys/class/net")
 _ANCILLARY_BYTES = socket.CMSG_SPACE(16) + socket.CMSG_SPACE(4)
 _MAX_FILTERS = 512
 RECEIVE_BUFFER = 4 * 1024 * 1024  # the kernel gives what net.core.rmem_max allows
+CLOCK_ATTEMPTS, CLOCK_APART_NS = 3, 1_000_000
 QUEUE_LOOK_S = 0.001  # nobody tells when a queue that was full has room: a frame of 8 bytes takes 0.13 ms
 
 
@@ -115,12 +116,12 @@ class SocketCanTransport:
 
     def _stamp_ns(self, ancillary: list[tuple[int, int, bytes]]) -> int:
         """The kernel's stamp on the monotonic clock: the offset is read anew, for wall time may jump."""
-        now_ns = time.monotonic_ns()
+        now_ns, wall_ns = _both_clocks()
         stamp_ns = now_ns
         for _, kind, data in ancillary:
             if kind == _SO_TIMESTAMPNS:
                 seconds, nanoseconds = _TIME.unpack(data)
-                stamp_ns = now_ns - max(0, time.time_ns() - seconds * 1_000_000_000 - nanoseconds)
+                stamp_ns = now_ns - max(0, wall_ns - seconds * 1_000_000_000 - nanoseconds)
             elif kind == _SO_RXQ_OVFL:
                 self.dropped = int.from_bytes(data, "little")
         return stamp_ns
@@ -170,6 +171,15 @@ def _bound_socket(name: str) -> socket.socket:
         sock.close()
         raise
     return sock
+
+
+def _both_clocks() -> tuple[int, int]:
+    """Monotonic and wall time of one moment: asked anew where we were kept waiting in between."""
+    for _ in range(CLOCK_ATTEMPTS):
+        now_ns, wall_ns = time.monotonic_ns(), time.time_ns()
+        if time.monotonic_ns() - now_ns < CLOCK_APART_NS:
+            break
+    return now_ns, wall_ns  # at the worst a stamp is too old
 
 
 def _mask(can_id: int) -> int:

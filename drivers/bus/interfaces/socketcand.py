@@ -4,6 +4,7 @@ python-can's own client does not notice that the server has gone and loses the h
 to it; this one says what is wrong at once and costs less per frame.
 """
 
+import math
 import select
 import socket
 import time
@@ -15,6 +16,9 @@ from drivers.errors import Unavailable
 CONNECT_TIMEOUT_S = 1.0
 RECEIVE_BYTES = 65536
 REMOTE_WORD = "R"  # of the simulator's hub; the protocol has none
+AWAY_NS = 20_000_000  # without a look at the socket: what is there now has waited
+QUICK_NS = 5_000_000
+MOST_READS = 64  # 4 MB, some half a minute of a robot
 MAX_PENDING = 4096  # characters without the end of a message: not socketcand
 
 
@@ -77,6 +81,31 @@ def _remote_frame(identifier: str, stamp_ns: int) -> Frame | None:
     return None if found is None else (stamp_ns, found[1] | REMOTE, b"")
 
 
+def waited_stamps(messages: Sequence[str], since_ns: int, now_ns: int) -> list[int]:
+    """When each frame came, of which the last came now and the others before, as the server's stamps tell.
+
+    None came before `since_ns`, for until then all was read: so a server's clock that steps does no harm.
+    """
+    times = [server_ns(message) for message in messages]
+    last_ns = next((one for one in reversed(times) if one is not None), None)
+    stamps, stamp_ns = [], since_ns
+    for one in times:
+        if one is not None and last_ns is not None:
+            stamp_ns = max(stamp_ns, min(now_ns, now_ns - last_ns + one))
+        stamps.append(stamp_ns)
+    return stamps
+
+
+def server_ns(message: str) -> int | None:
+    """The server's stamp in ` frame 181 1234.5 0102 `; `None` where there is none."""
+    words = message.split(maxsplit=3)
+    try:
+        seconds = float(words[2]) if len(words) > 2 else math.nan
+    except ValueError:
+        return None
+    return round(seconds * 1e9) if math.isfinite(seconds) else None
+
+
 def send_message(can_id: int, data: bytes) -> str:
     """The line that sends a frame."""
     identifier = f"{can_id & 0x1FFF_FFFF:08X}" if can_id & EXTENDED else f"{can_id & STANDARD_IDS:03X}"
@@ -102,6 +131,7 @@ class SocketcandTransport:
         self._unsent = b""  # of a frame that was taken
         self._parser = SocketcandParser()
         self._early: list[str] = []
+        self._read_ns = time.monotonic_ns()  # when all was read that had come
         try:
             self._socket = socket.create_connection((host, port), timeout=CONNECT_TIMEOUT_S)
         except OSError as error:
@@ -124,12 +154,17 @@ class SocketcandTransport:
         self._room.register(self._out, select.POLLOUT)
 
     def receive(self, timeout_s: float) -> Sequence[Frame]:
-        """Frames that came; stamped together when they were taken from the socket."""
+        """Frames that came, stamped when they were read; those that waited by `waited_stamps`."""
         messages = self._early or self._read(timeout_s)
         self._early = []
-        stamp_ns = time.monotonic_ns()
+        since_ns, self._read_ns = self._read_ns, time.monotonic_ns()
+        if not messages or self._read_ns - since_ns <= AWAY_NS:
+            stamps = [self._read_ns] * len(messages)
+        else:
+            messages = [*messages, *self._drain()]
+            stamps = waited_stamps(messages, since_ns, self._read_ns)
         frames = []
-        for message in messages:
+        for message, stamp_ns in zip(messages, stamps, strict=True):
             frame = frame_of(message, stamp_ns)
             if frame is not None:
                 frames.append(frame)
@@ -178,11 +213,26 @@ class SocketcandTransport:
             raise Unavailable(f"{self._where} is gone ({error})") from error
 
     def _read(self, timeout_s: float) -> list[str]:
+        if self._socket.gettimeout() != timeout_s:
+            self._socket.settimeout(timeout_s)
+        return self._take(self._socket)
+
+    def _drain(self) -> list[str]:
+        """All that waits: until a look that took no time finds nothing, so that the last frame is of now."""
+        messages: list[str] = []
+        for _ in range(MOST_READS):
+            looked_ns = time.monotonic_ns()
+            more = self._take(self._out)
+            self._read_ns = time.monotonic_ns()
+            messages += more
+            if not more and self._read_ns - looked_ns < QUICK_NS:
+                break
+        return messages
+
+    def _take(self, connection: socket.socket) -> list[str]:
         try:
-            if self._socket.gettimeout() != timeout_s:
-                self._socket.settimeout(timeout_s)
-            data = self._socket.recv(RECEIVE_BYTES)
-        except TimeoutError:
+            data = connection.recv(RECEIVE_BYTES)
+        except (TimeoutError, BlockingIOError):
             return []
         except OSError as error:
             raise Unavailable(f"{self._where} is gone ({error})") from error

@@ -7,6 +7,7 @@ from msgspec import UNSET, UnsetType
 
 from drivers.bus.bus import CanBus
 from drivers.bus.life import NodeLife
+from drivers.bus.nmt import HEARTBEAT
 from drivers.bus.node import Node
 from drivers.component import Component
 from drivers.samples import Finding
@@ -38,9 +39,16 @@ def _bus(bus: CanBus, now_ns: int) -> BusInfo:
         dropped=bus.dropped,
         nodes=[_node(nodes[node_id], now_ns) for node_id in sorted(nodes)],
         problem=bus.trouble,
-        findings=finding_infos(health.findings),
+        findings=finding_infos(bus.findings),
         talks=[TalkInfo(one.kind, one.node_id, round(one.frames_per_s, 1)) for one in bus.traffic.talks],
+        strangers=_strangers(bus),
     )
+
+
+def _strangers(bus: CanBus) -> list[int]:
+    """Nodes whose heartbeat has come although no table has them; ours is nobody's."""
+    heard = {can_id - HEARTBEAT for can_id in bus.unclaimed.copy()}
+    return sorted(node_id for node_id in heard if 0 < node_id <= 127 and node_id not in bus.nodes)
 
 
 def _node(node: Node, now_ns: int) -> NodeInfo:

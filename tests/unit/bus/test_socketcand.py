@@ -3,6 +3,7 @@
 import contextlib
 import socket
 import threading
+import time
 from collections.abc import Iterator
 
 import pytest
@@ -10,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.bus.frames import ERROR, EXTENDED, REMOTE, Frame
+from drivers.bus.interfaces import socketcand
 from drivers.bus.interfaces.socketcand import (
     MAX_PENDING,
     SocketcandParser,
@@ -21,6 +23,7 @@ from drivers.bus.sender import Sender
 from drivers.errors import Unavailable
 from tests.support.waiting import WAIT_S, until
 
+SECOND_NS = 1_000_000_000
 STREAM = (
     "< frame 181 1234.5 0102030405060708 >< frame 1FFFFFFF 0.0 AA >< error 20000004 1.0 >< frame 702 1.0 05 >"
 )
@@ -251,3 +254,19 @@ def test_a_server_that_is_not_there_is_named() -> None:
         port = closed.getsockname()[1]
     with pytest.raises(Unavailable, match=rf"nothing answers as socketcand at 127\.0\.0\.1:{port}"):
         SocketcandTransport("127.0.0.1", port, "can0")
+
+
+def test_what_waited_in_many_reads_is_taken_at_once_and_stamped_apart(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(socketcand, "RECEIVE_BYTES", 100)
+    burst = b"".join(b"< frame 181 %.3f 01 >" % (5.0 + number / 1000) for number in range(100))
+    with server(b"< hi >", b"< ok >", b"< ok >", then=burst, keep_open=True) as port:
+        transport = SocketcandTransport("127.0.0.1", port, "can0")
+        until(lambda: len(transport._socket.recv(len(burst), socket.MSG_PEEK)) >= len(burst) - 100)
+        since_ns = transport._read_ns = time.monotonic_ns() - SECOND_NS
+        stamps = [frame[0] for frame in receive(transport)]
+        transport.close()
+    assert len(stamps) == 100
+    assert stamps[-1] - stamps[0] == pytest.approx(99_000_000, abs=1000)
+    assert since_ns < stamps[0] < stamps[-1] <= time.monotonic_ns()

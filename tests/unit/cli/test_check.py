@@ -132,6 +132,14 @@ def test_a_program_reads_the_same_as_json(tmp_path: Path, capsys: pytest.Capture
             'mistake: [channel."knee.x"] object: 0x1008:0 is no number in joint_drive.eds',
         ),
         (
+            ("gear_ratio = 100", "gear_ratio = 10"),
+            "warning: [joint.knee] gear_ratio: 10 is far from 100, as joint_drive.eds has it in 6091h",
+        ),
+        (
+            ("per_revolution = 4096", "per_revolution = 65536"),
+            "warning: [joint.knee] counts_per_revolution: 65536 is far from 4096, as joint_drive.eds has it",
+        ),
+        (
             ("", STEP + "min = 2\nmax = 3\n"),
             'mistake: [parameter."gait.step_length"]: its limits allow nothing: minimum 2 is above maximum',
         ),

@@ -51,6 +51,11 @@ def test_the_tables_show_each_thing_once() -> None:
     assert "left_knee 3 s its position stays the same check its encoder" in rows
 
 
+def test_who_is_heard_and_is_in_no_table_is_named() -> None:
+    shown = "\n".join(chapters(described(msgspec.structs.replace(BUS, strangers=[9, 21]))))
+    assert "no table of the file has what is heard on main as node 9, 21: give it one" in shown
+
+
 def test_a_robot_of_before_has_no_such_tables() -> None:
     text = msgspec.json.encode(described())
     old = {key: value for key, value in msgspec.json.decode(text).items() if key != "buses"}

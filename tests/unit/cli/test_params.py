@@ -2,6 +2,7 @@
 
 import io
 import json
+import socket
 import tomllib
 from pathlib import Path
 
@@ -338,10 +339,19 @@ def test_what_cannot_be_done_is_a_sentence(
     if arguments[0] == "compare":
         robot.run("params", "save", "k.dcf", "left_knee.profile_*", "--component", "left_knee")
     capsys.readouterr()
-    assert robot.run("params", *arguments) == 1
+    assert robot.run("params", *arguments) == (2 if arguments[0] == "compare" else 1)
     captured = capsys.readouterr()
     assert words in captured.err
     assert captured.err.count("\n") == 1
+
+
+def test_a_comparison_without_a_gateway_does_not_say_that_something_differs(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+    assert main(["params", "compare", "a.toml", "--robot", f"127.0.0.1:{port}", "--json"]) == 2
+    assert '"error"' in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

@@ -41,6 +41,7 @@ def test_device_joint_pdos_objects_limits_and_findings_are_told(
     assert "TPDO1  0x185       type 1: 6041:00 Statusword (16 bits), 6064:00 Position (32 bits)" in text
     assert "6064:00 INTEGER32      rw    Position  [-5 … 5]" in text
     assert "findings\n    none" in text
+    assert "\n  for robot.toml\n\n[joint.node_5]" in text
 
 
 def test_brief_leaves_out_the_objects(drive: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -53,6 +54,7 @@ def test_json_is_one_object_a_file(drive: Path, capsys: pytest.CaptureFixture[st
     first, second = map(json.loads, capsys.readouterr().out.splitlines())
     assert first == second
     assert first["vendor_id"] == 0x1234
+    assert first["table"].startswith("[joint.NAME]")
     assert first["pdos"][0]["mapped"] == [[0x6041, 0, 16], [0x6064, 0, 32]]
     assert {row["index"]: row["maximum"] for row in first["objects"]}[0x6064] == 5
 

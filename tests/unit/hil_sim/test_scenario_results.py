@@ -163,6 +163,36 @@ def test_the_exit_status_says_what_came_of_all(
     assert len(ElementTree.fromstring(junit.read_bytes()).findall("testsuite")) == 2
 
 
+def test_results_that_could_not_be_written_are_told_before_anything_is_run(
+    outcomes: list[Outcome], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file, outcome = tmp_path / "two.toml", Outcome((MET,))
+    file.write_text("", encoding="utf-8")
+    outcomes.append(outcome)
+    nowhere = tmp_path / "none" / "junit.xml"
+    assert main(["sim", "run", "--junit", str(nowhere), str(file)]) == 1
+    said = capsys.readouterr()
+    assert f"{nowhere} cannot be written, so nothing was run: No such file or directory" in said.err
+    assert (said.out, outcomes) == ("", [outcome])
+
+
+def test_results_of_before_stay_until_there_are_new_ones(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file, junit, new = tmp_path / "two.toml", tmp_path / "junit.xml", tmp_path / "new.xml"
+    file.write_text("", encoding="utf-8")
+    junit.write_text("of before", encoding="utf-8")
+
+    def killed(*_: object) -> Outcome:
+        assert junit.read_text(encoding="utf-8") == "of before"
+        assert not new.exists()
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(command, "run", killed)
+    for one in (junit, new):
+        assert main(["sim", "run", "--junit", str(one), str(file)]) == 130
+
+
 def test_which_one_is_run_is_said_before_it_is_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -195,10 +225,17 @@ def test_one_that_cannot_be_run_does_not_keep_the_others_from_it(
     assert f"{files[0]}: the gateway did not start" in said.err
 
 
-def test_results_that_cannot_be_written_are_an_error(
-    outcomes: list[Outcome], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def test_results_that_cannot_be_written_any_more_are_an_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "x.toml").write_text("", encoding="utf-8")
-    outcomes.append(Outcome((MET,)))
-    assert main(["sim", "run", "--junit", str(tmp_path / "none" / "x.xml"), str(tmp_path / "x.toml")]) == 1
+    folder = tmp_path / "going"
+    folder.mkdir()
+
+    def run(*_: object) -> Outcome:
+        folder.rmdir()
+        return Outcome((MET,))
+
+    monkeypatch.setattr(command, "run", run)
+    assert main(["sim", "run", "--junit", str(folder / "x.xml"), str(tmp_path / "x.toml")]) == 1
     assert "x.xml cannot be written: No such file" in capsys.readouterr().err

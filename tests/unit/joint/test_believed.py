@@ -11,12 +11,12 @@ from drivers.joint.pairs import join_joints
 from drivers.samples import Quality, State
 from tests.support.waiting import until
 from tests.unit.bus.fake_node import FakeNode
-from tests.unit.joint.conftest import drive_objects, tpdo
+from tests.unit.joint.conftest import drive_objects, surroundings, tpdo
 from tests.unit.joint.test_drive import STATUS_AND_POSITION
 
 Make = Callable[..., JointDrive]
 
-ENABLED, IN_FAULT = 0x0027, 0x0008
+ENABLED, IN_FAULT, OFF = 0x0027, 0x0008, 0x0040
 MAPPED = drive_objects() | tpdo(1, 0x182, *STATUS_AND_POSITION) | tpdo(2, 0x282, 0x606C0020)
 
 
@@ -42,6 +42,36 @@ def test_a_frozen_encoder_is_a_fault_until_it_counts_again(joint: Make, channel:
         assert "check its encoder" in found.findings[0].check
         until(lambda: quality(knee).state is State.OK, step=lambda: send(fake, 251, 100))
         assert quality(knee).findings == ()
+        knee.stop()
+
+
+def test_what_explains_something_is_told_before_it(joint: Make, channel: str) -> None:
+    objects = MAPPED | {(0x6091, 1): (50).to_bytes(4, "little"), (0x6091, 2): (1).to_bytes(4, "little")}
+    with FakeNode(channel, 2, objects) as fake:
+        knee = joint(objects, slow_poll_hz=0)
+        knee.start()
+        until(lambda: knee.node.ready)
+        until(lambda: quality(knee).findings, step=lambda: send(fake, 250, 100))
+        said = str(quality(knee).problem)
+        assert said.startswith(
+            "gear_ratio is 1, but the drive's 6091h says 50: angles may be wrong; its position"
+        )
+        knee.stop()
+
+
+def test_a_drive_that_an_input_holds_off_stands_and_is_no_fault(joint: Make, channel: str) -> None:
+    objects = MAPPED | surroundings()  # with the interlock set
+    with FakeNode(channel, 2, objects) as fake:
+        knee = joint(objects, slow_poll_hz=50)
+        knee.start()
+        until(lambda: knee.node.ready)
+        until(
+            lambda: str(quality(knee).problem).startswith(
+                "the drive is off: interlock (60FDh bit 3) holds it"
+            ),
+            step=lambda: send(fake, 250, statusword=OFF),
+        )
+        assert quality(knee).state is State.OK
         knee.stop()
 
 

@@ -12,7 +12,6 @@ from ml.registry.registry import Registry
 from ml.training import training
 from ml.training.material import Wish
 from ml.training.training import Trained
-from server_gui.cli import train as command
 from tests.unit.training.walkers import day, put
 
 
@@ -28,7 +27,14 @@ def test_a_better_model_serves_and_an_equal_one_does_not(
 ) -> None:
     put(folder_url, tmp_path / "spool", [day(f"s{number}", number, each_s=5.0) for number in range(4)])
     assert main.main(["train", "activity", "--config", config, "--held-out", "s3"]) == 0
-    said = capsys.readouterr().out
+    heard = capsys.readouterr()
+    said = heard.out
+    assert heard.err.splitlines() == [
+        f"gwrms train: activity, from the sessions and labels of {folder_url}",
+        "gwrms train: reading sessions",
+        "gwrms train: learning",
+        "gwrms train: judging",
+    ]
     registry = Registry(folder_url)
     (model,) = {card.id for card in registry.entries("activity")} - registry.shipped()
     assert f"let it serve: gwrms models promote {model}" in said
@@ -41,7 +47,9 @@ def test_a_better_model_serves_and_an_equal_one_does_not(
     assert pointer.model == model
     assert "macro_f1 on held-out people" in pointer.why
     assert main.main([*arguments, "--json"]) == 1
-    told = json.loads(capsys.readouterr().out)
+    heard = capsys.readouterr()
+    told = json.loads(heard.out)
+    assert heard.err == ""
     assert (told["model"], told["compared_with"], told["promoted"]) == (model, model, False)
     assert told["held_out"]["new"] == told["held_out"]["serving"]
     assert len(registry.history("activity", "exo")) == 1
@@ -63,7 +71,7 @@ def test_a_model_that_another_one_has_overtaken_while_it_was_judged_is_not_promo
         registry.promote(faster, who="Ada", why="a test")
         return trained
 
-    monkeypatch.setattr(command, "train", overtaken)
+    monkeypatch.setattr(training, "train", overtaken)
     arguments = ["train", "activity", "--config", config, "--held-out", "s3", "--promote"]
     assert main.main(arguments) == 1
     said = capsys.readouterr().out

@@ -1,0 +1,84 @@
+"""Whether the reader of a bus was there to read: while it stood still frames waited, and we heard nobody.
+
+A starved computer hands out what waited in one burst. Nobody can say then how a joint moved meanwhile, nor
+that a device was silent; how old a value is, is judged all the same.
+"""
+
+from drivers.noted import Noted
+
+STOOD_NS = 100_000_000  # without a look at the bus; it waits half as long for a frame at most
+TOLD_S = 0.3  # shorter ones are told only where they are many
+MANY = 5
+SHOWN_S = 10.0
+EXCUSED_NS = 1_000_000_000  # of a silence, at most
+SHORTEST_SETTLING_NS, LONGEST_SETTLING_NS = 100_000_000, 1_000_000_000
+CHECK = "see what keeps it busy (gwrms blame, gwrms snapshot resource), or take load from it"
+
+
+class Standstill(Noted):
+    """Told by the bus's thread that it ran; read by any. The last one is told for `SHOWN_S`."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.times = 0  # since it was made
+        self._passed_ns: int | None = None  # None: nobody is to read
+        self._listening_since_ns = 0
+        self._settled_ns = 0
+        self._before_ns = 0  # the end of the one before
+        self._row, self._longest_s = 0, 0.0  # of those that follow each other
+
+    def closed(self) -> None:
+        """Nobody reads any more, and nobody has to."""
+        self._passed_ns = None
+        self.clear()
+
+    def passed(self, now_ns: int) -> None:
+        """The thread has looked at the bus, and handed out what came."""
+        passed_ns, self._passed_ns = self._passed_ns, now_ns
+        if passed_ns is None:
+            self._listening_since_ns = now_ns
+        elif now_ns - passed_ns > STOOD_NS:
+            self._stood(passed_ns, now_ns)
+        elif self.finding is not None and now_ns - self._before_ns > SHOWN_S * 1e9:
+            self.clear()
+
+    def silent_ns(self, since_ns: int, now_ns: int) -> int:
+        """For how long nothing has come since `since_ns`, as far as somebody looked; 0 at least.
+
+        What passed until the last standstill's end does not count, up to `EXCUSED_NS`: who stands still again
+        and again would never miss anybody. While it stands still all counts: nobody knows then.
+        """
+        passed_ns = self._passed_ns
+        looked_ns = now_ns if passed_ns is None or now_ns - passed_ns > STOOD_NS else passed_ns
+        listened_ns = looked_ns - max(since_ns, self._listening_since_ns)
+        return max(0, listened_ns, now_ns - since_ns - EXCUSED_NS)
+
+    def is_settled(self, now_ns: int) -> bool:
+        """Whether what comes now has not waited, so that its time is its own."""
+        return now_ns >= self._settled_ns
+
+    def words(self, now_ns: int) -> str | None:
+        """That it stands still, or has just begun anew, with what to check; `None` where it runs."""
+        passed_ns = self._passed_ns
+        if passed_ns is not None and now_ns - passed_ns > STOOD_NS:
+            return f"this computer has stood still for {(now_ns - passed_ns) / 1e9:.1f} s: {CHECK}"
+        if not self.is_settled(now_ns):
+            return f"this computer stood still until just now: {CHECK}"
+        return None
+
+    def _stood(self, passed_ns: int, now_ns: int) -> None:
+        stood_ns = now_ns - passed_ns
+        follows = passed_ns - self._before_ns < SHOWN_S * 1e9 and self.times > 0
+        self.times += 1
+        self._row = self._row + 1 if follows else 1
+        self._longest_s = max(self._longest_s if follows else 0.0, stood_ns / 1e9)
+        self._listening_since_ns = self._before_ns = now_ns
+        self._settled_ns = now_ns + min(max(stood_ns // 2, SHORTEST_SETTLING_NS), LONGEST_SETTLING_NS)
+        if self._longest_s >= TOLD_S or self._row >= MANY:
+            self.note(passed_ns, self._told(), CHECK)
+
+    def _told(self) -> str:
+        once = f"this computer stood still for {self._longest_s:.1f} s"
+        if self._row == 1:
+            return once
+        return f"this computer stood still {self._row} times, for up to {self._longest_s:.1f} s"
