@@ -264,6 +264,7 @@ class CanBus:
         handler_of = self._handlers.get
         next_tick_ns = time.monotonic_ns()
         accepted: frozenset[int] | None = None
+        self.standstill.passed(next_tick_ns)
         while not self._stopping.is_set():
             frames = transport.receive(TICK_S)
             self.frames += len(frames)

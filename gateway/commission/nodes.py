@@ -16,6 +16,7 @@ from gateway.commission.draft import Draft
 
 HEARTBEAT_TIME = 0x1017
 HEARTBEAT_MS = 100
+ALL, AGAIN = "all", "again"
 OBSERVER, MASTER = "observer", "master"
 
 
@@ -40,8 +41,11 @@ def scanned(bench: Bench) -> Talk[tuple[Found, dict[int, Told]]]:
                 f"Not asked, because somebody else asks them: {others}. End that program to commission them."
             )
         answered = {node: told for node, told in found.told.items() if isinstance(told, Told)}
-        if axes_of(answered):
-            return found, answered
+        if axes := axes_of(answered):
+            drives = f"{len(axes)} drive" + "s" * (len(axes) > 1)
+            if (yield from choose(f"{drives}. Are these all?", (ALL, AGAIN), ALL)) == ALL:
+                return found, answered
+            continue
         yield from press(
             "No drive has answered. Check power, CAN-H and CAN-L, both terminators, and the bit rate "
             "(gwrms scan tells what comes)."

@@ -50,8 +50,8 @@ function _shtab_gwrms_using
   test "$_shtab_gwrms_cmdpath" = "$argv"
 end
 
-set -g _shtab_gwrms_commands gateway install-service keys 'keys pair' 'keys list' 'keys revoke' pair check doctor describe snapshot cost bench blame watch top plot get set params 'params save' 'params compare' 'params apply' od store restore journal 'journal tail' 'journal verify' stop reset enable completion docs eds scan lss trace commission sensor 'sensor record' 'sensor replay' 'sensor decode' calibrate 'calibrate insole' 'calibrate imu' collect sessions 'sessions ls' 'sessions show' 'sessions gait' 'sessions resources' 'sessions compare' 'sessions export' label train cloud 'cloud ls' 'cloud du' 'cloud verify' 'cloud mend' 'cloud upload' 'cloud download' 'cloud compact' 'cloud retain' 'cloud vacuum' query models 'models ls' 'models show' 'models promote' 'models rollback' 'models history' 'models export' predict gui evaluate demo sim 'sim run' sim-record sim-fault
-set -g _shtab_gwrms_opts_with_value --activity --adapt-from --author --axes --baud --benchmark --bitrate --bus --channels --clear --cluster --component --computer --config --consent --controller --count --data --days --dir --drive --eds --falling --falls --file --foot --for --format --from --grace --hand --held-out --host --imu --include --insole --instead-of --junit --key --kind --layout --lean --limit --link --look --mark --minutes --mistake --model --mount --mounting --name --new-bitrate --node --node-id --notes --object --on --onnx --operator --out --path --picture --port --pseudo-labels --rate --reason --report --requests --robot --role --run-as --saturation --scale --scenario --schema --script --seconds --seed --serial --session --set --sort --speed --stamp --subject --subjects --table --task --timeout --to --trial --truth --unconfigured --url --wearer --who --why --without --witness --write -n
+set -g _shtab_gwrms_commands gateway install-service keys 'keys pair' 'keys list' 'keys push' 'keys add' 'keys revoke' pair check doctor describe snapshot cost bench blame watch top plot get set params 'params save' 'params compare' 'params apply' od store restore journal 'journal tail' 'journal verify' stop reset enable completion docs eds scan lss trace commission sensor 'sensor record' 'sensor replay' 'sensor decode' calibrate 'calibrate insole' 'calibrate imu' collect sessions 'sessions ls' 'sessions show' 'sessions gait' 'sessions resources' 'sessions compare' 'sessions export' label train cloud 'cloud ls' 'cloud du' 'cloud verify' 'cloud mend' 'cloud upload' 'cloud download' 'cloud compact' 'cloud retain' 'cloud vacuum' 'cloud forget' 'cloud witnesses' query models 'models ls' 'models show' 'models promote' 'models rollback' 'models history' 'models export' predict gui evaluate demo sim 'sim run' sim-record sim-fault
+set -g _shtab_gwrms_opts_with_value --activity --adapt-from --author --axes --baud --benchmark --bitrate --bus --certificate --channels --clear --cluster --component --computer --config --consent --controller --count --data --days --dir --drive --eds --falling --falls --file --foot --for --format --from --grace --hand --held-out --host --imu --include --insole --instead-of --junit --key --kind --layout --lean --limit --link --look --mark --minutes --mistake --model --mount --mounting --name --new-bitrate --node --node-id --notes --object --on --onnx --operator --out --path --picture --port --pseudo-labels --rate --reason --remote --report --requests --robot --role --run-as --saturation --scale --scenario --schema --script --seconds --seed --serial --session --set --sort --speed --stamp --subject --subjects --table --task --timeout --to --trial --truth --unconfigured --url --wearer --who --why --without --witness --write -n
 
 complete -c gwrms -e
 complete -c gwrms -f
@@ -83,6 +83,18 @@ complete -c gwrms -n '_shtab_gwrms_using keys; and test $_shtab_gwrms_npos -eq 0
 complete -c gwrms -n '_shtab_gwrms_using keys list' -s h -l help -d 'show this help message and exit'
 complete -c gwrms -n '_shtab_gwrms_using keys list' -l json -d 'one JSON object a line, for machines'
 complete -c gwrms -n '_shtab_gwrms_using keys list; and test $_shtab_gwrms_npos -eq 0' -ka "(__fish_complete_path (commandline -ct))" -d 'the robot'"'"'s file'
+complete -c gwrms -n '_shtab_gwrms_using keys; and test $_shtab_gwrms_npos -eq 0' -a push -d 'Lets a key in on further robots: runs `gwrms keys add` on each by ssh, as whoever may log in there and use'
+complete -c gwrms -n '_shtab_gwrms_using keys push' -s h -l help -d 'show this help message and exit'
+complete -c gwrms -n '_shtab_gwrms_using keys push' -l role -xka "viewer operator maintainer" -d 'what it may there'
+complete -c gwrms -n '_shtab_gwrms_using keys push' -l certificate -xka "(__fish_complete_path (commandline -ct))" -d 'of somebody else, such as anna.crt'
+complete -c gwrms -n '_shtab_gwrms_using keys push' -l name -x -d 'that the robots are to call it (default: as its file)'
+complete -c gwrms -n '_shtab_gwrms_using keys push' -l config -x -d 'the robots'"'"' file there (default: /etc/gwrms/robot.toml)'
+complete -c gwrms -n '_shtab_gwrms_using keys push' -l remote -x -d 'how gwrms is called there (default: sudo -n gwrms)'
+complete -c gwrms -n '_shtab_gwrms_using keys; and test $_shtab_gwrms_npos -eq 0' -a add -d 'Let a key in whose certificate (PEM) comes on the standard input. gwrms keys push runs this by ssh.'
+complete -c gwrms -n '_shtab_gwrms_using keys add' -s h -l help -d 'show this help message and exit'
+complete -c gwrms -n '_shtab_gwrms_using keys add' -l role -xka "viewer operator maintainer" -d 'what it may'
+complete -c gwrms -n '_shtab_gwrms_using keys add' -l json -d 'one JSON object, for machines'
+complete -c gwrms -n '_shtab_gwrms_using keys add; and test $_shtab_gwrms_npos -eq 0' -ka "(__fish_complete_path (commandline -ct))" -d 'the robot'"'"'s file'
 complete -c gwrms -n '_shtab_gwrms_using keys; and test $_shtab_gwrms_npos -eq 0' -a revoke -d 'Let somebody in no more. A gateway that runs closes their connections at once.'
 complete -c gwrms -n '_shtab_gwrms_using keys revoke' -s h -l help -d 'show this help message and exit'
 complete -c gwrms -n '_shtab_gwrms_using keys revoke; and test $_shtab_gwrms_npos -eq 0' -ka "(__fish_complete_path (commandline -ct))" -d 'the robot'"'"'s file'
@@ -473,6 +485,21 @@ complete -c gwrms -n '_shtab_gwrms_using cloud vacuum' -l json -d 'for machines'
 complete -c gwrms -n '_shtab_gwrms_using cloud vacuum' -l dry-run -d 'say what would be done, and do nothing'
 complete -c gwrms -n '_shtab_gwrms_using cloud vacuum' -l alone -d 'no server runs: for a store that keeps no two writers apart'
 complete -c gwrms -n '_shtab_gwrms_using cloud vacuum' -l grace -x -d '(default: 7)'
+complete -c gwrms -n '_shtab_gwrms_using cloud; and test $_shtab_gwrms_npos -eq 0' -a forget -d 'Remove a wearer'"'"'s sessions: rows, labels, predictions, of every version; and prove that they are gone.'
+complete -c gwrms -n '_shtab_gwrms_using cloud forget' -s h -l help -d 'show this help message and exit'
+complete -c gwrms -n '_shtab_gwrms_using cloud forget' -l config -xka "(__fish_complete_path (commandline -ct))" -d 'the server'"'"'s file, which names the store'
+complete -c gwrms -n '_shtab_gwrms_using cloud forget' -l json -d 'for machines'
+complete -c gwrms -n '_shtab_gwrms_using cloud forget' -l url -x -d 'file:///folder or s3://bucket/prefix (default: of the server'"'"'s file)'
+complete -c gwrms -n '_shtab_gwrms_using cloud forget' -l wearer -x -d 'who is to be forgotten'
+complete -c gwrms -n '_shtab_gwrms_using cloud forget' -l dry-run -d 'say what would be removed, and do nothing'
+complete -c gwrms -n '_shtab_gwrms_using cloud forget' -l unpin -d 'let go of versions that models name'
+complete -c gwrms -n '_shtab_gwrms_using cloud forget' -l alone -d 'no other server runs: for a store that keeps no two apart'
+complete -c gwrms -n '_shtab_gwrms_using cloud forget' -l yes -d 'do not ask'
+complete -c gwrms -n '_shtab_gwrms_using cloud; and test $_shtab_gwrms_npos -eq 0' -a witnesses -d 'What this desk has seen of a robot'"'"'s journal, signed by the robot.'
+complete -c gwrms -n '_shtab_gwrms_using cloud witnesses' -s h -l help -d 'show this help message and exit'
+complete -c gwrms -n '_shtab_gwrms_using cloud witnesses' -l config -xka "(__fish_complete_path (commandline -ct))" -d 'the server'"'"'s file, which names the store'
+complete -c gwrms -n '_shtab_gwrms_using cloud witnesses' -l json -d 'for machines'
+complete -c gwrms -n '_shtab_gwrms_using cloud witnesses' -l url -x -d 'file:///folder or s3://bucket/prefix (default: of the server'"'"'s file)'
 complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a query -d 'SQL over the store'"'"'s tables.'
 complete -c gwrms -n '_shtab_gwrms_using query' -s h -l help -d 'show this help message and exit'
 complete -c gwrms -n '_shtab_gwrms_using query' -l config -xka "(__fish_complete_path (commandline -ct))" -d 'the server'"'"'s file, which names the store'

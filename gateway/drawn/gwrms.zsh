@@ -74,12 +74,14 @@ _shtab_gwrms_cloud_commands() {
     compact:'Put small files together.'
     download:'A store, or some of it, into a folder: a store too.'
     du:'Space used in the store, by tables and robots.'
+    forget:'Remove a wearer'"'"'s sessions: rows, labels, predictions, of every version; and prove that they are gone.'
     ls:'The store'"'"'s tables, or with --path the files below one.'
     mend:'Take files that are gone or damaged out of the store, and bring again what the spool still has of them.'
     retain:'Remove rows that are older than so many days.'
     upload:'What waits in the spool, now; or a whole store.'
     vacuum:'Delete files that no newer version needs.'
     verify:'Check every file of every table, and that each row which this computer'"'"'s spool has sent is there once,'
+    witnesses:'What this desk has seen of a robot'"'"'s journal, signed by the robot.'
   )
   _describe 'gwrms cloud commands' _commands
 }
@@ -94,8 +96,10 @@ _shtab_gwrms_journal_commands() {
 
 _shtab_gwrms_keys_commands() {
   local _commands=(
+    add:'Let a key in whose certificate (PEM) comes on the standard input. gwrms keys push runs this by ssh.'
     list:'Who is let in on this robot, and as what.'
     pair:'Shows HOST:PORT and a code. On the desk, `gwrms pair HOST:PORT` asks for it and proves to know it; then you'
+    push:'Lets a key in on further robots: runs `gwrms keys add` on each by ssh, as whoever may log in there and use'
     revoke:'Let somebody in no more. A gateway that runs closes their connections at once.'
   )
   _describe 'gwrms keys commands' _commands
@@ -268,6 +272,21 @@ _shtab_gwrms_cloud_du_options=(
 # guard to ensure default positional specs are added only once per session
 _shtab_gwrms_cloud_du_defaults_added=0
 
+_shtab_gwrms_cloud_forget_options=(
+  "(- : *)"{-h,--help}"[show this help message and exit]"
+  "--config[the server\'s file, which names the store]:FILE:_files"
+  "--json[for machines]"
+  "--url[file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file)]:URL:"
+  "--wearer[who is to be forgotten]:ID:"
+  "--dry-run[say what would be removed, and do nothing]"
+  "--unpin[let go of versions that models name]"
+  "--alone[no other server runs\: for a store that keeps no two apart]"
+  "--yes[do not ask]"
+)
+
+# guard to ensure default positional specs are added only once per session
+_shtab_gwrms_cloud_forget_defaults_added=0
+
 _shtab_gwrms_cloud_ls_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
@@ -344,6 +363,17 @@ _shtab_gwrms_cloud_verify_options=(
 
 # guard to ensure default positional specs are added only once per session
 _shtab_gwrms_cloud_verify_defaults_added=0
+
+_shtab_gwrms_cloud_witnesses_options=(
+  "(- : *)"{-h,--help}"[show this help message and exit]"
+  "--config[the server\'s file, which names the store]:FILE:_files"
+  "--json[for machines]"
+  "--url[file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file)]:URL:"
+  ":its name in the store:"
+)
+
+# guard to ensure default positional specs are added only once per session
+_shtab_gwrms_cloud_witnesses_defaults_added=0
 
 _shtab_gwrms_collect_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
@@ -560,6 +590,17 @@ _shtab_gwrms_keys_options=(
 # guard to ensure default positional specs are added only once per session
 _shtab_gwrms_keys_defaults_added=0
 
+_shtab_gwrms_keys_add_options=(
+  "(- : *)"{-h,--help}"[show this help message and exit]"
+  "--role[what it may]:role:(viewer operator maintainer)"
+  "--json[one JSON object, for machines]"
+  ":the robot\'s file:_files"
+  ":NAME:"
+)
+
+# guard to ensure default positional specs are added only once per session
+_shtab_gwrms_keys_add_defaults_added=0
+
 _shtab_gwrms_keys_list_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--json[one JSON object a line, for machines]"
@@ -581,6 +622,19 @@ _shtab_gwrms_keys_pair_options=(
 
 # guard to ensure default positional specs are added only once per session
 _shtab_gwrms_keys_pair_defaults_added=0
+
+_shtab_gwrms_keys_push_options=(
+  "(- : *)"{-h,--help}"[show this help message and exit]"
+  "--role[what it may there]:role:(viewer operator maintainer)"
+  "--certificate[of somebody else, such as anna.crt]:FILE:_files"
+  "--name[that the robots are to call it (default\: as its file)]:name:"
+  "--config[the robots\' file there (default\: \/etc\/gwrms\/robot.toml)]:PATH:"
+  "--remote[how gwrms is called there (default\: sudo -n gwrms)]:COMMAND:"
+  "(*):robots, as ssh names them:"
+)
+
+# guard to ensure default positional specs are added only once per session
+_shtab_gwrms_keys_push_defaults_added=0
 
 _shtab_gwrms_keys_revoke_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
@@ -1281,12 +1335,14 @@ _shtab_gwrms_cloud() {
         compact) _arguments -C -s $_shtab_gwrms_cloud_compact_options ;;
         download) _arguments -C -s $_shtab_gwrms_cloud_download_options ;;
         du) _arguments -C -s $_shtab_gwrms_cloud_du_options ;;
+        forget) _arguments -C -s $_shtab_gwrms_cloud_forget_options ;;
         ls) _arguments -C -s $_shtab_gwrms_cloud_ls_options ;;
         mend) _arguments -C -s $_shtab_gwrms_cloud_mend_options ;;
         retain) _arguments -C -s $_shtab_gwrms_cloud_retain_options ;;
         upload) _arguments -C -s $_shtab_gwrms_cloud_upload_options ;;
         vacuum) _arguments -C -s $_shtab_gwrms_cloud_vacuum_options ;;
         verify) _arguments -C -s $_shtab_gwrms_cloud_verify_options ;;
+        witnesses) _arguments -C -s $_shtab_gwrms_cloud_witnesses_options ;;
       esac
   esac
 }
@@ -1333,8 +1389,10 @@ _shtab_gwrms_keys() {
       (( CURRENT += 1 ))
       curcontext="${curcontext%:*:*}:_shtab_gwrms_keys-$line[1]:"
       case $line[1] in
+        add) _arguments -C -s $_shtab_gwrms_keys_add_options ;;
         list) _arguments -C -s $_shtab_gwrms_keys_list_options ;;
         pair) _arguments -C -s $_shtab_gwrms_keys_pair_options ;;
+        push) _arguments -C -s $_shtab_gwrms_keys_push_options ;;
         revoke) _arguments -C -s $_shtab_gwrms_keys_revoke_options ;;
       esac
   esac

@@ -114,7 +114,7 @@ class DirectWorker:
     """Does every job at once, and what is repeated when the simulated clock says so, one after another."""
 
     def __init__(self, sdo: DirectSdo, clock: Clock) -> None:
-        self._sdo = sdo
+        self._sdo = self.channel = sdo
         self._clock = clock
         self._waiting: list[Callable[[SdoChannel], object]] = []
 
@@ -268,7 +268,10 @@ class Watched:
         for bus in robot.buses.values():
             cast("DirectBus", bus).join(self.simulated, self.now_ns)
             for node_id, node in bus.nodes.items():
-                vars(node)["worker"] = DirectWorker(DirectSdo(node_id, self.simulated), self.clock)
+                worker = DirectWorker(DirectSdo(node_id, self.simulated), self.clock)
+                vars(node)["worker"] = worker
+                for part in (vars(node)["_booting"], vars(node)["_asking"]):
+                    vars(part)["_worker"] = worker
         for name, line in self.simulated.sensors.lines.items():
             line.port = self._ports[name]
         return robot
