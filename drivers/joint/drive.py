@@ -116,7 +116,7 @@ class JointDrive(PowerDrive):
             elif implausible:
                 state = State.FAULT
         else:
-            problem = self.node.bus.standstill.words(now_ns) or problem or self._silence_text(age_ms)
+            problem = self._stood_still(now_ns, age_ms) or problem or self._silence_text(age_ms)
         findings = (*implausible, *self.node.trouble)
         objects = self._objects.problems(now_ns) if state is not State.LOST else ()
         notes = (*objects, *self._notes(now_ns, findings))
@@ -268,6 +268,10 @@ class JointDrive(PowerDrive):
             return None
         age_s = max(0, now_ns - emcy.stamp_ns) / 1e9
         return f"it reports {emcy.text(self._description.vendor_id)} ({age_s:.0f} s ago)"
+
+    def _stood_still(self, now_ns: int, age_ms: float | None) -> str | None:
+        since_ns = None if age_ms is None else now_ns - round(age_ms * 1e6)
+        return self.node.bus.standstill.words(now_ns, since_ns, self.settings.stale_after_s)
 
     def _silence_text(self, age_ms: float | None) -> str:
         since = "no position has come yet" if age_ms is None else f"no position for {age_ms / 1000:.1f} s"
