@@ -39,7 +39,7 @@ class Device:
     def _value(self, index: int, subindex: int) -> ObjectValue:
         if index == 0x6065:
             return ObjectValue(0xFFFF_FFFF, "", 1)
-        if index == 0x1006:
+        if index == 0x6073:
             return ObjectValue(None, "", None, "SDO abort 0x06020000: no such object")
         if index == 0x1017:
             return ObjectValue(None, "", None, "no answer")
@@ -63,7 +63,7 @@ def test_a_device_is_asked_in_bites_and_told_in_its_own_counts(drive: Device) ->
     assert len(drive.bites) > 1
     assert max(drive.bites) == AT_ONCE
     assert found[0x6065, 0] == 0xFFFF_FFFF
-    assert found[0x1006, 0] is None, "the device does not have it"
+    assert found[0x6073, 0] is None, "the device does not have it"
     assert not {(0x1017, 0), (0x605A, 0)} & found.keys(), "nothing is known of these"
 
 
