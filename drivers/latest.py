@@ -47,6 +47,11 @@ class Latest:
         stamp_ns, value = slot
         return (value if now_ns - stamp_ns <= self.stale_after_ns else None), stamp_ns
 
+    def stamp_ns(self, index: int) -> int | None:
+        """Of one channel's value, fresh or not."""
+        slot = self._slots[index]
+        return None if slot is None else slot[0]
+
     def age_ns(self, now_ns: int) -> int | None:
         """Time since the last update, `None` before the first."""
         return None if self.updated_ns is None else max(0, now_ns - self.updated_ns)

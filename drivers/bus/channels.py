@@ -3,6 +3,7 @@
 import math
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -49,8 +50,8 @@ class _Source:
         return Linear(self.settings.scale, self.settings.offset)
 
     def fits(self, bits: int) -> bool:
-        """Whether so many mapped bits can be its number: a real has all of its own, or is none."""
-        return bits == self.type.bits if self.type.kind == "real" else bits > 0
+        """Whether so many mapped bits can be its number: a part of it would be another number."""
+        return bits == self.type.bits or (self.type.kind == "boolean" and bits > 0)
 
     def value(self, number: float) -> float | None:
         value = number * self.settings.scale + self.settings.offset
@@ -115,6 +116,7 @@ class ObjectChannels:
                     self._follow(plan, tpdo, found)
                     brought |= {source.channel for source, _ in found}
                     fresh |= {source.channel for source, _ in found if tpdo.cyclic}
+                    self._expect_change(tpdo, [one for one, _ in found if not one.settings.poll_hz])
             self._poll_those(plan, [one for one in self._sources if one.channel not in fresh])
             self._notes = tuple(
                 f"{one.name}: not asked for (poll_hz is 0), and no TPDO brings it"
@@ -164,6 +166,11 @@ class ObjectChannels:
             words = f"TPDO{tpdo.number} (0x{tpdo.cob_id:03X}), which brings it {tpdo.trigger}, does not come"
             self._expected[words] = sources
 
+    def _expect_change(self, tpdo: Tpdo, unasked: list[_Source]) -> None:
+        if unasked and not tpdo.cyclic:
+            words = f"TPDO{tpdo.number} (0x{tpdo.cob_id:03X}) brings it only {tpdo.trigger}, and poll_hz is 0"
+            self._expected[words] = unasked
+
     def _handler(
         self, plan: int, size: int, sources: Sequence[_Source], fields: Sequence[Field]
     ) -> FrameHandler:
@@ -186,27 +193,34 @@ class ObjectChannels:
             if one.settings.poll_hz:
                 by_rate.setdefault(one.settings.poll_hz, []).append(one)
         for hz, some in by_rate.items():
-            self._undo.append(self._node.worker.repeat(1 / hz, partial(self._poll, plan, some)))
+            self._undo.append(self._node.worker.repeat(1 / hz, partial(self._poll, plan, deque(some))))
             words = f"the device does not answer the SDO that asks for it {hz:g} times a second"
             self._expected[words] = some
 
-    def _poll(self, plan: int, sources: Sequence[_Source], sdo: SdoChannel) -> None:
-        for one in sources:
+    def _poll(self, plan: int, sources: deque[_Source], sdo: SdoChannel) -> None:
+        for _ in range(len(sources)):
+            one, asked_ns = sources[0], time.monotonic_ns()
+            sources.rotate(-1)
             try:
                 number = decode(sdo.upload(*one.settings.address, attempts=1), one.code)
             except DeviceTimeout:
-                return  # nor will it answer for the others; the next turn asks again
+                return  # the next turn begins with the others: it may be deaf to this one only
             except DeviceAbort as error:
                 self._refuse(plan, one, str(error))
                 continue
-            self._take(plan, one, number)
+            self._take(plan, one, asked_ns, None if number is None else one.value(number))
 
-    def _take(self, plan: int, one: _Source, number: float | None) -> None:
+    def _take(self, plan: int, one: _Source, asked_ns: int, value: float | None) -> None:
+        """What it answered, as old as the question: nobody knows how long the answer has waited."""
         with self._lock:
-            if plan == self._plan:
+            if plan != self._plan:
+                return
+            if value is None:
+                self._refused[one.channel] = "the device answers with no number of its type"
+            else:
                 self._refused.pop(one.channel, None)
-                value = None if number is None else one.value(number)
-                self._latest.update(time.monotonic_ns(), (one.channel,), (value,))
+            if (self._latest.stamp_ns(one.channel) or 0) < asked_ns:
+                self._latest.update(asked_ns, (one.channel,), (value,))
 
     def _refuse(self, plan: int, one: _Source, words: str) -> None:
         with self._lock:

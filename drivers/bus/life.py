@@ -122,7 +122,8 @@ class NodeLife:
     def problem(self, now_ns: int) -> str | None:
         """What is wrong with a node that came up, in words."""
         if self.lost(now_ns):
-            if (words := self._standstill.words(now_ns)) is not None:
+            words = self._standstill.words(now_ns, self.heartbeat_ns, self.timeout_s or 0.0)
+            if words is not None:
                 return words
             silent_s = (self.silent_ms(now_ns) or 0) / 1000
             return f"its heartbeat is missing for {silent_s:.1f} s: check the node's power and cable"

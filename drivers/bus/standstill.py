@@ -24,7 +24,7 @@ class Standstill(Noted):
         self._passed_ns: int | None = None  # None: nobody is to read
         self._listening_since_ns = 0
         self._settled_ns = 0
-        self._before_ns = 0  # the end of the one before
+        self._began_ns, self._before_ns = 0, 0  # beginning and end of the one before
         self._row, self._longest_s = 0, 0.0  # of those that follow each other
 
     def closed(self) -> None:
@@ -34,13 +34,14 @@ class Standstill(Noted):
 
     def passed(self, now_ns: int) -> None:
         """The thread has looked at the bus, and handed out what came."""
-        passed_ns, self._passed_ns = self._passed_ns, now_ns
+        passed_ns = self._passed_ns
         if passed_ns is None:
             self._listening_since_ns = now_ns
         elif now_ns - passed_ns > STOOD_NS:
             self._stood(passed_ns, now_ns)
         elif self.finding is not None and now_ns - self._before_ns > SHOWN_S * 1e9:
             self.clear()
+        self._passed_ns = now_ns  # last: who reads meanwhile takes it for standing still, not for a silence
 
     def silent_ns(self, since_ns: int, now_ns: int) -> int:
         """For how long nothing has come since `since_ns`, as far as somebody looked; 0 at least.
@@ -57,11 +58,19 @@ class Standstill(Noted):
         """Whether what comes now has not waited, so that its time is its own."""
         return now_ns >= self._settled_ns
 
-    def words(self, now_ns: int) -> str | None:
-        """That it stands still, or has just begun anew, with what to check; `None` where it runs."""
+    def words(self, now_ns: int, since_ns: int | None, allowed_s: float) -> str | None:
+        """Why nothing has come since `since_ns`: it stands still, or has just begun anew, with what to check.
+
+        `None` where it runs, and where nothing had come for more than `allowed_s` when it stood still: that
+        has another cause, however often it stands still since.
+        """
         passed_ns = self._passed_ns
-        if passed_ns is not None and now_ns - passed_ns > STOOD_NS:
-            return f"this computer has stood still for {(now_ns - passed_ns) / 1e9:.1f} s: {CHECK}"
+        stood_ns = 0 if passed_ns is None else now_ns - passed_ns
+        began_ns = now_ns - stood_ns if stood_ns > STOOD_NS else self._began_ns
+        if since_ns is None or began_ns - since_ns > allowed_s * 1e9:
+            return None
+        if stood_ns > STOOD_NS:
+            return f"this computer has stood still for {stood_ns / 1e9:.1f} s: {CHECK}"
         if not self.is_settled(now_ns):
             return f"this computer stood still until just now: {CHECK}"
         return None
@@ -72,6 +81,7 @@ class Standstill(Noted):
         self.times += 1
         self._row = self._row + 1 if follows else 1
         self._longest_s = max(self._longest_s if follows else 0.0, stood_ns / 1e9)
+        self._began_ns = passed_ns
         self._listening_since_ns = self._before_ns = now_ns
         self._settled_ns = now_ns + min(max(stood_ns // 2, SHORTEST_SETTLING_NS), LONGEST_SETTLING_NS)
         if self._longest_s >= TOLD_S or self._row >= MANY:

@@ -6,6 +6,8 @@ from eds.datatypes import DATA_TYPES
 
 Number = int | float
 
+EXPEDITED = 4  # bytes that a device's answer of one frame has at most
+
 
 def size_of(data_type: int) -> int | None:
     """Bytes of a data type; `None` where its length varies or it is unknown."""
@@ -16,11 +18,12 @@ def size_of(data_type: int) -> int | None:
 def decode(data: bytes, data_type: int) -> Number | None:
     """A number out of an object's bytes; `None` for types that are no numbers.
 
-    Some devices answer with more bytes than the type has: those beyond are cut off.
+    Some devices answer with all four bytes of a frame: those beyond the type are cut off. What is longer
+    still is something else, such as a text.
     """
     known = DATA_TYPES.get(data_type)
     size = size_of(data_type)
-    if known is None or size is None or known.kind == "bytes" or not data:
+    if known is None or size is None or known.kind == "bytes" or not 0 < len(data) <= max(size, EXPEDITED):
         return None
     data = data[:size]
     if known.kind == "real":

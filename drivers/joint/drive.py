@@ -4,8 +4,10 @@ Everything about the drive is read from the drive when it comes up: its PDO mapp
 on quick stop. What no TPDO brings is polled by SDO.
 """
 
+import math
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
@@ -17,6 +19,7 @@ from drivers.bus.frames import EXTENDED, FrameHandler
 from drivers.bus.node import shared_node
 from drivers.bus.pdo import Tpdo
 from drivers.bus.sdo.channel import SdoChannel
+from drivers.bus.values import Number, decode
 from drivers.component import Kind
 from drivers.error_codes import error_text
 from drivers.errors import DeviceAbort, Mismatch
@@ -25,7 +28,7 @@ from drivers.joint.cia402 import STATE_BITS, STATE_OF, DriveState
 from drivers.joint.decoder import Decoder
 from drivers.joint.plan import Plan, Source, make_plan
 from drivers.joint.power import PowerDrive
-from drivers.joint.quantities import POSITION, STATE, STATUSWORD, channels, quantities
+from drivers.joint.quantities import POSITION, STATE, STATUSWORD, Quantity, channels, quantities
 from drivers.joint.reading import DriveReading, read_drive
 from drivers.joint.remap import free_tpdo, put_back, remap
 from drivers.joint.scaling import rated_torque
@@ -116,7 +119,7 @@ class JointDrive(PowerDrive):
             elif implausible:
                 state = State.FAULT
         else:
-            problem = self.node.bus.standstill.words(now_ns) or problem or self._silence_text(age_ms)
+            problem = self._stood_still(now_ns, age_ms) or problem or self._silence_text(age_ms)
         findings = (*implausible, *self.node.trouble)
         objects = self._objects.problems(now_ns) if state is not State.LOST else ()
         notes = (*objects, *self._notes(now_ns, findings))
@@ -191,7 +194,7 @@ class JointDrive(PowerDrive):
             (self.settings.slow_poll_hz, plan.polled_seldom),
         ):
             if hz and polled:
-                self._undo.append(self.node.worker.repeat(1 / hz, partial(self._poll, polled)))
+                self._undo.append(self.node.worker.repeat(1 / hz, partial(self._poll, deque(polled))))
 
     def _handler(self, tpdo: Tpdo, decoder: Decoder) -> FrameHandler:
         """What is done with each frame of a TPDO: the hot path."""
@@ -213,21 +216,33 @@ class JointDrive(PowerDrive):
 
         return on_frame
 
-    def _poll(self, polled: tuple[Source, ...], sdo: SdoChannel) -> None:
-        for one in polled:
+    def _poll(self, polled: deque[Source], sdo: SdoChannel) -> None:
+        """Ask for each; after one that is not answered the next turn begins with the others."""
+        for _ in range(len(polled)):
+            one, asked_ns = polled[0], time.monotonic_ns()
+            polled.rotate(-1)
             try:
                 data = sdo.upload(one.quantity.index, one.quantity.subindex, attempts=1)
             except DeviceAbort:
                 continue  # its EDS knows it, this device does not: the others are there all the same
-            self._take(one, int.from_bytes(data, "little", signed=one.quantity.signed), time.monotonic_ns())
+            counts = decode(data, self._type_of(one.quantity))
+            if counts is not None and math.isfinite(counts):
+                self._take(one, counts, asked_ns)
 
-    def _take(self, one: Source, counts: int, stamp_ns: int) -> None:
+    def _type_of(self, quantity: Quantity) -> int:
+        variable = self._description.variable(quantity.index, quantity.subindex)
+        return 0 if variable is None else variable.data_type or 0
+
+    def _take(self, one: Source, counts: Number, stamp_ns: int) -> None:
+        """What it answered, as old as the question: nobody knows how long the answer has waited."""
         indices: tuple[int, ...] = (one.channel,)
         values: tuple[float | None, ...] = (counts * one.linear.scale + one.linear.offset,)
         if one.quantity.name == STATUSWORD:
             indices = (*indices, self._index[STATE])
-            values = (*values, STATE_OF[counts & STATE_BITS])
+            values = (*values, STATE_OF[int(counts) & STATE_BITS])
         with self._lock:
+            if self._plan is None or (self.latest.stamp_ns(one.channel) or 0) >= stamp_ns:
+                return  # of another life of the drive, or older than what a TPDO has brought
             self.latest.update(stamp_ns, indices, values)
             if one.quantity.name == POSITION:
                 self._freshness.seen(stamp_ns)
@@ -268,6 +283,10 @@ class JointDrive(PowerDrive):
             return None
         age_s = max(0, now_ns - emcy.stamp_ns) / 1e9
         return f"it reports {emcy.text(self._description.vendor_id)} ({age_s:.0f} s ago)"
+
+    def _stood_still(self, now_ns: int, age_ms: float | None) -> str | None:
+        since_ns = None if age_ms is None else now_ns - round(age_ms * 1e6)
+        return self.node.bus.standstill.words(now_ns, since_ns, self.settings.stale_after_s)
 
     def _silence_text(self, age_ms: float | None) -> str:
         since = "no position has come yet" if age_ms is None else f"no position for {age_ms / 1000:.1f} s"

@@ -31,6 +31,7 @@ LOADED_SHARE, ALONE_SHARE = 0.5, 1.0  # of the rated torque, with and without a 
 BEHIND = math.radians(2.0)
 POSITION_MODES = frozenset({1, 7, 8})  # in which a drive follows a position (6061h)
 HOMING = 6
+UNSEEN_S = 1.5  # without a sample: nobody knows what was then, so nothing is known to have lasted
 
 _ENCODER = "check its encoder and the encoder's cable"
 
@@ -226,8 +227,10 @@ class JointCheck:
         """What is known now; a position that is as old as the last time says nothing new."""
         if now.stamp_ns == self._last_ns:
             return
-        self._last_ns = now.stamp_ns
+        unseen_ns, self._last_ns = now.stamp_ns - self._last_ns, now.stamp_ns
         for check in self._own:
+            if unseen_ns > UNSEEN_S * 1e9 and check.finding is None:
+                check.restart()
             check.update(now)
         if self.mirror is not None and (position := other()) is not None:
             self.mirror.update(now.stamp_ns, now.position, position)

@@ -9,6 +9,8 @@ from gateway.tables.finding import Finding, meant, warning
 from gateway.units import ALIASES, UNITS
 
 _FURTHER = ("V", "W", "Hz", "kg", "m/s", "rad/s²", "N/m", "N·m/rad", "J", "K", "Ω", "F", "H", "T", "lx")
+# Of a joint: guard, window and driver go by these names and take the numbers for what the names say.
+_JOINTS_UNITS = {"temperature": "°C", "voltage": "V", "digital_inputs": ""}
 SI = (*UNITS, *_FURTHER)
 # Units that are none here: what they are in SI, and how much of it one is.
 _OTHERS: dict[str, tuple[str, float]] = {
@@ -30,6 +32,7 @@ def complaints(config: RobotConfig) -> Iterator[Finding]:
         yield from _about_name(config, where, name)
         yield from _about_numbers(where, one)
         yield from _about_unit(where, one)
+        yield from _about_meaning(config, where, name, one)
         yield from _about_words(where, one)
         yield from _about_rate(config, where, name, one)
 
@@ -70,6 +73,16 @@ def _about_unit(where: str, one: ChannelSettings) -> Iterator[Finding]:
     else:
         text = f'is SI: for {one.unit} write unit = "{si}" and scale = {one.scale * factor:.12g}'
         yield Finding(where, "unit", text)
+
+
+def _about_meaning(config: RobotConfig, where: str, name: str, one: ChannelSettings) -> Iterator[Finding]:
+    component, _, quantity = name.partition(".")
+    unit = _JOINTS_UNITS.get(quantity) if component in config.joint else None
+    if unit is None or one.unit == unit:
+        return
+    told = f"in {unit}" if unit else "a number without a unit"
+    text = f'a joint\'s {quantity} is {told}: write unit = "{unit}" with its scale, or take another name'
+    yield Finding(where, "unit", text)
 
 
 def _about_words(where: str, one: ChannelSettings) -> Iterator[Finding]:

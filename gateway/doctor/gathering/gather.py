@@ -105,7 +105,7 @@ def _running(empty: Observations, how: How, robot: Robot) -> _Seen:
         buses = running.by_figures(before, after)
         facts = listening.facts(running.begun_between(before, after))
         buses |= {name: one for name, one in facts.items() if one.heard is not None}
-    objects = running.objects(robot, described, empty.nodes(), empty.descriptions)
+    objects = running.objects(robot, empty.nodes(), empty.descriptions)
     return _Seen(buses, objects, samples, NOT_HERE)
 
 

@@ -1,7 +1,8 @@
 """A running robot: its gateway is asked for objects and channels, and its buses are listened to beside it."""
 
+import contextlib
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 from drivers.bus.interfaces.controller_state import BusState
 from eds import Description
@@ -9,6 +10,8 @@ from gateway.client import ClientError, Robot
 from gateway.doctor.gathering.objects import wanted
 from gateway.doctor.observations import BusFacts, Object, Place, Samples, Value
 from gateway.wire.bus import CLOSED, Buses
+from gateway.wire.dictionary import ObjectValue
+from gateway.wire.limits import OBJECTS_READ
 from gateway.wire.robot import Description as Robots
 
 RATE_HZ = 50.0
@@ -82,32 +85,33 @@ def samples(robot: Robot, described: Robots, seconds: float) -> Samples:
 
 
 def objects(
-    robot: Robot, described: Robots, places: Iterable[Place], descriptions: Mapping[str, Description]
+    robot: Robot, places: Iterable[Place], descriptions: Mapping[str, Description]
 ) -> dict[str, dict[Object, Value]]:
-    """What each device holds; one that does not answer is left out."""
+    """What each device holds; one that does not answer, or has no EDS, is left out."""
     found = {}
     for place in places:
         description = descriptions.get(place.name)
-        asked = list(wanted(place, description))
-        held = _held(robot, described, place.name, asked)
+        if description is None:
+            continue
+        held = _held(robot, place.name, [one for one in wanted(place, description) if description.has(*one)])
         if any(value is not None for value in held.values()):
             found[place.name] = held
     return found
 
 
-def _held(robot: Robot, described: Robots, component: str, asked: list[Object]) -> dict[Object, Value]:
-    known = {f"{one.component}.{one.object}": one for one in described.parameters}
-    addresses = {f"{component}.0x{index:04X}:{sub}": (index, sub) for index, sub in asked}
-    try:
-        values = robot.read(*addresses).values
-    except ClientError:
-        return {}
+def _held(robot: Robot, component: str, asked: list[Object]) -> dict[Object, Value]:
     held: dict[Object, Value] = {}
-    for address, key in addresses.items():
-        parameter = known.get(address)
-        value = values.get(address if parameter is None else parameter.name)
-        if value is None or (value.value is None and ABORTED not in (value.problem or "")):
-            continue
-        scale = 1.0 if parameter is None else parameter.scale
-        held[key] = value.value if value.value is None or scale == 1.0 else round(value.value / scale)
+    with contextlib.suppress(ClientError):  # what it has told so far is true
+        for start in range(0, len(asked), OBJECTS_READ):
+            addresses = {f"0x{index:04X}:{sub}": (index, sub) for index, sub in asked[start:][:OBJECTS_READ]}
+            values = robot.read_objects(component, *addresses).values
+            held |= {addresses[name]: number for name, one in values.items() for number in _number(one)}
     return held
+
+
+def _number(told: ObjectValue) -> Iterator[Value]:
+    """What it holds; `None` of what the device does not have, and nothing of what is not known."""
+    if isinstance(told.value, int | float):
+        yield told.value
+    elif told.value is None and ABORTED in (told.problem or ""):
+        yield None

@@ -80,7 +80,9 @@ def resolve(
 ) -> Catalogue:
     """Every parameter of the robot; what cannot be used says why."""
     own = [described(name, one, descriptions, absent) for name, one in config.parameter.items()]
-    return Catalogue([*own, *offered(config, descriptions, own)], descriptions)
+    asked = config.joint.keys() | config.device.keys()  # an IMU has an EDS too, and no parameters
+    readable = {name: one for name, one in descriptions.items() if name in asked}
+    return Catalogue([*own, *offered(config, descriptions, own)], readable)
 
 
 def described(

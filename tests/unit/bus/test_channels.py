@@ -1,5 +1,6 @@
 """Objects that the robot's file makes channels: by PDO where one brings them, else asked for."""
 
+import math
 import struct
 import time
 from collections.abc import Callable
@@ -10,7 +11,7 @@ from drivers.bus.bus import CanBus
 from drivers.bus.channels import objection
 from drivers.bus.device import CanDevice
 from drivers.bus.settings import ChannelSettings, DeviceSettings
-from drivers.samples import State
+from drivers.samples import Sample, State
 from eds import Description
 from tests.support.waiting import until
 from tests.unit.bus.conftest import IDENTITY, SMALL_EDS
@@ -144,6 +145,68 @@ def test_what_came_before_a_reboot_is_not_shown_as_what_is_now(
         fake.boot_up()
         until(lambda: not gait.node.ready)
         assert gait.latest.read(0, 0) == (None, None)
+        gait.stop()
+
+
+def test_one_object_that_is_never_answered_leaves_the_others_theirs(
+    bus: CanBus, channel: str, describe: Describe
+) -> None:
+    with FakeNode(channel, 5, dict(OBJECTS), deaf_to={(0x2100, 0)}):
+        gait = device(bus, describe, phase=PHASE, load=LOAD, strain=STRAIN)
+        gait.start()
+        until(lambda: (value(gait, 1), value(gait, 2)) == (-3.0, 1.5))
+        assert value(gait, 0) is None
+        gait.stop()
+
+
+def test_an_answer_that_is_no_number_of_its_type_is_no_value(
+    bus: CanBus, channel: str, describe: Describe
+) -> None:
+    objects = {**OBJECTS, (0x2100, 0): b"31.5 degrees", (0x2102, 0): struct.pack("<f", math.nan)}
+    with FakeNode(channel, 5, objects):
+        gait = device(bus, describe, phase=PHASE, load=LOAD, strain=STRAIN)
+        gait.start()
+        until(lambda: "phase: the device answers with no number of its type" in problem(gait))
+        assert "strain: the device answers with no number of its type" in problem(gait)
+        assert value(gait, 0) is None
+        until(lambda: value(gait, 1) == -3.0)
+        gait.stop()
+
+
+def test_an_answer_is_as_old_as_its_question_and_replaces_nothing_newer(
+    bus: CanBus, channel: str, describe: Describe
+) -> None:
+    gait = device(bus, describe, phase=PHASE, load=LOAD)
+    asked: list[int] = []
+    with FakeNode(channel, 5, {**OBJECTS, **tpdo(0x2100_0010, transmission_type=255)}) as fake:
+
+        def changes_meanwhile(request: bytes) -> None:
+            if request[1:3] == b"\x01\x21":
+                asked.append(time.monotonic_ns())
+            elif request[1:3] == b"\x00\x21":
+                fake.send(0x185, struct.pack("<H", 400))
+
+        fake.on_request = changes_meanwhile
+        samples: list[Sample] = []
+        gait.latest.subscribe(samples.append)
+        gait.start()
+        until(lambda: {index for one in samples for index in one.indices} == {0, 1})
+        assert {one.values for one in samples if one.indices == (0,)} == {(0.4,)}
+        assert next(one for one in samples if one.indices == (1,)).stamp_ns <= asked[0]
+        gait.stop()
+
+
+def test_what_comes_only_when_it_changes_and_is_not_asked_for_is_said(
+    bus: CanBus, channel: str, describe: Describe
+) -> None:
+    with FakeNode(channel, 5, {**OBJECTS, **tpdo(0x2103_0001, transmission_type=255)}):
+        gait = device(bus, describe, swing=SWING)
+        gait.start()
+        until(
+            lambda: (
+                "no swing: TPDO1 (0x185) brings it only when it changes, and poll_hz is 0" in problem(gait)
+            )
+        )
         gait.stop()
 
 

@@ -69,6 +69,18 @@ def test_who_is_gone_is_missed_though_we_stand_still_again_and_again() -> None:
     assert life.lost(reader.now_ns)
 
 
+def test_who_was_silent_before_is_not_explained_by_standing_still() -> None:
+    reader = Reader()
+    life = NodeLife(0.25, reader.standstill)
+    life.on_heartbeat(reader.now_ns, b"\x05")
+    reader.runs(1000)
+    for _ in range(5):
+        reader.stands(300)
+        assert "its heartbeat is missing" in (life.problem(reader.now_ns) or "")
+        reader.runs()
+        assert "its heartbeat is missing" in (life.problem(reader.now_ns) or "")
+
+
 def test_a_period_is_not_learned_from_heartbeats_that_waited() -> None:
     reader = Reader()
     life = NodeLife(None, reader.standstill)

@@ -132,6 +132,10 @@ def test_a_program_reads_the_same_as_json(tmp_path: Path, capsys: pytest.Capture
             'mistake: [channel."knee.x"] object: 0x1008:0 is no number in joint_drive.eds',
         ),
         (
+            ("", '[channel."knee.temperature"]\nobject = "0x6065:0"\nunit = "K"\n'),
+            'mistake: [channel."knee.temperature"] unit: a joint\'s temperature is in °C: write unit = "°C"',
+        ),
+        (
             ("gear_ratio = 100", "gear_ratio = 10"),
             "warning: [joint.knee] gear_ratio: 10 is far from 100, as joint_drive.eds has it in 6091h",
         ),

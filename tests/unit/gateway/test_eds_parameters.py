@@ -357,6 +357,13 @@ def test_any_number_of_the_eds_is_read_by_its_address_and_is_no_parameter_for_th
             found.chosen([wrong])
 
 
+def test_an_object_of_what_has_no_parameters_is_refused_and_holds_up_nobody(tmp_path: Path) -> None:
+    text = HEAD + '[imu.trunk]\nbus = "main"\nnode_id = 9\nformat = "cia410"\n'
+    known = {"trunk": eds.load(eds.locate("inclinometer.eds", None), 9)}
+    with pytest.raises(RpcError, match="there is no parameter"):
+        resolve(config(tmp_path, text), known, {}).chosen(["trunk.0x1000:0"])
+
+
 def test_an_address_means_the_parameter_and_answers_go_by_name(
     offering: str, bench: Bench, tmp_path: Path
 ) -> None:

@@ -110,6 +110,24 @@ def test_a_drive_without_position_in_its_tpdos_is_polled_and_says_so(joint: Make
         knee.stop()
 
 
+def test_polled_values_are_of_their_type_and_one_without_an_answer_costs_no_other(
+    joint: Make, channel: str
+) -> None:
+    described = drive_objects()
+    objects = dict(described)
+    objects[0x6064, 0] = (250).to_bytes(4, "little")
+    objects[0x6077, 0] = (-10).to_bytes(2, "little", signed=True) + bytes(2)  # four bytes, of which two count
+    objects[0x603F, 0] = b"no error, thank you"
+    with FakeNode(channel, 2, objects, deaf_to={(0x606C, 0)}):
+        knee = joint(described, poll_hz=50, slow_poll_hz=50)
+        knee.start()
+        until(lambda: read(knee, "torque") is not None)
+        assert (read(knee, "torque") or 0.0) < 0.0
+        assert read(knee, "error_code") is None
+        until(lambda: read(knee, "position") == pytest.approx(math.pi / 2))
+        knee.stop()
+
+
 def test_a_drive_without_any_tpdo_is_polled_for_position_and_state(joint: Make, channel: str) -> None:
     objects = drive_objects()
     with FakeNode(channel, 2, objects):

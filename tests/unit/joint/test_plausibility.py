@@ -99,6 +99,9 @@ class Still:
         self.check.loaded.rated = 40.0
         self._now_ns = 0
 
+    def unseen(self, seconds: float) -> None:
+        self._now_ns += round(seconds * 1e9)
+
     def hold(self, seconds: float, **values: float | None) -> str:
         known = {"velocity": 0.0, "torque": 0.0, "following_error": 0.0, "position": 0.5, **values}
         for _ in range(round(seconds * 1e9 / STEP_NS)):
@@ -146,6 +149,17 @@ def test_a_velocity_beside_a_position_that_stands_is_a_frozen_encoder() -> None:
     joint = Still()
     assert joint.hold(60.0, velocity=0.02) == "", "noise of a joint that stands"
     assert "the same to the count while it turns at 0." in joint.hold(2.0, velocity=0.5)
+
+
+def test_what_nobody_saw_lasted_is_not_held_against_a_joint() -> None:
+    joint = Still()
+    joint.hold(0.1, torque=30.0, following_error=0.5, velocity=0.5)
+    joint.unseen(LOADED_S)
+    assert joint.hold(0.1, torque=30.0, following_error=0.5, velocity=0.5) == ""
+    joint.unseen(2.0)
+    assert "torque without motion" in joint.hold(LOADED_S + 0.1, torque=30.0, following_error=0.5)
+    joint.unseen(2.0)
+    assert "torque without motion" in joint.hold(0.1, torque=30.0, following_error=0.5), "what is known stays"
 
 
 def test_homing_may_set_the_position() -> None:
