@@ -4,6 +4,7 @@ import contextlib
 import os
 import secrets
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
@@ -13,6 +14,8 @@ from gateway.openssl import piped, run
 
 DAYS: Final = 36_500  # who is no longer trusted is revoked; no clock decides about a stop
 _CURVE: Final = "prime256v1"  # NIST P-256
+_TURN_S: Final = 5.0  # how long somebody else's turn is waited for
+_LOOK_S: Final = 0.02
 _EXTENSIONS: Final = """\
 [req]
 distinguished_name = name
@@ -29,17 +32,17 @@ keyUsage = critical, digitalSignature
 def make(name: str, key: Path, certificate: Path) -> None:
     """Make a key pair for `name`; what is there already is not touched.
 
-    The folder is made for its owner alone (0700), and so is the key (0600).
+    The folder is made for its owner alone (0700), and so is the key (0600). A key without a certificate, as
+    one that was killed leaves it, gets one.
 
     Raises:
-        KeyProblem: there is one already, it cannot be written, or nothing here can make one.
+        KeyProblem: there is a certificate already, it cannot be written, or nothing here can make one.
 
     """
     if not NAME.fullmatch(name):
         raise KeyProblem(f"{name!r} is no name for a key: letters, digits, _, . and -, at most 64")
-    for one in (key, certificate):
-        if one.exists():
-            raise KeyProblem(f"{one} is there already; a key is made once, and removed by hand only")
+    if certificate.exists():
+        raise KeyProblem(f"{certificate} is there already; a key is made once, and removed by hand only")
     try:
         _make(name, key, certificate)
     except OSError as error:
@@ -50,33 +53,47 @@ def _make(name: str, key: Path, certificate: Path) -> None:
     key.parent.mkdir(parents=True, mode=0o755, exist_ok=True)
     if not any(key.parent.iterdir()):
         key.parent.chmod(0o700)
-    key_pem, certificate_pem = _made(name)
-    write_file(certificate, certificate_pem, 0o644)
-    write_file(key, key_pem, 0o600)
+    if not key.exists():
+        write_file(key, _new_key(), 0o600)
+    write_file(certificate, _certificate(name, key.read_bytes()), 0o644)
 
 
 @contextlib.contextmanager
 def alone_in(folder: Path) -> Iterator[None]:
     """Within the block no other process of ours changes the files of this folder; it is made where it is not.
 
-    Whoever comes second waits: each is done in some milliseconds.
+    Whoever comes second waits: each is done in some milliseconds. But whoever may read a folder can lock it,
+    so nobody waits for ever.
 
     Raises:
-        OSError: it cannot be made or opened.
+        OSError: it cannot be made or opened, or another program keeps it.
 
     """
     folder.mkdir(parents=True, mode=0o755, exist_ok=True)
     if sys.platform == "win32":
         yield  # a desk there has no locks of folders
         return
-    import fcntl
-
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX)
+        until_s = time.monotonic() + _TURN_S
+        while not _locked(descriptor):
+            if time.monotonic() >= until_s:
+                raise TimeoutError(f"another program keeps {folder} locked; lslocks names it")
+            time.sleep(_LOOK_S)
         yield
     finally:
         os.close(descriptor)
+
+
+def _locked(descriptor: int) -> bool:
+    """Whether it is our turn; the lock goes with the descriptor, also where its owner is killed."""
+    import fcntl
+
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True
 
 
 def write_file(file: Path, content: bytes, mode: int) -> None:
@@ -96,11 +113,15 @@ def write_file(file: Path, content: bytes, mode: int) -> None:
         raise
 
 
-def _made(name: str) -> tuple[bytes, bytes]:
-    """A key and its certificate, both as PEM."""
-    key = run(["ecparam", "-name", _CURVE, "-genkey", "-noout"], b"")
+def _new_key() -> bytes:
+    """As PEM."""
+    return run(["ecparam", "-name", _CURVE, "-genkey", "-noout"], b"")
+
+
+def _certificate(name: str, key: bytes) -> bytes:
+    """Of a key; both as PEM."""
     settings = _EXTENSIONS.format(name=name).encode("ascii")
     with piped(settings) as read_settings:
         command = ["req", "-x509", "-new", "-key", "/dev/stdin", "-sha256", "-days", str(DAYS)]
         command += ["-config", f"/dev/fd/{read_settings}"]
-        return key, run(command, key, read_settings)
+        return run(command, key, read_settings)

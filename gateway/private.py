@@ -9,6 +9,7 @@ from typing import Final
 from gateway.certificates import KeyProblem
 
 _OTHERS: Final = stat.S_IRWXG | stat.S_IRWXO
+_WRITING: Final = stat.S_IWGRP | stat.S_IWOTH
 
 
 def forbid_core_dumps() -> None:
@@ -23,6 +24,8 @@ def forbid_core_dumps() -> None:
 def check_private(file: Path) -> None:
     """A file and its folder are for their owner alone, as ssh demands it of its keys.
 
+    Where it is a link, nobody else may change the folder that it leads to.
+
     Raises:
         KeyProblem: others may read it, or take its place; it says what closes it.
         OSError: nobody can say.
@@ -30,9 +33,14 @@ def check_private(file: Path) -> None:
     """
     if os.name != "posix":
         return  # permissions are not told by a mode there
-    for one, wanted in ((file.parent, "700"), (file, "600")):
+    real = file.resolve()
+    for one, closed, wanted in (
+        (file.parent, _OTHERS, "700"),
+        (real.parent, _WRITING, "go-w"),
+        (real, _OTHERS, "600"),
+    ):
         mode = stat.S_IMODE(one.stat().st_mode)
-        if mode & _OTHERS:
+        if mode & closed:
             raise KeyProblem(
                 f"{one} is open to others on this computer (mode {mode:04o}), and whoever has a key is its "
                 f"owner: chmod {wanted} {one}"

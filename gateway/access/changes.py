@@ -27,7 +27,7 @@ may = []   # "reset", "enable"
 def ensure_keys(folder: AccessFolder, robot: str) -> bool:
     """Make the robot's key where it has none; whether it was made now. Raises `KeyProblem`."""
     with _alone(folder):
-        if folder.key.exists():
+        if folder.key.exists() and folder.certificate.exists():
             return False
         make(_file_name(robot), folder.folder / "keys" / KEY, folder.folder / "keys" / CERTIFICATE)
         return True
@@ -48,24 +48,36 @@ def add(folder: AccessFolder, name: str, der: bytes, role: Role) -> None:
         KeyProblem: there is one of that name, or with that certificate, or it cannot be written.
 
     """
-    if not NAME.fullmatch(name):
-        raise KeyProblem(f"{name!r} is no name: letters, digits, _, . and -, at most 64")
     with _alone(folder):
         _add(folder, name, der, role)
 
 
-def _add(folder: AccessFolder, name: str, der: bytes, role: Role) -> None:
-    file = folder.clients / f"{name}.crt"
-    if file.exists():
+def check_free(folder: AccessFolder, name: str) -> None:
+    """Raise `KeyProblem` where nobody new can have this name."""
+    if not NAME.fullmatch(name):
+        raise KeyProblem(f"{name!r} is no name: letters, digits, _, . and -, at most 64")
+    if (folder.clients / f"{name}.crt").exists():
         raise KeyProblem(f"{name} is known already; take another name, or revoke that one first")
+
+
+def _add(folder: AccessFolder, name: str, der: bytes, role: Role) -> None:
+    check_free(folder, name)
+    file = folder.clients / f"{name}.crt"
     if (other := _known_as(folder, der)) is not None:
         raise KeyProblem(f"this key is known already, as {other}; revoke that one first")
     _edit(folder, lambda text: with_entry(text or _HEAD, "clients", name, role.value))
     try:
-        folder.clients.mkdir(parents=True, mode=0o755, exist_ok=True)
+        _ensure_clients(folder.clients)
         write_file(file, pem_of(der), 0o644)
     except OSError as error:
         raise KeyProblem(f"{file} cannot be written: {error.strerror or error}") from error
+
+
+def _ensure_clients(clients: Path) -> None:
+    """For the gateway's account to read, whatever the mask of whoever makes it: nothing there is secret."""
+    if not clients.exists():
+        clients.mkdir(parents=True)
+        clients.chmod(0o755)
 
 
 def remove(folder: AccessFolder, name: str) -> None:
@@ -75,23 +87,30 @@ def remove(folder: AccessFolder, name: str) -> None:
         KeyProblem: there is none, or it stays.
 
     """
-    with _alone(folder):
-        _remove(folder, name)
+    names = _without_certificates(folder, name)  # whoever locks the folder keeps nobody in
+    try:
+        with _alone(folder):
+            for one in names:
+                _edit(folder, partial(without_entry, table="clients", key=one))
+    except KeyProblem as error:
+        raise KeyProblem(f"{name} is let in no more, but its role still stands there: {error}") from error
 
 
-def _remove(folder: AccessFolder, name: str) -> None:
+def _without_certificates(folder: AccessFolder, name: str) -> list[str]:
+    """Remove them; the names that they had."""
     files = {one.stem: one for one in folder.files()}
     if name not in files:
         raise KeyProblem(f"there is no {name}; known are {', '.join(files) or 'nobody'}")
     der = _certificate(files[name])
     same = [one for one, file in files.items() if der is not None and _certificate(file) == der]
-    for one in dict.fromkeys((name, *same)):
+    names = list(dict.fromkeys((name, *same)))
+    for one in names:
         try:
             files[one].unlink(missing_ok=True)
         except OSError as error:
             problem = f"{files[one]} cannot be removed: {error.strerror}; {name} IS STILL LET IN"
             raise KeyProblem(problem) from error
-        _edit(folder, partial(without_entry, table="clients", key=one))
+    return names
 
 
 @contextlib.contextmanager

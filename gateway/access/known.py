@@ -56,6 +56,7 @@ def known_in(folder: AccessFolder) -> Known:
     table, problems = table_of(folder)
     by_key: dict[str, Identity] = {}
     found: list[bytes] = []
+    problems += _unreadable(folder)
     for file in folder.files():
         try:
             der = der_of(file.read_bytes())
@@ -74,3 +75,15 @@ def known_in(folder: AccessFolder) -> Known:
         by_key[of] = Identity(role, file.stem, of, granted=table.operators.may)
         found.append(der)
     return Known(table, by_key, tuple(found), tuple(problems))
+
+
+def _unreadable(folder: AccessFolder) -> list[str]:
+    try:
+        next(folder.clients.iterdir(), None)
+    except FileNotFoundError:
+        return []
+    except OSError as error:
+        return [
+            f"{folder.clients} cannot be read ({error.strerror}); nobody whose certificate is there is let in"
+        ]
+    return []

@@ -36,6 +36,19 @@ class Candidate:
     def fingerprint(self) -> str:
         return fingerprint(self.der)
 
+    def check_waits(self) -> None:
+        """Raise `PairingEnded` where it has gone: it would never know that it was let in."""
+        self.connection.settimeout(0)
+        try:
+            gone = not self.connection.recv(1)
+        except ssl.SSLWantReadError:
+            gone = False
+        except OSError:
+            gone = True
+        self.connection.settimeout(VALID_S)
+        if gone:
+            raise PairingEnded("the desk has gone meanwhile, and was not let in; begin again with a new code")
+
     def answer(self, reply: Reply) -> None:
         with self.connection, contextlib.suppress(OSError):
             self.connection.sendall(msgspec.json.encode(reply) + b"\n")

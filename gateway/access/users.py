@@ -41,12 +41,15 @@ def identity_of(peer: Peer, table: AccessTable) -> Identity | None:
 
 
 def resolved(peer: Peer) -> Peer:
-    """The same with the names that the system's directories have of it, which may ask the network."""
+    """The same with the names that the system's directories have of it, which may ask the network.
+
+    A name of digits alone is none here: in a table it is a number, and somebody else's.
+    """
     try:
         name = pwd.getpwuid(peer.uid).pw_name
     except KeyError:
         return peer
-    return Peer(peer.uid, peer.gid, name, tuple(_groups(name, peer.gid)))
+    return Peer(peer.uid, peer.gid, "" if name.isdecimal() else name, tuple(_groups(name, peer.gid)))
 
 
 def _groups(name: str, gid: int) -> Iterator[str]:
@@ -58,6 +61,8 @@ def _groups(name: str, gid: int) -> Iterator[str]:
     for number in numbers:
         yield str(number)
         try:
-            yield grp.getgrgid(number).gr_name
+            group = grp.getgrgid(number).gr_name
         except KeyError:
             continue
+        if not group.isdecimal():
+            yield group

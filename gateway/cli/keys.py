@@ -63,6 +63,8 @@ def pair(argv: list[str]) -> int:
         raise NobodyToAsk("there is no terminal to ask on; give --name, --role and --yes")
     forbid_core_dumps()
     robot, folder = _robot(arguments)
+    if arguments.name:
+        changes.check_free(folder, arguments.name)
     if changes.ensure_keys(folder, robot.robot.name):
         say(f"The robot's key was made in {folder.keys}. Start its gateway again: it speaks TLS only then.\n")
     host = arguments.host or robot.gateway.host
@@ -71,14 +73,15 @@ def pair(argv: list[str]) -> int:
         pairing = Pairing(folder, listener, code, own)
         _show(listener, code, own)
         candidate = pairing.wait()
-    name, role = _confirmed(candidate, arguments)
-    if role is None:
-        candidate.answer(Reply(problem="it was not confirmed on the robot"))
-        raise PairingEnded("nobody was paired")
     try:
+        name, role = _confirmed(candidate, arguments, folder)
+        candidate.check_waits()
         changes.add(folder, name, candidate.der, role)
     except KeyProblem as error:
         candidate.answer(Reply(problem=str(error)))
+        raise
+    except (PairingEnded, KeyboardInterrupt):
+        candidate.answer(Reply(problem="it was not confirmed on the robot"))
         raise
     candidate.answer(
         Reply(
@@ -121,24 +124,44 @@ def _address() -> str:
     return socket.gethostname()
 
 
-def _confirmed(candidate: Candidate, arguments: argparse.Namespace) -> tuple[str, Role | None]:
-    """What the person here says; no role where they refuse."""
+def _confirmed(candidate: Candidate, arguments: argparse.Namespace, folder: AccessFolder) -> tuple[str, Role]:
+    """What the person here says; raises `PairingEnded` where they refuse."""
     if arguments.yes:
         return arguments.name, arguments.role
     wished = arguments.name or (candidate.name if NAME.fullmatch(candidate.name) else "")
     say(f"\nA desk has proved the code. It calls itself {candidate.name!r}, its key is\n")
     say(f"{grouped(candidate.fingerprint)}\n\n")
-    name = arguments.name or _asked(f"Its name [{wished}]: ") or wished
-    roles = ", ".join(Role)
-    said = arguments.role or _asked(f"Its role ({roles}; nothing: it is not let in): ")
-    if not NAME.fullmatch(name) or said not in list(Role):
-        return name, None
-    return name, Role(said)
+    return arguments.name or _name(folder, wished), arguments.role or _role()
+
+
+def _name(folder: AccessFolder, wished: str) -> str:
+    """Asked for until it is one that a new desk can have."""
+    while True:
+        name = _asked(f"Its name [{wished}]: ") or wished
+        try:
+            changes.check_free(folder, name)
+        except KeyProblem as error:
+            warn("keys", str(error))
+        else:
+            return name
+
+
+def _role() -> Role:
+    """Asked for until it is one, or nothing."""
+    while said := _asked(f"Its role ({', '.join(Role)}; nothing: it is not let in): "):
+        if said in list(Role):
+            return Role(said)
+        warn("keys", f"{said!r} is no role")
+    raise PairingEnded("nobody was paired")
 
 
 def _asked(question: str) -> str:
+    """Raises `PairingEnded` where the terminal has closed."""
     say(question)
-    return sys.stdin.readline().strip()
+    line = sys.stdin.buffer.readline()
+    if not line:
+        raise PairingEnded("nobody was paired: nothing was typed")
+    return line.decode("utf-8", "replace").strip()
 
 
 def list_(argv: list[str]) -> int:

@@ -5,6 +5,7 @@ import sys
 from typing import Final
 
 from gateway.cli.connect import NobodyToAsk
+from gateway.cli.keys_push import name_of
 from gateway.cli.text import say, say_json, warn
 from gateway.client import Address, pairing
 from gateway.client.keys import keys_folder, server_file
@@ -39,7 +40,9 @@ def main(argv: list[str]) -> int:
     made.add_argument(
         "code", metavar="CODE", nargs="?", default="", help="instead of being asked; others here may see it"
     )
-    made.add_argument("--name", help="that the robot is to call this desk (default: your user and computer)")
+    made.add_argument(
+        "--name", type=name_of, help="that the robot is to call this desk (default: your user and computer)"
+    )
     made.add_argument("--json", action="store_true", help="one JSON object, for machines")
     arguments = made.parse_args(argv)
     forbid_core_dumps()

@@ -148,7 +148,7 @@ def own_certificate() -> bytes:
     folder = keys_folder()
     try:
         with alone_in(folder.parent):
-            if not (folder / KEY).exists():
+            if not ((folder / KEY).exists() and (folder / CERTIFICATE).exists()):
                 make(own_name(), folder / KEY, folder / CERTIFICATE)
         check_private(folder / KEY)
         return (folder / CERTIFICATE).read_bytes()

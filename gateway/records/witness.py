@@ -103,6 +103,9 @@ def _told(found: Judgement, seen: list[SignedHead], hashes: Mapping[int, str], l
             text = f"{_when(head)} entry {head.n} was another one: the journal was rewritten; {since}"
             return Judgement(Verdict.BROKEN, text, head.n, *counts, good.n if good else 0)
         good = head if head.n in hashes else good
+    if good is None and seen:
+        text = f"what others have seen of it ends with entry {seen[-1].n}, which is removed"
+        return Judgement(Verdict.UNPROVEN, text, found.at, *counts)
     if good is None:
         return found
     if good.n < last:

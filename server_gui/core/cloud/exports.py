@@ -5,6 +5,7 @@ A file of the list for each place, in the user's own data; whatever is made is n
 
 import contextlib
 import hashlib
+import stat
 from collections.abc import Collection, Iterator, Sequence, Set
 from dataclasses import dataclass
 from enum import Enum
@@ -25,6 +26,8 @@ class State(Enum):
 
     AS_MADE = "as it was made"
     CHANGED = "has changed since, or was not ended"
+    LINKED = "has another name too (a hard link), under which it would stay"
+    CLOSED = "cannot be looked at or removed"
     GONE = "has gone from there: moved, or removed"
     HAS_ROWS = "a copy that has rows of theirs"
     UNKNOWN = "a copy that cannot be looked into"
@@ -83,41 +86,58 @@ def _in(file: Path, wanted: Set[Name], but: str) -> Exported | None:
     """What an entry of the list says, where it is of somebody's sessions."""
     try:
         note = _read(file)
-    except msgspec.MsgspecError as error:
-        return Exported(str(file), State.UNREADABLE, str(error))
+    except (OSError, msgspec.MsgspecError) as error:
+        return Exported(str(file), State.UNREADABLE, _why(error))
     is_theirs = note.sessions is None or not wanted.isdisjoint(note.sessions)
     return _looked(note, sorted(wanted)) if is_theirs and note.place != but else None
 
 
-def remove(exported: Sequence[Exported]) -> list[str]:
-    """Remove the files that are as they were made; of all others, say what is left, in words."""
-    for each in exported:
-        if each.state is State.AS_MADE:
-            Path(each.place).unlink(missing_ok=True)
-            _note_of(each.place).unlink(missing_ok=True)
-    return [_told(each) for each in exported if each.state not in (State.AS_MADE, State.GONE)]
+def remove(sessions: Collection[Name], but: str) -> list[str]:
+    """Look again, and remove the files that are as they were made; of all others, say what is left, in words.
+
+    Whatever was found before somebody was asked may be somebody else's by now.
+    """
+    tried = [_removed(each) if each.state is State.AS_MADE else each for each in found(sessions, but)]
+    return [_told(each) for each in tried if each.state is not State.GONE]
+
+
+def _removed(each: Exported) -> Exported:
+    try:
+        Path(each.place).unlink(missing_ok=True)
+        _note_of(each.place).unlink(missing_ok=True)
+    except OSError as error:
+        return Exported(each.place, State.CLOSED, _why(error))
+    return Exported(each.place, State.GONE)
 
 
 def _told(each: Exported) -> str:
-    if each.state is State.CHANGED:
-        return f"{each.place} was exported with rows of theirs, and {each.state.value}: look, and remove it"
-    if each.state is State.UNREADABLE:
-        return f"{each.place} is {each.state.value} ({each.why}): what was exported there is unknown"
     why = f" ({each.why})" if each.why else ""
+    if each.state in (State.CHANGED, State.LINKED, State.CLOSED):
+        return (
+            f"{each.place} was exported with rows of theirs, and {each.state.value}{why}: look, and remove it"
+        )
+    if each.state is State.UNREADABLE:
+        return f"{each.place} is {each.state.value}{why}: what was exported there is unknown"
     return f"{each.place} is {each.state.value}{why}: gwrms cloud forget --url {each.place}, or remove it"
 
 
 def _looked(note: _Note, wanted: Sequence[Name]) -> Exported | None:
     if note.is_store:
         return _store(note, wanted)
-    file = Path(note.place)
-    if file.is_symlink() or not file.exists():
-        return Exported(note.place, State.CHANGED if file.is_symlink() else State.GONE)
     try:
-        same = bool(note.sha256) and file.is_file() and _sha256(file) == note.sha256
-    except OSError:
-        same = False
-    return Exported(note.place, State.AS_MADE if same else State.CHANGED)
+        return Exported(note.place, _state(Path(note.place), note.sha256))
+    except (FileNotFoundError, NotADirectoryError):
+        return Exported(note.place, State.GONE)
+    except OSError as error:
+        return Exported(note.place, State.CLOSED, _why(error))
+
+
+def _state(file: Path, sha256: str) -> State:
+    """Of a file; a link in its place is none. Raises `OSError`."""
+    found = file.lstat()
+    if not (sha256 and stat.S_ISREG(found.st_mode) and _sha256(file) == sha256):
+        return State.CHANGED
+    return State.AS_MADE if found.st_nlink == 1 else State.LINKED
 
 
 def _store(note: _Note, wanted: Sequence[Name]) -> Exported | None:
@@ -130,6 +150,10 @@ def _store(note: _Note, wanted: Sequence[Name]) -> Exported | None:
         is_gone = parts.scheme == "file" and not Path(unquote(parts.path)).exists()
         return Exported(note.place, State.GONE if is_gone else State.UNKNOWN, str(error))
     return Exported(note.place, State.HAS_ROWS) if has_some else None
+
+
+def _why(error: Exception) -> str:
+    return (error.strerror if isinstance(error, OSError) else None) or str(error)
 
 
 def _text(file: Path) -> str:

@@ -146,7 +146,7 @@ def forget(store: Store, spool: Spool, known: Plan, name: str, expect: Expect) -
     forgetting.delete(store, known.sessions)
     mend.accept(store, spool, expect, MADE)
     _tell(store, spool, known, name)
-    left = [*proof(store, spool.folder, known), *exports.remove(known.exported)]
+    left = [*proof(store, spool.folder, known), *exports.remove(known.sessions, store.url)]
     (spool.folder / _BEGUN).unlink()
     return left
 

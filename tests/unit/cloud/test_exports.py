@@ -1,13 +1,15 @@
 """What was exported on this desk is found where a wearer is forgotten: removed, or named."""
 
+import errno
 import json
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from gateway.main import main
-from server_gui.core.cloud import actions, exports
+from server_gui.core.cloud import actions, exports, mend
 from server_gui.core.cloud.jobs import Job
 from server_gui.core.cloud.recordings import Recordings
 from server_gui.core.cloud.selection import Choice
@@ -55,20 +57,83 @@ def _edited(file: Path) -> None:
 
 
 def _linked(file: Path) -> None:
-    file.rename(file.with_name("elsewhere.csv"))
-    file.symlink_to(file.with_name("elsewhere.csv"))
+    file.rename(file.with_suffix(".other"))
+    file.symlink_to(file.with_suffix(".other"))
 
 
-@pytest.mark.parametrize("change", [_edited, _linked])
-def test_a_file_that_is_another_one_now_is_named_and_stays(
-    change: Callable[[Path], None], server: Server, tmp_path: Path
-) -> None:
-    file = export(server, HERS, tmp_path / "hers.csv")
-    change(file)
+def _named_twice(file: Path) -> None:
+    file.with_suffix(".other").hardlink_to(file)
+
+
+def _a_folder(file: Path) -> None:
+    file.unlink()
+    file.mkdir()
+
+
+def test_files_that_are_others_now_are_named_and_stay(server: Server, tmp_path: Path) -> None:
+    """Also in a folder whose name a shell would take for a pattern."""
+    folder = tmp_path / "wal[k] *?"
+    folder.mkdir()
+    changes: dict[Callable[[Path], None], str] = {
+        _edited: "has changed since",
+        _linked: "has changed since",
+        _a_folder: "has changed since",
+        _named_twice: "has another name too",
+    }
+    files = {change: export(server, HERS, folder / f"[{change.__name__}]*.csv") for change in changes}
+    for change, file in files.items():
+        change(file)
     said = server.run(*FORGET, status=1)
-    assert f"{file} was exported with rows of theirs, and has changed since" in said
+    for change, file in files.items():
+        assert f"{file} was exported with rows of theirs, and {changes[change]}" in said
+        assert file.exists()
     assert "gone:" not in said
-    assert file.read_bytes()
+
+
+def test_what_came_to_its_place_since_it_was_found_is_not_removed(
+    server: Server, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Between the question and the end there may be hours; what was exported in them is found too."""
+    file, late = export(server, HERS, tmp_path / "some.csv"), tmp_path / "late.csv"
+    accept = mend.accept
+
+    def meanwhile(*arguments: Any) -> None:
+        file.write_bytes(b"of somebody else")
+        with exports.noted(late, ("exo", HERS)):
+            late.write_bytes(b"hers")
+        accept(*arguments)
+
+    monkeypatch.setattr(mend, "accept", meanwhile)
+    assert f"{file} was exported with rows of theirs, and has changed" in server.run(*FORGET, status=1)
+    assert file.read_bytes() == b"of somebody else"
+    assert not late.exists()
+
+
+def test_what_cannot_be_looked_at_or_removed_is_named(
+    server: Server, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Then the rest is done, and the same command goes on when it can be."""
+    stays, unseen = (export(server, HERS, tmp_path / f"{name}.csv") for name in ("stays", "unseen"))
+    goes = export(server, HERS, tmp_path / "goes.csv")
+    (exports_folder() / "0.json").mkdir()
+    for refused, name in ((stays, "unlink"), (unseen, "lstat")):
+        monkeypatch.setattr(Path, name, _refusing(getattr(Path, name), refused))
+    said = server.run(*FORGET, status=1)
+    assert said.count("and cannot be looked at or removed (Permission denied)") == 2
+    assert f"{exports_folder() / '0.json'} is an entry of the list of exports that cannot be read" in said
+    assert not goes.exists()
+    assert server.rows() == {HIS}
+
+
+def _refusing(was: Callable[..., Any], refused: Path) -> Callable[..., Any]:
+    """As where a folder is somebody else's."""
+
+    def refusing(file: Path, **options: Any) -> Any:
+        if file == refused:
+            raise PermissionError(errno.EACCES, "Permission denied", str(file))
+        return was(file, **options)
+
+    return refusing
 
 
 def test_a_file_that_was_moved_is_said_to_be_out_of_reach(server: Server, tmp_path: Path) -> None:

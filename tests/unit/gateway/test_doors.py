@@ -11,6 +11,7 @@ import tempfile
 import threading
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -275,6 +276,18 @@ def test_names_of_user_and_groups_are_those_of_the_computer() -> None:
     named = Peer(12_345, 12_345, "somebody", ("12345", "exo"))
     who = identity_of(named, AccessTable(groups={"exo": Role.OPERATOR}))
     assert who == Identity(Role.OPERATOR, "somebody", peer=named)
+
+
+def test_an_account_whose_name_is_a_number_is_nobody_else(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A directory on the network may have such a one; the table means the number."""
+    monkeypatch.setattr("pwd.getpwuid", lambda uid: SimpleNamespace(pw_name="1001"))
+    monkeypatch.setattr("os.getgrouplist", lambda name, gid: [2000])
+    monkeypatch.setattr("grp.getgrgid", lambda gid: SimpleNamespace(gr_name="27"))
+    table = AccessTable(users={"1001": Role.MAINTAINER}, groups={"27": Role.OPERATOR})
+    assert identity_of(resolved(Peer(2000, 2000)), table) is None
+    assert identity_of(resolved(Peer(1001, 2000)), table) == Identity(
+        Role.MAINTAINER, "1001", peer=Peer(1001, 2000, "", ("2000",))
+    )
 
 
 def test_who_is_at_the_other_end_is_what_the_kernel_says() -> None:

@@ -1,9 +1,11 @@
 """Files of keys, clients and pins: changed by one process at a time, and secret where they must be."""
 
 import contextlib
+import fcntl
 import os
 import shutil
 import ssl
+import stat
 import subprocess
 import sys
 import threading
@@ -118,19 +120,84 @@ def test_what_is_no_certificate_is_known_for_none_in_no_time(tmp_path: Path) -> 
 def test_two_that_begin_at_once_make_one_key(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Without it, the certificate of one lay beside the key of the other."""
     both = threading.Barrier(2)
-    was = key_making._made
+    was = key_making._new_key
 
-    def made(name: str) -> tuple[bytes, bytes]:
+    def made() -> bytes:
         with contextlib.suppress(threading.BrokenBarrierError):
             both.wait(0.2)  # both are in it, where nothing keeps the second out
-        return was(name)
+        return was()
 
-    monkeypatch.setattr(key_making, "_made", made)
+    monkeypatch.setattr(key_making, "_new_key", made)
     folder = AccessFolder(tmp_path, {})
     with ThreadPoolExecutor(2) as pool:
         begun = [pool.submit(changes.ensure_keys, folder, "exo-01") for _ in range(2)]
         assert sorted(one.result() for one in begun) == [False, True]
     ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(folder.certificate, folder.key)
+
+
+def test_who_was_killed_between_key_and_certificate_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "desk"))
+    folder = AccessFolder(tmp_path, {})
+    assert changes.ensure_keys(folder, "exo-01")
+    desk.own_certificate()
+    own = keys_folder() / "desk.key", keys_folder() / "desk.crt"
+    before = folder.key.read_bytes(), own[0].read_bytes()
+    for left_out in (folder.certificate, own[1]):
+        left_out.unlink()
+    assert changes.ensure_keys(folder, "exo-01")
+    desk.own_certificate()
+    assert (folder.key.read_bytes(), own[0].read_bytes()) == before, "who is known by it stays known"
+    for key, certificate in ((folder.key, folder.certificate), own):
+        ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(certificate, key)
+
+
+def test_a_folder_that_another_program_keeps_locked_keeps_nobody_in(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whoever may read it may lock it, and could have made every command wait for ever."""
+    monkeypatch.setattr(key_making, "_TURN_S", 0.0)
+    folder = AccessFolder(keyed(tmp_path, {"anna": Role.OPERATOR}), {})
+    descriptor = os.open(tmp_path, os.O_RDONLY)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX)
+        with pytest.raises(KeyProblem, match=f"another program keeps {tmp_path} locked"):
+            changes.ensure_keys(folder, "exo-01")
+        with pytest.raises(KeyProblem, match="anna is let in no more, but its role still stands there"):
+            changes.remove(folder, "anna")
+    finally:
+        os.close(descriptor)
+    assert known_in(folder).by_key == {}
+
+
+def test_clients_can_be_read_by_the_gateway_whatever_the_mask_and_else_it_is_said(tmp_path: Path) -> None:
+    folder = AccessFolder(tmp_path, {})
+    mask = os.umask(0o077)
+    try:
+        changes.add(folder, "anna", der_of(keys.pair("anna")[1].read_bytes()), Role.VIEWER)
+    finally:
+        os.umask(mask)
+    assert [stat.S_IMODE(one.stat().st_mode) for one in (folder.clients, folder.table)] == [0o755, 0o644]
+    assert known_in(folder).problems == ()
+    shutil.rmtree(folder.clients)
+    folder.clients.write_text("no folder")
+    assert "nobody whose certificate is there is let in" in "".join(known_in(folder).problems)
+
+
+def test_a_link_to_a_key_whose_place_others_could_take_is_not_used(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "desk"))
+    desk.own_certificate()
+    open_ = tmp_path / "open"
+    open_.mkdir()
+    (keys_folder() / "desk.key").rename(open_ / "desk.key")
+    (keys_folder() / "desk.key").symlink_to(open_ / "desk.key")
+    desk.own_certificate()
+    open_.chmod(0o777)
+    with pytest.raises(KeyProblem, match=f"chmod go-w {open_}$"):
+        desk.own_certificate()
 
 
 def test_two_that_are_let_in_at_once_both_have_their_role(tmp_path: Path) -> None:

@@ -1,6 +1,8 @@
 """`gwrms keys pair` and `gwrms pair`: what is typed where, and what a terminal shows."""
 
 import io
+import threading
+from argparse import Namespace
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -8,13 +10,19 @@ from pathlib import Path
 import msgspec
 import pytest
 
+from gateway.access import changes
+from gateway.access.folder import AccessFolder
+from gateway.access.pairing import Candidate, PairingEnded
 from gateway.certificates import grouped
 from gateway.cli import qr_code
+from gateway.cli.keys import _confirmed as confirmed
 from gateway.cli.keys import _show as show
-from gateway.client import Address
+from gateway.client import Address, NotPaired
 from gateway.client.keys import pin_of
+from gateway.client.pairing import pair
 from gateway.main import main
-from gateway.wire.pairing import link
+from gateway.wire.pairing import Reply, link
+from gateway.wire.role import Role
 from tests.unit.gateway import processes
 from tests.unit.gateway.pairing_robot import CODE, Shown
 
@@ -31,7 +39,7 @@ class Typing(io.TextIOWrapper):
     """A standard input with these lines in it."""
 
     def __init__(self, lines: str, *, is_terminal: bool) -> None:
-        super().__init__(io.BytesIO(lines.encode()))
+        super().__init__(io.BytesIO(lines.encode(errors="surrogateescape")))
         self._is_terminal = is_terminal
 
     def isatty(self) -> bool:
@@ -89,6 +97,78 @@ def test_what_is_no_code_in_a_pipe_ends_it(
     with pytest.raises(SystemExit, match="2"):
         main(["pair", "192.0.2.7"])
     assert "16 letters and digits" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["anna b", "\udcff", "x" * 9000, "a\N{RIGHT-TO-LEFT OVERRIDE}b"])
+def test_a_name_that_no_desk_can_have_is_not_sent(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        main(["pair", "192.0.2.7", CODE, "--name", name])
+    assert "is no name" in capsys.readouterr().err
+
+
+# What the person on the robot types
+
+
+@pytest.fixture
+def candidate(shown: Shown) -> Iterator[Candidate]:
+    """A desk that has proved the code."""
+    waiting = shown.wait()
+    with ThreadPoolExecutor(1) as pool:
+        pool.submit(pair, shown.where, CODE)
+        yield (found := waiting.result())
+        found.answer(Reply(problem="enough"))
+
+
+ASKING = Namespace(yes=False, name=None, role=None)
+
+
+def test_who_mistypes_name_or_role_is_asked_again(
+    shown: Shown, candidate: Candidate, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Before, one letter too many sent the desk away, and nobody was told why."""
+    changes.add(shown.folder, "anna", b"another one's", Role.VIEWER)
+    types(monkeypatch, "anna\nbeñ\nben\noprator\noperator\n", is_terminal=True)
+    assert confirmed(candidate, ASKING, shown.folder) == ("ben", Role.OPERATOR)
+    said = capsys.readouterr().err
+    assert all(
+        words in said for words in ("anna is known already", "'beñ' is no name", "'oprator' is no role")
+    )
+
+
+@pytest.mark.parametrize("lines", ["ben\n\n", "ben\n", "", "\udcff\n"])
+def test_who_says_nothing_lets_nobody_in(
+    lines: str, shown: Shown, candidate: Candidate, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    types(monkeypatch, lines, is_terminal=True)
+    with pytest.raises(PairingEnded, match="nobody was paired"):
+        confirmed(candidate, ASKING, shown.folder)
+
+
+def test_a_desk_that_has_gone_while_the_person_thought_is_not_let_in(shown: Shown) -> None:
+    """Its key was let in, the robot said so, and the desk knew nothing of it."""
+    waiting, gone = shown.wait(), threading.Event()
+    with ThreadPoolExecutor(1) as pool:
+        desk = pool.submit(pair, shown.where, CODE, given_up=gone.is_set)
+        candidate = waiting.result()
+        candidate.check_waits()
+        gone.set()
+        assert isinstance(desk.exception(), NotPaired)
+    with candidate.connection, pytest.raises(PairingEnded, match="the desk has gone meanwhile"):
+        candidate.check_waits()
+
+
+def test_a_name_that_is_taken_is_said_before_a_code_is_shown(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "robot.toml"
+    file.write_text('[robot]\nname = "exo-01"\n', encoding="utf-8")
+    changes.add(AccessFolder(tmp_path, {}), "anna", b"another one's", Role.VIEWER)
+    assert (
+        main(["keys", "pair", str(file), "--port", "0", "--name", "anna", "--role", "viewer", "--yes"]) == 1
+    )
+    captured = capsys.readouterr()
+    assert "anna is known already" in captured.err
+    assert captured.out == ""
 
 
 # From beginning to end

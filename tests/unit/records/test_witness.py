@@ -11,8 +11,9 @@ import pytest
 from gateway.access.folder import AccessFolder
 from gateway.certificates import der_of, fingerprint
 from gateway.main import main
-from gateway.records.journal import Journal, head_file
+from gateway.records.journal import Journal, Sizes, head_file
 from gateway.records.signing import EMPTY, KEYLESS, HeadSigner
+from gateway.records.witness import Verdict, judge
 from gateway.wire.control import JournalProof, SignedHead
 from tests.support.waiting import WAIT_S
 from tests.unit.gateway import keyed as keys
@@ -192,3 +193,16 @@ def test_the_same_head_is_signed_once(path: Path, tmp_path: Path) -> None:
     assert written(path, [], signing) == head
     (tmp_path / "keys" / "robot.key").unlink()
     assert "cannot be read" in str(written(path, ["two"], signing).unsigned)
+
+
+def test_what_was_seen_of_entries_that_are_removed_is_said(path: Path, seen: SignedHead) -> None:
+    """And not that nobody has seen any."""
+    journal = Journal(path, "boot", sizes=Sizes(piece=2000, kept=5000))
+    for _ in range(60):
+        journal.append("tester", "more").result(WAIT_S)
+    journal.close()
+    found = judge(path, [seen])
+    assert (found.verdict, found.text) == (
+        Verdict.UNPROVEN,
+        "what others have seen of it ends with entry 3, which is removed",
+    )
