@@ -60,6 +60,11 @@ class StopProgress:
     proofs: dict[str, Proof] = field(default_factory=dict)  # drive → what its state channel has shown
     _entry: int = 0  # of the journal: the newest that was read
 
+    @property
+    def stage(self) -> tuple[StopState, bool]:
+        """How far it has gone, and whether one is held."""
+        return self.state, self.held
+
     def sent(self) -> int:
         """Note that a STOP has gone out, and return its number."""
         self.number += 1
