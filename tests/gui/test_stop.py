@@ -15,7 +15,7 @@ from server_gui.views.main_window import MainWindow
 from server_gui.views.stop_keys import StopKeys
 from server_gui.views.theme import Theme
 from tests.gui.fakes import Bench, destroy, stop_is_whole
-from tests.support.desk import JOINTS, described
+from tests.support.desk import JOINTS, described, looked, walking
 
 ALL = Stopped(dict.fromkeys(JOINTS, "confirmed"), held=True)
 
@@ -179,3 +179,14 @@ def test_a_very_long_name_makes_no_card_wider_and_hides_no_stop(window: MainWind
         assert all(area.contains(card.stop.mapTo(window.robots, corner)) for corner in corners)
         assert card.stop.text().startswith("STOP")
         assert card.stop.width() >= card.stop.fontMetrics().horizontalAdvance(card.stop.text())
+
+
+def test_header_and_overview_say_the_same_of_a_stop_at_once(window: MainWindow, bench: Bench) -> None:
+    bench.look_again([walking(10), looked()])
+    bench.draw(window)
+    said = [window.header._chips["status"].main_text, window.overview.now.activity.main.text()]
+    bench.station.stopping.held = True
+    window.refresh()
+    after = [window.header._chips["status"].main_text, window.overview.now.activity.main.text()]
+    assert all(one != other for one, other in zip(said, after, strict=True))
+    assert len(set(after)) == 1
