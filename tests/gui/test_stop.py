@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QApplication, QPushButton
 
 from gateway.client import LinkLost, NotConnected
 from gateway.wire.stop import Reset, Stopped
-from server_gui.core.tuning.stop import StopState
+from server_gui.core.tuning.stop import StopProgress, StopState
 from server_gui.views.header import Header
 from server_gui.views.main_window import MainWindow
 from server_gui.views.stop_keys import StopKeys
@@ -190,3 +190,18 @@ def test_header_and_overview_say_the_same_of_a_stop_at_once(window: MainWindow, 
     after = [window.header._chips["status"].main_text, window.overview.now.activity.main.text()]
     assert all(one != other for one, other in zip(said, after, strict=True))
     assert len(set(after)) == 1
+
+
+def test_a_reset_from_before_ends_no_stop_that_is_not_confirmed() -> None:
+    stopping = StopProgress()
+    stopping.failed(stopping.sent(), "no link")
+    stopping.described(held=False, reason=None)
+    stopping.read([{"n": 1, "what": "stop"}, {"n": 2, "what": "reset", "held": False}])
+    assert (stopping.state, stopping.held) == (StopState.NOT_CONFIRMED, False)
+
+
+def test_a_held_stop_that_was_not_confirmed_is_ended_by_whoever_resets_it() -> None:
+    stopping = StopProgress()
+    stopping.answered(stopping.sent(), Stopped({"left_knee": "timeout"}, held=True))
+    stopping.read([{"n": 1, "what": "reset", "held": False}])
+    assert (stopping.state, stopping.held) == (StopState.IDLE, False)

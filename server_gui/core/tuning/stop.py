@@ -109,7 +109,11 @@ class StopProgress:
         self.held, self.reason = held, (reason or "") if held else ""
 
     def read(self, entries: Iterable[Mapping[str, Any]]) -> None:
-        """Take the newest entries of the robot's journal, oldest first: others stop and reset it too."""
+        """Take the newest entries of the robot's journal, oldest first: others stop and reset it too.
+
+        They may be older than a STOP that was not confirmed: what they hold and reset is not that one.
+        """
+        is_open = self.state is StopState.NOT_CONFIRMED and not self.held
         for entry in entries:
             number, what = entry.get("n"), entry.get("what")
             if not isinstance(number, int) or number <= self._entry:
@@ -119,7 +123,9 @@ class StopProgress:
                 self._holds(entry)
             elif what == "reset":
                 held = bool(entry.get("held"))
-                if self.held and not held and self.state is not StopState.SENT:
+                if is_open and not held:
+                    self.held, self.reason = False, ""
+                elif self.held and not held and self.state is not StopState.SENT:
                     self.was_reset(held=False)
 
     def show(
