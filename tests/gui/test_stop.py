@@ -202,6 +202,6 @@ def test_a_reset_from_before_ends_no_stop_that_is_not_confirmed() -> None:
 
 def test_a_held_stop_that_was_not_confirmed_is_ended_by_whoever_resets_it() -> None:
     stopping = StopProgress()
-    stopping.answered(stopping.sent(), Stopped({"left_knee": "timeout"}, held=True))
+    stopping.answered(stopping.sent(), Stopped({"left_knee": "unreachable"}, held=True))
     stopping.read([{"n": 1, "what": "reset", "held": False}])
     assert (stopping.state, stopping.held) == (StopState.IDLE, False)
