@@ -59,6 +59,8 @@ class AlarmStrip(Choosable):
         self.buttons.clear.clicked.connect(lambda: self.clear(self._first))
         self.buttons.show_signal.clicked.connect(lambda: self.show_signal(self._first))
         self.buttons.acknowledge.clicked.connect(lambda: self.acknowledge(self._first))
+        again = Qt.ConnectionType.QueuedConnection  # buttons that come beside it take room from the words
+        self._words.resized.connect(lambda: self._say(self.told[0] if self.told else None), again)
         theme.changed.connect(self._restyle)
         self._restyle()
 
@@ -201,6 +203,12 @@ class AlarmStrip(Choosable):
 
 class _Words(QScrollArea):
     """What has no room is scrolled, and changes the size of nothing around."""
+
+    resized = Signal()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self.resized.emit()
 
     def hold(self, *labels: QWidget) -> None:
         """Show these below each other."""
