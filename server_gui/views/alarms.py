@@ -60,7 +60,7 @@ class AlarmStrip(Choosable):
         self.buttons.show_signal.clicked.connect(lambda: self.show_signal(self._first))
         self.buttons.acknowledge.clicked.connect(lambda: self.acknowledge(self._first))
         again = Qt.ConnectionType.QueuedConnection  # buttons that come beside it take room from the words
-        self._words.resized.connect(lambda: self._say(self.told[0] if self.told else None), again)
+        self._words.resized.connect(self._say_again, again)
         theme.changed.connect(self._restyle)
         self._restyle()
 
@@ -140,6 +140,9 @@ class AlarmStrip(Choosable):
                 told[1].since_s,
             ),
         )
+
+    def _say_again(self) -> None:
+        self._say(self.told[0] if self.told else None)
 
     def _say(self, first: Told | None) -> None:
         """As much of it as has room, the cause before all; laid out only when it says something else."""
