@@ -59,6 +59,8 @@ class AlarmStrip(Choosable):
         self.buttons.clear.clicked.connect(lambda: self.clear(self._first))
         self.buttons.show_signal.clicked.connect(lambda: self.show_signal(self._first))
         self.buttons.acknowledge.clicked.connect(lambda: self.acknowledge(self._first))
+        again = Qt.ConnectionType.QueuedConnection  # buttons that come beside it take room from the words
+        self._words.resized.connect(self._say_again, again)
         theme.changed.connect(self._restyle)
         self._restyle()
 
@@ -139,6 +141,9 @@ class AlarmStrip(Choosable):
             ),
         )
 
+    def _say_again(self) -> None:
+        self._say(self.told[0] if self.told else None)
+
     def _say(self, first: Told | None) -> None:
         """As much of it as has room, the cause before all; laid out only when it says something else."""
         if first is None:
@@ -201,6 +206,12 @@ class AlarmStrip(Choosable):
 
 class _Words(QScrollArea):
     """What has no room is scrolled, and changes the size of nothing around."""
+
+    resized = Signal()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self.resized.emit()
 
     def hold(self, *labels: QWidget) -> None:
         """Show these below each other."""

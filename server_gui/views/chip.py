@@ -55,6 +55,10 @@ class Chip(QFrame):
         return self._main.text()
 
     @property
+    def detail_text(self) -> str:
+        return self._detail.text()
+
+    @property
     def needs(self) -> int:
         """How wide it is with all of its first line, and what is short of the second."""
         bold, plain = QFontMetrics(self._theme.text_font(bold=True)), QFontMetrics(self._theme.text_font())

@@ -192,11 +192,12 @@ def _status(station: Station) -> Words:
     if line is not None:
         parts = ("predicted", line.short) if line.detail.startswith("predicted") else (line.detail,)
         return Words(line.mark, line.text, tuple(filter(None, parts)), f"{line.text}\n{line.detail}")
-    gait, why = station.processing.derived().gait, f"by steps; not predicted: {station.predictions.problem}"
+    gait, problem = station.processing.derived().gait, station.predictions.problem
+    parts = ("by steps", f"not predicted: {problem}" if problem else "not predicted")
     if not gait.walking:
-        return Words(Mark("ring", "dim"), "Not walking", (why,))
+        return Words(Mark("ring", "dim"), "Not walking", parts)
     cadence = "–" if gait.cadence_spm is None else f"{gait.cadence_spm:.0f}"
-    return Words(Mark("diamond", "accent"), f"Walking  {cadence} steps/min", (why,))
+    return Words(Mark("diamond", "accent"), f"Walking  {cadence} steps/min", parts)
 
 
 def _link(station: Station) -> Words:

@@ -96,7 +96,7 @@ class MainWindow(QMainWindow):
         self.kept = settings
         desk.pins.take(settings.value("pinned"))
         self._frame = 0
-        self._named: Station | None = None  # the robot of header and panels
+        self._known: tuple[object, ...] | None = None  # of the robot of header and panels, when last read
         self._is_arranged = False  # the panels, which may wait for the window to be shown
         self.setWindowTitle("GWRMS")
         self.resize(USUAL.boundedTo(self.screen().availableSize()))
@@ -167,12 +167,14 @@ class MainWindow(QMainWindow):
         """Draw a frame: what moves each time, what is read now and then, and only what is visible."""
         self._frame += 1
         self._bar.frame()
+        due = self._is_due()
+        if due:
+            self.overview.read_now()  # what header and overview say is of the same moment
         shown = self._desk.selected is not None or self.tabs.currentIndex() >= self._live
         if shown:
             self._views[self.tabs.currentIndex()].refresh()
-        selected, self._named = self._named, self._desk.selected
-        if self._frame % SLOW and selected is self._named:
-            return  # STOP names at once whom it stops
+        if not due:
+            return
         self._pages.setCurrentIndex(1 if shown else 0)
         self.header.refresh()
         self.alarms.refresh()
@@ -184,6 +186,13 @@ class MainWindow(QMainWindow):
         self.trial.refresh(shown=not any(_is_seen(one) for one in elsewhere))
         self.events.refresh()
         self._bar.refresh()
+
+    def _is_due(self) -> bool:
+        """Whether what is read now and then is: at once where another robot is named, or a STOP goes on."""
+        station = self._desk.selected
+        known = None if station is None else (station, station.is_live, *station.stopping.stage)
+        before, self._known = self._known, known
+        return self._frame % SLOW == 0 or known != before
 
     def show_signals(self, globs: Sequence[str]) -> None:
         """Begin with these channels in sight."""

@@ -40,11 +40,9 @@ class Measuring(Card):
         self.table.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.table.setShowGrid(False)
         self.table.verticalHeader().hide()
-        for column in range(1, len(TITLES)):
-            self.table.horizontalHeader().setSectionResizeMode(
-                column, QHeaderView.ResizeMode.ResizeToContents
-            )
-        self.table.horizontalHeader().setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
+        header = self.table.horizontalHeader()
+        header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)  # names whole, else scrolled
+        header.setStretchLastSection(True)
         self.body.addWidget(self.table)
         self.hide()
 
@@ -86,9 +84,9 @@ class Measuring(Card):
     def _fit(self, rows: int) -> None:
         height = self._theme.px(20)
         self.table.verticalHeader().setDefaultSectionSize(height)
-        self.table.setFixedHeight(
-            self.table.horizontalHeader().sizeHint().height() + min(rows, ROWS) * height + 4
-        )
+        header = self.table.horizontalHeader().sizeHint().height()
+        bar = self.table.horizontalScrollBar().sizeHint().height()
+        self.table.setFixedHeight(header + min(rows, ROWS) * height + bar)
 
     def _set(self, row: int, column: int, text: str) -> None:
         item = self.table.item(row, column)

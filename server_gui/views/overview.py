@@ -111,6 +111,10 @@ class Overview(QWidget):
             is_plots = (row - 1) * columns >= 3
             grid.setRowStretch(row, 0 if row in (0, rows) or row > rows else 6 if is_plots else 10)
 
+    def read_now(self) -> None:
+        """Let the next frame show also what is read: what stands beside it is shown anew then."""
+        self._read_s = 0.0
+
     def refresh(self) -> None:
         """Draw how it is now; what is read rather than seen changes more slowly."""
         station = self._desk.selected

@@ -75,7 +75,7 @@ class StatusBar(QStatusBar):
         set_tip(self._window, "frames that this window draws a second")
 
     def _refresh_recording(self, station: Station | None) -> None:
-        address, is_live = (None, True) if station is None else (station.address, station.is_live)
+        address, is_live = (None, False) if station is None else (station.address, station.is_live)
         said = self._desk.recording.said(address, is_live=is_live)
         self._icon.show_mark(TONES[said.tone])
         first = said.detail.partition("\n")[0]

@@ -380,3 +380,17 @@ def test_alarms_of_two_robots_are_named(window: MainWindow, bench: Bench) -> Non
     other.take([LinkChanged(ConnectionState.WAITING, "gone", time.monotonic_ns())])
     bench.draw(window)
     assert [text.partition(" · ")[0] for text in window.alarms.texts] == ["exo-01", "exo-02"]
+
+
+@pytest.mark.parametrize("width", [1200, 1480])
+def test_words_have_room_beside_the_buttons_that_come_with_them(
+    window: MainWindow, bench: Bench, width: int
+) -> None:
+    window.resize(width, 900)
+    bench.look_again([walking(10), looked()])
+    bench.draw(window)
+    bench.station.stopping.held = True
+    window.refresh()
+    QApplication.processEvents()
+    assert window.alarms.told
+    assert not window.alarms._words.verticalScrollBar().isVisible()

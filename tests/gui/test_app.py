@@ -78,8 +78,10 @@ def test_a_refused_write_leaves_the_robot_as_it_is(app: App, robot: FakeRobot) -
 
 
 def test_processes_are_asked_for_only_while_they_are_looked_at(app: App, robot: FakeRobot) -> None:
+    """But for the one that uses most, which costs a hundredth of the table's bytes."""
+    wait(lambda: bool(robot.called("resource.snapshot")), "looked at the computer")
     asked = [params for params in robot.called("resource.snapshot") if params.get("processes", True)]
-    assert asked == []
+    assert [params for params in asked if params.get("limit") != 1 or params["include"]] == []
     app.window.tabs.setCurrentIndex(2)
     wait(lambda: app.window.resources.table.processes.rowCount() == 12, "showed the processes")
 

@@ -183,6 +183,15 @@ def test_two_cursors_tell_values_and_their_difference(signals: Signals) -> None:
     assert cell(signals.measuring, 1, "B − A") == "0"
 
 
+def test_names_are_whole_in_a_small_window(signals: Signals) -> None:
+    signals.resize(480, 500)
+    signals.cursors.click()
+    title(signals)
+    QApplication.processEvents()
+    table, name = signals.measuring.table, cell(signals.measuring, 0, "Channel")
+    assert table.columnWidth(0) >= table.fontMetrics().horizontalAdvance(name)
+
+
 def test_statistics_are_of_what_is_in_sight(signals: Signals) -> None:
     signals.cursors.click()
     signals.plots[0].plot.show_window(-2.0, -1.0)

@@ -138,6 +138,12 @@ def test_a_recording_is_not_all_well_once_the_link_is_old() -> None:
     assert (said.tone, said.text[:26]) == (Tone.WARNING, "Recording · nothing comes ")
 
 
+def test_a_window_without_a_robot_is_not_said_to_record() -> None:
+    recording, _ = looked(FakeKeeper(report()))  # the report is of a moment ago, when there was one
+    said = recording.said(None, is_live=False)
+    assert (said.tone, said.text) == (Tone.OFF, "No robot to record")
+
+
 def test_rows_come_before_there_is_a_rate_of_them() -> None:
     recording, _ = looked(FakeKeeper(report(rows_per_s=0.0)))
     said = recording.said(ADDRESS)

@@ -9,13 +9,13 @@ from PySide6.QtWidgets import QApplication, QPushButton
 
 from gateway.client import LinkLost, NotConnected
 from gateway.wire.stop import Reset, Stopped
-from server_gui.core.tuning.stop import StopState
+from server_gui.core.tuning.stop import StopProgress, StopState
 from server_gui.views.header import Header
 from server_gui.views.main_window import MainWindow
 from server_gui.views.stop_keys import StopKeys
 from server_gui.views.theme import Theme
 from tests.gui.fakes import Bench, destroy, stop_is_whole
-from tests.support.desk import JOINTS, described
+from tests.support.desk import JOINTS, described, looked, walking
 
 ALL = Stopped(dict.fromkeys(JOINTS, "confirmed"), held=True)
 
@@ -179,3 +179,29 @@ def test_a_very_long_name_makes_no_card_wider_and_hides_no_stop(window: MainWind
         assert all(area.contains(card.stop.mapTo(window.robots, corner)) for corner in corners)
         assert card.stop.text().startswith("STOP")
         assert card.stop.width() >= card.stop.fontMetrics().horizontalAdvance(card.stop.text())
+
+
+def test_header_and_overview_say_the_same_of_a_stop_at_once(window: MainWindow, bench: Bench) -> None:
+    bench.look_again([walking(10), looked()])
+    bench.draw(window)
+    said = [window.header._chips["status"].main_text, window.overview.now.activity.main.text()]
+    bench.station.stopping.held = True
+    window.refresh()
+    after = [window.header._chips["status"].main_text, window.overview.now.activity.main.text()]
+    assert all(one != other for one, other in zip(said, after, strict=True))
+    assert len(set(after)) == 1
+
+
+def test_a_reset_from_before_ends_no_stop_that_is_not_confirmed() -> None:
+    stopping = StopProgress()
+    stopping.failed(stopping.sent(), "no link")
+    stopping.described(held=False, reason=None)
+    stopping.read([{"n": 1, "what": "stop"}, {"n": 2, "what": "reset", "held": False}])
+    assert (stopping.state, stopping.held) == (StopState.NOT_CONFIRMED, False)
+
+
+def test_a_held_stop_that_was_not_confirmed_is_ended_by_whoever_resets_it() -> None:
+    stopping = StopProgress()
+    stopping.answered(stopping.sent(), Stopped({"left_knee": "unreachable"}, held=True))
+    stopping.read([{"n": 1, "what": "reset", "held": False}])
+    assert (stopping.state, stopping.held) == (StopState.IDLE, False)

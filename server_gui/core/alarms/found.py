@@ -22,6 +22,7 @@ SOON_NS: Final = 3_000_000_000  # for so long a link without a row is nothing st
 _IN_FAULT: Final = ("fault", "fault reaction active")
 _CODE: Final = re.compile(r"0x([0-9A-Fa-f]{4})\b")
 _PREFIX: Final = re.compile(r"^(the drive is in fault: |it reports )")
+_ADVICE: Final = re.compile(r": (?=(?:check|plug) )")  # with which what the robot says of a part may end
 # What shows it best, by the code's beginning; else the position.
 _SHOWN_BY: Final = (
     ("2", ("current", "torque")),
@@ -233,14 +234,15 @@ def _of_part(robot: Robot, part: Part, stopping: StopProgress) -> Iterator[Alarm
         yield Alarm(Kind.UNKNOWN, part.name, what, where, check=check_of(Kind.UNKNOWN), is_now=is_now)
         return
     did = _did(robot, stopping) if part.kind == "joint" else ""
+    what, *advice = _ADVICE.split(problem, maxsplit=1)
     since_s = None if part.age_ms is None or not is_now else time.time() - part.age_ms / 1000
     yield Alarm(
         kind,
         part.name,
-        problem or "it does not say why",
+        what or "it does not say why",
         where,
         did,
-        check_of(kind, part.kind),
+        advice[0] if advice else check_of(kind, part.kind),  # who says what is wrong knows best
         since_s if kind is not Kind.IMPLAUSIBLE else None,
         channel,
         is_now=is_now,

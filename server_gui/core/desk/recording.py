@@ -23,6 +23,7 @@ WHO: Final = "recording"  # what the news name instead of a robot
 STOPPED: Final = frozenset({AlarmKind.DISK_FULL, AlarmKind.SPOOL_FAILED})
 NEEDED: Final = frozenset({"network", "recorder"})  # threads without which nothing is recorded
 NOTHING: Final = "nothing comes"
+NO_ROBOT: Final = "No robot to record"
 COMES_S: Final = 3.0  # since the newest row: then nothing comes any more
 DAMAGED: Final = "gwrms cloud verify says what is missing, gwrms cloud mend brings it again"
 UNKNOWN_NS: Final = 2_000_000_000  # without an answer: nobody knows then
@@ -224,7 +225,7 @@ class Recording:
             yield Alarm(Kind.UPLOAD, text, text, "what is kept", check=DAMAGED)
 
     def said(self, address: str | None, *, is_live: bool = True) -> Said:
-        """Return how it goes, for who looks at the robot with this address.
+        """Return how it goes, for who looks at the robot with this address, or at none.
 
         A report is a second old; whether this window's own link `is_live` is known at once.
         """
@@ -252,6 +253,8 @@ class Recording:
         return self._going_on(report, address, comes=is_live or self.by is not By.WINDOW)
 
     def _going_on(self, report: CollectorReport, address: str | None, *, comes: bool) -> Said:
+        if address is None and not comes:
+            return Said(Tone.OFF, NO_ROBOT, f"spool {report.spool}")
         who = "" if self.by is By.WINDOW else f" by process {report.pid}"
         rows = sum(link.rows_per_s for link in report.robots.values())
         problems = [trouble.text for threads in self._threads.values() for trouble in threads]

@@ -60,6 +60,11 @@ class StopProgress:
     proofs: dict[str, Proof] = field(default_factory=dict)  # drive → what its state channel has shown
     _entry: int = 0  # of the journal: the newest that was read
 
+    @property
+    def stage(self) -> tuple[StopState, bool]:
+        """How far it has gone, and whether one is held."""
+        return self.state, self.held
+
     def sent(self) -> int:
         """Note that a STOP has gone out, and return its number."""
         self.number += 1
@@ -104,7 +109,11 @@ class StopProgress:
         self.held, self.reason = held, (reason or "") if held else ""
 
     def read(self, entries: Iterable[Mapping[str, Any]]) -> None:
-        """Take the newest entries of the robot's journal, oldest first: others stop and reset it too."""
+        """Take the newest entries of the robot's journal, oldest first: others stop and reset it too.
+
+        They may be older than a STOP that was not confirmed: what they hold and reset is not that one.
+        """
+        is_open = self.state is StopState.NOT_CONFIRMED and not self.held
         for entry in entries:
             number, what = entry.get("n"), entry.get("what")
             if not isinstance(number, int) or number <= self._entry:
@@ -114,7 +123,9 @@ class StopProgress:
                 self._holds(entry)
             elif what == "reset":
                 held = bool(entry.get("held"))
-                if self.held and not held and self.state is not StopState.SENT:
+                if is_open and not held:
+                    self.held, self.reason = False, ""
+                elif self.held and not held and self.state is not StopState.SENT:
                     self.was_reset(held=False)
 
     def show(

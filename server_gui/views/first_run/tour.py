@@ -27,8 +27,8 @@ class Stop:
 STOPS: Final = (
     Stop(
         "one look",
-        "robot, drives, status, link and warnings stand at the top, whatever tab is open. What is not known "
-        "now is grey.",
+        "robot, drives, status, link and recording stand at the top, alarms below, whatever tab is open. "
+        "What is not known now is grey.",
         lambda window: window.header,
     ),
     Stop(

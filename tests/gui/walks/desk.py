@@ -11,11 +11,13 @@ from typing import Final
 from tests.gui.walks.hand import Hand
 from tests.gui.walks.robot import AGAIN_S
 from tests.gui.walks.walk import Bench
+from tests.support.waiting import until
 from tests.unit.training.walkers import day, put
 
 NEW_STEP: Final = "430"
 SHORTEST_S: Final = "5"
 WEARERS: Final = 4
+TAKE_BACK: Final = ("Take back", "Take it back now")  # on the overview, and where that is not in sight
 EATER: Final = "gait_planner"
 
 
@@ -32,8 +34,9 @@ def tuning(bench: Bench) -> None:
     hand.insist("Try it for", lambda: hand.reads("On trial"))
     hand.key("F9")
     hand.sees("taken back in")
+    ends = until(lambda: next(filter(hand.can_see, TAKE_BACK), None), "could be taken back")
     hand.keep("trial")
-    hand.click("Take back" if hand.can_see("Take back") else "Take it back now")
+    hand.click(ends)
     hand.misses("On trial")
     hand.key("F9")
     hand.reveal("Filter: name, 0x6072", "Parameters")

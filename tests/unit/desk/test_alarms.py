@@ -72,6 +72,13 @@ def test_a_fault_says_its_cause_first_where_it_is_what_was_done_and_what_to_chec
     assert bench.station.mark == one.alarm.mark == TEXTS[Kind.FAULT].mark
 
 
+def test_what_the_robot_advises_is_said_once_in_place_of_what_is_usual(bench: Bench) -> None:
+    bench.station.take([looked(state="lost", problem="no heartbeat for 3 s: check the cable")])
+    alarm = bench.station.alarms.active[0].alarm
+    assert alarm.line.endswith("no heartbeat for 3 s")
+    assert alarm.check == "check the cable"
+
+
 def test_a_drive_that_tells_its_code_alone_is_put_into_words(bench: Bench) -> None:
     now_ns = time.monotonic_ns()
     columns: dict[str, list[float | None]] = {"left_knee.state": [7.0], "left_knee.error_code": [0x8611]}
