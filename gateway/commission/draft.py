@@ -1,7 +1,7 @@
 """What has been found out until now, and how: kept beside the file it becomes, after every finding."""
 
 import fcntl
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,14 @@ from gateway.records import durable
 
 SUFFIX = ".commission"
 LOCK = ".commission.lock"
+KINDS: Mapping[str, Any] = {  # what is reckoned with
+    "name": str,
+    "joints": list[str],
+    "node_id": int,
+    "axis": int,
+    "direction": int,
+    **dict.fromkeys(("counts_per_revolution", "gear_ratio", "zero_offset", "min", "max"), float),
+}
 
 
 class Found(msgspec.Struct, frozen=True):
@@ -62,6 +70,8 @@ class Draft:
         if self.path.exists():
             try:
                 self.tables = msgspec.json.decode(self.path.read_bytes(), type=dict[str, dict[str, Found]])
+                for key, found in (pair for keys in self.tables.values() for pair in keys.items()):
+                    msgspec.convert(found.value, KINDS.get(key, Any))
             except (OSError, msgspec.DecodeError) as error:
                 raise SettingsError(
                     f"{self.path}: cannot be gone on with: {error}; remove it to begin anew"

@@ -211,3 +211,13 @@ def test_a_comment_stays_one_line_and_beside_a_value_only_where_it_fits(draft: D
         "# as it was plugged in"
     )
     assert 'role = "observer"' in lines
+
+
+@pytest.mark.parametrize(
+    "left",
+    [b"", b"{", b"\xff\xfe", b"[]", b'{"robot": 7}', b'{"robot": {"joints": {"value": "left_knee"}}}'],
+)
+def test_a_damaged_draft_is_named_and_not_gone_on_with(tmp_path: Path, left: bytes) -> None:
+    (tmp_path / "exo-01.toml.commission").write_bytes(left)
+    with pytest.raises(SettingsError, match=r"exo-01\.toml\.commission: cannot be gone on with"):
+        Draft(tmp_path / "exo-01.toml")
