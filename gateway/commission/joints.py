@@ -5,6 +5,8 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
+import eds
+from eds.profile import profile_of
 from gateway.commission import scale as scales
 from gateway.commission.axes import Axis, answered, counts, number, powered
 from gateway.commission.bench import Bench
@@ -252,21 +254,23 @@ def _end(bench: Bench, joint: str, axis: Axis, end: str) -> Talk[int]:
         yield Say("Its position could not be read: once more.")
 
 
-RATINGS: tuple[tuple[str, int, str, str, Callable[[int, float], float]], ...] = (
-    ("rated_current", 0x6075, "A", "current", lambda raw, _gear: raw / 1000),
-    ("rated_torque", 0x6076, "N·m", "torque at the joint", lambda raw, gear: raw / 1000 * gear),
+RATINGS: tuple[tuple[str, int, str, str, Callable[[int, float, float], float]], ...] = (
+    ("rated_current", 0x6075, "A", "current", lambda raw, _gear, _nm: raw / 1000),
+    ("rated_torque", 0x6076, "N·m", "torque at the joint", lambda raw, gear, nm: raw * nm * gear),
 )
 
 
 def ratings(draft: Draft, bench: Bench, joint: str, axis: Axis, gear: float) -> Talk[None]:
     """What the drive knows is shown; what it does not know is asked for, and may stay unknown."""
+    torque_nm = _rated_torque_nm(draft, axis.node)
     for key, index, unit, what, si in RATINGS:
         if draft.has(table(joint), key) or draft.has(f"told.{joint}", key):
             continue
         raw = yield from answered(partial(number, bench, axis, index))
         if raw:
-            yield Say(f"{words(joint)}: rated {what} {si(raw, gear):g} {unit} ({index:04X}h).")
-            draft.put(f"told.{joint}", key, si(raw, gear), f"{index:04X}h")
+            rated = si(raw, gear, torque_nm)
+            yield Say(f"{words(joint)}: rated {what} {rated:g} {unit} ({index:04X}h).")
+            draft.put(f"told.{joint}", key, rated, f"{index:04X}h")
             continue
         value = yield from ask_number(
             f"The drive does not know its rated {what} ({index:04X}h). What is it? 0: not known",
@@ -279,3 +283,10 @@ def ratings(draft: Draft, bench: Bench, joint: str, axis: Axis, gear: float) -> 
             draft.put(table(joint), key, value, f"{unit}; typed, {index:04X}h does not say it")
         else:
             draft.put(f"told.{joint}", key, None, "not known")
+
+
+def _rated_torque_nm(draft: Draft, node: int) -> float:
+    """Of one count of 6076h: 1 mN·m (CiA 402-2), where the device's profile knows no other."""
+    file = draft.value(f"node.{node}", "eds")
+    profile = None if file is None else profile_of(eds.load(eds.locate(file, draft.file), node))
+    return 0.001 if profile is None else profile.rated_torque_nm

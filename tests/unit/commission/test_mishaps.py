@@ -8,6 +8,7 @@ import pytest
 
 from drivers.errors import SettingsError
 from drivers.scan.products import Library
+from eds.profile import profiles
 from eds.shipped import SHIPPED
 from gateway.cli.commission import main
 from gateway.commission import joints, nodes
@@ -221,3 +222,15 @@ def test_a_damaged_draft_is_named_and_not_gone_on_with(tmp_path: Path, left: byt
     (tmp_path / "exo-01.toml.commission").write_bytes(left)
     with pytest.raises(SettingsError, match=r"exo-01\.toml\.commission: cannot be gone on with"):
         Draft(tmp_path / "exo-01.toml")
+
+
+def test_the_rated_torque_that_is_shown_is_in_the_unit_of_its_maker(
+    draft: Draft, bench: FakeBench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    maxon = next(one for one in profiles() if one.name == "maxon EPOS4")
+    monkeypatch.setattr(joints, "profile_of", lambda _description: maxon)
+    draft.put("node.7", "eds", "joint_drive.eds")
+    bench.drives[7].objects[0x6076, 0] = 400_000  # µN·m
+    hands = Hands()
+    run(joints.ratings(draft, bench, "left_knee", KNEE, 100.0), hands)
+    assert hands.heard("rated torque at the joint 40 N·m")
