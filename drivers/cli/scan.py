@@ -4,6 +4,7 @@ import argparse
 import sys
 import threading
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from drivers.scan.asking import Told
 from drivers.scan.products import Library, files
 from drivers.scan.report import as_json, as_text
 from drivers.scan.scan import scan
+from eds.table import BUS
 
 MORE = """\
 examples:
@@ -72,7 +74,8 @@ def main(arguments: Sequence[str]) -> int:
     for problem in library.unreadable.values():
         sys.stderr.write(f"gwrms scan: {problem}\n")
     for name, settings in named(options.buses, options.bitrate):
-        failed |= not _told(name, lambda settings=settings: _scan_bus(settings, options, library))
+        bus = BUS if name in options.buses else name
+        failed |= not _told(name, partial(_scan_bus, bus, settings, options, library))
     for port in options.serial:
         failed |= not _told(port, lambda port=port: _scan_port(port, options))
     return int(failed)
@@ -87,15 +90,15 @@ def _told(name: str, act: Any) -> bool:
     return True
 
 
-def _scan_bus(settings: CanSettings, options: argparse.Namespace, library: Library) -> None:
+def _scan_bus(bus: str, settings: CanSettings, options: argparse.Namespace, library: Library) -> None:
     found = scan(settings, options.seconds, threading.Event().wait, active=options.active)
     proposals = {
         node: library.proposals(node, told) for node, told in found.told.items() if isinstance(told, Told)
     }
     if options.json:
-        line = msgspec.json.encode(as_json(settings, found, proposals)).decode()
+        line = msgspec.json.encode(as_json(settings, found, proposals, bus)).decode()
     else:
-        line = "\n".join(as_text(settings, found, proposals, active=options.active)) + "\n"
+        line = "\n".join(as_text(settings, found, proposals, bus, active=options.active)) + "\n"
     sys.stdout.write(line + "\n")
     sys.stdout.flush()
 

@@ -1,6 +1,6 @@
 """Reading what unknown nodes are: first all 127 ids at once, then each that answers (CiA 301, CiA 402)."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
 from drivers.bus.bus import CanBus
@@ -18,6 +18,7 @@ GAP_S = 0.002  # between two questions of the sweep: it takes less than a tenth 
 TIMEOUT_S = 0.3
 MAX_AXES = 8
 _DRIVE = 402
+_RATIOS = (0x608F, 0x6091)  # CiA 402-2: encoder counts, and gear, a revolution
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +46,7 @@ class Told:
     heartbeat_ms: int | None
     axes: tuple[Axis, ...]
     tpdos: tuple[Tpdo, ...]
+    ratios: tuple[tuple[int, int, int], ...] = ()  # index, sub-index, value of 608Fh and 6091h
     problem: str | None = None  # why the rest could not be read
 
 
@@ -101,6 +103,7 @@ class _Reader:
 
     def told(self) -> Told:
         device_type = unsigned(self._channel.upload(0x1000, 0))
+        axes = self._axes() if device_type & 0xFFFF == _DRIVE else ()
         return Told(
             device_type=device_type,
             error_register=self._number(0x1001, 0),
@@ -112,8 +115,9 @@ class _Reader:
             revision=self._number(0x1018, 3),
             serial_number=self._number(0x1018, 4),
             heartbeat_ms=self._number(0x1017, 0),
-            axes=self._axes() if device_type & 0xFFFF == _DRIVE else (),
+            axes=axes,
             tpdos=self._tpdos(),
+            ratios=tuple(self._ratios(axes)),
             problem=self._problem,
         )
 
@@ -146,6 +150,14 @@ class _Reader:
             motor_type, modes = self._number(0x6402 + offset, 0), self._number(0x6502 + offset, 0)
             axes.append(Axis(number, motor_type, modes))
         return tuple(axes)
+
+    def _ratios(self, axes: Iterable[Axis]) -> Iterator[tuple[int, int, int]]:
+        for axis in axes:
+            for index in _RATIOS:
+                for subindex in (1, 2):
+                    place = index + axis.number * AXIS_OFFSET
+                    if (value := self._number(place, subindex)) is not None:
+                        yield place, subindex, value
 
     def _tpdos(self) -> tuple[Tpdo, ...]:
         tpdos: list[Tpdo] = []

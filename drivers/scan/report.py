@@ -10,6 +10,8 @@ from drivers.joint.cia402 import MODES
 from drivers.scan.asking import Axis, Told
 from drivers.scan.products import Proposal
 from drivers.scan.scan import Found
+from eds.profile import profile_of
+from eds.table import BUS, joint_table
 
 _TYPES = {  # CiA 301 §7.5.2.1: the device profile, in the low half of 1000h
     0x0191: "inputs and outputs (CiA 401)",
@@ -25,9 +27,9 @@ _ERRORS = ("generic", "current", "voltage", "temperature", "communication", "pro
 
 
 def as_json(
-    settings: CanSettings, found: Found, proposals: Mapping[int, Sequence[Proposal]]
+    settings: CanSettings, found: Found, proposals: Mapping[int, Sequence[Proposal]], bus: str = BUS
 ) -> dict[str, Any]:
-    """For machines: everything that was found."""
+    """For machines: everything that was found. `bus` is what a robot's file calls this one."""
     traffic = found.traffic
     return {
         "bus": {"interface": settings.interface, "channel": settings.channel, "bitrate": settings.bitrate},
@@ -38,12 +40,13 @@ def as_json(
         "problem": found.trouble,
         "master": list(traffic.master()),
         "other_ids": list(traffic.others()),
-        "nodes": [_node_json(node, found, proposals.get(node, ())) for node in found.nodes],
+        "nodes": [_node_json(node, found, proposals.get(node, ()), bus) for node in found.nodes],
     }
 
 
-def _node_json(node: int, found: Found, proposals: Sequence[Proposal]) -> dict[str, Any]:
+def _node_json(node: int, found: Found, proposals: Sequence[Proposal], bus: str) -> dict[str, Any]:
     traffic, told = found.traffic, found.told.get(node)
+    profile = profile_of(proposals[0].description) if proposals else None
     state = traffic.states.get(node)
     heartbeat = traffic.seen.get(0x700 + node)
     return {
@@ -56,13 +59,28 @@ def _node_json(node: int, found: Found, proposals: Sequence[Proposal]) -> dict[s
         "asked_by_others": node in traffic.asked(),
         "answer": None if told is None else told if isinstance(told, str) else asdict(told),
         "eds": [{"file": str(one.description.path), "differs": list(one.differs)} for one in proposals],
+        "profile": None if profile is None else profile.name,
+        "table": _table(node, told, proposals, bus) if isinstance(told, Told) else None,
     }
 
 
+def _table(node: int, told: Told, proposals: Sequence[Proposal], bus: str) -> str | None:
+    """What to paste into a robot's file, by the EDS that fits best and what the device has said itself."""
+    if not proposals:
+        return None
+    read = {(index, subindex): value for index, subindex, value in told.ratios}
+    return joint_table(proposals[0].description, node, bus, read)
+
+
 def as_text(
-    settings: CanSettings, found: Found, proposals: Mapping[int, Sequence[Proposal]], *, active: bool
+    settings: CanSettings,
+    found: Found,
+    proposals: Mapping[int, Sequence[Proposal]],
+    bus: str = BUS,
+    *,
+    active: bool,
 ) -> Iterator[str]:
-    """For people: the bus in a few lines, then node by node."""
+    """For people: the bus in a few lines, then node by node, then what to paste into a robot's file."""
     traffic = found.traffic
     load = "" if found.load_percent is None else f" · {found.load_percent:.0f} % of its time"
     errors = f"{found.error_frames} error frames" if found.error_frames else "no error frames"
@@ -79,6 +97,9 @@ def as_text(
         )
     for node in found.nodes:
         yield from _node_text(node, found, proposals.get(node, ()))
+    for node, told in sorted(found.told.items()):
+        if isinstance(told, Told) and (table := _table(node, told, proposals.get(node, ()), bus)):
+            yield f"\nfor robot.toml\n\n{table.rstrip()}"
 
 
 def _node_text(node: int, found: Found, proposals: Sequence[Proposal]) -> Iterator[str]:
@@ -140,6 +161,8 @@ def _proposal_text(told: Told, proposals: Sequence[Proposal]) -> Iterator[str]:
         known = told.vendor_id is not None and told.product_code is not None
         why = "take it from its maker, and give its folder with --eds" if known else "it says not who made it"
         yield f"  EDS         none for this vendor and product: {why}"
+    elif profile := profile_of(proposals[0].description):
+        yield f"  profile     {profile.name}"
     for one in proposals:
         yield f"  EDS         {one.description.path}"
         yield from (f"              {text}" for text in one.differs)

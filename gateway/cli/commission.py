@@ -16,10 +16,10 @@ from drivers.scan.products import Library, files
 from gateway.cli.text import say, say_json, warn
 from gateway.commission.bench import CanBench
 from gateway.commission.dialogue import Ask, Talk, agree, run
-from gateway.commission.draft import Draft
+from gateway.commission.draft import Draft, alone
 from gateway.commission.serial_bench import SerialPorts
 from gateway.commission.steps import commission
-from gateway.commission.writing import text
+from gateway.commission.writing import text, unfinished
 from gateway.config.reading import examine
 from gateway.config.robot import RobotConfig
 from gateway.records import durable
@@ -37,6 +37,8 @@ exit status
   0 written, 1 not (interrupted, or something failed), 2 usage
 """
 
+NOT_FINISHED = "is not in it, because it was not finished: the same command goes on there."
+
 
 def main(argv: list[str]) -> int:
     """Run `gwrms commission`."""
@@ -46,11 +48,17 @@ def main(argv: list[str]) -> int:
     if missing:
         parser.error(f"--eds {', '.join(missing)}: there is no such folder")
     name, settings = _the_bus(options.bus, options.bitrate)
-    draft = Draft(options.file)
-    _keep_bus(draft, settings)
+    with alone(options.file):
+        draft = Draft(options.file)
+        return _lead(draft, name, settings, options)
+
+
+def _lead(draft: Draft, name: str, settings: CanSettings, options: argparse.Namespace) -> int:
+    """Through all of it; returns the exit status."""
     face: _JsonFace | _Terminal = _JsonFace() if options.json else _Terminal()
     bench = CanBench(name, settings)
     try:
+        _keep_bus(draft, settings)
         run(_all(draft, bench, options, face), face)
     except EOFError:
         warn(
@@ -61,6 +69,9 @@ def main(argv: list[str]) -> int:
     except KeyboardInterrupt:
         warn("commission", f"interrupted; {draft.path} has what was found, go on with the same command")
         return 130
+    except OSError as error:
+        warn("commission", f"{error}; {draft.path} has what was found until then")
+        return 1
     finally:
         bench.close()
     return 0 if not draft.path.exists() else 1
@@ -104,6 +115,13 @@ def _the_bus(bus: str, bitrate: int | None) -> tuple[str, CanSettings]:
 
 
 def _keep_bus(draft: Draft, settings: CanSettings) -> None:
+    kept = tuple(draft.value("can.main", key) for key in ("interface", "channel"))
+    if draft.has("can.main", "channel") and kept != (settings.interface, settings.channel):
+        raise SettingsError(
+            f"{draft.path} is of the bus {kept[0]}:{kept[1]}, not {settings.interface}:{settings.channel}: "
+            "go on at that one, or remove the file to begin anew"
+        )
+    draft.forget("can.main")
     told = {**msgspec.to_builtins(settings), **settings.more}
     usual = msgspec.to_builtins(CanSettings(interface="", channel=""))
     for key, value in told.items():
@@ -135,7 +153,11 @@ def _write(draft: Draft, made: str, who: str) -> str:
     if found.config is None:
         return f"{draft.file} is written and cannot be used yet:\n{said}"
     journaled = _journal(found.config, draft, who)
-    draft.end()
+    left = unfinished(draft)
+    if left:
+        said += f"  {', '.join(left)} {NOT_FINISHED}\n"
+    else:
+        draft.end()
     return f"{draft.file} is written.\n{said}{journaled}Next: gwrms gateway {draft.file}"
 
 

@@ -111,4 +111,9 @@ def _set(robot: Robot, found: ObjectList, description: Description, arguments: a
 
 def _value(text: str) -> Change:
     """A value and its unit, for a parameter that is not known yet."""
-    return change_of(f"object={text}")
+    try:
+        return change_of(f"object={text}")
+    except argparse.ArgumentTypeError as error:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is no number with or without its unit, as 60 or 3deg"
+        ) from error

@@ -1,13 +1,18 @@
 """The drives that a bus has, axis by axis: read while they stand without power, moved by hand."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 from drivers.bus.values import unsigned
+from drivers.errors import DriverError
 from drivers.joint.cia402 import ENERGISED, DriveState, drive_state
 from drivers.joint.quantities import AXIS_OFFSET
 from drivers.scan.asking import Told
 from gateway.commission.bench import Bench
+from gateway.commission.dialogue import Talk, press
+
+T = TypeVar("T")
 
 STATUSWORD, POSITION = 0x6041, 0x6064
 
@@ -53,3 +58,12 @@ def number(bench: Bench, axis: Axis, index: int, subindex: int = 0) -> int | Non
     """An unsigned object of the axis; `None` where it has none. Raises `DriverError`."""
     data = bench.read(axis.node, axis.index(index), subindex)
     return None if data is None else unsigned(data)
+
+
+def answered(read: Callable[[], T]) -> Talk[T]:
+    """What `read` says; where a drive does not answer it waits for somebody to see to it, and asks again."""
+    while True:
+        try:
+            return read()
+        except DriverError as error:
+            yield from press(f"{error}. See that every drive answers.")

@@ -1,5 +1,8 @@
 """What has been found out until now, and how: kept beside the file it becomes, after every finding."""
 
+import fcntl
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +12,15 @@ from drivers.errors import SettingsError
 from gateway.records import durable
 
 SUFFIX = ".commission"
+LOCK = ".commission.lock"
+KINDS: Mapping[str, Any] = {  # what is reckoned with
+    "name": str,
+    "joints": list[str],
+    "node_id": int,
+    "axis": int,
+    "direction": int,
+    **dict.fromkeys(("counts_per_revolution", "gear_ratio", "zero_offset", "min", "max"), float),
+}
 
 
 class Found(msgspec.Struct, frozen=True):
@@ -16,6 +28,30 @@ class Found(msgspec.Struct, frozen=True):
 
     value: Any
     how: str = ""
+
+
+@contextmanager
+def alone(file: Path) -> Iterator[None]:
+    """Nobody else commissions `file` meanwhile.
+
+    Raises:
+        SettingsError: somebody does, or nothing can be written beside it.
+
+    """
+    path = file.with_name(file.name + LOCK)
+    try:
+        lock = path.open("ab")
+    except OSError as error:
+        raise SettingsError(f"{file} could not be written: {path}: {error.strerror or error}") from error
+    with lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise SettingsError(f"{file}: another gwrms commission is at it; end that first") from error
+        try:
+            yield
+        finally:
+            path.unlink(missing_ok=True)
 
 
 class Draft:
@@ -34,6 +70,8 @@ class Draft:
         if self.path.exists():
             try:
                 self.tables = msgspec.json.decode(self.path.read_bytes(), type=dict[str, dict[str, Found]])
+                for key, found in (pair for keys in self.tables.values() for pair in keys.items()):
+                    msgspec.convert(found.value, KINDS.get(key, Any))
             except (OSError, msgspec.DecodeError) as error:
                 raise SettingsError(
                     f"{self.path}: cannot be gone on with: {error}; remove it to begin anew"
@@ -56,6 +94,15 @@ class Draft:
         kept = self.tables.pop(table, {})
         if keys:
             self.tables[table] = {key: found for key, found in kept.items() if key not in keys}
+
+    def forget_node(self, node: int) -> None:
+        """Ask again for all that was found of a node, and of the joints that it moves."""
+        self.forget(f"node.{node}")
+        for table in [one for one in self.tables if one.startswith("joint.")]:
+            if self.value(table, "node_id") == node:
+                joint = table.removeprefix("joint.")
+                for one in (table, f"told.{joint}", f"guard.rule.{joint}_range"):
+                    self.forget(one)
 
     def end(self) -> None:
         """The file is written: nothing is left to go on with."""

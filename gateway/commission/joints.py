@@ -1,11 +1,14 @@
 """The steps of a joint: which drive it is, what its counts mean, how far it goes, what it is rated for."""
 
 import math
-from collections.abc import Callable, Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 
-from drivers.errors import DriverError
+import eds
+from eds.profile import profile_of
 from gateway.commission import scale as scales
-from gateway.commission.axes import Axis, counts, number, powered
+from gateway.commission.axes import Axis, answered, counts, number, powered
 from gateway.commission.bench import Bench
 from gateway.commission.dialogue import Say, Talk, choose, press, word
 from gateway.commission.dialogue import number as ask_number
@@ -18,6 +21,7 @@ LEAST_MOVE = 50  # counts
 STILL = 3  # tries for a position that is held still
 MARGIN = 3.0  # ° within the ends that were found by hand
 SKIP = "skip"
+_NAME = re.compile("[a-z][a-z0-9_]*")
 
 
 def table(joint: str) -> str:
@@ -47,26 +51,30 @@ def names(draft: Draft, axes: Sequence[Axis]) -> Talk[list[str]]:
 def _names_problem(names: Sequence[str], most: int) -> str | None:
     if len(set(names)) != len(names):
         return "two joints have one name"
-    wrong = [name for name in names if not name.isidentifier() or not name.islower()]
+    wrong = [name for name in names if not _NAME.fullmatch(name)]
     if wrong:
-        return f"{wrong[0]!r} is no name of small letters, digits and _"
+        return f"{wrong[0]!r} is no name of small letters, digits and _, a letter first"
     return f"these are {len(names)} joints, and there are {most} drives" if len(names) > most else None
 
 
 def unpowered(bench: Bench, axes: Sequence[Axis]) -> Talk[None]:
     """Nobody moves a joint by hand whose drive might move it: wait until none has power."""
-    while True:
-        try:
-            live = powered(bench, axes)
-        except DriverError as error:
-            yield from press(f"{error}. Nothing is known of its power: see that every drive answers.")
-            continue
-        if not live:
-            return
+    while live := (yield from answered(lambda: powered(bench, axes))):
         yield from press(
             f"{', '.join(map(str, live))} may be under power. Switch the drives off (controller off, or STO) "
             "before you take hold of a joint; this command never switches anything on or off."
         )
+
+
+def stayed_off(bench: Bench, axes: Sequence[Axis]) -> Talk[bool]:
+    """Whether no drive has got power since `unpowered`: what was read meanwhile may not be by hand alone."""
+    live = yield from answered(lambda: powered(bench, axes))
+    if live:
+        yield Say(
+            f"{', '.join(map(str, live))} may be under power now: let go of the joint. What was read does "
+            "not count."
+        )
+    return not live
 
 
 def which_drive(draft: Draft, bench: Bench, joint: str, axes: Sequence[Axis]) -> Talk[Axis | None]:
@@ -75,7 +83,7 @@ def which_drive(draft: Draft, bench: Bench, joint: str, axes: Sequence[Axis]) ->
         return Axis(draft.value(table(joint), "node_id"), draft.value(table(joint), "axis", 0))
     while True:
         yield from unpowered(bench, axes)
-        before = {axis: counts(bench, axis) for axis in axes}
+        before = yield from answered(lambda: {axis: counts(bench, axis) for axis in axes})
         typed = yield from word(
             f"Bend the {words(joint)} by hand by a good part of its way, keep it there, and press Enter "
             f"(or: {SKIP}).",
@@ -83,20 +91,27 @@ def which_drive(draft: Draft, bench: Bench, joint: str, axes: Sequence[Axis]) ->
         )
         if typed == SKIP:
             return None
-        moved = {
-            axis: abs(now - was)
-            for axis, was in before.items()
-            if was is not None and (now := counts(bench, axis)) is not None
-        }
-        axis, problem = _mover(moved)
+        after = yield from answered(lambda: {axis: counts(bench, axis) for axis in axes})
+        if not (yield from stayed_off(bench, axes)):
+            continue
+        axis, problem = _mover(moved := _moved(before, after))
         if axis is not None:
             others = max((far for one, far in moved.items() if one != axis), default=0)
             how = f"moved by hand: it counted {moved[axis]}, the others {others} or less"
-            draft.put(table(joint), "node_id", axis.node, how)
             draft.put(table(joint), "axis", axis.number)
+            draft.put(table(joint), "node_id", axis.node, how)
             yield Say(f"{words(joint)} is {axis} ({how}).")
             return axis
         yield Say(problem)
+
+
+def _moved(before: Mapping[Axis, int | None], after: Mapping[Axis, int | None]) -> dict[Axis, int]:
+    """How far each has counted that has a position."""
+    return {
+        axis: abs(now - was)
+        for axis, was in before.items()
+        if was is not None and (now := after[axis]) is not None
+    }
 
 
 def _mover(moved: dict[Axis, int]) -> tuple[Axis | None, str]:
@@ -116,7 +131,7 @@ def _mover(moved: dict[Axis, int]) -> tuple[Axis | None, str]:
 def meaning(draft: Draft, bench: Bench, joint: str, axis: Axis) -> Talk[Scale]:
     """What its counts mean, from two angles that somebody knows."""
     if not draft.has(table(joint), "zero_offset"):
-        nominal = _nominal(bench, axis)
+        nominal = yield from answered(lambda: _nominal(bench, axis))
         while True:
             first = yield from _held(bench, joint, axis, "one known angle, such as straight, 0°")
             second = yield from _held(bench, joint, axis, "another known angle, 30° or more away")
@@ -154,7 +169,9 @@ def _held(bench: Bench, joint: str, axis: Axis, where: str) -> Talk[Held]:
             -180,
             360,
         )
-        seen = [counts(bench, axis) for _ in range(STILL)]
+        seen = yield from answered(lambda: [counts(bench, axis) for _ in range(STILL)])
+        if not (yield from stayed_off(bench, [axis])):
+            continue
         found = [one for one in seen if one is not None]
         if len(found) == len(seen) and max(found) - min(found) <= LEAST_MOVE:
             return Held(math.radians(degrees), round(sum(found) / len(found)))
@@ -210,15 +227,12 @@ def limits(draft: Draft, bench: Bench, joint: str, axis: Axis, scale: Scale) -> 
     rule = f"guard.rule.{joint}_range"
     if draft.has(rule, "max"):
         return
-    yield from unpowered(bench, [axis])
     margin = yield from ask_number(
         f"How far within its ends may the {words(joint)} go before the guard warns?", "°", 0, 30, MARGIN
     )
-    ends = []
-    for end in ("as straight as it goes", "as bent as it goes"):
-        while (here := (yield from _end(bench, joint, axis, end))) is None:
-            yield Say("Its position could not be read: once more.")
-        ends.append(scales.angle(scale, here))
+    straight = yield from _end(bench, joint, axis, "as straight as it goes")
+    bent = yield from _end(bench, joint, axis, "as bent as it goes")
+    ends = [scales.angle(scale, here) for here in (straight, bent)]
     low, high = min(ends) + math.radians(margin), max(ends) - math.radians(margin)
     if low >= high:
         yield Say(f"Between these ends nothing is left: {words(joint)} has no limits in the file.")
@@ -228,26 +242,35 @@ def limits(draft: Draft, bench: Bench, joint: str, axis: Axis, scale: Scale) -> 
     draft.put(rule, "max", round(high, 4))
 
 
-def _end(bench: Bench, joint: str, axis: Axis, end: str) -> Talk[int | None]:
-    yield from press(f"Bring the {words(joint)} by hand {end}, and keep it there.")
-    return counts(bench, axis)
+def _end(bench: Bench, joint: str, axis: Axis, end: str) -> Talk[int]:
+    while True:
+        yield from unpowered(bench, [axis])
+        yield from press(f"Bring the {words(joint)} by hand {end}, and keep it there.")
+        here = yield from answered(lambda: counts(bench, axis))
+        if not (yield from stayed_off(bench, [axis])):
+            continue
+        if here is not None:
+            return here
+        yield Say("Its position could not be read: once more.")
 
 
-RATINGS: tuple[tuple[str, int, str, str, Callable[[int, float], float]], ...] = (
-    ("rated_current", 0x6075, "A", "current", lambda raw, _gear: raw / 1000),
-    ("rated_torque", 0x6076, "N·m", "torque at the joint", lambda raw, gear: raw / 1000 * gear),
+RATINGS: tuple[tuple[str, int, str, str, Callable[[int, float, float], float]], ...] = (
+    ("rated_current", 0x6075, "A", "current", lambda raw, _gear, _nm: raw / 1000),
+    ("rated_torque", 0x6076, "N·m", "torque at the joint", lambda raw, gear, nm: raw * nm * gear),
 )
 
 
 def ratings(draft: Draft, bench: Bench, joint: str, axis: Axis, gear: float) -> Talk[None]:
     """What the drive knows is shown; what it does not know is asked for, and may stay unknown."""
+    torque_nm = _rated_torque_nm(draft, axis.node)
     for key, index, unit, what, si in RATINGS:
         if draft.has(table(joint), key) or draft.has(f"told.{joint}", key):
             continue
-        raw = number(bench, axis, index)
+        raw = yield from answered(partial(number, bench, axis, index))
         if raw:
-            yield Say(f"{words(joint)}: rated {what} {si(raw, gear):g} {unit} ({index:04X}h).")
-            draft.put(f"told.{joint}", key, si(raw, gear), f"{index:04X}h")
+            rated = si(raw, gear, torque_nm)
+            yield Say(f"{words(joint)}: rated {what} {rated:g} {unit} ({index:04X}h).")
+            draft.put(f"told.{joint}", key, rated, f"{index:04X}h")
             continue
         value = yield from ask_number(
             f"The drive does not know its rated {what} ({index:04X}h). What is it? 0: not known",
@@ -260,3 +283,10 @@ def ratings(draft: Draft, bench: Bench, joint: str, axis: Axis, gear: float) -> 
             draft.put(table(joint), key, value, f"{unit}; typed, {index:04X}h does not say it")
         else:
             draft.put(f"told.{joint}", key, None, "not known")
+
+
+def _rated_torque_nm(draft: Draft, node: int) -> float:
+    """Of one count of 6076h: 1 mN·m (CiA 402-2), where the device's profile knows no other."""
+    file = draft.value(f"node.{node}", "eds")
+    profile = None if file is None else profile_of(eds.load(eds.locate(file, draft.file), node))
+    return 0.001 if profile is None else profile.rated_torque_nm

@@ -1,5 +1,6 @@
 """The steps of the bus: what is on it, whose EDS each drive is, its heartbeat, how its position comes."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import eds
@@ -9,7 +10,7 @@ from drivers.scan.products import Library
 from drivers.scan.scan import Found
 from eds import EdsError
 from eds.shipped import SHIPPED
-from gateway.commission.axes import POSITION, Axis, axes_of, number
+from gateway.commission.axes import POSITION, Axis, answered, axes_of, number
 from gateway.commission.bench import Bench
 from gateway.commission.dialogue import Say, Talk, agree, choose, press, word
 from gateway.commission.draft import Draft
@@ -61,12 +62,12 @@ def _line(node: int, told: Told | str) -> str:
 
 
 def role(draft: Draft, found: Found) -> Talk[None]:
-    """Who leads the bus."""
-    if draft.has("gateway", "role"):
-        return
+    """Who leads the bus; who was heard to lead it counts more than what was chosen before."""
     reasons = list(found.traffic.master())
-    if reasons:
+    if reasons and draft.value("gateway", "role") != OBSERVER:
         draft.put("gateway", "role", OBSERVER, f"another controller leads the bus: {', '.join(reasons)}")
+        return
+    if draft.has("gateway", "role"):
         return
     choice = yield from choose(
         "Nobody leads this bus now.  observer: a controller will;  master: this is a bench, where GWRMS "
@@ -75,6 +76,19 @@ def role(draft: Draft, found: Found) -> Talk[None]:
         OBSERVER,
     )
     draft.put("gateway", "role", choice, "nobody was heard to lead the bus; chosen")
+
+
+def same_devices(draft: Draft, told: Mapping[int, Told]) -> Talk[None]:
+    """What was found of a node that is another device now (1018h) is forgotten, with its joints."""
+    for node, one in sorted(told.items()):
+        identity = [one.vendor_id, one.product_code, one.serial_number]
+        kept = draft.value(table(node), "identity", identity)
+        if one.problem is not None or (kept == identity and draft.has(table(node), "identity")):
+            continue
+        if kept != identity:
+            yield Say(f"Node {node} is another device than it was (1018h): all of it is asked again.")
+            draft.forget_node(node)
+        draft.put(table(node), "identity", identity)
 
 
 def file_of(draft: Draft, library: Library, node: int, told: Told) -> Talk[None]:
@@ -122,7 +136,7 @@ def heartbeat(draft: Draft, bench: Bench, node: int) -> Talk[None]:
     """A node that lives is known by its heartbeat: where it has none, one is offered."""
     if draft.has(table(node), "heartbeat"):
         return
-    period = number(bench, Axis(node), HEARTBEAT_TIME)
+    period = yield from answered(lambda: number(bench, Axis(node), HEARTBEAT_TIME))
     if period:
         draft.put(table(node), "heartbeat", period, "ms, 1017h")
         return

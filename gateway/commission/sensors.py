@@ -2,10 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Protocol
 
 from drivers.errors import DriverError
 from drivers.imu.rotation import Vector
+from gateway.commission.axes import answered
 from gateway.commission.axes_of_imu import NoAxes, axes
 from gateway.commission.dialogue import Say, Talk, press
 from gateway.commission.draft import Draft
@@ -65,11 +67,11 @@ def _feet(draft: Draft, bench: SerialBench, insoles: Sequence[Sensor]) -> Talk[N
         elif left:
             one, how = yield from _stamped(bench, foot, left)
             left.remove(one)
-            draft.put(table, "port", one.port, how)
             draft.put(table, "baudrate", one.baudrate, "as it was heard")
             draft.put(table, "format", one.format, "as it was recognised")
             if one.layout is not None:
                 draft.put(table, "layout", one.layout, "whose description fits")
+            draft.put(table, "port", one.port, how)
 
 
 def _stamped(bench: SerialBench, foot: str, insoles: Sequence[Sensor]) -> Talk[tuple[Sensor, str]]:
@@ -98,7 +100,7 @@ def _trunk(draft: Draft, bench: SerialBench, imu: Sensor) -> Talk[None]:
             "Lean to your left, still",
         ):
             yield from press(f"{posture} (or hold the IMU's part of the trunk so).")
-            ups.append(bench.up(imu))
+            ups.append((yield from answered(partial(bench.up, imu))))
         try:
             found = axes(*ups)
         except NoAxes as error:

@@ -32,6 +32,7 @@ def commission(
     found, told = yield from nodes.scanned(bench)
     yield from nodes.role(draft, found)
     left = list(axes := axes_of(told))
+    yield from nodes.same_devices(draft, {axis.node: told[axis.node] for axis in axes})
     for joint in (yield from joints.names(draft, axes)):
         axis = yield from joints.which_drive(draft, bench, joint, left)
         if axis is None:

@@ -12,12 +12,24 @@ HEAD = """\
 
 """
 WIDTH = 34  # of `key = value`, before its comment
+LONGEST = 120  # with it; a comment that would go beyond stands above
+NEEDED = ("node_id", "configure_pdos", "zero_offset")  # the last of each step that a joint cannot be without
 
 
 def text(draft: Draft, who: str, when: str) -> str:
     """The file as the draft has it."""
     name = str(draft.value("robot", "name"))
-    return HEAD.format(robot=name, when=when, who=who) + "\n".join(_tables(draft))
+    return HEAD.format(robot=name, when=when, who=_plain(who)) + "\n".join(_tables(draft))
+
+
+def unfinished(draft: Draft) -> tuple[str, ...]:
+    """Joints whose drive is known and not what it counts: their tables would be of no use."""
+    return tuple(
+        joint
+        for joint in draft.value("robot", "joints", ())
+        if draft.has(f"joint.{joint}", "node_id")
+        and not all(draft.has(f"joint.{joint}", key) for key in NEEDED)
+    )
 
 
 def _tables(draft: Draft) -> Iterator[str]:
@@ -26,7 +38,9 @@ def _tables(draft: Draft) -> Iterator[str]:
     yield from _table("can.main", draft.tables["can.main"])
     for joint in draft.value("robot", "joints"):
         node = draft.value(f"joint.{joint}", "node_id")
-        if node is not None:
+        if joint in unfinished(draft):
+            yield f"# {joint}, node {node}, is not here: it was not finished.\n"
+        elif node is not None:
             yield from _table(f"joint.{joint}", _joint(draft, joint, node))
     for table in sorted(draft.tables):
         if table.startswith(("insole.", "imu.")):
@@ -57,15 +71,24 @@ def _guard(draft: Draft) -> Iterator[str]:
 def _table(name: str, keys: Mapping[str, Found]) -> Iterator[str]:
     yield f"[{name}]"
     for key, found in keys.items():
-        yield f"# {found.how}" if key == "#" else _line(key, found)
+        yield f"# {_plain(found.how)}" if key == "#" else _line(key, found)
     yield ""
 
 
 def _line(key: str, found: Found) -> str:
     line = f"{key} = {_value(found.value)}"
-    return f"{line:<{WIDTH}}# {found.how}" if found.how else line
+    if not found.how:
+        return line
+    comment = f"# {_plain(found.how)}"
+    beside = f"{line:<{WIDTH - 1}} {comment}"
+    return beside if len(line) < WIDTH and len(beside) <= LONGEST else f"{comment}\n{line}"
+
+
+def _plain(text: str) -> str:
+    """For a comment, which ends with its line."""
+    return " ".join(text.split())
 
 
 def _value(value: Any) -> str:
     """JSON's strings, numbers, booleans and lists are TOML's too."""
-    return json.dumps(value, ensure_ascii=False)
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+from gateway.cli.od import main
 from tests.unit.cli.served import VELOCITY, Served, lines
 
 
@@ -54,3 +55,11 @@ def test_json_holds_objects_and_values(robot: Served, capsys: pytest.CaptureFixt
     told = json.loads(capsys.readouterr().out)
     assert told["component"] == "left_knee"
     assert told["values"]["0x6081:0"]["value"] == 65190
+
+
+@pytest.mark.parametrize("typed", ["abc", "nan", ""])
+def test_what_is_no_number_is_named_as_it_was_typed(typed: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["left_knee", "0x6072:0", "--set", typed])
+    assert ended.value.code == 2
+    assert f"{typed!r} is no number" in capsys.readouterr().err

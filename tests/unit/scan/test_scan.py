@@ -2,6 +2,7 @@
 
 import json
 import threading
+import tomllib
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
@@ -221,6 +222,46 @@ def test_a_node_is_told_in_words(channel: str, tmp_path: Path, capsys: pytest.Ca
     assert "axis 0      homing, cyclic synchronous position" in text
     assert f"EDS         {tmp_path / 'drive.eds'}" in text
     assert "has a TPDO1, which the file lacks" in text
+
+
+SHIPPED_DRIVE = DRIVE | {
+    (0x1018, 1): u32(0),
+    (0x1018, 2): u32(0x4A440001),
+    (0x608F, 1): u32(16_384),
+    (0x608F, 2): u32(1),
+    (0x6091, 1): u32(1),
+    (0x6091, 2): u32(1),
+}
+
+
+def test_a_known_device_has_its_profile_and_a_table_to_paste_with_what_it_says_itself(
+    channel: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with FakeNode(channel, 7, SHIPPED_DRIVE):
+        assert main([f"virtual:{channel}", "--active", "--seconds", "0.1"]) == 0
+    text = capsys.readouterr().out
+    assert "  profile     GWRMS joint drive" in text
+    table = text.partition("for robot.toml")[2]
+    found = tomllib.loads(table)["joint"]["node_7"]
+    assert found == {
+        "bus": "main",
+        "node_id": 7,
+        "eds": "joint_drive.eds",
+        "counts_per_revolution": 16_384,
+    }
+    assert "# gear_ratio" in table, "1:1 is what drives hold that were never told"
+
+
+def test_a_table_of_a_files_bus_is_on_that_bus(
+    tmp_path: Path, channel: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "robot.toml"
+    path.write_text(f'[can.legs]\ninterface = "virtual"\nchannel = {json.dumps(channel)}\n')
+    with FakeNode(channel, 7, SHIPPED_DRIVE):
+        assert main([str(path), "--active", "--seconds", "0.1", "--json"]) == 0
+    (node,) = json.loads(capsys.readouterr().out)["nodes"]
+    assert node["profile"] == "GWRMS joint drive"
+    assert tomllib.loads(node["table"])["joint"]["node_7"]["bus"] == "legs"
 
 
 def test_an_interface_that_is_not_there_hides_no_other(
