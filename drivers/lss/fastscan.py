@@ -10,10 +10,12 @@ from drivers.errors import Mismatch
 from drivers.lss.master import PARTS, Identity, LssMaster
 
 BITS = 32
+SEARCHES = 2
+PATIENCE = 4
 
 
 def unconfigured(master: LssMaster) -> list[Identity]:
-    """Find every device without a node id.
+    """Find every device without a node id; where answers came late it is searched again, with more patience.
 
     Raises:
         Mismatch: an identity that was found is not confirmed: answers came late, or were lost. Or a device
@@ -28,15 +30,17 @@ def unconfigured(master: LssMaster) -> list[Identity]:
                 "on its label), or take all other devices off the bus and say `only`"
             )
         return []
-    identities = [Identity(*numbers) for numbers in _identities(master, ())]
-    for identity in identities:
-        if not _confirmed(master, identity.numbers):
-            raise Mismatch(
-                f"the search found {identity}, and no device confirms it: answers came late or were lost; "
-                "search again, with a longer --timeout"
-            )
-    master.release()
-    return identities
+    for _ in range(SEARCHES):
+        identities = [Identity(*numbers) for numbers in _identities(master, ())]
+        doubtful = [one for one in identities if not _confirmed(master, one.numbers)]
+        if not doubtful:
+            master.release()
+            return identities
+        master.scan_s *= PATIENCE
+    raise Mismatch(
+        f"the search found {doubtful[0]}, and no device confirms it: answers came late or were lost; "
+        "search again, with a longer --timeout"
+    )
 
 
 def _identities(master: LssMaster, known: tuple[int, ...]) -> Iterator[tuple[int, ...]]:

@@ -99,7 +99,7 @@ class LssMaster:
     def __init__(self, bus: Bus, timeout_s: float = TIMEOUT_S, scan_s: float = SCAN_S) -> None:
         self._bus = bus
         self._timeout_s = timeout_s
-        self._scan_s = scan_s
+        self.scan_s = scan_s
         self._heard: queue.SimpleQueue[bytes] = queue.SimpleQueue()
 
     def __enter__(self) -> Self:
@@ -141,7 +141,7 @@ class LssMaster:
 
         Those that have turn to number `then`; to a smaller one: the device is to be configured.
         """
-        return self._scan(number, bit, part, then, self._scan_s)
+        return self._scan(number, bit, part, then, self.scan_s)
 
     def is_anybody_unconfigured(self) -> bool:
         """Whether a device without a node id answers, also one that knows no fastscan (it is older)."""
