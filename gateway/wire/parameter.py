@@ -47,8 +47,8 @@ class TrialInfo(Struct, frozen=True):
 class ParameterParams(Params, frozen=True):
     """`parameter.list` and `parameter.read`: names, addresses such as `left_knee.0x6072:0`, and globs.
 
-    No names means every parameter but those that are `read_only`. The address of a number in a device's EDS
-    that is no parameter may be read too.
+    No names means every parameter but those that are `read_only`. Objects that are no parameters are for
+    `object.read`.
     """
 
     names: Globs | None = None

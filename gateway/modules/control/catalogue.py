@@ -1,6 +1,5 @@
 """Every parameter of a robot by its name: those that its file describes, and those that an EDS offers."""
 
-import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from eds import Description
@@ -9,20 +8,16 @@ from gateway.coding import NUMBERS, Number, scaled
 from gateway.config.objects import STORE
 from gateway.config.robot import ParameterSettings, RobotConfig
 from gateway.modules.control.eds_parameters import offered
-from gateway.modules.control.parameters import Lock, Parameter, contradiction
+from gateway.modules.control.parameters import Parameter, contradiction
 from gateway.streaming.sources import Wanted, check_globs
 
 _TEXT = 'what is none is read where its device has parameters = "eds"'
-ADDRESS = re.compile(r"0x([0-9A-F]{4}):(\d{1,3})")  # as parameters are told
 
 
 class Catalogue(Mapping[str, Parameter]):
     """Parameters by name. An object's address, as in `left_knee.0x6072:0`, means the same parameter."""
 
-    def __init__(
-        self, parameters: Iterable[Parameter], descriptions: Mapping[str, Description] | None = None
-    ) -> None:
-        self._descriptions = descriptions or {}
+    def __init__(self, parameters: Iterable[Parameter]) -> None:
         self._by_name = {one.name: one for one in parameters}
         self._by_address: dict[str, str] = {}
         for one in self._by_name.values():
@@ -40,8 +35,6 @@ class Catalogue(Mapping[str, Parameter]):
     def chosen(self, names: Sequence[str] | None) -> list[Parameter]:
         """Those that the names, addresses and globs mean; without any, all that are not locked.
 
-        The address of a number in a device's EDS that is no parameter may be read all the same.
-
         Raises:
             RpcError: unknown_name, for one that means nothing.
 
@@ -50,29 +43,10 @@ class Catalogue(Mapping[str, Parameter]):
             return [one for one in self._by_name.values() if one.lock is None]
         meant = {self._by_address.get(name, name) for name in names} & self._by_name.keys()
         globs = [name for name in names if name not in self]
-        objects = {name: one for name in globs if (one := self._object(name)) is not None}
-        globs = [name for name in globs if name not in objects]
         check_globs("parameter", self._by_name, globs)
         wanted = Wanted(globs)
         meant.update(name for name, one in self._by_name.items() if name in wanted and not one.is_long)
-        return [*(one for name, one in self._by_name.items() if name in meant), *objects.values()]
-
-    def _object(self, address: str) -> Parameter | None:
-        """A number of an EDS that is no parameter, to be read; `None` where there is no such."""
-        component, _, name = address.partition(".")
-        place = ADDRESS.fullmatch(name)
-        if place is None or component not in self._descriptions:
-            return None
-        index, subindex = int(place[1], 16), int(place[2])
-        variable = self._descriptions[component].variable(index, subindex)
-        known = None if variable is None else DATA_TYPES.get(variable.data_type or 0)
-        if variable is None or known is None or known.kind not in NUMBERS:
-            return None
-        settings = ParameterSettings(object=name)
-        data_type, access = variable.data_type or 0, variable.access_type.lower()
-        return Parameter(
-            address, component, settings, index, subindex, data_type, access, lock=Lock.UNRELEASED
-        )
+        return [one for name, one in self._by_name.items() if name in meant]
 
 
 def resolve(
@@ -80,9 +54,7 @@ def resolve(
 ) -> Catalogue:
     """Every parameter of the robot; what cannot be used says why."""
     own = [described(name, one, descriptions, absent) for name, one in config.parameter.items()]
-    asked = config.joint.keys() | config.device.keys()  # an IMU has an EDS too, and no parameters
-    readable = {name: one for name, one in descriptions.items() if name in asked}
-    return Catalogue([*own, *offered(config, descriptions, own)], readable)
+    return Catalogue([*own, *offered(config, descriptions, own)])
 
 
 def described(
