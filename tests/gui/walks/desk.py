@@ -82,6 +82,8 @@ def a_core_is_eaten(bench: Bench) -> None:
         try:
             hand.click("Resources")
             hand.sees(EATER, within_s=AGAIN_S)
+            hand.click("Filter processes by name or command")
+            hand.type(EATER)
             hand.keep("eaten")
         finally:
             process.kill()
