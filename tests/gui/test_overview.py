@@ -1,5 +1,6 @@
 """The overview shows what is so, in the units of choice, and how old it is when it is so no more."""
 
+import itertools
 import math
 import time
 from collections.abc import Iterator
@@ -19,11 +20,13 @@ from server_gui.core.processing.gait_events import Leg
 from server_gui.core.tuning.stop import Proof
 from server_gui.core.tuning.writing import Trial
 from server_gui.views.joint_table import ERROR, STOP, TORQUE, JointModel
+from server_gui.views.now_line import NowLine
 from server_gui.views.overview import Overview
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.figure import ANKLE, SHANK, THIGH, Pose, chain
 from server_gui.views.widgets.pressure_map import COLUMNS, ROWS, PressureMap, weights
 from tests.gui.fakes import Bench, destroy
+from tests.gui.rules import settle
 from tests.support.desk import described, looked, telemetry, walking
 
 
@@ -262,6 +265,30 @@ def test_a_trial_is_kept_or_taken_back_where_it_is_seen(overview: Overview, benc
     overview.now.take_back.click()
     assert bench.first.named("confirm") == [(7,)]
     assert bench.first.named("revert") == [(7,)]
+
+
+@pytest.mark.parametrize("others", [0, 2])
+def test_a_trial_is_never_shown_without_its_value(theme: Theme, bench: Bench, others: int) -> None:
+    names = ["gait.step_length", "left_knee.max_torque", "right_knee.max_torque"][: 1 + others]
+    until_ns = time.monotonic_ns() + 24 * 10**9
+    trial = Trial(7, dict.fromkeys(names, 0.42), dict.fromkeys(names, 0.4), until_ns)
+    bench.station.writing.trial = trial
+    now = NowLine(bench.desk, theme)
+    now.show()
+    for scale in (1.0, 1.5):
+        theme.set(scale=scale)
+        for width, is_offered in itertools.product(range(220, 1000, 60), (True, False)):
+            now.offer(is_offered)
+            now.resize(round(width * scale), 200)
+            now.refresh()
+            settle()
+            shown, end = now.trial.main, now.trial.detail
+            assert "400 → 420" in shown.shown or f"{1 + others} values" in shown.shown, (width, scale)
+            assert shown.is_whole, (width, scale, shown.shown)
+            assert end.is_whole, (width, scale, end.shown)
+            assert now.keep.isVisible() is is_offered
+    assert now.trial.main.shown.startswith("On trial: gait step length 400 → 420 mm")
+    destroy(now)
 
 
 @pytest.mark.parametrize("happened", ["nothing", "link lost", "old"])
