@@ -13,7 +13,7 @@ from PySide6.QtGui import QImage
 from gateway.client import ConnectionState
 from gateway.units import Units
 from gateway.wire.component import LayoutInfo
-from server_gui.core.desk.leg_phase import leg_phase, phase_at
+from server_gui.core.desk.leg_phase import LegPhase, leg_phase, phase_at
 from server_gui.core.desk.soles import cells_of, sole
 from server_gui.core.follow.events import LinkChanged
 from server_gui.core.processing.gait_events import Leg
@@ -24,6 +24,7 @@ from server_gui.views.now_line import NowLine
 from server_gui.views.overview import Overview
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.figure import ANKLE, SHANK, THIGH, Pose, chain
+from server_gui.views.widgets.gait_ring import GaitRing, Phases
 from server_gui.views.widgets.pressure_map import COLUMNS, ROWS, PressureMap, weights
 from tests.gui.fakes import Bench, destroy
 from tests.gui.rules import settle
@@ -309,3 +310,21 @@ def test_nothing_on_the_overview_is_green_where_nothing_is_known(
     model.refresh()
     assert "good" not in {cell.colour for row in model._cells for cell in row}
     assert "text" not in {row[column].colour for row in model._cells for column in range(2, 7)}
+
+
+@pytest.mark.parametrize("scale", [1.0, 1.5, 2.0])
+def test_the_ring_says_what_the_wearer_does_however_small_it_is(theme: Theme, scale: float) -> None:
+    theme.set(scale=scale)
+    ring = GaitRing(theme)
+    ring.resize(ring.minimumSizeHint().expandedTo(ring.minimumSize()))
+    known: Phases = dict.fromkeys(Leg, LegPhase(30.0, "mid-stance"))
+    for word, least in (("Walk 94 %", "Walk"), ("Stopped", "Stopped"), ("Abnormal", "Abnormal")):
+        ring.show_phases(known, known, word, "120 steps/min", live=True)
+        assert (ring.read[0], ring.read[-1]) == ("L  30 %", "R  30 %"), scale
+        assert ring.read[1].startswith(least), scale
+    ring.show_phases(dict.fromkeys(Leg), dict.fromkeys(Leg), "Not known", "", live=False)
+    assert " ".join(ring.read) == "Not known"
+    ring.setFixedSize(theme.px(400), theme.px(400))
+    ring.show_phases(known, known, "Walk 94 %", "120 steps/min", live=True)
+    assert ring.read[:2] == ["Walk 94 %", "120 steps/min"]
+    destroy(ring)
