@@ -318,7 +318,7 @@ def test_the_ring_says_what_the_wearer_does_however_small_it_is(theme: Theme, sc
     ring = GaitRing(theme)
     ring.resize(ring.minimumSizeHint().expandedTo(ring.minimumSize()))
     known: Phases = dict.fromkeys(Leg, LegPhase(30.0, "mid-stance"))
-    for word, least in (("Walk 94 %", "Walk"), ("Stopped", "Stopped"), ("Abnormal", "Abnormal")):
+    for word, least in (("Walk 94 %", "Walk"), ("Stopped", "Stopped"), ("Turn 61 %", "Turn")):
         ring.show_phases(known, known, word, "120 steps/min", live=True)
         assert (ring.read[0], ring.read[-1]) == ("L  30 %", "R  30 %"), scale
         assert ring.read[1].startswith(least), scale

@@ -18,7 +18,7 @@ from server_gui.views.theme import Theme
 
 GAP_DEG: Final = 2.4  # between two phases
 SMALL: Final = 0.75  # of the size that text has elsewhere: what is smaller is not read
-LEAST: Final = 106  # wide and high, at text of 100 %: three lines have room in its middle
+LEAST: Final = 90  # wide and high, at text of 100 %: three lines have room in its middle
 READ: Final = 0.85  # of it, for a phase's name
 DIM: Final = 70  # opacity of the phases that are not now, of 255
 
@@ -193,7 +193,7 @@ class GaitRing(QWidget):
         return self._width(text) <= box.width()
 
     def _width(self, text: str) -> float:
-        return QFontMetricsF(self._theme.text_font(READ, bold=True)).horizontalAdvance(text)
+        return QFontMetricsF(self._theme.text_font(SMALL, bold=True)).horizontalAdvance(text)
 
     def _fitting(self, text: str, factor: float, place: QRectF, *, bold: bool) -> QFont:
         """As large as wanted, or as there is room for."""
