@@ -12,7 +12,7 @@ from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.plain import PlainLabel
 
 LOOK_S: Final = 0.03
-SAID_S: Final = 0.25  # what takes less is not worth a word
+SAID_S: Final = 0.2  # what takes less is not worth a word
 HURRIED_S: Final = 1.5  # for what goes to the disk, when nobody waits any more
 WIDTH: Final = 430
 KEPT: Final = (

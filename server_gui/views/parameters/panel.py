@@ -243,6 +243,7 @@ class ParametersPanel(QWidget):
         self.review_button.clicked.connect(self.begin_review)
         self.review.back.connect(lambda: self.pages.setCurrentIndex(EDIT))
         self.review.write.connect(self._write)
+        self.review.dropped.connect(lambda names: self._with(lambda station: station.edits.drop(*names)))
         self._compare.clicked.connect(lambda: ask_open(self, "Compare with", ("toml", "dcf"), self.open_file))
         self._save.clicked.connect(
             lambda: ask_save(self, "Save parameters", "toml", self.save_file, self._title)
@@ -325,7 +326,8 @@ class ParametersPanel(QWidget):
         return "\n".join(said)
 
     def _refresh_banner(self, station: Station | None, staged: int) -> None:
-        text, tone = _banner(station, staged, self._problem or self._refused(station))
+        is_review = self.pages.currentIndex() == REVIEW  # which says itself what would be refused
+        text, tone = _banner(station, staged, self._problem or ("" if is_review else self._refused(station)))
         if (self.banner.text(), self.banner.property("tone")) != (text, tone):
             self.banner.setText(text)
             self.banner.setProperty("tone", tone)
