@@ -198,6 +198,8 @@ def test_a_tight_window_begins_with_the_robot_and_has_its_panels_a_click_away(
     QTest.keyClick(window, Qt.Key.Key_F, Qt.KeyboardModifier.ControlModifier)
     bench.draw(window)
     assert not window.parameters.visibleRegion().isEmpty()
+    for button in (window.parameters.review_button, window.parameters.more):
+        assert button.visibleRegion().boundingRect() == button.rect(), "it is below the edge"
     assert set(window.tabifiedDockWidgets(window.docks[1])) == {window.docks[0], window.docks[2]}
     window._panels.put_away()
     theme.set(scale=1.0)

@@ -54,7 +54,7 @@ class ParametersPanel(QWidget):
         self.filters, self.file = FilterBar(desk, theme), FileBar(desk)
         self.storing = StorePage(desk, theme)
         self.pages = QStackedWidget()
-        self.pages.addWidget(self._edit_page())
+        self.pages.addWidget(Scrolled(self._edit_page()))  # what leads on, below, stays in sight
         for page in (Scrolled(self.review), Scrolled(self.storing)):
             page.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Ignored)
             self.pages.addWidget(page)
