@@ -172,7 +172,8 @@ class MainWindow(QMainWindow):
         self._bar.frame()
         due = self._is_due()
         if due:
-            self.overview.read_now()  # what header and overview say is of the same moment
+            for page in (self.overview, self.buses):
+                page.read_now()  # what header, alarms and page say is of the same moment
         shown = self._desk.selected is not None or self.tabs.currentIndex() >= self._live
         if shown:
             self._views[self.tabs.currentIndex()].refresh()
