@@ -151,6 +151,7 @@ class App:
         """End everything, and say what is waited for where that takes a moment."""
         self._timer.stop()
         self._poster.close()
+        self.window.setUpdatesEnabled(False)  # nothing is drawn any more
         self.window.hide()
         self.ending.begin()
         wait_closed(self.ending, self.theme)
