@@ -200,6 +200,13 @@ def test_a_tight_window_begins_with_the_robot_and_has_its_panels_a_click_away(
     assert not window.parameters.visibleRegion().isEmpty()
     for button in (window.parameters.review_button, window.parameters.more):
         assert button.visibleRegion().boundingRect() == button.rect(), "it is below the edge"
+    bench.look_again([looked()])
+    window.parameters.stage_text("gait.step_length", "430")
+    window.parameters.begin_review()
+    bench.draw(window)
+    review = window.parameters.review
+    for button in (review.try_it, review.seconds, review.write_it):
+        assert button.visibleRegion().boundingRect() == button.rect(), "it is below the edge"
     assert set(window.tabifiedDockWidgets(window.docks[1])) == {window.docks[0], window.docks[2]}
     window._panels.put_away()
     theme.set(scale=1.0)

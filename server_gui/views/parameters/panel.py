@@ -67,7 +67,9 @@ class ParametersPanel(QWidget):
         everything.addWidget(self.pages, 1)
         everything.addWidget(self.banner)
         everything.addWidget(self.trial)
-        everything.addLayout(self._buttons())
+        self._below = QWidget()
+        self._below.setLayout(self._buttons())
+        everything.addWidget(self._below)
         self._connect()
 
     def refresh(self) -> None:
@@ -89,6 +91,7 @@ class ParametersPanel(QWidget):
         if not_stored:
             self.store_button.setEnabled(False)
         set_tip(self.store_button, not_stored or STORING)
+        self._below.setVisible(editing)  # a page that leads on itself has that room
         self._filter()
         self._refresh_banner(station, staged)
         if self.pages.currentIndex() == REVIEW and station is not None:
@@ -198,6 +201,7 @@ class ParametersPanel(QWidget):
         self.store_button = QPushButton("Store to flash …")
         set_tip(self.store_button, STORING)
         grid = self._buttons_grid = QGridLayout()
+        grid.setContentsMargins(0, 0, 0, 0)
         grid.addWidget(self.undo, 0, 0)
         grid.addWidget(self._discard, 0, 1)
         grid.addWidget(self.review_button, 0, 2)
@@ -332,6 +336,7 @@ class ParametersPanel(QWidget):
             self.banner.setText(text)
             self.banner.setProperty("tone", tone)
             self.banner.style().polish(self.banner)
+        self.banner.setVisible(not is_review or tone == "bad")
 
 
 def _enable_alike(actions: Mapping[QPushButton, QAction]) -> None:
