@@ -19,6 +19,7 @@ from gateway.wire.resource import ResourceSnapshotParams
 from gateway.wire.stop import Stopped
 from server_gui.core.archive.archive import Archive
 from server_gui.core.desk.desk import Desk
+from server_gui.core.desk.ending import Ending
 from server_gui.core.desk.feeds import Feeds, Record
 from server_gui.core.desk.station import Station
 from server_gui.core.desk.ticks import Ticks
@@ -28,7 +29,6 @@ from server_gui.core.follow.mailbox import Mailbox
 from server_gui.core.prediction.news import PredictionNews
 from server_gui.core.settings.server_file import ServerSettings, name_of
 from server_gui.core.tuning.link import Link
-from server_gui.ending import Ending
 from server_gui.processes.own_robot import OwnRobot
 from server_gui.processes.sim_control import SimControl
 from server_gui.views.application import application, kept_settings, kept_theme

@@ -9,8 +9,8 @@ import pytest
 from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QApplication
 
+from server_gui.core.desk.ending import Ending
 from server_gui.core.desk.feeds import Feeds
-from server_gui.ending import Ending
 from server_gui.views.closing import Closing, wait_closed
 from server_gui.views.theme import Theme
 

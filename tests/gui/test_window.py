@@ -205,8 +205,8 @@ def test_a_tight_window_begins_with_the_robot_and_has_its_panels_a_click_away(
     window.parameters.begin_review()
     bench.draw(window)
     review = window.parameters.review
-    for button in (review.try_it, review.seconds, review.write_it):
-        assert button.visibleRegion().boundingRect() == button.rect(), "it is below the edge"
+    for control in (review.try_it, review.seconds, review.write_it):
+        assert control.visibleRegion().boundingRect() == control.rect(), "it is below the edge"
     assert set(window.tabifiedDockWidgets(window.docks[1])) == {window.docks[0], window.docks[2]}
     window._panels.put_away()
     theme.set(scale=1.0)
