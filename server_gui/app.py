@@ -19,6 +19,7 @@ from gateway.wire.resource import ResourceSnapshotParams
 from gateway.wire.stop import Stopped
 from server_gui.core.archive.archive import Archive
 from server_gui.core.desk.desk import Desk
+from server_gui.core.desk.ending import Ending
 from server_gui.core.desk.feeds import Feeds, Record
 from server_gui.core.desk.station import Station
 from server_gui.core.desk.ticks import Ticks
@@ -31,6 +32,7 @@ from server_gui.core.tuning.link import Link
 from server_gui.processes.own_robot import OwnRobot
 from server_gui.processes.sim_control import SimControl
 from server_gui.views.application import application, kept_settings, kept_theme
+from server_gui.views.closing import wait_closed
 from server_gui.views.first_run.demo_bar import DemoBar
 from server_gui.views.first_run.opening import Opening
 from server_gui.views.kept import kept_units
@@ -52,7 +54,6 @@ FOLLOWING: Final = FollowSettings(
     buses_s=1.0,
 )
 OWN: Final = "simulated"  # what the window's own robot is called before it has told its name
-BREAK_OFF_S: Final = 5.0  # for what is read from the store at the end
 MOST_PREDICTIONS: Final = 4096  # what may wait for a window that hangs
 
 
@@ -68,6 +69,10 @@ class Poster(QObject):
     def deliver(self, call: Callable[[], None]) -> None:
         """Run this soon in the window's thread."""
         self._posted.emit(call)
+
+    def close(self) -> None:
+        """Run nothing more: what it would show is gone."""
+        self._posted.disconnect(self._run)
 
     def _run(self, call: Callable[[], None]) -> None:
         call()
@@ -117,7 +122,7 @@ class App:
         self.theme = kept_theme(qt, kept)
         operator = "" if record is None else record.operator
         self._archive = Archive(settings, self.desk, self._poster.deliver, operator, file)
-        self._ended = True
+        self.ending = Ending(self.feeds, self._close_others, self._own.close)
         self.window = MainWindow(self.desk, self.theme, kept, self._archive)
         self.window.stopped.connect(lambda: self.stop("STOP button of the window"))
         self.window.stop_all.connect(lambda: self.desk.stop_all("STOP ALL of the window"))
@@ -140,17 +145,26 @@ class App:
 
     def __exit__(self, *exc: object) -> None:
         self._timer.stop()
-        asked = self.demo is None or self.demo.end(BREAK_OFF_S)
-        try:
-            self._ended = self._archive.close(BREAK_OFF_S) and asked
-            self.feeds.__exit__(*exc)
-        finally:
-            self._own.close()  # last, so that nobody misses it
+        self.ending.finish()
 
-    @property
-    def hangs(self) -> bool:
-        """Whether something still runs after all was ended, which only the end of the process ends."""
-        return not self._ended or self.feeds.hangs
+    def close(self) -> None:
+        """End everything, and say what is waited for where that takes a moment."""
+        self._timer.stop()
+        self._poster.close()
+        self.window.setUpdatesEnabled(False)  # nothing is drawn any more
+        self.window.hide()
+        self.ending.begin()
+        wait_closed(self.ending, self.theme)
+
+    def quit(self) -> None:
+        """End the window; asked again, without waiting."""
+        if self.ending.is_begun:
+            self.ending.hurry()
+        self._qt.quit()
+
+    def _close_others(self, within_s: float) -> bool:
+        asked = self.demo is None or self.demo.end(within_s)
+        return self._archive.close(within_s) and asked
 
     def follow(self, name: str, address: Address) -> Station:
         """Another robot, from now on."""
@@ -256,7 +270,7 @@ def run(
     with App(qt, settings, kept_settings(), FOLLOWING, record, file, opening) as app:
         app.theme.set(look, scale)
         for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, lambda *_: qt.quit())
+            signal.signal(number, lambda *_: app.quit())
         if signals:
             app.window.show_signals(signals)
         app.first_look()
@@ -265,8 +279,8 @@ def run(
             QTimer.singleShot(round(seconds * 1000), qt.quit)
         with stop_keys(qt, app):
             status = qt.exec()
-        app.window.hide()
-    if app.hangs:
+        app.close()
+    if app.ending.hangs:
         os._exit(status)  # what an upload under way has done is found out at the next start
     return status
 

@@ -15,6 +15,7 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import (
     QApplication,
+    QDockWidget,
     QHBoxLayout,
     QMainWindow,
     QMenu,
@@ -42,6 +43,7 @@ from server_gui.views.kept import keep_bytes, kept_bytes
 from server_gui.views.keys_sheet import KeysSheet
 from server_gui.views.models.panel import ModelsPage
 from server_gui.views.overview import Overview
+from server_gui.views.page_bar import PageBar
 from server_gui.views.parameters.panel import ParametersPanel
 from server_gui.views.parameters.trial_bar import TrialBar
 from server_gui.views.recording_chip import ask_recording
@@ -163,8 +165,9 @@ class MainWindow(QMainWindow):
         self._pages = QStackedWidget()
         self._pages.addWidget(Scrolled(self.empty))
         self._pages.addWidget(self.tabs)
+        self.page_bar = PageBar(self.tabs, self._help_corner())
         self._build()
-        self._offer_help()
+        self._bind_keys()
         menu.setMenu(self._view_menu())
 
     def refresh(self) -> None:
@@ -173,13 +176,15 @@ class MainWindow(QMainWindow):
         self._bar.frame()
         due = self._is_due()
         if due:
-            self.overview.read_now()  # what header and overview say is of the same moment
+            for page in (self.overview, self.buses):
+                page.read_now()  # what header, alarms and page say is of the same moment
         shown = self._desk.selected is not None or self.tabs.currentIndex() >= self._live
         if shown:
             self._views[self.tabs.currentIndex()].refresh()
         if not due:
             return
         self._pages.setCurrentIndex(1 if shown else 0)
+        self.page_bar.setVisible(shown)
         self.header.refresh()
         self.alarms.refresh()
         self._hold_header()
@@ -247,8 +252,11 @@ class MainWindow(QMainWindow):
         """Show what the manual says of the panel that has the keyboard, or of the tab."""
         tab = self.tabs.tabText(self.tabs.currentIndex()).replace("&", "")
         self.help.show_section("Parameters" if _within(self.parameters) else tab)
-        self._manual.show()
-        self._manual.raise_()
+        self.bring(self._manual)
+
+    def bring(self, dock: QDockWidget) -> None:
+        """Show a panel, in front of those that are at its place."""
+        self._panels.bring(dock)
 
     def _open_in_signals(self, channels: Sequence[str]) -> None:
         self.tabs.setCurrentIndex(self._views.index(self.signals))
@@ -260,7 +268,7 @@ class MainWindow(QMainWindow):
 
     def _find(self) -> None:
         """Words that are typed are seen, also where the panel was hidden."""
-        self._panels.bring(self.docks[1])
+        self.bring(self.docks[1])
         self.parameters.find_parameter()
 
     def _end_trial(self, *, keep: bool) -> None:
@@ -284,6 +292,7 @@ class MainWindow(QMainWindow):
         top = _column(above)
         top.addWidget(self.header)
         top.addWidget(self.alarms)
+        top.addWidget(self.page_bar)
         self.setMenuWidget(above)
         left, right, below = Area.LeftDockWidgetArea, Area.RightDockWidgetArea, Area.BottomDockWidgetArea
         panels = {
@@ -314,13 +323,13 @@ class MainWindow(QMainWindow):
         needed = QSize(self.header.minimumSizeHint().width(), self._theme.px(LEAST))
         self.setMinimumSize(needed.boundedTo(self.screen().availableSize()))
 
-    def _offer_help(self) -> None:
+    def _help_corner(self) -> QWidget:
         self.help_button.setAccessibleName("Help")
         self.help_button.setToolTip("What the manual says of this (F1)")
         self.help_button.clicked.connect(self.show_help)
         self.panels_button = QPushButton("Panels")
         self.panels_button.setToolTip("Hide robots, parameters and events, or show them again (F9)")
-        self.panels_button.clicked.connect(self._panels.put_away)
+        self.panels_button.clicked.connect(lambda: self._panels.put_away())
         self.panels_button.hide()
         corner = QWidget()
         row = QHBoxLayout(corner)
@@ -328,7 +337,9 @@ class MainWindow(QMainWindow):
         row.setSpacing(2)
         row.addWidget(self.panels_button)
         row.addWidget(self.help_button)
-        self.tabs.setCornerWidget(corner)
+        return corner
+
+    def _bind_keys(self) -> None:
         QShortcut(QKeySequence.StandardKey.HelpContents, self, self.show_help)
         QShortcut(QKeySequence.StandardKey.Find, self, self._find)
         QShortcut(QKeySequence("?"), self, self.keys.turn)

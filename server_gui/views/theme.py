@@ -150,6 +150,10 @@ QPushButton:checked, QPushButton#primary {{ background: {accent}; color: {on_acc
     border-color: {accent}; }}
 QPushButton#primary {{ font-weight: bold; }}
 QPushButton#primary:disabled {{ background: {card}; color: {old}; border-color: {border}; }}
+QPushButton#page_name {{ background: transparent; color: {dim}; padding: 7px 11px; border: none;
+    border-bottom: 2px solid transparent; border-radius: 0; }}
+QPushButton#page_name:checked {{ color: {text}; border-bottom: 2px solid {accent}; }}
+QPushButton#page_name:focus, QPushButton#page_name:hover {{ color: {text}; background: {card}; }}
 QPushButton#stop {{ background: {stop}; color: white; border: 3px solid {stop_border}; border-radius: 6px;
     font-weight: bold; padding: 6px 14px; }}
 QPushButton#stop:pressed {{ background: #7d0a1d; }}

@@ -20,8 +20,9 @@ SPANS_S: Final = (30.0, 60.0, 120.0, 300.0, 600.0)  # of the past, the shortest 
 class Trend(Card):
     """`least` is the smallest range that is shown, in the unit of `scale` times what comes."""
 
-    def __init__(self, theme: Theme, title: str, least: float, scale: float = 1.0) -> None:
+    def __init__(self, theme: Theme, title: str, least: float, scale: float = 1.0, *, unit: str = "") -> None:
         super().__init__(title)
+        self.set_note(unit, unit.partition(" ")[0], "")
         self._theme = theme
         self._name, self._least, self._scale = title, least, scale
         self._shown: tuple[object, ...] = ()

@@ -122,6 +122,7 @@ def replay(bench: Bench) -> None:
     hand.keep("replay")
     hand.click("Play", exactly=True)
     hand.sees("steps/min", within_s=AGAIN_S)
+    hand.reveal("The span is the whole recording", "Labels")
     hand.click("The span is the whole recording")
     hand.click("Label span")
     hand.sees("walk", "Ada", "person")
