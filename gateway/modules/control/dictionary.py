@@ -11,8 +11,12 @@ from typing import TYPE_CHECKING, Any
 from drivers.errors import DeviceTimeout, DriverError
 from eds import Description
 from eds.datatypes import DATA_TYPES, DOMAIN
+from eds.naming import remark
+from eds.report import pdo_rows
+from gateway.config.robot import RobotConfig
 from gateway.connections.turns import Client
 from gateway.modules.component.module import ComponentModule
+from gateway.modules.control.locked import Table, locked
 from gateway.modules.control.parameters import READABLE, WRITABLE, Parameter
 from gateway.modules.control.unanswered import Unanswered
 from gateway.process.futures import back, done, gather, then
@@ -56,7 +60,7 @@ class Objects:
 
     def __init__(
         self,
-        described: frozenset[str],
+        config: RobotConfig,
         component: ComponentModule,
         loop: Loop,
         parameters: Mapping[str, Parameter],
@@ -64,13 +68,25 @@ class Objects:
         unanswered: Unanswered,
         ask: "Callable[[Client, Sequence[Wanted]], Future[dict[str, ObjectValue]]]",
     ) -> None:
-        """`described` are the joints and devices; `ask` has objects read in their turn, by `read_all`."""
-        self._described = described
+        """`ask` has objects read in their turn, by `read_all`."""
+        self._tables = {
+            name: Table(name, f"[{kind}.{name}]", settings)
+            for kind, tables in (("joint", config.joint), ("device", config.device))
+            for name, settings in tables.items()
+        }
+        self._config = config
         self._component = component
         self._loop = loop
         self._silence = silence
         self._unanswered = unanswered
-        self._parameters = {(one.component, one.object): one for one in parameters.values()}
+        self._names = frozenset(parameters)
+        # By node: what all axes of one share, and what is another axis's, is a parameter all the same.
+        self._parameters = {
+            (config.node_of(one.component), one.object): one
+            for one in parameters.values()
+            if one.component in self._tables
+        }
+        self._mapped: dict[str, dict[tuple[int, int], list[str]]] = {}  # by component, once it was asked for
         self._ask = ask
 
     def listed(self, params: ObjectListParams) -> ObjectList:
@@ -86,7 +102,8 @@ class Objects:
             for variable in description.variables()
             if fits(variable.index, variable.subindex, variable.qualname)
         ]
-        shown = [self._info(params.component, variable) for variable in found[:OBJECTS_LISTED]]
+        mapped = self._mapped_in(params.component, description)
+        shown = [self._info(params.component, variable, mapped) for variable in found[:OBJECTS_LISTED]]
         return ObjectList(params.component, shown, len(found) - len(shown))
 
     def read(self, params: ObjectReadParams, client: Client) -> "Future[ObjectValues]":
@@ -101,11 +118,11 @@ class Objects:
 
     def _description(self, component: str) -> Description:
         descriptions = self._component.robot.descriptions
-        if component in self._described and component in descriptions:
+        if component in self._tables and component in descriptions:
             return descriptions[component]
         if component in self._component.absent:
             raise refuse(Kind.UNAVAILABLE, f"{component}: {self._component.absent[component]}")
-        known = ", ".join(one for one in descriptions if one in self._described) or "none"
+        known = ", ".join(one for one in descriptions if one in self._tables) or "none"
         raise refuse(Kind.UNKNOWN_NAME, f"{component!r} has no object dictionary; those that have: {known}")
 
     def _wanted(self, component: str, text: str, description: Description) -> Wanted:
@@ -115,10 +132,24 @@ class Objects:
             raise refuse(Kind.UNKNOWN_NAME, f"{description.path.name} has no object {wanted.name}")
         return wanted
 
-    def _info(self, component: str, variable: "ODVariable") -> ObjectInfo:
+    def _mapped_in(self, component: str, description: Description) -> Mapping[tuple[int, int], list[str]]:
+        """The PDOs that each object is mapped in."""
+        if component not in self._mapped:
+            found: dict[tuple[int, int], list[str]] = {}
+            for pdo in pdo_rows(description):
+                for index, subindex, _bits in pdo.mapped if pdo.enabled is not False else ():
+                    found.setdefault((index, subindex), []).append(pdo.name)
+            self._mapped[component] = found
+        return self._mapped[component]
+
+    def _info(
+        self, component: str, variable: "ODVariable", mapped: Mapping[tuple[int, int], list[str]]
+    ) -> ObjectInfo:
         data_type = DATA_TYPES.get(variable.data_type or 0)
         where = address(variable.index, variable.subindex)
-        parameter = self._parameters.get((component, where))
+        parameter = self._parameters.get((self._config.node_of(component), where))
+        owner = self._tables[component if parameter is None else parameter.component]
+        found = locked(variable, parameter, owner, self._names)
         default = variable.default
         return ObjectInfo(
             where,
@@ -130,6 +161,10 @@ class Objects:
             default if isinstance(default, int | float | str) else None,
             None if parameter is None else parameter.name,
             _read_only(variable, parameter),
+            remark(variable.name),
+            mapped.get((variable.index, variable.subindex), []),
+            None if found is None else found.why,
+            None if found is None else found.lines,
         )
 
     # -- what the device holds -------------------------------------------------------------------------------
