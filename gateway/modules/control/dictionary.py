@@ -1,6 +1,5 @@
 """Any object of a device that has an EDS: found by address or name, and read; writing is for parameters."""
 
-import re
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
@@ -31,15 +30,10 @@ from gateway.wire.dictionary import (
 )
 from gateway.wire.framing import Kind, refuse
 from gateway.wire.limits import OBJECTS_LISTED
+from gateway.wire.object_search import fitting
 
 if TYPE_CHECKING:
     from canopen.objectdictionary import ODVariable
-
-_ADDRESS = re.compile(r"0x([0-9a-f]{1,4})(?::([0-9]{1,3}))?")
-_RANGE = re.compile(r"0x([0-9a-f]{1,4})\s*(?:-\s*(?:0x([0-9a-f]{1,4}))?|…|\.\.\.)")
-_LAST = 0xFFFF
-
-Fits = Callable[[int, int, str], bool]
 
 
 @dataclass(frozen=True, slots=True)
@@ -225,22 +219,6 @@ class Objects:
 def address(index: int, subindex: int) -> str:
     """`0x6041:0`, as parameters have it."""
     return f"0x{index:04X}:{subindex}"
-
-
-def fitting(search: str) -> Fits:
-    """Which objects a search means: see `ObjectListParams`."""
-    text = search.strip().lower()
-    if text.startswith("0x") and text.endswith("*"):
-        prefix = text[2:-1]
-        return lambda index, _subindex, _name: f"{index:04x}".startswith(prefix)
-    if found := _RANGE.fullmatch(text):
-        first, last = int(found[1], 16), int(found[2], 16) if found[2] else _LAST
-        return lambda index, _subindex, _name: first <= index <= last
-    if found := _ADDRESS.fullmatch(text):
-        wanted, member = int(found[1], 16), None if found[2] is None else int(found[2])
-        return lambda index, subindex, _name: index == wanted and member in (None, subindex)
-    words = text.split()
-    return lambda _index, _subindex, name: all(word in name.lower() for word in words)
 
 
 def _read_only(variable: "ODVariable", parameter: Parameter | None) -> str | None:

@@ -7,8 +7,8 @@ from typing import Any, cast
 import pytest
 
 from drivers.errors import DeviceTimeout
-from gateway.modules.control.dictionary import fitting
 from gateway.wire.limits import OBJECTS_READ
+from gateway.wire.object_search import fitting
 from tests.unit.gateway.harness import DISABLED, ROBOT, Bench, Client, config, serving
 
 EDS = '\nparameters = "eds"\nrelease = ["profile_*"]\n'
