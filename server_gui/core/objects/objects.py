@@ -104,7 +104,9 @@ class Objects:
 
 def _following(indices: list[int], first: int) -> int | None:
     """Where to go on: at the last index, which may have more, unless it filled an answer alone."""
-    last = indices[-1] if indices else LAST
+    if not indices:
+        return None
+    last = indices[-1]
     following = last + 1 if last == first or indices[0] == last else last
     return following if first < following <= LAST else None
 
