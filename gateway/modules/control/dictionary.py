@@ -143,7 +143,8 @@ class Objects:
         where = address(variable.index, variable.subindex)
         parameter = self._parameters.get((self._config.node_of(component), where))
         owner = self._tables[component if parameter is None else parameter.component]
-        found = locked(variable, parameter, owner, self._names)
+        pdos = mapped.get((variable.index, variable.subindex), [])
+        found = locked(variable, parameter, owner, self._names, pdos)
         default = variable.default
         return ObjectInfo(
             where,
@@ -156,7 +157,7 @@ class Objects:
             None if parameter is None else parameter.name,
             _read_only(variable, parameter),
             remark(variable.name),
-            mapped.get((variable.index, variable.subindex), []),
+            pdos,
             None if found is None else found.why,
             None if found is None else found.lines,
         )

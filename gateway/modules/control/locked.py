@@ -1,5 +1,6 @@
 """Why an object of a device cannot be written, and the lines of the robot's file that would let it be."""
 
+from collections.abc import Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -7,15 +8,14 @@ from typing import TYPE_CHECKING
 from eds.datatypes import DATA_TYPES
 from eds.naming import object_name
 from gateway.coding import NUMBERS
-from gateway.config.objects import AXIS_OFFSET, CONTROLWORD, RESTORE, STORE
 from gateway.config.robot import DeviceTable, JointTable
+from gateway.modules.control.eds_parameters import own_lock
 from gateway.modules.control.parameters import WRITABLE, Lock, Parameter
 
 if TYPE_CHECKING:
     from canopen.objectdictionary import ODVariable
 
 _BY_NAME = (Lock.UNRELEASED, Lock.COMMANDED, Lock.STOPPING)  # what `release` reaches
-_CONTROLWORDS = range(CONTROLWORD, 0xA000, AXIS_OFFSET)
 _NOBODY_SAID = "it is no parameter: the robot's file does not say that it may be changed, nor how far"
 
 
@@ -37,34 +37,44 @@ class Table:
 
 
 def locked(
-    variable: "ODVariable", parameter: Parameter | None, table: Table, taken: AbstractSet[str]
+    variable: "ODVariable",
+    parameter: Parameter | None,
+    table: Table,
+    taken: AbstractSet[str],
+    pdos: Sequence[str],
 ) -> Locked | None:
-    """`None` where it can be written as the parameter that it is; `taken` are the names there are."""
+    """`None` where it can be written as the parameter that it is.
+
+    `taken` are the names there are, `pdos` those that it is mapped in.
+    """
     access = variable.access_type.lower()
     if access not in WRITABLE:
         return Locked(f"the device lets nobody write it and read it back: its EDS says {access}")
-    if parameter is not None and parameter.problem is not None:
+    if parameter is None:
+        return _no_parameter(variable, table, taken, pdos)
+    if parameter.problem is not None:
         return Locked(parameter.problem)
-    lock = _lock(variable) if parameter is None else parameter.lock
-    if lock is None:
-        return None if parameter is not None else Locked(_NOBODY_SAID, _own_table(variable, table, taken))
-    why = lock.remedy if parameter is None else parameter.remedy(lock)
-    if lock in _BY_NAME and parameter is not None:
+    if parameter.lock is None:
+        return None
+    why = parameter.remedy(parameter.lock)
+    if parameter.lock in _BY_NAME:
         return Locked(why, _released(table, parameter))
-    if lock is not Lock.COMMUNICATION:
-        return Locked(why)
-    others = taken if parameter is None else taken - {parameter.name}
-    return Locked(why, _own_table(variable, table, others))
+    if parameter.lock is Lock.COMMUNICATION:
+        return Locked(why, _own_table(variable, table, taken - {parameter.name}))
+    return Locked(why)
 
 
-def _lock(variable: "ODVariable") -> Lock | None:
-    """Of what is no parameter: why it could not be made one as it stands."""
+def _no_parameter(
+    variable: "ODVariable", table: Table, taken: AbstractSet[str], pdos: Sequence[str]
+) -> Locked:
     known = DATA_TYPES.get(variable.data_type or 0)
-    if variable.index in _CONTROLWORDS:
-        return Lock.CONTROLWORD
-    if variable.index in (STORE, RESTORE):
-        return Lock.STORAGE
-    return Lock.TEXT if known is None or known.kind not in NUMBERS else None
+    if known is None or known.kind not in NUMBERS:
+        return Locked(Lock.TEXT.remedy)
+    lock = own_lock(variable.index, is_led=any(name.startswith("RPDO") for name in pdos))
+    if lock in (Lock.CONTROLWORD, Lock.STORAGE):
+        return Locked(lock.remedy)
+    beware = "" if lock is None else f"; beware: {lock.remedy.partition(';')[0]}"
+    return Locked(f"{_NOBODY_SAID}{beware}", _own_table(variable, table, taken))
 
 
 def _released(table: Table, parameter: Parameter) -> str:

@@ -113,6 +113,8 @@ def test_what_the_file_offers_nothing_of_is_released_by_a_table_of_its_own(clien
     (found,) = client.call("object.list", component="right_knee", search="0x6065:0")["objects"]
     assert found["parameter"] is None
     assert "it is no parameter" in found["locked"]
+    (mode,) = client.call("object.list", component="right_knee", search="0x605A:0")["objects"]
+    assert "beware: it decides how the drive stops" in mode["locked"]
     assert found["release"] == '[parameter."right_knee.following_error_window"]\nobject = "0x6065:0"'
 
 
