@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from msgspec.structs import replace
+
 from drivers.errors import DeviceTimeout, DriverError
 from eds import Description
 from eds.datatypes import DATA_TYPES, DOMAIN
@@ -139,27 +141,18 @@ class Objects:
     def _info(
         self, component: str, variable: "ODVariable", mapped: Mapping[tuple[int, int], list[str]]
     ) -> ObjectInfo:
-        data_type = DATA_TYPES.get(variable.data_type or 0)
         where = address(variable.index, variable.subindex)
         parameter = self._parameters.get((self._config.node_of(component), where))
         owner = self._tables[component if parameter is None else parameter.component]
         pdos = mapped.get((variable.index, variable.subindex), [])
         found = locked(variable, parameter, owner, self._names, pdos)
-        default = variable.default
-        return ObjectInfo(
-            where,
-            variable.qualname,
-            "?" if data_type is None else data_type.name,
-            variable.access_type.lower(),
-            variable.min,
-            variable.max,
-            default if isinstance(default, int | float | str) else None,
-            None if parameter is None else parameter.name,
-            _read_only(variable, parameter),
-            remark(variable.name),
-            pdos,
-            None if found is None else found.why,
-            None if found is None else found.lines,
+        return replace(
+            by_eds(variable),
+            parameter=None if parameter is None else parameter.name,
+            read_only=_read_only(variable, parameter),
+            pdos=pdos,
+            locked=None if found is None else found.why,
+            release=None if found is None else found.lines,
         )
 
     # -- what the device holds -------------------------------------------------------------------------------
@@ -198,12 +191,7 @@ class Objects:
         return self._unanswered.why(component) if silence is None else f"{component} is not there: {silence}"
 
     def _unreadable(self, wanted: Wanted) -> str | None:
-        variable = self._description(wanted.component).variable(wanted.index, wanted.subindex)
-        if variable is None or variable.access_type.lower() not in READABLE:
-            return "it cannot be read, the EDS says"
-        if variable.data_type == DOMAIN:
-            return "a domain is not read: nobody knows how long it would keep the device busy"
-        return None
+        return unreadable(self._description(wanted.component).variable(wanted.index, wanted.subindex))
 
     def _unread(self, wanted: Wanted, why: str | None) -> ObjectValue:
         return ObjectValue(None, "", None, why or self._unreadable(wanted))
@@ -220,6 +208,32 @@ class Objects:
 def address(index: int, subindex: int) -> str:
     """`0x6041:0`, as parameters have it."""
     return f"0x{index:04X}:{subindex}"
+
+
+def by_eds(variable: "ODVariable") -> ObjectInfo:
+    """What the EDS alone says of an object."""
+    known, default = DATA_TYPES.get(variable.data_type or 0), variable.default
+    return ObjectInfo(
+        address(variable.index, variable.subindex),
+        variable.qualname,
+        "?" if known is None else known.name,
+        variable.access_type.lower(),
+        variable.min,
+        variable.max,
+        default if isinstance(default, int | float | str) else None,
+        None,
+        None,
+        remark(variable.name),
+    )
+
+
+def unreadable(variable: "ODVariable | None") -> str | None:
+    """Why an object is not read; `None` where it is."""
+    if variable is None or variable.access_type.lower() not in READABLE:
+        return "it cannot be read, the EDS says"
+    if variable.data_type == DOMAIN:
+        return "a domain is not read: nobody knows how long it would keep the device busy"
+    return None
 
 
 def _read_only(variable: "ODVariable", parameter: Parameter | None) -> str | None:
