@@ -21,7 +21,8 @@ from server_gui.views.objects.objects_model import AGE, HOLDS, NAME, OTHER, PARA
 from server_gui.views.objects.panel import READ_NO_MORE, ObjectsPage
 from server_gui.views.parameters.filter import NAME_ROLE
 from server_gui.views.theme import Theme
-from tests.gui.fakes import Bench, destroy
+from tests.gui import rules
+from tests.gui.fakes import Bench, destroy, stop_is_whole
 from tests.support.desk import described, looked
 from tests.support.dictionaries import HOLDS as HELD
 from tests.support.dictionaries import OBJECTS, RELEASE, answer_lists, answer_reads, one
@@ -260,6 +261,32 @@ def test_an_object_is_pinned_for_its_robot(page: ObjectsPage, bench: Bench) -> N
     assert _cell(page, "0x6041:0", NAME) == "★ Statusword"
     page.kinds[Kind.PINNED].click()
     assert [info.object for info in page.table.rows] == ["0x6041:0"]
+
+
+SIZES = ((1024, 700, 1.0), (1024, 700, 2.0), (1366, 768, 1.5))
+
+
+def test_the_page_keeps_the_rules_at_every_size(window: MainWindow, bench: Bench, theme: Theme) -> None:
+    """Full of values, also when the link has gone: then nothing is green."""
+    window.tabs.setCurrentIndex(window._views.index(window.objects))
+    page, broken = window.objects, list[str]()
+    for width, height, scale in SIZES:
+        bench.station.take([LinkChanged(ConnectionState.CONNECTED, None, 0), described(), looked()])
+        theme.set(scale=scale)
+        window.resize(width, height)
+        bench.draw(window)
+        _answer(page, bench)
+        page.table.choose("0x6065:0")
+        bench.draw(window)
+        rules.settle()
+        broken += [*rules.halved_numbers(window), *rules.out_of_reach(window), *rules.nameless(window)]
+        bench.station.take([LinkChanged(ConnectionState.WAITING, "no gateway", 0)])
+        bench.draw(window)
+        rules.settle()
+        broken += [*rules.halved_numbers(page), *rules.green(page, theme), *rules.out_of_reach(window)]
+        assert page.table.rows
+        assert stop_is_whole(window)
+    assert not broken, "\n".join(sorted(set(broken)))
 
 
 def test_names_that_command_something_are_shown_as_what_they_are(theme: Theme, bench: Bench) -> None:
