@@ -77,7 +77,7 @@ def two_channels(hand: Hand) -> None:
 def a_locked_object(hand: Hand) -> None:
     """Found by its address, with what it holds, and why it may not be written."""
     hand.click("Search of the objects")
-    hand.type("0x60*")
+    hand.type("0x606*")
     hand.click("0x6060:0")
     hand.sees("cyclic synchronous")
 

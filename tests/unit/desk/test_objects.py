@@ -122,7 +122,7 @@ def test_one_question_at_a_time_and_not_at_once_again(commands: FakeCommands) ->
     wanted = [(KNEE, "0x6041:0")]
     reading.look(wanted)
     reading._next_ns = 0
-    reading.look(wanted)
+    reading.look([(KNEE, "0x1000:0")])  # while the first is under way
     assert len(commands.named("read_objects")) == 1
     answer_reads(commands)
     reading.look(wanted)
