@@ -4,7 +4,9 @@ import argparse
 from dataclasses import replace
 from typing import Final
 
+from gateway.cli.arguments import lines
 from gateway.cli.connect import UnknownName, connect, parser
+from gateway.cli.od_watch import watch
 from gateway.cli.set import Change, change_of, value_of
 from gateway.cli.text import exact, say, say_json, table
 from gateway.cli.writing import add_trial, write
@@ -22,6 +24,7 @@ examples:
   gwrms od left_knee 0x6060…             from there on
   gwrms od 2 'target position'           of node 2, by words of the name
   gwrms od left_knee 0x60* --read        with what the device holds now
+  gwrms od left_knee 0x6041 --watch      again each second, where it holds something else
   gwrms od left_knee 0x6072:0 --set 500
   gwrms od 5 0x1018 --interface can0 --eds drive.eds   read from the bus itself, where no gateway runs"""
 
@@ -47,6 +50,10 @@ def main(argv: list[str]) -> int:
     )
     made.add_argument("--read", action="store_true", help="ask the device what it holds now")
     made.add_argument(
+        "--watch", action="store_true", help="a line whenever one holds something else, until Ctrl-C"
+    )
+    made.add_argument("--count", type=lines, metavar="N", help="end --watch after N lines")
+    made.add_argument(
         "--set", metavar="VALUE", type=_value, help="write the one object that SEARCH finds; 3deg, 420mm"
     )
     add_trial(made)
@@ -68,6 +75,8 @@ def main(argv: list[str]) -> int:
         found = robot.objects(component, arguments.search)
         if not found.objects:
             raise UnknownName(f"{component} has no object that fits {arguments.search!r}")
+        if arguments.watch:
+            return watch(robot, found, arguments.count, as_json=arguments.json)
         if arguments.set is not None:
             return _set(robot, found, description, arguments)
         return _show(robot, found, arguments)
@@ -76,6 +85,10 @@ def main(argv: list[str]) -> int:
 def _misused(arguments: argparse.Namespace) -> str | None:
     if arguments.trial is not None and arguments.set is None:
         return "--trial is for --set"
+    if arguments.watch and (arguments.set is not None or arguments.interface is not None):
+        return "--watch is neither for --set nor for --interface"
+    if arguments.count is not None and not arguments.watch:
+        return "--count is for --watch"
     if arguments.interface is None:
         return "--eds and --bitrate are for --interface" if arguments.eds or arguments.bitrate else None
     if arguments.set is not None:

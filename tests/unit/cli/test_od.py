@@ -60,6 +60,27 @@ def test_json_holds_objects_and_values(robot: Served, capsys: pytest.CaptureFixt
     assert told["values"]["0x6081:0"]["value"] == 65190
 
 
+def test_a_watch_says_what_has_changed(
+    robot: Served, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("gateway.cli.od_watch.PERIOD_S", 0.01)
+    held = iter((65190, 65190, 65190, 70001))
+
+    def turn(index: int) -> None:
+        if index == VELOCITY[0]:
+            robot.bench.left.node.objects[VELOCITY] = next(held).to_bytes(4, "little")
+
+    robot.bench.left.node.before_upload = turn
+    assert robot.run("od", "left_knee", "0x6081", "--watch", "--count", "2", "--json") == 0
+    told = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert [one["value"]["value"] for one in told] == [65190, 70001]
+
+
+def test_what_is_too_much_to_watch_is_said(robot: Served, capsys: pytest.CaptureFixture[str]) -> None:
+    assert robot.run("od", "left_knee", "--watch") == 1
+    assert "too many to watch, 64 at most" in capsys.readouterr().err
+
+
 DRIVE = {
     (0x6041, 0): b"\x37\x02",
     (0x6064, 0): (-5).to_bytes(4, "little", signed=True),
@@ -109,6 +130,8 @@ def test_a_node_that_somebody_else_asks_is_left_alone(request: pytest.FixtureReq
         (("left_knee", "--interface", "can0", "--eds", "a.eds"), "DEVICE is a node id"),
         (("200", "--interface", "can0", "--eds", "a.eds"), "DEVICE is a node id"),
         (("5", "--eds", "a.eds"), "are for --interface"),
+        (("5", "0x6041", "--watch", "--set", "1"), "--watch is neither"),
+        (("5", "0x6041", "--count", "1"), "--count is for --watch"),
         (("5", "0x6072:0", "--interface", "can0", "--eds", "a.eds", "--set", "1"), "only reads"),
     ],
 )
