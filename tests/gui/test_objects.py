@@ -17,8 +17,9 @@ from gateway.wire.robot import Hello
 from server_gui.core.follow.events import Described, LinkChanged
 from server_gui.core.objects.rows import Kind
 from server_gui.views.main_window import MainWindow
+from server_gui.views.objects.choice_bar import READ_NO_MORE
 from server_gui.views.objects.objects_model import AGE, HOLDS, NAME, OTHER, PARAMETER
-from server_gui.views.objects.panel import READ_NO_MORE, ObjectsPage
+from server_gui.views.objects.panel import ObjectsPage
 from server_gui.views.parameters.filter import NAME_ROLE
 from server_gui.views.theme import Theme
 from tests.gui import rules
@@ -38,8 +39,8 @@ def page(theme: Theme, bench: Bench) -> Iterator[ObjectsPage]:
     made.resize(1200, 900)
     made.show()
     made.look()
-    made.device.setCurrentIndex(made.device.findData(KNEE))
-    made.device.activated.emit(made.device.currentIndex())
+    made.bar.device.setCurrentIndex(made.bar.device.findData(KNEE))
+    made.bar.device.activated.emit(made.bar.device.currentIndex())
     _answer(made, bench)
     yield made
     destroy(made)
@@ -108,20 +109,20 @@ def test_of_thousands_only_those_in_sight_are_asked_for(theme: Theme, bench: Ben
 
 
 def test_words_and_kinds_choose(page: ObjectsPage) -> None:
-    page.words.setText("0x60*")
+    page.bar.words.setText("0x60*")
     assert [info.object[:4] for info in page.table.rows] == ["0x60"] * 4
-    page.words.setText("")
-    page.kinds[Kind.DIFFERENT].click()
+    page.bar.words.setText("")
+    page.bar.kinds[Kind.DIFFERENT].click()
     assert [info.object for info in page.table.rows] == ["0x6040:0", "0x6065:0", "0x6072:0"]
-    page.kinds[Kind.PARAMETERS].click()
+    page.bar.kinds[Kind.PARAMETERS].click()
     assert [info.object for info in page.table.rows] == ["0x6072:0"]
-    assert page.kinds[Kind.ALL].text() == f"All {len(OBJECTS)}"
+    assert page.bar.kinds[Kind.ALL].text() == f"All {len(OBJECTS)}"
 
 
 def test_the_chosen_one_stays_chosen_when_it_is_found_again(page: ObjectsPage) -> None:
     page.table.choose("0x6041:0")
-    page.words.setText("torque")
-    page.words.setText("")
+    page.bar.words.setText("torque")
+    page.bar.words.setText("")
     current = page.table.current
     assert current is not None
     assert current.object == "0x6041:0"
@@ -146,8 +147,8 @@ def test_a_parameter_is_staged_where_parameters_are(window: MainWindow, bench: B
     window.tabs.setCurrentIndex(window._views.index(window.objects))
     bench.draw(window)
     page = window.objects
-    page.device.setCurrentIndex(page.device.findData(KNEE))
-    page.device.activated.emit(page.device.currentIndex())
+    page.bar.device.setCurrentIndex(page.bar.device.findData(KNEE))
+    page.bar.device.activated.emit(page.bar.device.currentIndex())
     _answer(page, bench)
     window.parameters.filters.words.setText("nothing has this")
     page.table.choose("0x6072:0")
@@ -201,7 +202,7 @@ def test_when_the_link_goes_values_are_grey_with_their_age_and_nothing_is_asked(
     assert _ink(page, theme, "0x6041:0", HOLDS) == "old"
     assert "as old as it says" in page.said.text()
     assert len(bench.first.asked) == asked
-    assert not page.all.isEnabled()
+    assert not page.bar.all.isEnabled()
 
 
 def test_a_node_that_is_silent_says_so_in_its_rows(page: ObjectsPage, bench: Bench, theme: Theme) -> None:
@@ -228,8 +229,8 @@ def test_a_device_without_eds_says_why_and_how(theme: Theme, bench: Bench) -> No
 
 
 def test_two_devices_stand_beside_each_other(page: ObjectsPage, bench: Bench) -> None:
-    page.other.setCurrentIndex(page.other.findData("right_knee"))
-    page.other.activated.emit(page.other.currentIndex())
+    page.bar.other.setCurrentIndex(page.bar.other.findData("right_knee"))
+    page.bar.other.activated.emit(page.bar.other.currentIndex())
     answer_lists(bench.first)
     _read_again(page, bench)
     reading = bench.station.objects.reading
@@ -242,8 +243,8 @@ def test_two_devices_stand_beside_each_other(page: ObjectsPage, bench: Bench) ->
 
 
 def test_everything_is_read_once_and_saved(page: ObjectsPage, bench: Bench, tmp_path: Path) -> None:
-    page.all.click()
-    assert page.all.text() == READ_NO_MORE
+    page.bar.all.click()
+    assert page.bar.all.text() == READ_NO_MORE
     _read_again(page, bench)
     assert not bench.station.objects.reading.left
     path = tmp_path / "knee.csv"
@@ -259,7 +260,7 @@ def test_an_object_is_pinned_for_its_robot(page: ObjectsPage, bench: Bench) -> N
     page.facts.pin.click()
     assert bench.desk.pins.of("exo-01") == {"left_knee.0x6041:0"}
     assert _cell(page, "0x6041:0", NAME) == "★ Statusword"
-    page.kinds[Kind.PINNED].click()
+    page.bar.kinds[Kind.PINNED].click()
     assert [info.object for info in page.table.rows] == ["0x6041:0"]
 
 

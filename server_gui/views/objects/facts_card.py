@@ -32,6 +32,7 @@ class FactsCard(Card):
         self._theme = theme
         self._info: ObjectInfo | None = None
         self._component = ""
+        self._columns = 0
         self.text = QPlainTextEdit()
         self.text.setReadOnly(True)
         self.text.setTabChangesFocus(True)
@@ -60,7 +61,11 @@ class FactsCard(Card):
         self._restyle()
 
     def arrange(self, columns: int) -> None:
-        """Stand so many buttons in a row."""
+        """Stand so many buttons in a row, at most."""
+        columns = min(columns, len(self.buttons))
+        if columns == self._columns:
+            return
+        self._columns = columns
         for place, button in enumerate(self.buttons):
             self._grid.addWidget(button, place // columns, place % columns)
 

@@ -11,11 +11,6 @@ from typing import Final
 from PySide6.QtCore import Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
-    QButtonGroup,
-    QComboBox,
-    QGridLayout,
-    QLineEdit,
-    QPushButton,
     QVBoxLayout,
     QWidget,
 )
@@ -29,8 +24,9 @@ from server_gui.core.objects.devices import Device, device_of, devices
 from server_gui.core.objects.facts import facts
 from server_gui.core.objects.objects import NO_EDS, Dictionary
 from server_gui.core.objects.reading import Object
-from server_gui.core.objects.rows import BY_EDS, CSV_TITLES, Compared, Finder, Kind, cells, pin_of
+from server_gui.core.objects.rows import CSV_TITLES, Compared, Finder, cells, pin_of
 from server_gui.core.tuning.edits import unit_of
+from server_gui.views.objects.choice_bar import ChoiceBar
 from server_gui.views.objects.facts_card import FactsCard
 from server_gui.views.objects.objects_model import Shown
 from server_gui.views.objects.objects_table import ObjectsTable
@@ -38,17 +34,9 @@ from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.files import ask_save, save_whole
 from server_gui.views.widgets.fitted import FittedLabel
-from server_gui.views.widgets.plain import PlainLabel, set_tip
+from server_gui.views.widgets.plain import PlainLabel
 
 READ: Final = 6  # frames between two looks
-BUTTON: Final = 104  # px at text of 100 % that one needs
-READ_ALL, READ_NO_MORE = "Read all", "Stop reading"
-TIPS: Final = {
-    Kind.ALL: "Every object of the device's EDS",
-    Kind.PARAMETERS: "Those that may be written: parameters",
-    Kind.DIFFERENT: "Those that were read, and hold something else than what they are compared with",
-    Kind.PINNED: "Those that are pinned (Ctrl+P pins the chosen one)",
-}
 LOST: Final = "The robot is not linked: what is shown is as old as it says."
 NO_DEVICE: Final = f"This robot has no CANopen device with an EDS. {NO_EDS}"
 ASKING: Final = "Asking for the objects of its EDS …"
@@ -66,20 +54,9 @@ class ObjectsPage(QWidget):
         self._frame = 0
         self._devices: Sequence[Device] = ()
         self._chosen: dict[str, str] = {}  # by robot, the component that is looked at
-        self._columns = 0  # of buttons, for the room that there is
         self._finder = Finder()
         self.setObjectName("page")
-        self.device, self.other = _combo("Device"), _combo("Compare with")
-        set_tip(self.other, "What is beside it: the default of its EDS, or what another device holds")
-        self.words = QLineEdit()
-        self.words.setPlaceholderText("Search: 0x6041, 0x60*, 0x6060-0x607F, words …")
-        self.words.setClearButtonEnabled(True)
-        self.words.setAccessibleName("Search of the objects")
-        self.kinds = {kind: QPushButton(kind.value) for kind in Kind}
-        self.all = QPushButton(READ_ALL)
-        self.export = QPushButton("CSV …")
-        set_tip(self.all, "Every object once, some hundred a second at most; goes on while this is shown")
-        set_tip(self.export, "All that was read of this device, with every digit")
+        self.bar = ChoiceBar(theme)
         self.count = FittedLabel("dim")
         self.said = PlainLabel()
         self.said.setObjectName("banner")
@@ -102,8 +79,8 @@ class ObjectsPage(QWidget):
             return
         description = station.robot.description
         self._devices = () if description is None else devices(description)
-        self._offer(station)
         device = self._device(station)
+        self.bar.offer(self._devices, device)
         dictionary = Dictionary() if device is None else self._dictionary(station, device)
         compared = self._compared(station, device)
         self._show_rows(station, device, dictionary, compared)
@@ -132,63 +109,31 @@ class ObjectsPage(QWidget):
     # --- how it is put together
 
     def _build(self) -> None:
-        self._group = QButtonGroup(self)
-        for kind, button in self.kinds.items():
-            button.setCheckable(True)
-            set_tip(button, TIPS[kind])
-            self._group.addButton(button)
-        self.kinds[Kind.ALL].setChecked(True)
-        self._above = QGridLayout()
-        self._above.setSpacing(4)
-        self._buttons = QGridLayout()
-        self._buttons.setSpacing(4)
         everything = QVBoxLayout(self)
         everything.setContentsMargins(8, 8, 8, 8)
-        everything.addLayout(self._above)
-        everything.addWidget(self.words)
-        everything.addLayout(self._buttons)
-        everything.addWidget(self.count)
-        everything.addWidget(self.said)
+        for widget in (self.bar, self.count, self.said):
+            everything.addWidget(widget)
         everything.addWidget(self.table, 1)
         everything.addWidget(self.facts)
         self._arrange()
 
     def _arrange(self) -> None:
         outside: QWidget | None = self.parentWidget()  # of the room itself this may be wider
-        room = (outside or self).width()
-        columns = max(1, room // self._theme.px(BUTTON))
-        if columns == self._columns:
-            return
-        self._columns = columns
-        buttons = (*self.kinds.values(), self.all, self.export)
-        for grid, widgets, most in (
-            (self._above, (self.device, self.other), columns // 2),
-            (self._buttons, buttons, columns),
-        ):
-            for place, widget in enumerate(widgets):
-                row, column = divmod(place, min(max(most, 1), len(widgets)))
-                grid.addWidget(widget, row, column)
-        self.facts.arrange(min(columns, len(self.facts.buttons)))
+        self.facts.arrange(self.bar.arrange((outside or self).width()))
 
     def _connect(self) -> None:
-        self.device.activated.connect(self._choose_device)
-        self.other.activated.connect(lambda _place: self.look())
-        self.words.textChanged.connect(lambda _text: self.look())
-        self._group.buttonClicked.connect(lambda _button: self.look())
-        self.all.clicked.connect(self._read_all)
-        self.export.clicked.connect(self._ask_where)
+        self.bar.picked.connect(self._choose_device)
+        self.bar.changed.connect(self.look)
+        self.bar.all.clicked.connect(self._read_all)
+        self.bar.export.clicked.connect(self._ask_where)
         self.table.chosen.connect(self._look_at_chosen)
         self.table.copied.connect(self.facts.copy_address)
         for part in (self.table, self.facts):
             part.pinned.connect(self._pin)
         self.table.wanted.connect(self._edit)
         self.facts.edited.connect(self._edit)
-        self._theme.scaled.connect(self._rearrange)
+        self._theme.scaled.connect(self._arrange)
         self._desk.on_select.append(lambda _station: self._forget_choice())
-
-    def _rearrange(self) -> None:
-        self._columns = 0
-        self._arrange()
 
     def _forget_choice(self) -> None:
         self._frame = 0  # what another robot has is shown with the next frame
@@ -254,59 +199,34 @@ class ObjectsPage(QWidget):
         return station.objects.of(device.component, ask=station.is_linked)
 
     def _compared(self, station: Station, device: Device | None) -> Compared:
-        place = self.other.currentIndex()
-        other = self.other.itemData(place) if place > 0 else None
         component = "" if device is None else device.component
-        return Compared(component, station.objects.reading.held, other if isinstance(other, str) else None)
-
-    def _offer(self, station: Station) -> None:
-        device = self._device(station)
-        _fill(self.device, [(one.title, one.component) for one in self._devices])
-        if device is not None:
-            self.device.setCurrentIndex(self._devices.index(device))
-        others = [(one.title, one.component) for one in self._devices if one is not device]
-        _fill(self.other, [(BY_EDS, None), *others])
+        return Compared(component, station.objects.reading.held, self.bar.beside)
 
     def _show_rows(
         self, station: Station, device: Device | None, dictionary: Dictionary, compared: Compared
     ) -> None:
         pinned = self._desk.pins.of(station.title)
-        revision = station.objects.reading.revision
-        kinds = self._finder.find(dictionary, self.words.text(), compared, pinned, revision)
-        for kind, button in self.kinds.items():
-            text = f"{kind.value} {len(kinds[kind])}"
-            if button.text() != text:
-                button.setText(text)
-        kind = next(kind for kind, button in self.kinds.items() if button.isChecked())
+        reading = station.objects.reading
+        kinds = self._finder.find(dictionary, self.bar.words.text(), compared, pinned, reading.revision)
+        self.bar.count(kinds, is_reading=bool(reading.left))
         shown = Shown(compared, station.is_linked, pinned, station.edits.staged.keys())
         component = None if device is None else device.component
         measured = (station, component, dictionary.revision, compared.with_component)
-        self.table.take(kinds[kind], shown, measured)
+        self.table.take(kinds[self.bar.kind], shown, measured)
 
     def _say(self, station: Station, device: Device | None, dictionary: Dictionary) -> None:
-        reading = station.objects.reading
-        problem = dictionary.problem or reading.problem
-        if not station.is_linked:
-            text = LOST
-        elif station.robot.description is None:
-            text = "The robot has not described itself yet."
-        elif device is None:
-            text = NO_DEVICE
-        else:
-            text = problem or ""
+        reading, known = station.objects.reading, len(dictionary.objects)
+        text = _trouble(station, device, dictionary)
         set_text(self.said, text)
         self.said.setVisible(bool(text))
         component = "" if device is None else device.component
         read = sum((component, one.object) in reading.held for one in dictionary.objects)
         left = f", {len(reading.left)} to read" if reading.left else ""
-        known = f"{len(dictionary.objects)} objects, {read} read{left}"
-        self.count.say(
-            known if dictionary.objects or problem or device is None else ASKING, f"{read} read{left}"
-        )
-        set_text_of(self.all, READ_NO_MORE if reading.left else READ_ALL)
-        refused = station.refused(OBJECT_READ)
-        self.all.setEnabled(station.is_linked and bool(dictionary.objects) and not refused)
-        self.export.setEnabled(read > 0)
+        is_asking = device is not None and not known and not text
+        self.count.say(ASKING if is_asking else f"{known} objects, {read} read{left}", f"{read} read{left}")
+        may_read = not station.refused(OBJECT_READ)
+        self.bar.all.setEnabled(station.is_linked and known > 0 and may_read)
+        self.bar.export.setEnabled(read > 0)
 
     def _show_facts(self, station: Station, compared: Compared) -> None:
         info = self.table.current
@@ -347,28 +267,12 @@ class ObjectsPage(QWidget):
         return wanted
 
 
-def set_text_of(button: QPushButton, text: str) -> None:
-    """Change a button only where it says something else."""
-    if button.text() != text:
-        button.setText(text)
-
-
-def _combo(name: str) -> QComboBox:
-    combo = QComboBox()
-    combo.setAccessibleName(name)
-    combo.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
-    combo.setMinimumContentsLength(8)
-    return combo
-
-
-def _fill(combo: QComboBox, entries: Sequence[tuple[str, str | None]]) -> None:
-    """Offer these; what is chosen stays, where it still is there."""
-    if [combo.itemText(place) for place in range(combo.count())] == [title for title, _ in entries]:
-        return
-    chosen = combo.currentData()
-    combo.blockSignals(True)
-    combo.clear()
-    for title, component in entries:
-        combo.addItem(title, component)
-    combo.setCurrentIndex(max(0, combo.findData(chosen)))
-    combo.blockSignals(False)
+def _trouble(station: Station, device: Device | None, dictionary: Dictionary) -> str:
+    """What is wrong as a whole; of single objects their rows tell."""
+    if not station.is_linked:
+        return LOST
+    if station.robot.description is None:
+        return "The robot has not described itself yet."
+    if device is None:
+        return NO_DEVICE
+    return dictionary.problem or station.objects.reading.problem or ""
