@@ -209,6 +209,8 @@ complete -c gwrms -n '_shtab_gwrms_using od' -s h -l help -d 'show this help mes
 complete -c gwrms -n '_shtab_gwrms_using od' -l robot -x -d 'the gateway to ask (default 127.0.0.1:7420)'
 complete -c gwrms -n '_shtab_gwrms_using od' -l json -d 'one JSON object a line, for machines'
 complete -c gwrms -n '_shtab_gwrms_using od' -l read -d 'ask the device what it holds now'
+complete -c gwrms -n '_shtab_gwrms_using od' -l watch -d 'a line whenever one holds something else, until Ctrl-C'
+complete -c gwrms -n '_shtab_gwrms_using od' -l count -x -d 'end --watch after N lines'
 complete -c gwrms -n '_shtab_gwrms_using od' -l set -x -d 'write the one object that SEARCH finds; 3deg, 420mm'
 complete -c gwrms -n '_shtab_gwrms_using od' -l trial -x -d 'try it for S seconds (at most 300); exit status 0 if kept'
 complete -c gwrms -n '_shtab_gwrms_using od' -l interface -x -d 'can0, INTERFACE:CHANNEL of python-can, or a robot'"'"'s file: read node DEVICE there, by --eds'

@@ -773,6 +773,8 @@ _shtab_gwrms_od_options=(
   "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
   "--json[one JSON object a line, for machines]"
   "--read[ask the device what it holds now]"
+  "--watch[a line whenever one holds something else, until Ctrl-C]"
+  "--count[end --watch after N lines]:N:"
   "--set[write the one object that SEARCH finds\; 3deg, 420mm]:VALUE:"
   "--trial[try it for S seconds (at most 300)\; exit status 0 if kept]:S:"
   "--interface[can0, INTERFACE\:CHANNEL of python-can, or a robot\'s file\: read node DEVICE there, by --eds]:BUS:"

@@ -20,6 +20,7 @@ from server_gui.views.theme import Theme
 from server_gui.views.widgets.plain import set_tip
 
 BUTTON: Final = 104  # px at text of 100 % that one needs
+EVENLY: Final = (6, 3, 2)  # buttons in a row: no row has only one
 READ_ALL, READ_NO_MORE = "Read all", "Stop reading"
 TIPS: Final = {
     Kind.ALL: "Every object of the device's EDS",
@@ -84,7 +85,8 @@ class ChoiceBar(QWidget):
 
     def arrange(self, room: int) -> int:
         """Stand beside each other as far as there is room; how many buttons that are."""
-        columns = max(1, room // self._theme.px(BUTTON))
+        found = room // self._theme.px(BUTTON)
+        columns = next((evenly for evenly in EVENLY if evenly <= found), 1)
         if columns != self._columns:
             self._columns = columns
             buttons = (*self.kinds.values(), self.all, self.export)
