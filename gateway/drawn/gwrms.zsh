@@ -54,7 +54,7 @@ _shtab_gwrms_commands() {
     stop:'Quick stop on every drive, held until gwrms reset. Needs no lease.'
     store:'Make a device keep its parameters as they are now (1010h).'
     top:'One robot in the terminal, live: its joints, feet, trunk, parameters and computer.'
-    trace:'Shows the frames of a CAN bus or of a recording, decoded by EDS. Only listens.'
+    trace:'Shows the frames of CAN buses or of recordings, decoded by EDS. Only listens.'
     train:'A model from recorded sessions and their labels.'
     watch:'Follow channels live, one line for every tick.'
   )
@@ -773,8 +773,13 @@ _shtab_gwrms_od_options=(
   "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
   "--json[one JSON object a line, for machines]"
   "--read[ask the device what it holds now]"
+  "--watch[a line whenever one holds something else, until Ctrl-C]"
+  "--count[end --watch after N lines]:N:"
   "--set[write the one object that SEARCH finds\; 3deg, 420mm]:VALUE:"
   "--trial[try it for S seconds (at most 300)\; exit status 0 if kept]:S:"
+  "--interface[can0, INTERFACE\:CHANNEL of python-can, or a robot\'s file\: read node DEVICE there, by --eds]:BUS:"
+  "--eds[the node\'s EDS or DCF, for --interface]:FILE:"
+  "--bitrate[bit\/s, for interfaces that are opened with one]:bitrate:"
   ":a joint or device by name, or a node id:"
   ":0x6041, 0x1018\:4, 0x60\*, 0x6060-0x607F, 0x6060\…, or words of the name (default\: all):"
 )
@@ -1170,7 +1175,7 @@ _shtab_gwrms_top_defaults_added=0
 _shtab_gwrms_trace_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--robot[robot\'s file that names nodes and EDS files]:FILE:_files"
-  "*--eds[EDS or DCF of a node (again for others)]:NODE=FILE:"
+  "*--eds[EDS or DCF of a node (again for others)\; can1\/5\=FILE\: on that interface alone]:NODE=FILE:"
   "*--node[only this one, by id or name (or again)]:NODE:"
   "*--kind[only these\: nmt, sync, time, emcy, pdo, sdo, heartbeat, lss, error, other]:KIND:"
   "*--object[only 0x6041, 0x1018\:4 or \'\*position\*\']:OBJECT:"
@@ -1181,7 +1186,7 @@ _shtab_gwrms_trace_options=(
   "--seconds[end after N seconds (default\: Ctrl-C)]:N:"
   "--count[end after N frames that are shown]:N:"
   "--json[one JSON line a frame, or a table]"
-  ":can0, INTERFACE\:CHANNEL of python-can, a robot\'s file with one bus\; or FILE.log, FILE.pcap:"
+  "(*):can0, INTERFACE\:CHANNEL of python-can, a robot\'s file\; or FILE.log, FILE.pcap\; or several:"
 )
 
 # guard to ensure default positional specs are added only once per session

@@ -42,6 +42,7 @@ from server_gui.views.help import Help
 from server_gui.views.kept import keep_bytes, kept_bytes
 from server_gui.views.keys_sheet import KeysSheet
 from server_gui.views.models.panel import ModelsPage
+from server_gui.views.objects.panel import ObjectsPage
 from server_gui.views.overview import Overview
 from server_gui.views.page_bar import PageBar
 from server_gui.views.parameters.panel import ParametersPanel
@@ -131,6 +132,8 @@ class MainWindow(QMainWindow):
         self.overview.opened.connect(self._open_in_signals)
         self.resources = Resources(desk, theme)
         self.buses = BusHealthView(desk, theme)
+        self.objects = ObjectsPage(desk, theme)
+        self.objects.edited.connect(self._edit_parameter)
         self.audit = Audit(desk, theme, None if archive is None else archive.journals)
         self.help, self.help_button = Help(theme), QPushButton("?")
         self.empty = EmptyView(theme)
@@ -145,10 +148,11 @@ class MainWindow(QMainWindow):
             self.signals,
             self.resources,
             self.buses,
+            self.objects,
             self.audit,
         )
         for title, view in zip(
-            ("&Overview", "&Signals", "&Resources", "&Bus", "&Audit"), self._views, strict=True
+            ("&Overview", "&Signals", "&Resources", "&Bus", "Ob&jects", "&Audit"), self._views, strict=True
         ):
             self.tabs.addTab(Scrolled(view), title)
         self._live = len(self._views)  # tabs that show the robot that is looked at
@@ -270,6 +274,10 @@ class MainWindow(QMainWindow):
         """Words that are typed are seen, also where the panel was hidden."""
         self.bring(self.docks[1])
         self.parameters.find_parameter()
+
+    def _edit_parameter(self, name: str) -> None:
+        self._panels.bring(self.docks[1])
+        self.parameters.edit_parameter(name)
 
     def _end_trial(self, *, keep: bool) -> None:
         station = self._desk.selected

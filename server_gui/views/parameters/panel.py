@@ -146,6 +146,13 @@ class ParametersPanel(QWidget):
         self.filters.words.setFocus(Qt.FocusReason.ShortcutFocusReason)
         self.filters.words.selectAll()
 
+    def edit_parameter(self, name: str) -> None:
+        """Let a new value be typed for this one, as a double click on it does; nothing is staged yet."""
+        self.pages.setCurrentIndex(EDIT)
+        self.filters.show_all()
+        self.refresh()
+        self.tree.edit_name(name)
+
     def open_file(self, path: Path) -> None:
         """Compare with a file from now on; nothing is staged and nothing is sent."""
         station = self._desk.selected

@@ -146,6 +146,14 @@ class ParameterTree(QTreeView):
             index = self.filter.mapFromSource(self._rows[name][NEW].index())
             self.setCurrentIndex(index)
 
+    def edit_name(self, name: str) -> None:
+        """Choose a parameter, and let its new value be typed."""
+        self.select_name(name)
+        if self.current_name == name:
+            self.setFocus(Qt.FocusReason.OtherFocusReason)
+            self.scrollTo(self.currentIndex())
+            self.edit(self.currentIndex())
+
     @property
     def current_name(self) -> str | None:
         """The parameter that is chosen."""

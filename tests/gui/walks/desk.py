@@ -74,6 +74,14 @@ def two_channels(hand: Hand) -> None:
     hand.click("Cursors")
 
 
+def a_locked_object(hand: Hand) -> None:
+    """Found by its address, with what it holds, and why it may not be written."""
+    hand.click("Search of the objects")
+    hand.type("0x606*")
+    hand.click("0x6060:0")
+    hand.sees("cyclic synchronous")
+
+
 def a_core_is_eaten(bench: Bench) -> None:
     """Whoever does that stands first in the table."""
     hand, program = bench.hand, bench.folder / EATER
@@ -202,5 +210,6 @@ PAGES: Final[tuple[tuple[str, Callable[[Hand], None], str], ...]] = (
     ("Signals", two_channels, "Box zoom"),
     ("Resources", lambda _: None, "processes"),
     ("Bus", lambda _: None, "main"),
+    ("Objects", a_locked_object, "Read all"),
     ("Audit", lambda _: None, "journal"),
 )
