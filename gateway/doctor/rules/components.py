@@ -6,11 +6,16 @@ from gateway.config.robot import COMPONENT_TABLES, header
 from gateway.doctor.observations import Observations
 from gateway.doctor.verdicts import Advice, Finding, Unknown, Verdict
 
+_RESTART = Advice("start the gateway again while nobody is in the robot, so that it takes the file")
+_COPY = Advice("where this is a copy of the robot's file, or an old one: take that which the gateway serves")
 _DESCRIBE = Advice("gwrms describe says since when, and what to check")
 
 
 def component(seen: Observations) -> Iterator[Verdict]:
-    """Every joint and sensor of which its driver says that something is wrong."""
+    """Every joint and sensor of which its driver says that something is wrong; the file that it goes by."""
+    if seen.other_file is not None:
+        words = "the gateway goes by another file than this one: joints and sensors are not judged"
+        yield Finding("component", str(seen.config.path), words, (seen.other_file,), (_RESTART, _COPY))
     sampled = {name.partition(".")[0] for name in seen.samples.columns}
     for kind in COMPONENT_TABLES:
         for name in getattr(seen.config, kind):
