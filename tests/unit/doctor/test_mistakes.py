@@ -9,10 +9,10 @@ from msgspec import structs
 
 import eds
 from drivers.bus.interfaces.controller_state import BusState
-from gateway.doctor.observations import BusFacts, Computer, Observations, Samples
+from gateway.doctor.observations import BusFacts, Computer, Heard, Observations, Samples
 from gateway.doctor.report import status, well
 from gateway.doctor.table import RULES, judged
-from gateway.doctor.verdicts import Edit, Finding, Write
+from gateway.doctor.verdicts import Edit, Finding, Unknown, Write
 from hil_sim.exoskeleton import JOINTS
 from hil_sim.mistakes.registry import MISTAKES
 from tests.unit.doctor.patient import Patient
@@ -180,6 +180,15 @@ def test_what_is_to_be_written_is_told_in_its_parameters_unit(tmp_path: Path) ->
     (found,) = findings(window)
     assert "right_knee.0x6065:0=0.349057328283rad" in found.fixes[0].words
     assert "22755 of the device's own" in found.fixes[0].words
+
+
+def test_a_node_that_no_table_has_is_told_and_no_mistake(walker: Patient) -> None:
+    seen = walker.seen()
+    heard = dict(seen.buses["main"].heard or {}) | {0x709: Heard(3, 1.0), 0x77F: Heard(1, 0.0)}
+    verdicts = list(judged(replace(seen, buses={"main": replace(seen.buses["main"], heard=heard)})))
+    (told,) = verdicts
+    assert isinstance(told, Unknown)
+    assert (told.about, told.why.partition(" is heard")[0]) == ("[can.main]", "node 9, 127")
 
 
 def test_what_a_driver_says_is_told_unless_another_finding_names_it_better(walker: Patient) -> None:
