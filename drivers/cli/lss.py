@@ -35,6 +35,7 @@ will happen is told, and asked for. A node id is stored and booted with, then th
 again. A bit rate is stored, and counts from when the device is switched on next.
 """
 WAIT_S = 3.0  # longer than most heartbeats
+AGAIN_S = 1.0  # after the question
 NODE_IDS = range(1, 128)
 
 
@@ -164,6 +165,9 @@ class _Task:
                 )
             return Device(found[0], UNCONFIGURED)
         if text == "only":
+            if len(self.heard.nodes) > 1:  # they would all be asked at once, in frames that look like one
+                nodes = ", ".join(map(str, self.heard.nodes))
+                raise NotPermitted(f"{self.bus.name}: nodes {nodes} are on the bus: say which")
             return inquire(self.master, None)
         if text.isdecimal():
             if int(text) not in NODE_IDS:
@@ -206,6 +210,8 @@ def _set(task: _Task) -> int:
     if not _agreed(task):
         task.say("nothing was changed")
         return 1
+    if not (options.yes or options.anyway):  # it may have taken a while
+        listen(task.bus, min(options.seconds, AGAIN_S), task.wait).refuse()
     if node_id is not None:
         device = give_node_id(task.bus, task.master, device, node_id, store=not options.no_store)
         task.say(f"{task.bus.name}: it has booted, and says: {_words(device)}")

@@ -26,6 +26,8 @@ def by_node(words: Sequence[str], devices: Sequence[Device]) -> Wanted:
 
 def _node(word: str, devices: Sequence[Device]) -> int:
     if word.isdecimal():
+        if not 0 < int(word) <= 127:
+            raise SettingsError(f"--node {word}: a node id is from 1 to 127")
         return int(word)
     found = [device.node_id for device in devices if word in device.name.split("/")]
     if not found:

@@ -5,6 +5,7 @@ import json
 import threading
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -112,6 +113,56 @@ def test_where_somebody_is_at_work_nothing_is_sent_unless_told(channel: str) -> 
             done.set()
             thread.join()
     assert {can_id for can_id, _ in worker.seen} == {0x7E5}
+
+
+def test_who_begins_to_work_while_a_person_thinks_is_not_disturbed(
+    channel: str, node: Node, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun, done = threading.Event(), threading.Event()
+    with FakeNode(channel, 9) as worker:
+
+        def work() -> None:
+            begun.wait()
+            while not done.wait(0.005):
+                worker.heartbeat()
+
+        thread = threading.Thread(target=work)
+        thread.start()
+
+        def readline() -> str:
+            begun.set()
+            return "y\n"
+
+        typed = SimpleNamespace(isatty=lambda: True, readline=readline)
+        monkeypatch.setattr("sys.stdin", typed)
+        try:
+            with pytest.raises(NotPermitted, match="operational: node 9"):
+                run(channel, "set", "5", "--node-id", "6")
+        finally:
+            begun.set()
+            done.set()
+            thread.join()
+    assert (node.lss.node_id, node.lss.pending_node_id) == (5, 5)
+
+
+def test_the_only_device_is_the_only_one(channel: str, node: Node) -> None:
+    done = threading.Event()
+    with FakeNode(channel, 9) as other:
+
+        def live() -> None:
+            while not done.wait(0.005):
+                other.send(0x705, b"\x7f")
+                other.heartbeat(0x7F)
+
+        thread = threading.Thread(target=live)
+        thread.start()
+        try:
+            with pytest.raises(NotPermitted, match="nodes 5, 9 are on the bus"):
+                run(channel, "inquire", "only", "--anyway")
+        finally:
+            done.set()
+            thread.join()
+    assert not {0x7E5} & {can_id for can_id, _ in other.seen}
 
 
 def test_new_is_refused_where_there_is_none(channel: str, node: Node) -> None:
