@@ -13,7 +13,7 @@ from typing import Any
 from drivers.joint.cia402 import ENERGISED, drive_state
 from drivers.joint.commands import STATUSWORD
 from drivers.joint.quantities import AXIS_OFFSET
-from gateway.client import CallTimeout, ClientError, LinkLost, ProtocolError, Robot
+from gateway.client import CallTimeout, ClientError, LinkLost, ProtocolError, RemoteError, Robot
 from gateway.config.robot import RobotConfig
 from gateway.doctor.file_edit import NotMended, change
 from gateway.doctor.verdicts import Edit, Finding, Fix, Together, Write
@@ -113,8 +113,10 @@ class Mender:
                 f"nobody knows whether {fix.address} was written: {error}. A gateway that starts again takes "
                 "back what it had not finished; ask the doctor again"
             ) from error
-        except ClientError as error:
+        except RemoteError as error:
             raise NotMended(f"the gateway refused: {error}") from error
+        except ClientError as error:
+            raise NotMended(f"nothing was written: {error}") from error
 
     def _written(self, robot: Robot, fix: Write) -> str:
         described = robot.describe()

@@ -10,7 +10,7 @@ from typing import cast
 import msgspec
 import pytest
 
-from gateway.client import ClientError, LinkLost, RemoteError, Robot
+from gateway.client import ClientError, LinkLost, NotConnected, RemoteError, Robot
 from gateway.config.reading import load
 from gateway.doctor.file_edit import NotMended
 from gateway.doctor.mending import RECORD, Mender
@@ -135,6 +135,7 @@ def test_an_object_that_is_a_parameter_with_a_unit_is_written_in_that_unit(file:
 LOST = LinkLost("the link dropped")
 REFUSED: dict[str, tuple[FakeRobot, str]] = {
     "the gateway says no": (FakeRobot(RemoteError(1, "pat has the lease")), "refused: pat has the lease"),
+    "its gateway is gone": (FakeRobot(NotConnected("there is no link")), "nothing was written: there is no"),
     "its gateway dies meanwhile": (FakeRobot(LOST), "nobody knows whether left_knee.0x6065:0 was written"),
     "another drive is enabled": (
         FakeRobot(held={"right_knee.0x6041:0": 0x0237}),
