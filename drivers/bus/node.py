@@ -34,7 +34,7 @@ T = TypeVar("T")
 _NOT_ASKED = "it has not come up, so nobody knows what it is: nothing is written to it"
 EMCY = 0x080
 PDO_PARAMETERS = range(0x1400, 0x1C00)  # communication and mapping, of both directions (CiA 301 §7.5.2)
-REMAPPED_S = 0.5  # after the last of them was written: who writes one mostly writes more
+REMAPPED_S = 0.3  # after the last of them was written: who writes one mostly writes more
 
 
 class NodeUser(Protocol):
