@@ -74,7 +74,8 @@ def table(load: Load, names: Mapping[int, str]) -> Iterator[str]:
     total = f"{load.frames_per_s:>9.1f} {bits / 1000:>8.1f} {_percent(load.percent):>7}"
     yield f"{'all':<14} {'':<12} {total}"
     if load.error_frames:
-        yield f"{load.error_frames} error frames: check termination, wiring and bit rate"
+        frames = "error frame" if load.error_frames == 1 else "error frames"
+        yield f"{load.error_frames} {frames}: check termination, wiring and bit rate"
 
 
 def _percent(value: float | None) -> str:

@@ -39,7 +39,10 @@ def _nodes(words: Sequence[str], devices: Sequence[Device]) -> Iterator[int]:
 
 
 def _check(word: str, devices: Sequence[Device]) -> None:
-    if not word.isdecimal() and not any(word in device.name.split("/") for device in devices):
+    if word.isdecimal():
+        if not 0 < int(word) <= 127:
+            raise SettingsError(f"--node {word}: a node id is from 1 to 127")
+    elif not any(word in device.name.split("/") for device in devices):
         names = ", ".join(device.name for device in devices) or "none, give --robot"
         raise SettingsError(f"--node {word}: no device has that name; known are {names}")
 

@@ -274,6 +274,7 @@ complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a 
 complete -c gwrms -n '_shtab_gwrms_using lss' -s h -l help -d 'show this help message and exit'
 complete -c gwrms -n '_shtab_gwrms_using lss' -l node-id -x -d 'set: the node id that it is to have'
 complete -c gwrms -n '_shtab_gwrms_using lss' -l new-bitrate -xka "1000000 800000 500000 250000 125000 50000 20000 10000" -d 'set: the bit rate that it stores'
+complete -c gwrms -n '_shtab_gwrms_using lss' -l activate -d 'set: let the bit rate count at once, and look for the device'
 complete -c gwrms -n '_shtab_gwrms_using lss' -l no-store -d 'set: a node id until it is switched off'
 complete -c gwrms -n '_shtab_gwrms_using lss' -l bitrate -x -d 'bit/s of the bus now, for interfaces opened with one'
 complete -c gwrms -n '_shtab_gwrms_using lss' -l seconds -x -d 'how long to listen first (default 3)'

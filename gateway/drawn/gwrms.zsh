@@ -671,6 +671,7 @@ _shtab_gwrms_lss_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--node-id[set\: the node id that it is to have]:N:"
   "--new-bitrate[set\: the bit rate that it stores]:N:(1000000 800000 500000 250000 125000 50000 20000 10000)"
+  "--activate[set\: let the bit rate count at once, and look for the device]"
   "--no-store[set\: a node id until it is switched off]"
   "--bitrate[bit\/s of the bus now, for interfaces opened with one]:bitrate:"
   "--seconds[how long to listen first (default 3)]:seconds:"

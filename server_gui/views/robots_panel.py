@@ -14,7 +14,7 @@ from PySide6.QtWidgets import (
 )
 
 from gateway.client import Address, BadAddress
-from gateway.wire.pairing import SCHEME
+from gateway.wire.pairing import is_link
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.views.ask import ask
@@ -193,7 +193,7 @@ class RobotsPanel(QWidget):
 
     def _add(self) -> None:
         text = self.address.text().strip()
-        if text.startswith(SCHEME):
+        if is_link(text):
             self.begin_pairing(text)
             return
         try:

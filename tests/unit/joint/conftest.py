@@ -1,7 +1,8 @@
 """A drive described by an EDS of the test's own, played by a fake node."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import pytest
@@ -67,11 +68,15 @@ def tpdo(number: int, cob_id: int, *mapped: int, transmission_type: int = 1) -> 
     return objects
 
 
-def drive_eds(objects: Objects) -> str:
-    """An EDS of exactly these objects."""
+NO_OTHER: Mapping[int, int] = MappingProxyType({})
+
+
+def drive_eds(objects: Objects, other: Mapping[int, int] = NO_OTHER) -> str:
+    """An EDS of exactly these objects; `other` are data types by index."""
     types = {index: data_type for index, data_type, _, _ in COMMON} | {
         index + axis * 0x800: data_type for index, data_type, _, _ in AXIS + SURROUNDINGS for axis in range(8)
     }
+    types |= other
     sections = []
     for index, subindex in sorted(objects):
         name = f"{index:04X}" if index in types else f"{index:04X}sub{subindex}"
@@ -95,10 +100,14 @@ def joint(bus: CanBus, tmp_path: Path) -> Callable[..., JointDrive]:
     """Make a joint for a drive with `objects`, node id 2."""
 
     def make(
-        objects: Objects, name: str = "left_knee", chosen: Chosen | None = None, **more: Any
+        objects: Objects,
+        name: str = "left_knee",
+        chosen: Chosen | None = None,
+        types: Mapping[int, int] = NO_OTHER,
+        **more: Any,
     ) -> JointDrive:
         path = tmp_path / "drive.eds"
-        path.write_text(drive_eds(objects))
+        path.write_text(drive_eds(objects, types))
         table: dict[str, Any] = {"counts_per_revolution": 1000, "gear_ratio": 1, "sdo_timeout_s": 0.2, **more}
         settings = JointSettings(bus="main", node_id=2, eds="drive.eds", **table)
         return JointDrive(name, settings, bus, eds.load(path, 2), chosen)

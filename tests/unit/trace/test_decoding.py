@@ -174,6 +174,8 @@ def test_only_what_is_wanted_is_shown(wanted: object, found: list[int]) -> None:
 def test_what_nobody_has_is_refused() -> None:
     with pytest.raises(SettingsError, match="known are left_knee"):
         by_node(["left_kne"], [KNEE], lambda _interface: [KNEE])
+    with pytest.raises(SettingsError, match="from 1 to 127"):
+        by_node(["200"], [KNEE], lambda _interface: [KNEE])
     with pytest.raises(SettingsError, match="there are nmt, sync"):
         by_kind(["pdos"])
 
