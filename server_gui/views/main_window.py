@@ -100,6 +100,13 @@ class MainWindow(QMainWindow):
         self._is_arranged = False  # the panels, which may wait for the window to be shown
         self.setWindowTitle("GWRMS")
         self.resize(USUAL.boundedTo(self.screen().availableSize()))
+        with theme.styled_at_the_end():
+            self._make(desk, theme, archive)
+        self._restore()
+        self._opened_as = self.size()
+        theme.scaled.connect(self._scaled)
+
+    def _make(self, desk: Desk, theme: Theme, archive: Archive | None) -> None:
         menu = QPushButton("View")
         self.header = Header(desk, theme, menu)
         self.header.stopped.connect(self.stopped)
@@ -159,9 +166,6 @@ class MainWindow(QMainWindow):
         self._build()
         self._offer_help()
         menu.setMenu(self._view_menu())
-        self._restore()
-        self._opened_as = self.size()
-        theme.scaled.connect(self._scaled)
 
     def refresh(self) -> None:
         """Draw a frame: what moves each time, what is read now and then, and only what is visible."""

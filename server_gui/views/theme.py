@@ -1,12 +1,14 @@
 """Colours, dark and light, and the style that everything is drawn in. Left is blue, right is orange."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import Enum
 from typing import Final
 
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtGui import QColor, QFont, QFontDatabase, QPalette
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QWidget
 
 SMALLEST_SCALE, LARGEST_SCALE = 0.8, 2.0
 BASE_POINTS: Final = 9.0
@@ -201,6 +203,9 @@ class Theme(QObject):
         super().__init__(application)
         self._application = application
         self._family = QFontDatabase.systemFont(QFontDatabase.SystemFont.GeneralFont).family()
+        # Without any sheet Qt 6.11 forgets to hear of the end of what it has measured, and crashes later.
+        self._never_shown = QWidget()
+        self._never_shown.setStyleSheet("QWidget#none { color: black; }")
         self.look, self.scale = look, scale
         self.colours = PALETTES[look]
         self.set(look, scale)
@@ -219,6 +224,15 @@ class Theme(QObject):
         self.changed.emit()
         if self.scale != before:
             self.scaled.emit()
+
+    @contextmanager
+    def styled_at_the_end(self) -> Iterator[None]:
+        """Style at once what is put together meanwhile: else Qt styles it again with each parent it gets."""
+        self._application.setStyleSheet("")
+        try:
+            yield
+        finally:
+            self._application.setStyleSheet(self._style())
 
     def colour(self, name: str) -> QColor:
         """Return a colour of the palette by its name."""
