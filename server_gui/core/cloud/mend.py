@@ -17,6 +17,7 @@ from ml.store import durable, mending
 from ml.store.errors import StoreError
 from ml.store.fragments import DataFile
 from ml.store.private import FILE
+from ml.store.snapshot import Snapshot
 from ml.store.store import Store
 from server_gui.core.cloud import verify
 from server_gui.core.cloud.counting import Advance, Batch
@@ -189,6 +190,7 @@ def _look(
     values: bool,
 ) -> tuple[list[DataFile], Proof]:
     """Which files are damaged or gone, and what the others prove; with `values` whether it is as sent."""
+    store = Snapshot.existing(store.url)  # each table is opened once
     found = verify.files(store)
     with expect(2 * len(found)) as advance:
         broken = verify.broken(store, found, advance, deep=True)
