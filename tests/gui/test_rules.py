@@ -86,8 +86,8 @@ SIZES = ((1024, 700, 1.0), (1024, 700, 2.0), (1366, 768, 1.5))
 OWN = ("link", "control", "Store", "recording")
 
 
-@pytest.mark.parametrize(("width", "height", "scale"), SIZES[:2])
 @pytest.mark.parametrize("state", [*UNKNOWN, *KNOWN])
+@pytest.mark.parametrize(("width", "height", "scale"), SIZES[:2])
 def test_every_view_in_every_state(
     request: pytest.FixtureRequest,
     bench: Bench,
