@@ -1,15 +1,24 @@
-"""What commissioning reaches: a CAN bus whose drives are asked by SDO, one at a time, and never commanded."""
+"""What commissioning reaches: a CAN bus whose drives are asked by SDO, one at a time.
+
+They are commanded by a homing alone, for which one of them is put under power (`power.py`).
+"""
 
 import threading
 import time
+from contextlib import AbstractContextManager
 from typing import Protocol
+
+import msgspec
 
 from drivers.bus.bus import CanBus
 from drivers.bus.outlet import Requests
 from drivers.bus.sdo.channel import SdoChannel
 from drivers.bus.settings import SDO_REQUEST, SDO_RESPONSE, CanSettings
 from drivers.errors import DeviceAbort, Mismatch, Unavailable
+from drivers.joint.settings import JointSettings
 from drivers.scan.scan import Found, scan
+from eds import Description
+from gateway.commission.power import Power, opened
 
 LISTEN_S = 2.0
 OPEN_S = 5.0
@@ -31,6 +40,10 @@ class Bench(Protocol):
         """Write and read back; raises `DriverError` where the device does not confirm it."""
         ...
 
+    def power(self, joint: JointSettings, description: Description) -> AbstractContextManager[Power]:
+        """The axis as it may be put under power; entering raises `DriverError` where it must not be."""
+        ...
+
 
 class CanBench:
     """A real bus, open between `open` and `close`."""
@@ -39,9 +52,12 @@ class CanBench:
         self._settings = settings
         self._bus = CanBus(name, settings)
         self._channels: dict[int, SdoChannel] = {}
+        self._nodes: frozenset[int] = frozenset()  # that were heard, or answered
 
     def nodes(self) -> Found:
-        return scan(self._settings, LISTEN_S, threading.Event().wait, active=True)
+        found = scan(self._settings, LISTEN_S, threading.Event().wait, active=True)
+        self._nodes = frozenset(found.nodes)
+        return found
 
     def read(self, node: int, index: int, subindex: int = 0) -> bytes | None:
         try:
@@ -57,6 +73,16 @@ class CanBench:
             raise Mismatch(
                 f"node {node}: {index:04X}h:{subindex} is {kept.hex(' ')} after {data.hex(' ')} was written"
             )
+
+    def power(self, joint: JointSettings, description: Description) -> AbstractContextManager[Power]:
+        self.close()  # it is opened as its master
+        return opened(self._bus.name, self._as_master(), joint, description, threading.Event().wait)
+
+    def _as_master(self) -> CanSettings:
+        """With a node id of our own that nobody has, and no cycles."""
+        taken = {*self._nodes, self._settings.node_id}
+        ours = self._settings.node_id or next(node for node in range(127, 0, -1) if node not in taken)
+        return msgspec.structs.replace(self._settings, node_id=ours, sync_period_s=None, heartbeat_s=None)
 
     def close(self) -> None:
         for node, channel in self._channels.items():

@@ -4,6 +4,7 @@ import json
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from gateway.commission.controller import CONTROLLER
 from gateway.commission.draft import Draft, Found
 
 HEAD = """\
@@ -45,7 +46,19 @@ def _tables(draft: Draft) -> Iterator[str]:
     for table in sorted(draft.tables):
         if table.startswith(("insole.", "imu.")):
             yield from _table(table, draft.tables[table])
+    yield from _controller(draft)
     yield from _guard(draft)
+
+
+def _controller(draft: Draft) -> Iterator[str]:
+    """Who commands the drives, and what stops it."""
+    if draft.value(CONTROLLER, "value") is not None:
+        node = draft.value(CONTROLLER, "node_id")
+        device = {"bus": Found("main"), "node_id": Found(node), "eds": draft.tables[f"node.{node}"]["eds"]}
+        stop = {key: draft.tables[CONTROLLER][key] for key in ("object", "value")}
+        yield from _table(CONTROLLER, device)
+        yield "[[stop.controller]]"
+        yield from list(_table("", {"component": Found(CONTROLLER.partition(".")[2]), **stop}))[1:]
 
 
 def _joint(draft: Draft, joint: str, node: int) -> Mapping[str, Found]:

@@ -39,6 +39,9 @@ class Person:
     def say(self, text: str) -> None:
         self.read.append(text)
 
+    def moving(self, text: str) -> str:
+        raise AssertionError(f"nobody agreed to a motion: {text}")
+
     def ask(self, question: Ask) -> str:
         self.read.append(question.text)
         assert len(self.read) < 150, self.read[:12]
