@@ -68,16 +68,17 @@ def refusal(draft: Draft, bench: Bench, joint: str, axis: Axis) -> str | None:
 
 def armed(bench: Bench, axis: Axis) -> Talk[str | None]:
     """Why it would not stop by itself if this program died; 6007h may be set for that."""
-    option = yield from answered(lambda: option(bench, axis, ABORT_CONNECTION))
+    reaction = yield from answered(lambda: option(bench, axis, ABORT_CONNECTION))
     entries = yield from answered(lambda: number(bench, Axis(axis.node), CONSUMER))
     if not entries:
         return (
             "its drive cannot watch our heartbeat (1016h), so that nothing would stop it if this program died"
         )
-    if option in ACTING:
+    if reaction in ACTING:
         return None
-    if option != 0:
-        return f"nobody knows what its drive does when communication is lost: 6007h {option_text({}, option)}"
+    if reaction != 0:
+        what = option_text({}, reaction)
+        return f"nobody knows what its drive does when communication is lost: 6007h {what}"
     yes = yield from agree(
         "If this program died its drive would go on (6007h is 0). Write 6007h = 3, a quick stop? It stays so "
         "until its power goes."

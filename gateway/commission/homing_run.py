@@ -213,19 +213,21 @@ class HomingRun:
     # Down, in any case.
 
     def _disable(self) -> tuple[bool, str]:
-        """Quick stop, else no voltage, else NMT stop; then to a state without power, read twice."""
+        """Quick stop, else no voltage, else NMT stop; then to a state without power, and read once more."""
         drive = self._power.drive
+        self.said = "the drive is being stopped"
         stopped = self._asked(drive.quick_stop) is StopOutcome.CONFIRMED
         if not stopped and self._asked(drive.disable_voltage) is not StopOutcome.CONFIRMED:
             drive.nmt_stop()
-        state: DriveState | None = None
-        for _ in range(2):
-            led = self._asked(drive.look)
-            state = None if led is None else led.state
-            if state is not None and state not in OFF:
-                led = self._asked(lambda: drive.reset(always))
-                state = None if led is None else led.state
+        state = self._state()
+        if state is not None and state not in OFF:
+            self._asked(lambda: drive.reset(always))
+            state = self._state()
         return state in OFF, "it does not answer" if state is None else state.words
+
+    def _state(self) -> DriveState | None:
+        led = self._asked(self._power.drive.look)
+        return None if led is None else led.state
 
     def _asked(self, ask: "Callable[[], Future[T]]") -> T | None:
         """Its answer; `None` where there is none in time. Our heartbeat goes on meanwhile."""
