@@ -3,7 +3,6 @@
 import argparse
 import datetime
 import getpass
-import shutil
 import signal
 from pathlib import Path
 from typing import NoReturn
@@ -20,13 +19,10 @@ from gateway.commission.bench import CanBench
 from gateway.commission.dialogue import Talk, agree, run
 from gateway.commission.draft import Draft, alone
 from gateway.commission.homing import NotStopped
+from gateway.commission.keeping import journal, put
 from gateway.commission.serial_bench import SerialPorts
 from gateway.commission.steps import commission
 from gateway.commission.writing import text, unfinished
-from gateway.config.reading import examine
-from gateway.config.robot import RobotConfig
-from gateway.records import durable
-from gateway.records.records import Records
 
 _EPILOG = """\
 example
@@ -159,33 +155,18 @@ def _all(
 
 def _write(draft: Draft, made: str, who: str) -> str:
     """What became of it, in words."""
-    if draft.file.exists():
-        shutil.copyfile(draft.file, draft.file.with_name(draft.file.name + ".before"))
-    durable.write(draft.file, made.encode())
-    found = examine(draft.file)
+    found = put(draft.file, made)
     said = "".join(f"  {finding.severity}: {finding.words}\n" for finding in found.findings)
     if found.config is None:
         return f"{draft.file} is written and cannot be used yet:\n{said}"
-    journaled = _journal(found.config, draft, who)
+    findings = {table: msgspec.to_builtins(keys) for table, keys in draft.tables.items()}
+    journaled = journal(found.config, who, "commission", found=findings)
     left = unfinished(draft)
     if left:
         said += f"  {', '.join(left)} {NOT_FINISHED}\n"
     else:
         draft.end()
     return f"{draft.file} is written.\n{said}{journaled}Next: gwrms gateway {draft.file}"
-
-
-def _journal(config: RobotConfig, draft: Draft, who: str) -> str:
-    """Put what was found into the robot's journal; what is in the way of that is told, no more."""
-    records = Records(config.records)
-    try:
-        findings = {table: msgspec.to_builtins(keys) for table, keys in draft.tables.items()}
-        records.journal.append(who, "commission", file=str(draft.file), found=findings).result()
-    except OSError as error:
-        return f"  It is not in the journal: {error.strerror or error}\n"
-    finally:
-        records.close()
-    return ""
 
 
 def _interrupt(_number: int, _frame: object) -> NoReturn:

@@ -84,17 +84,18 @@ def _guard(draft: Draft) -> Iterator[str]:
 def _table(name: str, keys: Mapping[str, Found]) -> Iterator[str]:
     yield f"[{name}]"
     for key, found in keys.items():
-        yield f"# {_plain(found.how)}" if key == "#" else _line(key, found)
+        yield f"# {_plain(found.how)}" if key == "#" else line(key, found)
     yield ""
 
 
-def _line(key: str, found: Found) -> str:
-    line = f"{key} = {_value(found.value)}"
+def line(key: str, found: Found) -> str:
+    """A value with its comment, beside it or above."""
+    value = f"{key} = {_value(found.value)}"
     if not found.how:
-        return line
+        return value
     comment = f"# {_plain(found.how)}"
-    beside = f"{line:<{WIDTH - 1}} {comment}"
-    return beside if len(line) < WIDTH and len(beside) <= LONGEST else f"{comment}\n{line}"
+    beside = f"{value:<{WIDTH - 1}} {comment}"
+    return beside if len(value) < WIDTH and len(beside) <= LONGEST else f"{comment}\n{value}"
 
 
 def _plain(text: str) -> str:
