@@ -26,11 +26,11 @@ from drivers.errors import DeviceAbort, Mismatch
 from drivers.freshness import Freshness
 from drivers.joint.cia402 import STATE_BITS, STATE_OF, DriveState
 from drivers.joint.decoder import Decoder
-from drivers.joint.plan import Plan, Source, make_plan
+from drivers.joint.plan import MIN_BITS, Plan, Source, make_plan
 from drivers.joint.power import PowerDrive
 from drivers.joint.quantities import POSITION, STATE, STATUSWORD, Quantity, channels, quantities
 from drivers.joint.reading import DriveReading, read_drive
-from drivers.joint.remap import free_tpdo, put_back, remap
+from drivers.joint.remap import Entry, free_tpdos, remap
 from drivers.joint.scaling import rated_torque
 from drivers.joint.settings import JointSettings
 from drivers.joint.stop_rpdo import find_stop_rpdo
@@ -38,6 +38,7 @@ from drivers.joint.watching import JointWatch
 from drivers.latest import Latest
 from drivers.samples import Channel, Finding, Quality, State
 from eds import Description
+from eds.datatypes import DATA_TYPES
 
 _IN_FAULT = (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE)
 
@@ -142,7 +143,7 @@ class JointDrive(PowerDrive):
         reading = read_drive(sdo, self._description, self.settings.axis)
         plan = make_plan(self.settings, self._quantities, reading)
         if self.settings.configure_pdos and (plan.position_from is None or not plan.position_from.cyclic):
-            told = self._remap(sdo, reading)
+            told = self._remap(sdo, reading, plan)
             reading = read_drive(sdo, self._description, self.settings.axis)
             plan = make_plan(self.settings, self._quantities, reading)
             plan = replace(plan, notes=(told, *plan.notes))
@@ -165,18 +166,27 @@ class JointDrive(PowerDrive):
             self._watch.restart()
             self._freshness.disconnected()
 
-    def _remap(self, sdo: SdoChannel, reading: DriveReading) -> str:
-        """Bring the position into a free TPDO; returns what came of it, in words."""
+    def _remap(self, sdo: SdoChannel, reading: DriveReading, plan: Plan) -> str:
+        """Bring what the channels need into free TPDOs; returns what came of it, in words."""
         if self.node.distrust is not None:
             return f"configure_pdos: {self.node.distrust}"
-        free = free_tpdo(reading.tpdos, self.node.node_id, self.node.bus.unclaimed)
-        if free is None:
+        free = list(free_tpdos(reading.tpdos, self.node.node_id, self.node.bus.unclaimed))
+        if not free:
             return "configure_pdos: no TPDO of the drive is free, nothing was changed"
         try:
-            return remap(sdo, self._description, *free, self._offset)
+            return remap(sdo, self._description, free, self._offset, list(self._mappable(plan)))
         except (DeviceAbort, Mismatch) as error:
-            put_back(sdo, self._description, *free)
             return f"configure_pdos: {error}"
+
+    def _mappable(self, plan: Plan) -> Iterator[Entry]:
+        """What is polled seldom, and could come by itself as its EDS says."""
+        for one in plan.polled_seldom:
+            quantity = one.quantity
+            variable = self._description.variable(quantity.index, quantity.subindex)
+            data_type = None if variable is None else DATA_TYPES.get(variable.data_type or 0)
+            bits = None if data_type is None else data_type.bits
+            if variable is not None and variable.pdo_mappable and bits is not None and bits >= MIN_BITS:
+                yield Entry(quantity.name, quantity.index, quantity.subindex, bits)
 
     # How values come.
 
