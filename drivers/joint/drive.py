@@ -26,11 +26,11 @@ from drivers.errors import DeviceAbort, Mismatch
 from drivers.freshness import Freshness
 from drivers.joint.cia402 import STATE_BITS, STATE_OF, DriveState
 from drivers.joint.decoder import Decoder
-from drivers.joint.plan import MIN_BITS, Plan, Source, make_plan
+from drivers.joint.plan import Plan, Source, make_plan
 from drivers.joint.power import PowerDrive
 from drivers.joint.quantities import POSITION, STATE, STATUSWORD, Quantity, channels, quantities
 from drivers.joint.reading import DriveReading, read_drive
-from drivers.joint.remap import Entry, free_tpdos, remap
+from drivers.joint.remap import free_tpdos, mappable, remap
 from drivers.joint.scaling import rated_torque
 from drivers.joint.settings import JointSettings
 from drivers.joint.stop_rpdo import find_stop_rpdo
@@ -38,7 +38,6 @@ from drivers.joint.watching import JointWatch
 from drivers.latest import Latest
 from drivers.samples import Channel, Finding, Quality, State
 from eds import Description
-from eds.datatypes import DATA_TYPES
 
 _IN_FAULT = (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE)
 
@@ -173,20 +172,11 @@ class JointDrive(PowerDrive):
         free = list(free_tpdos(reading.tpdos, self.node.node_id, self.node.bus.unclaimed))
         if not free:
             return "configure_pdos: no TPDO of the drive is free, nothing was changed"
+        more = mappable(self._description, (one.quantity for one in plan.polled_seldom))
         try:
-            return remap(sdo, self._description, free, self._offset, list(self._mappable(plan)))
+            return remap(sdo, self._description, free, self._offset, list(more))
         except (DeviceAbort, Mismatch) as error:
             return f"configure_pdos: {error}"
-
-    def _mappable(self, plan: Plan) -> Iterator[Entry]:
-        """What is polled seldom, and could come by itself as its EDS says."""
-        for one in plan.polled_seldom:
-            quantity = one.quantity
-            variable = self._description.variable(quantity.index, quantity.subindex)
-            data_type = None if variable is None else DATA_TYPES.get(variable.data_type or 0)
-            bits = None if data_type is None else data_type.bits
-            if variable is not None and variable.pdo_mappable and bits is not None and bits >= MIN_BITS:
-                yield Entry(quantity.name, quantity.index, quantity.subindex, bits)
 
     # How values come.
 

@@ -6,14 +6,17 @@ is written is read back, and nothing is stored. A device that refuses has that T
 """
 
 import contextlib
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from drivers.bus.pdo import NOT_VALID, TPDO_MAPPING, TPDO_PARAMETER, Tpdo, read_tpdo
 from drivers.bus.sdo.channel import SdoChannel
 from drivers.bus.values import unsigned
 from drivers.errors import DeviceAbort, DeviceTimeout, Mismatch
+from drivers.joint.plan import MIN_BITS
+from drivers.joint.quantities import Quantity
 from eds import Description
+from eds.datatypes import DATA_TYPES
 
 _NO_REMOTE = 0x4000_0000
 _EVENT = 255
@@ -37,6 +40,16 @@ class Entry:
     @property
     def raw(self) -> int:
         return self.index << 16 | self.subindex << 8 | self.bits
+
+
+def mappable(description: Description, wanted: Iterable[Quantity]) -> Iterator[Entry]:
+    """Those that may come by themselves, as the EDS says."""
+    for one in wanted:
+        variable = description.variable(one.index, one.subindex)
+        data_type = None if variable is None else DATA_TYPES.get(variable.data_type or 0)
+        bits = None if data_type is None else data_type.bits
+        if variable is not None and variable.pdo_mappable and bits is not None and bits >= MIN_BITS:
+            yield Entry(one.name, one.index, one.subindex, bits)
 
 
 Free = tuple[Tpdo, int]  # and the identifier that it can have

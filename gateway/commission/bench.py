@@ -12,9 +12,12 @@ import msgspec
 
 from drivers.bus.bus import CanBus
 from drivers.bus.outlet import Requests
+from drivers.bus.pdo import read_tpdos
 from drivers.bus.sdo.channel import SdoChannel
 from drivers.bus.settings import SDO_REQUEST, SDO_RESPONSE, CanSettings
 from drivers.errors import DeviceAbort, Mismatch, Unavailable
+from drivers.joint.quantities import AXIS_OFFSET, quantities
+from drivers.joint.remap import free_tpdos, mappable, remap
 from drivers.joint.settings import JointSettings
 from drivers.scan.scan import Found, scan
 from eds import Description
@@ -23,6 +26,8 @@ from gateway.commission.power import Power, opened
 LISTEN_S = 2.0
 OPEN_S = 5.0
 TIMEOUT_S = 0.5
+STORE, ALL, SAVE = 0x1010, 1, b"save"  # CiA 301 §7.5.2.13
+STORE_S = 10.0  # for the answer: flash takes its time
 
 
 class Bench(Protocol):
@@ -40,6 +45,13 @@ class Bench(Protocol):
         """Write and read back; raises `DriverError` where the device does not confirm it."""
         ...
 
+    def map(self, node: int, axis: int, description: Description) -> str:
+        """Bring what a joint's channels need into free TPDOs, and store it in the device (1010h).
+
+        Returns what was done, in words. Raises `DriverError` where the device does not take all of it.
+        """
+        ...
+
     def power(self, joint: JointSettings, description: Description) -> AbstractContextManager[Power]:
         """The axis as it may be put under power; entering raises `DriverError` where it must not be."""
         ...
@@ -53,10 +65,12 @@ class CanBench:
         self._bus = CanBus(name, settings)
         self._channels: dict[int, SdoChannel] = {}
         self._nodes: frozenset[int] = frozenset()  # that were heard, or answered
+        self._heard: frozenset[int] = frozenset()  # identifiers that are somebody's
 
     def nodes(self) -> Found:
         found = scan(self._settings, LISTEN_S, threading.Event().wait, active=True)
         self._nodes = frozenset(found.nodes)
+        self._heard = frozenset(found.traffic.seen)
         return found
 
     def read(self, node: int, index: int, subindex: int = 0) -> bytes | None:
@@ -73,6 +87,16 @@ class CanBench:
             raise Mismatch(
                 f"node {node}: {index:04X}h:{subindex} is {kept.hex(' ')} after {data.hex(' ')} was written"
             )
+
+    def map(self, node: int, axis: int, description: Description) -> str:
+        channel, offset = self._channel(node), axis * AXIS_OFFSET
+        free = list(free_tpdos(read_tpdos(channel, description), node, self._heard))
+        if not free:
+            raise Unavailable(f"node {node}: no TPDO is free")
+        wanted = (one for one in quantities(description, axis) if not one.fast)
+        done = remap(channel, description, free, offset, list(mappable(description, wanted)))
+        channel.download(STORE, ALL, SAVE, STORE_S)
+        return f"{done}; stored (1010h)"
 
     def power(self, joint: JointSettings, description: Description) -> AbstractContextManager[Power]:
         self.close()  # it is opened as its master

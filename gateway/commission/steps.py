@@ -52,7 +52,7 @@ def commission(
 def _joint(draft: Draft, bench: Bench, library: Library, joint: str, axis: Axis, told: Told) -> Talk[None]:
     yield from nodes.file_of(draft, library, axis.node, told)
     yield from nodes.heartbeat(draft, bench, axis.node)
-    yield from nodes.mapping(draft, axis, told, joint)
+    yield from nodes.mapping(draft, bench, axis, told, joint)
     scale = yield from joints.meaning(draft, bench, joint, axis)
     yield from joints.limits(draft, bench, joint, axis, scale)
     yield from joints.ratings(draft, bench, joint, axis, scale.gear_ratio)

@@ -98,6 +98,7 @@ def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Commissioned]:
 def test_its_file_passes_the_check(robot: Commissioned) -> None:
     done = gwrms("check", str(robot.file))
     assert done.returncode == 0, done.stdout + done.stderr
+    assert "controller" not in done.stdout + done.stderr, "what commands the drives was asked"
 
 
 def test_it_walks_with_the_angles_that_its_joints_have(robot: Commissioned) -> None:

@@ -63,6 +63,9 @@ class FakeBench:
     def write(self, node: int, index: int, subindex: int, data: bytes) -> None:
         raise AssertionError(f"nobody agreed to write {index:04X}h of node {node}")
 
+    def map(self, node: int, axis: int, description: Description) -> str:
+        raise AssertionError(f"nobody agreed to map PDOs of node {node}, axis {axis}, {description.product}")
+
     def power(self, joint: JointSettings, description: Description) -> AbstractContextManager[Power]:
         raise AssertionError(f"nobody agreed to power for node {joint.node_id}, {description.product}")
 

@@ -68,6 +68,10 @@ class Person:
             self._move(joint, 90.0)
         elif "Counts of its encoder" in asked:
             return "4096"
+        elif "Which node commands" in asked:
+            return "16"
+        elif "Which of its objects stops" in asked:
+            return "0x2000:0"
         elif "rated current" in asked:
             return "5"
         elif "rated torque" in asked:
