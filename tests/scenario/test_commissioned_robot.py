@@ -153,4 +153,4 @@ def test_the_doctor_is_content_with_it(robot: Commissioned) -> None:
     computer = str(robot.folder / "computer")
     done = gwrms("doctor", str(robot.file), "--robot", robot.address, "--computer", computer, "--json")
     bill = json.loads(done.stdout)
-    assert (done.returncode, bill["findings"], bill["not_judged"]) == (0, [], []), done.stderr
+    assert (done.returncode, bill["findings"], bill["not_judged"]) == (0, [], []), done.stdout
