@@ -143,8 +143,8 @@ def _run(draft: Draft, bench: Bench, known: Known, plan: Plan) -> Talk[Outcome |
 
 def _followed(run: HomingRun, known: Known) -> Talk[Outcome]:
     """Every way out of here ends it, and waits for that."""
-    run.start()
     try:
+        run.start()
         while not run.done:
             why = yield Moving(f"The {words(known.joint)} is under power. STOP: Enter.  {run.said}")
             if why:

@@ -84,7 +84,7 @@ class HomingRun:
         self._before: int | None = None
         self._after: int | None = None
         self._way: deque[tuple[float, int]] = deque()
-        self._outcome = Outcome("it was not begun", off=False, state="not read")
+        self._outcome = Outcome("it was not begun", off=True, state="not asked for anything")
         self._thread = threading.Thread(target=self._run, name="homing", daemon=False)
 
     @property
@@ -117,6 +117,7 @@ class HomingRun:
 
     def _run(self) -> None:
         problem: str | None = "internal error"
+        self._outcome = Outcome(problem, off=False, state="not read")
         mode: bytes | None = None
         try:
             mode = self._wait(self._power.drive.ask(homing.mode_of))

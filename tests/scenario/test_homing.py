@@ -135,11 +135,11 @@ def signalled(number: signal.Signals) -> "Callable[[subprocess.Popen[str]], None
 @pytest.mark.parametrize(
     "end",
     [
-        enter,
         signalled(signal.SIGKILL),
         *(
             pytest.param(one, marks=pytest.mark.nightly)
             for one in (
+                enter,
                 end_of_input,
                 signalled(signal.SIGTERM),
                 signalled(signal.SIGHUP),

@@ -185,6 +185,14 @@ def test_who_does_not_say_that_stop_is_in_reach_any_more_has_let_go(
         assert drive.state is S.SWITCH_ON_DISABLED
 
 
+def test_one_that_was_not_begun_has_nothing_to_confirm(channel: str) -> None:
+    bench = CanBench("main", CanSettings(interface="virtual", channel=channel))
+    with HomingDrive(channel, NODE) as drive:
+        with bench.power(SETTINGS, eds.load(eds.locate("joint_drive.eds", None), NODE)) as found:
+            assert HomingRun(found, WAY).end().off
+        assert drive.words == []
+
+
 def test_a_drive_that_answers_no_more_is_not_taken_for_stopped(channel: str) -> None:
     with HomingDrive(channel, NODE, home=None, step=0, on_look=errs(silent=True)), begun(channel) as run:
         outcome = finished(run)
