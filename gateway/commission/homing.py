@@ -9,7 +9,6 @@ from functools import partial
 from pathlib import Path
 
 import eds
-from drivers.bus.arming import ABORT_CONNECTION
 from drivers.errors import DriverError
 from drivers.joint.homing import HOME_OFFSET, METHODS, offered
 from drivers.joint.settings import JointSettings
@@ -20,7 +19,7 @@ from gateway.commission.bench import Bench
 from gateway.commission.dialogue import Ask, Moving, Say, Talk, choose, press
 from gateway.commission.draft import Draft, Found
 from gateway.commission.homing_plan import (
-    QUICK_STOP,
+    TOLD,
     Known,
     armed,
     explained,
@@ -92,6 +91,7 @@ def _one(draft: Draft, bench: Bench, joint: str, axis: Axis, scale: Scale, metho
     if plan is None or not (yield from _agreed(bench, known, method, plan)):
         yield Say("Nothing gets power.")
         return scale
+    yield Say("Listening whether somebody else is on the bus; then it begins …")
     zero = _forget_zero(draft, joint)
     outcome = yield from _run(draft, bench, known, plan)
     if outcome is None or outcome.before is None:  # nothing was begun that could have given it another zero
@@ -116,10 +116,8 @@ def _agreed(bench: Bench, known: Known, method: int, plan: Plan) -> Talk[bool]:
         f"The drive of the {words(known.joint)} is to get power. Nobody wears the robot, all hands are "
         "off it, the hardware emergency stop is within reach, and the drive's power and STO are released."
     )
-    options = yield from answered(
-        lambda: (option(bench, known.axis, QUICK_STOP), option(bench, known.axis, ABORT_CONNECTION))
-    )
-    yield Say("\n".join(explained(known, method, plan, *options)))
+    options = yield from answered(lambda: {index: option(bench, known.axis, index) for index in TOLD})
+    yield Say("\n".join(explained(known, method, plan, options)))
     phrase = f"home {known.joint}"
     typed = yield Ask(f"Type  {phrase}  to put it under power and begin; anything else: nothing gets power.")
     return typed == phrase
@@ -146,7 +144,10 @@ def _followed(run: HomingRun, known: Known) -> Talk[Outcome]:
     try:
         run.start()
         while not run.done:
-            why = yield Moving(f"The {words(known.joint)} is under power. STOP: Enter.  {run.said}")
+            moved = math.degrees(run.moved * known.scale.direction * math.tau / known.counts_per_turn)
+            why = yield Moving(
+                f"The {words(known.joint)} is under power. STOP: Enter.  {run.said} ({moved:+.1f}°)"
+            )
             if why:
                 run.stop(why)
             else:

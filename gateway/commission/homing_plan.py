@@ -1,7 +1,7 @@
 """What a homing rests on: what must be known before, how far and how fast it may go, and that in words."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from drivers.bus.arming import ABORT_CONNECTION, ACTING, CONSUMER
@@ -21,6 +21,7 @@ from gateway.commission.joints import ENDS, table, words
 from gateway.commission.scale import Scale
 
 QUICK_STOP, VELOCITY_UNIT, MAX_CURRENT, MAX_TORQUE = 0x605A, 0x60A9, 0x6073, 0x6072
+TOLD = (QUICK_STOP, ABORT_CONNECTION, MAX_CURRENT, MAX_TORQUE)
 SPEED, LEAST_SPEED, MOST_SPEED = 5.0, 0.5, 20.0  # °/s, of the joint
 ZERO_SHARE = 0.2  # of that, from the switch on
 RAMP_S = 0.25  # to reach it
@@ -153,9 +154,8 @@ def _setup(bench: Bench, known: Known, method: int, rad_s: float) -> Setup | Non
     return Setup(method, round(fast), slow, round(fast / RAMP_S) if in_counts else None)
 
 
-def explained(
-    known: Known, method: int, plan: Plan, on_stop: int | None, on_loss: int | None
-) -> Iterator[str]:
+def explained(known: Known, method: int, plan: Plan, told: Mapping[int, int | None]) -> Iterator[str]:
+    """What will happen, line by line; `told` are the drive's objects TOLD."""
     one, turn = METHODS[method], known.counts_per_turn
     yield f"What will happen, to the {words(known.joint)} ({known.axis}) alone:"
     yield f"  method {method}: the drive {one.words}; its position then counts as 607Ch says"
@@ -168,6 +168,10 @@ def explained(
         )
     else:
         yield "  it is held where it is for a moment; more than half a degree ends it"
-    yield f"  a stop: the drive {option_text(QUICK_STOP_OPTIONS, on_stop)} (605Ah), and is disabled"
-    yield f"  if this program dies: the drive {option_text(ABORT_CONNECTION_OPTIONS, on_loss)} (6007h)"
+    for index, what in ((MAX_CURRENT, "current"), (MAX_TORQUE, "torque")):
+        if told[index]:
+            yield f"  its {what}: at most {(told[index] or 0) / 10:g} % of the rated one ({index:04X}h)"
+    yield f"  a stop: the drive {option_text(QUICK_STOP_OPTIONS, told[QUICK_STOP])} (605Ah), and is disabled"
+    on_loss = option_text(ABORT_CONNECTION_OPTIONS, told[ABORT_CONNECTION])
+    yield f"  if this program dies: the drive {on_loss} (6007h)"
     yield "  STOP: Enter, at any time; so do Ctrl-C, a closed terminal, another master, and a drive that errs"

@@ -73,10 +73,11 @@ class Ended(Exception):
 
 
 class HomingRun:
-    """Between `start` and `end`. `said` are words of how far it is."""
+    """Between `start` and `end`. `said` are words of how far it is, `moved` the counts it has gone."""
 
     def __init__(self, power: Power, plan: Plan) -> None:
         self.said = "the drive is led up"
+        self.moved = 0
         self._power = power
         self._plan = plan
         self._why: str | None = None  # to stop
@@ -190,7 +191,7 @@ class HomingRun:
         if seen.lag is not None and abs(seen.lag) > plan.lag:
             raise Ended(f"the joint is {abs(seen.lag)} counts behind what the drive wants (60F4h)")
         self._judge_speed(near)
-        self.said = f"homing: {near - (self._before or 0):+d} counts"
+        self.said, self.moved = "it looks for home", near - (self._before or 0)
 
     def _judge_speed(self, position: int) -> None:
         """Units that were misread show here."""

@@ -87,7 +87,7 @@ def moving(process: "subprocess.Popen[str]", method: int) -> None:
     for one in said(process):
         if "ask" in one:
             answer(process, one["ask"], {"find its own zero": str(method)})
-        elif "counts" in (one.get("moving") or ""):
+        elif "looks for home" in (one.get("moving") or "") and "(+0.0°)" not in one["moving"]:
             return
     raise AssertionError(process.communicate())
 

@@ -34,7 +34,7 @@ class Keeper(Hands):
     def moving(self, text: str) -> str:
         if not self.heard(text):
             self.read.append(text)
-        return "STOP was pressed" if self._stop and "counts" in text else ""
+        return "STOP was pressed" if self._stop and "looks for home" in text else ""
 
 
 @pytest.fixture(autouse=True)
@@ -114,7 +114,14 @@ def test_what_moves_is_told_with_its_ends_and_its_speed_and_its_zero_is_shown_by
         assert drive.objects[0x6099, 1] == encoded(0x6099, round(5 / 360 * TURN))
         assert drive.objects[0x6099, 2] == encoded(0x6099, round(1 / 360 * TURN))
     told = next(line for line in hands.read if "What will happen" in line)
-    for words in ("left knee (node 5) alone", "from 0.0°", "-28.6° and 85.9°", "at 5°/s at most", "6007h"):
+    for words in (
+        "left knee (node 5) alone",
+        "from 0.0°",
+        "-28.6° and 85.9°",
+        "at 5°/s at most",
+        "at most 200 %",
+        "6007h",
+    ):
         assert words in told
     assert hands.heard("stopped and disabled, as its statusword says")
     assert zero(draft) == pytest.approx(math.radians(30), abs=1e-4)
