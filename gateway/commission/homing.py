@@ -136,6 +136,8 @@ def _run(draft: Draft, bench: Bench, known: Known, plan: Plan) -> Talk[Outcome |
         return None
     result = "Home was found" if outcome.problem is None else f"Not homed: {outcome.problem}"
     yield Say(f"{result}; {outcome.text}.")
+    if power.left is not None:
+        yield Say(f"{power.left}.")
     return outcome
 
 

@@ -63,6 +63,7 @@ class Power:
         self.node = shared_node(bus, settings.node_id, description, settings)
         self.drive = PowerDrive(self.node, settings)
         self.heartbeat = Heartbeat(bus, HEARTBEAT_S)
+        self.left: str | None = None  # what stays in the drive, in words, once it is closed
         self._arming = Arming(self.node, self.heartbeat, [settings.axis * AXIS_OFFSET], lambda: None)
 
     @property
@@ -92,17 +93,15 @@ class Power:
             self.heartbeat.feed()
             wait(TICK_S)
 
-    def close(self) -> str | None:
-        """Let go of it all; what stays in the drive, in words."""
-        left = None
+    def close(self) -> None:
+        """Let go of it all."""
         try:
             self._arming.disarm().result(UP_S)
         except (DriverError, TimeoutError) as error:
-            left = f"its 1016h may still watch our heartbeat, until it is switched off and on: {error}"
+            self.left = f"its 1016h may still watch our heartbeat, until it is switched off and on: {error}"
         self._arming.stop()
         self.heartbeat.stop()
         self.bus.stop()
-        return left
 
 
 @contextmanager
