@@ -225,3 +225,17 @@ def test_a_speed_in_a_unit_that_nobody_knows_is_not_set(draft: Draft, bench: Can
         run(homing(draft, bench, KNEE, AXIS, SCALE), hands := Keeper(*does))
         assert drive.words == []
     assert hands.heard("Its speeds cannot be set")
+
+
+@pytest.mark.parametrize(("choice", "finished"), [("no", False), ("37", True)])
+def test_a_drive_whose_zero_is_turns_away_is_mended_by_homing_where_it_is(
+    draft: Draft, bench: CanBench, channel: str, choice: str, finished: bool
+) -> None:
+    draft.put(f"joint.{KNEE}", "zero_offset", 3 * math.tau)
+    far = Scale(4096.0, 100.0, 1, 3 * math.tau)
+    with HomingDrive(channel, NODE) as drive:
+        drive.objects[0x6064, 0] = encoded(0x6064, -3 * TURN)
+        does = beginning(37)[2:] if finished else ()
+        run(homing(draft, bench, KNEE, AXIS, far), Keeper(("find its own zero", saying(choice)), *does))
+    assert draft.has(f"joint.{KNEE}", "zero_offset") is finished
+    assert draft.value(f"joint.{KNEE}", "zero_offset", 0.0) == pytest.approx(0.0, abs=1e-4)
