@@ -46,7 +46,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "trace": ("drivers.cli.trace:main", "every frame of a CAN bus, decoded by EDS; candump and PCAP files"),
     "commission": ("gateway.cli.commission:main", "a robot's file found out on the bench, joint by joint"),
     "sensor": ("drivers.cli.sensor:main", "what is on a serial port; record, replay and decode it"),
-    "calibrate": ("drivers.cli.calibrate:main", "an insole's pressure, an IMU's zero"),
+    "calibrate": ("gateway.cli.calibrate:main", "an insole's pressure, an IMU's or a joint's zero"),
     "collect": ("server_gui.cli.collect:main", "record every robot into the store, without a window"),
     "sessions": (
         "server_gui.cli.sessions:main",

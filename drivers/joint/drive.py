@@ -30,7 +30,7 @@ from drivers.joint.plan import Plan, Source, make_plan
 from drivers.joint.power import PowerDrive
 from drivers.joint.quantities import POSITION, STATE, STATUSWORD, Quantity, channels, quantities
 from drivers.joint.reading import DriveReading, read_drive
-from drivers.joint.remap import free_tpdo, put_back, remap
+from drivers.joint.remap import free_tpdos, mappable, remap
 from drivers.joint.scaling import rated_torque
 from drivers.joint.settings import JointSettings
 from drivers.joint.stop_rpdo import find_stop_rpdo
@@ -142,7 +142,7 @@ class JointDrive(PowerDrive):
         reading = read_drive(sdo, self._description, self.settings.axis)
         plan = make_plan(self.settings, self._quantities, reading)
         if self.settings.configure_pdos and (plan.position_from is None or not plan.position_from.cyclic):
-            told = self._remap(sdo, reading)
+            told = self._remap(sdo, reading, plan)
             reading = read_drive(sdo, self._description, self.settings.axis)
             plan = make_plan(self.settings, self._quantities, reading)
             plan = replace(plan, notes=(told, *plan.notes))
@@ -165,17 +165,17 @@ class JointDrive(PowerDrive):
             self._watch.restart()
             self._freshness.disconnected()
 
-    def _remap(self, sdo: SdoChannel, reading: DriveReading) -> str:
-        """Bring the position into a free TPDO; returns what came of it, in words."""
+    def _remap(self, sdo: SdoChannel, reading: DriveReading, plan: Plan) -> str:
+        """Bring what the channels need into free TPDOs; returns what came of it, in words."""
         if self.node.distrust is not None:
             return f"configure_pdos: {self.node.distrust}"
-        free = free_tpdo(reading.tpdos, self.node.node_id, self.node.bus.unclaimed)
-        if free is None:
+        free = list(free_tpdos(reading.tpdos, self.node.node_id, self.node.bus.unclaimed))
+        if not free:
             return "configure_pdos: no TPDO of the drive is free, nothing was changed"
+        more = mappable(self._description, (one.quantity for one in plan.polled_seldom))
         try:
-            return remap(sdo, self._description, *free, self._offset)
+            return remap(sdo, self._description, free, self._offset, list(more))
         except (DeviceAbort, Mismatch) as error:
-            put_back(sdo, self._description, *free)
             return f"configure_pdos: {error}"
 
     # How values come.

@@ -3,9 +3,9 @@
 import argparse
 import datetime
 import getpass
-import shutil
-import sys
+import signal
 from pathlib import Path
+from typing import NoReturn
 
 import msgspec
 
@@ -13,30 +13,34 @@ from drivers.bus.settings import CanSettings
 from drivers.cli.buses import named
 from drivers.errors import SettingsError
 from drivers.scan.products import Library, files
-from gateway.cli.text import say, say_json, warn
+from gateway.cli.commission_faces import JsonFace, Terminal
+from gateway.cli.text import warn
 from gateway.commission.bench import CanBench
-from gateway.commission.dialogue import Ask, Talk, agree, run
+from gateway.commission.dialogue import Talk, agree, run
 from gateway.commission.draft import Draft, alone
+from gateway.commission.homing import NotStopped
+from gateway.commission.keeping import journal, put
 from gateway.commission.serial_bench import SerialPorts
 from gateway.commission.steps import commission
 from gateway.commission.writing import text, unfinished
-from gateway.config.reading import examine
-from gateway.config.robot import RobotConfig
-from gateway.records import durable
-from gateway.records.records import Records
 
 _EPILOG = """\
 example
   gwrms commission exo-01.toml can0 --eds ~/eds --serial /dev/serial/by-id/usb-left --serial …
 
-The joints are moved by hand, without power: nothing here moves, enables or stops anything. What is to be
-written to a drive is asked for, and read back. Ctrl-C interrupts; the same command goes on where it was, and
-what is known is kept in FILE.commission until FILE is written.
+The joints are moved by hand, without power. What is to be written to a drive is asked for, and read back.
+Only homing, where it is wanted, puts one drive under power: it is told in words before, begins when its
+phrase is typed, and Enter, Ctrl-C or the end of the input stop and disable it. Ctrl-C interrupts; the same
+command goes on where it was, and what is known is kept in FILE.commission until FILE is written.
+
+With --json, {"moving": …} says that a joint is under power: any line is a STOP then. {"moving": null} comes
+when that is over.
 
 exit status
   0 written, 1 not (interrupted, or something failed), 2 usage
 """
 
+_LOSSES = (signal.SIGTERM, signal.SIGHUP)  # of whoever started it, or of the terminal
 NOT_FINISHED = "is not in it, because it was not finished: the same command goes on there."
 
 
@@ -55,8 +59,9 @@ def main(argv: list[str]) -> int:
 
 def _lead(draft: Draft, name: str, settings: CanSettings, options: argparse.Namespace) -> int:
     """Through all of it; returns the exit status."""
-    face: _JsonFace | _Terminal = _JsonFace() if options.json else _Terminal()
+    face: JsonFace | Terminal = JsonFace() if options.json else Terminal()
     bench = CanBench(name, settings)
+    before = {number: signal.signal(number, _interrupt) for number in _LOSSES}
     try:
         _keep_bus(draft, settings)
         run(_all(draft, bench, options, face), face)
@@ -72,8 +77,13 @@ def _lead(draft: Draft, name: str, settings: CanSettings, options: argparse.Name
     except OSError as error:
         warn("commission", f"{error}; {draft.path} has what was found until then")
         return 1
+    except NotStopped as error:
+        warn("commission", f"NOT STOPPED: {error}")
+        return 1
     finally:
         bench.close()
+        for number, handler in before.items():
+            signal.signal(number, handler)
     return 0 if not draft.path.exists() else 1
 
 
@@ -130,7 +140,7 @@ def _keep_bus(draft: Draft, settings: CanSettings) -> None:
 
 
 def _all(
-    draft: Draft, bench: CanBench, options: argparse.Namespace, face: "_Terminal | _JsonFace"
+    draft: Draft, bench: CanBench, options: argparse.Namespace, face: "Terminal | JsonFace"
 ) -> Talk[None]:
     library = Library(files(options.eds))
     yield from commission(draft, bench, library, SerialPorts(), options.serial)
@@ -145,14 +155,12 @@ def _all(
 
 def _write(draft: Draft, made: str, who: str) -> str:
     """What became of it, in words."""
-    if draft.file.exists():
-        shutil.copyfile(draft.file, draft.file.with_name(draft.file.name + ".before"))
-    durable.write(draft.file, made.encode())
-    found = examine(draft.file)
+    found = put(draft.file, made)
     said = "".join(f"  {finding.severity}: {finding.words}\n" for finding in found.findings)
     if found.config is None:
         return f"{draft.file} is written and cannot be used yet:\n{said}"
-    journaled = _journal(found.config, draft, who)
+    findings = {table: msgspec.to_builtins(keys) for table, keys in draft.tables.items()}
+    journaled = journal(found.config, who, "commission", found=findings)
     left = unfinished(draft)
     if left:
         said += f"  {', '.join(left)} {NOT_FINISHED}\n"
@@ -161,50 +169,6 @@ def _write(draft: Draft, made: str, who: str) -> str:
     return f"{draft.file} is written.\n{said}{journaled}Next: gwrms gateway {draft.file}"
 
 
-def _journal(config: RobotConfig, draft: Draft, who: str) -> str:
-    """Put what was found into the robot's journal; what is in the way of that is told, no more."""
-    records = Records(config.records)
-    try:
-        findings = {table: msgspec.to_builtins(keys) for table, keys in draft.tables.items()}
-        records.journal.append(who, "commission", file=str(draft.file), found=findings).result()
-    except OSError as error:
-        return f"  It is not in the journal: {error.strerror or error}\n"
-    finally:
-        records.close()
-    return ""
-
-
-class _Terminal:
-    def say(self, text: str) -> None:
-        say(text + "\n")
-
-    def ask(self, question: Ask) -> str:
-        choices = f" [{'/'.join(question.choices)}]" if question.choices else ""
-        default = f" (Enter: {question.default})" if question.default else ""
-        say(f"\n{question.text}{choices}{default}\n> ")
-        return _line()
-
-
-class _JsonFace:
-    """A line each: {"say": …} and {"ask": …, "choices": …, "default": …, "unit": …}; plain lines answer."""
-
-    def say(self, text: str) -> None:
-        say_json({"say": text})
-
-    def ask(self, question: Ask) -> str:
-        say_json(
-            {
-                "ask": question.text,
-                "choices": question.choices,
-                "default": question.default,
-                "unit": question.unit,
-            }
-        )
-        return _line()
-
-
-def _line() -> str:
-    typed = sys.stdin.readline()
-    if not typed:
-        raise EOFError
-    return typed
+def _interrupt(_number: int, _frame: object) -> NoReturn:
+    """As Ctrl-C: what was begun is ended in order."""
+    raise KeyboardInterrupt

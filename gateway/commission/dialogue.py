@@ -30,7 +30,14 @@ class Ask:
     unit: str = ""  # of a number
 
 
-Talk = Generator[Say | Ask, str, T]
+@dataclass(frozen=True, slots=True)
+class Moving:
+    """A joint is under power now: said again and again, and sent "" as long as nobody has pressed STOP."""
+
+    text: str
+
+
+Talk = Generator[Say | Ask | Moving, str, T]
 
 
 class Face(Protocol):
@@ -40,6 +47,13 @@ class Face(Protocol):
 
     def ask(self, question: Ask) -> str:
         """What was typed; raises `EOFError` where nothing more can be."""
+        ...
+
+    def moving(self, text: str) -> str:
+        """Show it, with STOP in reach, and look for some hundredths of a second whether it is pressed.
+
+        Returns why to stop, "" where there is no reason. Nothing that could be a STOP may be missed.
+        """
         ...
 
 
@@ -52,6 +66,8 @@ def run(talk: Talk[T], face: Face) -> T:
             typed = None
             if isinstance(step, Say):
                 face.say(step.text)
+            elif isinstance(step, Moving):
+                typed = face.moving(step.text)
             else:
                 typed = face.ask(step).strip() or (step.default or "")
     except StopIteration as end:

@@ -12,7 +12,7 @@ _shtab_gwrms_commands() {
   local _commands=(
     bench:'Measure a robot'"'"'s gateway: latency, CPU and memory of what it does.'
     blame:'Watch the robot'"'"'s control loop, and name what made it late.'
-    calibrate:'an insole'"'"'s pressure, an IMU'"'"'s zero'
+    calibrate:'an insole'"'"'s pressure, an IMU'"'"'s or a joint'"'"'s zero'
     check:'Checks a robot'"'"'s file, a server'"'"'s file or a scenario as a gateway, a collector or `gwrms sim run` would read'
     cloud:'the store: browse, upload, download, verify, tidy'
     collect:'Record every robot, whole, into the store; and ask how that goes.'
@@ -65,6 +65,7 @@ _shtab_gwrms_calibrate_commands() {
   local _commands=(
     imu:'Takes the present posture as upright and writes it. Stand upright and still; name the file in [imu.NAME] as `zero`. ROBOT.toml:NAME instead of a port takes everything from [imu.NAME], also for an IMU on a CAN bus.'
     insole:'Measures the unloaded cells, then known loads on the whole insole; fits, shows the fit, and asks before it writes. Name the file in [insole.NAME] as `calibration`. ROBOT.toml:NAME instead of a port takes everything from [insole.NAME]. A device that sends pressure needs no calibration.'
+    joint:'Finds a joint'"'"'s zero again: hold it, without power, as the comment of its zero_offset says, or at --angle. Old and new are shown, and written into the robot'"'"'s file on your word, with a comment and an entry of the journal. Nothing is moved. End this robot'"'"'s gateway first.'
   )
   _describe 'gwrms calibrate commands' _commands
 }
@@ -216,6 +217,17 @@ _shtab_gwrms_calibrate_insole_options=(
 
 # guard to ensure default positional specs are added only once per session
 _shtab_gwrms_calibrate_insole_defaults_added=0
+
+_shtab_gwrms_calibrate_joint_options=(
+  "(- : *)"{-h,--help}"[show this help message and exit]"
+  "--angle[at which it is held (flexion positive)]:DEGREES:"
+  "--max-change[a larger change is refused (default\: 10)]:DEGREES:"
+  "--who[who does it, for the record (default\: your user name)]:who:"
+  ":the joint of a robot\'s file:"
+)
+
+# guard to ensure default positional specs are added only once per session
+_shtab_gwrms_calibrate_joint_defaults_added=0
 
 _shtab_gwrms_check_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
@@ -1316,6 +1328,7 @@ _shtab_gwrms_calibrate() {
       case $line[1] in
         imu) _arguments -C -s $_shtab_gwrms_calibrate_imu_options ;;
         insole) _arguments -C -s $_shtab_gwrms_calibrate_insole_options ;;
+        joint) _arguments -C -s $_shtab_gwrms_calibrate_joint_options ;;
       esac
   esac
 }
