@@ -71,9 +71,7 @@ def tpdo(number: int, cob_id: int, *mapped: int, transmission_type: int = 1) -> 
 NO_OTHER: Mapping[int, int] = MappingProxyType({})
 
 
-def drive_eds(
-    objects: Objects, other: Mapping[int, int] = NO_OTHER, mappable: Collection[int] = ()
-) -> str:
+def drive_eds(objects: Objects, other: Mapping[int, int] = NO_OTHER, mappable: Collection[int] = ()) -> str:
     """An EDS of exactly these objects; `other` are data types by index, those `mappable` may be in a PDO."""
     types = {index: data_type for index, data_type, _, _ in COMMON} | {
         index + axis * 0x800: data_type for index, data_type, _, _ in AXIS + SURROUNDINGS for axis in range(8)
