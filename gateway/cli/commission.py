@@ -4,22 +4,29 @@ import argparse
 import datetime
 import getpass
 import shutil
+import signal
 import sys
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from types import FrameType
 
 import msgspec
 
 from drivers.bus.settings import CanSettings
 from drivers.cli.buses import named
-from drivers.errors import SettingsError
+from drivers.errors import DriverError, SettingsError
 from drivers.scan.products import Library, files
+from gateway.cli.commission_lines import JsonFace, Lines, stdin
 from gateway.cli.text import say, say_json, warn
 from gateway.commission.bench import CanBench
-from gateway.commission.dialogue import Ask, Talk, agree, run
+from gateway.commission.dialogue import Ask, At, Talk, agree, run
 from gateway.commission.draft import Draft, alone
+from gateway.commission.progress import Progress, Step
 from gateway.commission.serial_bench import SerialPorts
 from gateway.commission.steps import commission
-from gateway.commission.writing import text, unfinished
+from gateway.commission.stopping import Stopped, stop
+from gateway.commission.writing import Written, text, unfinished
 from gateway.config.reading import examine
 from gateway.config.robot import RobotConfig
 from gateway.records import durable
@@ -37,7 +44,7 @@ exit status
   0 written, 1 not (interrupted, or something failed), 2 usage
 """
 
-NOT_FINISHED = "is not in it, because it was not finished: the same command goes on there."
+ENDS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 def main(argv: list[str]) -> int:
@@ -48,33 +55,92 @@ def main(argv: list[str]) -> int:
     if missing:
         parser.error(f"--eds {', '.join(missing)}: there is no such folder")
     name, settings = _the_bus(options.bus, options.bitrate)
-    with alone(options.file):
+    if options.stop:
+        return _stop(Draft(options.file), CanBench(name, settings), as_json=options.json)
+    with alone(options.file), _ending(), ExitStack() as ends:
         draft = Draft(options.file)
-        return _lead(draft, name, settings, options)
+        bench = CanBench(name, settings)
+        ends.callback(bench.close)
+        if not options.json:
+            return _lead(draft, bench, settings, options, _Terminal(), None)
+        lines = ends.enter_context(Lines(stdin()))
+        return _lead(draft, bench, settings, options, JsonFace(lines), lines)
 
 
-def _lead(draft: Draft, name: str, settings: CanSettings, options: argparse.Namespace) -> int:
+def _lead(
+    draft: Draft,
+    bench: CanBench,
+    settings: CanSettings,
+    options: argparse.Namespace,
+    face: "_Terminal | JsonFace",
+    lines: Lines | None,
+) -> int:
     """Through all of it; returns the exit status."""
-    face: _JsonFace | _Terminal = _JsonFace() if options.json else _Terminal()
-    bench = CanBench(name, settings)
+    progress = Progress(draft)
+
+    def at(where: At) -> None:
+        progress.at(where)
+        face.steps(progress.steps())
+
     try:
         _keep_bus(draft, settings)
-        run(_all(draft, bench, options, face), face)
+        run(_all(draft, bench, options, face), face, at)
     except EOFError:
-        warn(
-            "commission",
-            f"nobody answers any more; {draft.path} has what was found, go on with the same command",
-        )
-        return 1
-    except KeyboardInterrupt:
-        warn("commission", f"interrupted; {draft.path} has what was found, go on with the same command")
-        return 130
+        return _left(draft, "nobody answers any more", 1)
+    except Ended as end:
+        if lines is not None and lines.stop_asked:
+            return _stop(draft, bench, as_json=True)
+        return _left(draft, "interrupted", end.status)
     except OSError as error:
         warn("commission", f"{error}; {draft.path} has what was found until then")
         return 1
+    return 0 if not draft.path.exists() else 1
+
+
+def _left(draft: Draft, why: str, status: int) -> int:
+    warn("commission", f"{why}; {draft.path} has what was found, go on with the same command")
+    return status
+
+
+def _stop(draft: Draft, bench: CanBench, *, as_json: bool) -> int:
+    """Quick stop to every drive that is known; nothing but SIGKILL keeps it from its end."""
+    for number in ENDS:
+        signal.signal(number, signal.SIG_IGN)
+    try:
+        stopped = stop(bench, draft)
+    except DriverError as error:
+        stopped = Stopped({}, str(error))
     finally:
         bench.close()
-    return 0 if not draft.path.exists() else 1
+    if as_json:
+        told = {"confirmed": stopped.confirmed, "drives": stopped.drives, "words": stopped.words}
+        say_json({"stopped": told})
+    else:
+        say(stopped.words + "\n")
+    return 0 if stopped.confirmed else 1
+
+
+class Ended(KeyboardInterrupt):
+    """Ctrl-C, SIGTERM or a terminal that is gone: the dialogue is closed, which ends what it has begun."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__()
+        self.status = 128 + number
+
+
+@contextmanager
+def _ending() -> Iterator[None]:
+    """While inside, `ENDS` raise `Ended` in whatever the dialogue does."""
+    before = {number: signal.signal(number, _end) for number in ENDS}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _end(number: int, _frame: FrameType | None) -> None:
+    raise Ended(number)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -101,6 +167,12 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--json", action="store_true", help="questions and answers as JSON lines, for other faces"
+    )
+    parser.add_argument(
+        "--stop",
+        action="store_true",
+        help="ask nothing: quick stop to every drive that was found until now, and what each confirms "
+        "(software, not a safety-rated emergency stop)",
     )
     return parser
 
@@ -130,35 +202,32 @@ def _keep_bus(draft: Draft, settings: CanSettings) -> None:
 
 
 def _all(
-    draft: Draft, bench: CanBench, options: argparse.Namespace, face: "_Terminal | _JsonFace"
+    draft: Draft, bench: CanBench, options: argparse.Namespace, face: "_Terminal | JsonFace"
 ) -> Talk[None]:
     library = Library(files(options.eds))
     yield from commission(draft, bench, library, SerialPorts(), options.serial)
     when = datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
     made = text(draft, options.who, when)
-    face.say(made)
+    face.propose(made, str(draft.file))
     if (yield from agree(f"Write this to {draft.file}?")):
-        face.say(_write(draft, made, options.who))
+        face.written(_write(draft, made, options.who))
     else:
         face.say(f"Nothing is written; {draft.path} has what was found.")
 
 
-def _write(draft: Draft, made: str, who: str) -> str:
-    """What became of it, in words."""
+def _write(draft: Draft, made: str, who: str) -> Written:
     if draft.file.exists():
         shutil.copyfile(draft.file, draft.file.with_name(draft.file.name + ".before"))
     durable.write(draft.file, made.encode())
     found = examine(draft.file)
-    said = "".join(f"  {finding.severity}: {finding.words}\n" for finding in found.findings)
+    findings = tuple((str(one.severity), one.words) for one in found.findings)
     if found.config is None:
-        return f"{draft.file} is written and cannot be used yet:\n{said}"
+        return Written(str(draft.file), made, findings, usable=False)
     journaled = _journal(found.config, draft, who)
     left = unfinished(draft)
-    if left:
-        said += f"  {', '.join(left)} {NOT_FINISHED}\n"
-    else:
+    if not left:
         draft.end()
-    return f"{draft.file} is written.\n{said}{journaled}Next: gwrms gateway {draft.file}"
+    return Written(str(draft.file), made, findings, usable=True, unfinished=left, not_journaled=journaled)
 
 
 def _journal(config: RobotConfig, draft: Draft, who: str) -> str:
@@ -168,7 +237,7 @@ def _journal(config: RobotConfig, draft: Draft, who: str) -> str:
         findings = {table: msgspec.to_builtins(keys) for table, keys in draft.tables.items()}
         records.journal.append(who, "commission", file=str(draft.file), found=findings).result()
     except OSError as error:
-        return f"  It is not in the journal: {error.strerror or error}\n"
+        return error.strerror or str(error)
     finally:
         records.close()
     return ""
@@ -178,33 +247,20 @@ class _Terminal:
     def say(self, text: str) -> None:
         say(text + "\n")
 
+    def propose(self, made: str, _file: str) -> None:
+        self.say(made)
+
+    def written(self, written: Written) -> None:
+        self.say(written.words)
+
+    def steps(self, steps: tuple[Step, ...]) -> None:
+        """Questions say it themselves."""
+
     def ask(self, question: Ask) -> str:
         choices = f" [{'/'.join(question.choices)}]" if question.choices else ""
         default = f" (Enter: {question.default})" if question.default else ""
         say(f"\n{question.text}{choices}{default}\n> ")
-        return _line()
-
-
-class _JsonFace:
-    """A line each: {"say": …} and {"ask": …, "choices": …, "default": …, "unit": …}; plain lines answer."""
-
-    def say(self, text: str) -> None:
-        say_json({"say": text})
-
-    def ask(self, question: Ask) -> str:
-        say_json(
-            {
-                "ask": question.text,
-                "choices": question.choices,
-                "default": question.default,
-                "unit": question.unit,
-            }
-        )
-        return _line()
-
-
-def _line() -> str:
-    typed = sys.stdin.readline()
-    if not typed:
-        raise EOFError
-    return typed
+        typed = sys.stdin.readline()
+        if not typed:
+            raise EOFError
+        return typed
