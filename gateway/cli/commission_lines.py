@@ -126,10 +126,11 @@ class JsonFace:
         for key in ("choices", "default", "unit", "bounds", "press", "refused"):
             asked[key] = getattr(question, key)
         say_json(asked)
-        within_s = None if question.live is None else LIVE_S
+        within_s = None if question.live is None else 0.0
         while (typed := self._lines.get(self._number, within_s)) is None:
             if question.live is not None:
                 self._show(question.live)
+                within_s = LIVE_S
         return typed
 
     def _show(self, live: Live) -> None:

@@ -45,14 +45,14 @@ def _sensors(draft: Draft, _part: str) -> bool:
     return any(table.startswith(("insole.", "imu.")) for table in draft.tables)
 
 
-# Name, words, whether the draft has what it finds; in the order of `steps.py`.
-FIRST: Mapping[str, tuple[str, Has]] = {
+# Name, words, whether the draft has what it finds (None: gone through is done); in the order of `steps.py`.
+FIRST: Mapping[str, tuple[str, Has | None]] = {
     "name": ("its name", lambda draft, _: draft.has("robot", "name")),
-    "bus": ("what is on the bus", lambda draft, _: any(one.startswith("node.") for one in draft.tables)),
+    "bus": ("what is on the bus", None),
     "role": ("who leads the bus", lambda draft, _: draft.has("gateway", "role")),
     "joints": ("its joints", lambda draft, _: draft.has("robot", "joints")),
 }
-JOINT: Mapping[str, tuple[str, Has]] = {
+JOINT: Mapping[str, tuple[str, Has | None]] = {
     "drive": ("which drive", _key("node_id")),
     "file": ("its EDS", _of_node("eds")),
     "heartbeat": ("heartbeat", _of_node("heartbeat")),
@@ -61,7 +61,7 @@ JOINT: Mapping[str, tuple[str, Has]] = {
     "limits": ("limits", lambda draft, joint: draft.has(f"guard.rule.{joint}_range", "max")),
     "ratings": ("ratings", _rated),
 }
-LAST: Mapping[str, tuple[str, Has]] = {
+LAST: Mapping[str, tuple[str, Has | None]] = {
     "sensors": ("feet and trunk", _sensors),
     "file": ("the file", lambda _draft, _part: False),
 }
@@ -90,18 +90,19 @@ class Progress:
         """All that are known by now: joints are once they have names."""
         return tuple(Step(where.part, title, self._state(where, has)) for where, title, has in self._all())
 
-    def _all(self) -> Iterator[tuple[At, str, Has]]:
+    def _all(self) -> Iterator[tuple[At, str, Has | None]]:
         joints: list[str] = self._draft.value("robot", "joints", [])
         for part, table in ((ROBOT, FIRST), *((joint, JOINT) for joint in joints), (ROBOT, LAST)):
             for name, (title, has) in table.items():
                 yield At(part, name), title, has
 
-    def _state(self, where: At, has: Has) -> State:
+    def _state(self, where: At, has: Has | None) -> State:
         if self._seen and self._seen[-1] == where:
             return State.NOW
-        if has(self._draft, where.part):
+        is_past = where in self._seen or self._is_behind(where)
+        if is_past if has is None else has(self._draft, where.part):
             return State.DONE
-        return State.PASSED if where in self._seen or self._is_behind(where) else State.NEXT
+        return State.PASSED if is_past else State.NEXT
 
     def _is_behind(self, where: At) -> bool:
         """Whether a later part was begun already."""

@@ -1,0 +1,73 @@
+"""How commissioning is, in words, with STOP beside it: always in sight on the page."""
+
+from typing import Final
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import QHBoxLayout, QPushButton, QWidget
+
+from server_gui.core.commissioning.commissioning import Commissioning
+from server_gui.views.theme import Theme
+from server_gui.views.widgets.card import set_text
+from server_gui.views.widgets.fitted import FittedLabel
+from server_gui.views.widgets.mark import MarkIcon
+from server_gui.views.widgets.stop_button import StopButton
+from server_gui.views.widgets.whole import WholeLabel
+
+LONG_S: Final = 3.0  # work that takes longer says for how long
+STOP_TIP: Final = (
+    "Ends what the command does, and asks every drive that it has found for a quick stop (F12 or Ctrl+Space "
+    "do so too). It is software over a bus, NOT a safety-rated emergency stop: keep the hardware one within "
+    "reach."
+)
+
+
+class Bar(QWidget):
+    """`stopped` asks for a STOP of the drives that are commissioned, `interrupted` for the command's end."""
+
+    stopped = Signal()
+    interrupted = Signal()
+
+    def __init__(self, commissioning: Commissioning, theme: Theme) -> None:
+        super().__init__()
+        self._commissioning = commissioning
+        self.setObjectName("dock")
+        self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
+        self._icon = MarkIcon(theme, 14)
+        self.stage, self.words = FittedLabel("title"), WholeLabel()
+        self.interrupt = QPushButton("Interrupt")
+        self.interrupt.setToolTip("End the command; what was found is kept, and gone on with")
+        self.interrupt.clicked.connect(self.interrupted)
+        self.stop = StopButton()
+        self.stop.name("bus")
+        self.stop.setAccessibleName("STOP the drives that are commissioned")
+        self.stop.setToolTip(STOP_TIP)
+        self.stop.setAccessibleDescription(STOP_TIP)
+        self.stop.stopped.connect(self.stopped)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(10, 6, 8, 6)
+        row.addWidget(self._icon)
+        row.addWidget(self.stage)
+        row.addWidget(self.words, 1)
+        row.addWidget(self.interrupt)
+        row.addWidget(self.stop)
+
+    def refresh(self) -> None:
+        """Show how it is now."""
+        now = self._commissioning
+        look = now.look_of
+        self._icon.show_mark(look.mark)
+        self.stage.say(look.mark.word)
+        set_text(self.words, self._said())
+        self.interrupt.setEnabled(now.runs)
+        self.stop.setEnabled(now.can_stop)
+
+    def _said(self) -> str:
+        now = self._commissioning
+        words = now.look_of.words
+        if now.problem:
+            words = f"{now.problem}. {words}" if not now.problem.endswith(".") else f"{now.problem} {words}"
+        if now.is_silent:
+            return f"Nothing was heard for {now.working_s:.0f} s, longer than any step takes: interrupt it."
+        if now.runs and not now.look_of.answers and now.working_s > LONG_S:
+            return f"{words} ({now.working_s:.0f} s)"
+        return words
