@@ -84,7 +84,9 @@ def _lead(
 
     try:
         _keep_bus(draft, settings)
-        run(_all(draft, bench, options, face), face, at)
+        if run(_all(draft, bench, options, face), face, at):
+            progress.end()
+            face.steps(progress.steps())
     except EOFError:
         return _left(draft, "nobody answers any more", 1)
     except Ended as end:
@@ -203,16 +205,19 @@ def _keep_bus(draft: Draft, settings: CanSettings) -> None:
 
 def _all(
     draft: Draft, bench: CanBench, options: argparse.Namespace, face: "_Terminal | JsonFace"
-) -> Talk[None]:
+) -> Talk[bool]:
+    """Whether the file is written."""
     library = Library(files(options.eds))
     yield from commission(draft, bench, library, SerialPorts(), options.serial)
     when = datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
     made = text(draft, options.who, when)
     face.propose(made, str(draft.file))
-    if (yield from agree(f"Write this to {draft.file}?")):
+    agreed = yield from agree(f"Write this to {draft.file}?")
+    if agreed:
         face.written(_write(draft, made, options.who))
     else:
         face.say(f"Nothing is written; {draft.path} has what was found.")
+    return agreed
 
 
 def _write(draft: Draft, made: str, who: str) -> Written:

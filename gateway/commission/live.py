@@ -29,16 +29,16 @@ def _axis(
 ) -> Sequence[Reading]:
     here = counts(bench, axis)
     name = str(axis)
-    found = [Reading(name, _power(bench, axis))]
+    found = []
+    if angle is not None:
+        found.append(Reading(name, None if here is None else round(math.degrees(angle(here)), 1), "°"))
     if before is None:
         found.append(Reading(name, here, "counts"))
     else:
         was = before.get(axis)
         moved = None if here is None or was is None else here - was
         found.append(Reading(name, moved, "counts moved"))
-    if angle is not None:
-        found.append(Reading(name, None if here is None else round(math.degrees(angle(here)), 1), "°"))
-    return found
+    return [*found, Reading(name, _power(bench, axis))]
 
 
 def _power(bench: Bench, axis: Axis) -> str:
@@ -46,4 +46,4 @@ def _power(bench: Bench, axis: Axis) -> str:
     found = state(bench, axis)
     if found is None:
         return NOT_KNOWN
-    return f"{POWERED}: {found.words}" if found in ENERGISED else f"no power: {found.words}"
+    return f"{POWERED if found in ENERGISED else 'no power'} ({found.words})"

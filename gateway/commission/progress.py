@@ -7,7 +7,7 @@ from enum import StrEnum
 from gateway.commission.dialogue import At
 from gateway.commission.draft import Draft
 
-ROBOT = "robot"
+ROBOT, END = "robot", "sensors and file"  # parts that are no joint
 
 
 class State(StrEnum):
@@ -63,7 +63,7 @@ JOINT: Mapping[str, tuple[str, Has | None]] = {
 }
 LAST: Mapping[str, tuple[str, Has | None]] = {
     "sensors": ("feet and trunk", _sensors),
-    "file": ("the file", lambda _draft, _part: False),
+    "file": ("the file", None),
 }
 
 
@@ -82,9 +82,14 @@ class Progress:
     def __init__(self, draft: Draft) -> None:
         self._draft = draft
         self._seen: list[At] = []
+        self._is_at_end = False
 
     def at(self, where: At) -> None:
         self._seen.append(where)
+
+    def end(self) -> None:
+        """The file is written."""
+        self._is_at_end = True
 
     def steps(self) -> tuple[Step, ...]:
         """All that are known by now: joints are once they have names."""
@@ -92,14 +97,14 @@ class Progress:
 
     def _all(self) -> Iterator[tuple[At, str, Has | None]]:
         joints: list[str] = self._draft.value("robot", "joints", [])
-        for part, table in ((ROBOT, FIRST), *((joint, JOINT) for joint in joints), (ROBOT, LAST)):
+        for part, table in ((ROBOT, FIRST), *((joint, JOINT) for joint in joints), (END, LAST)):
             for name, (title, has) in table.items():
                 yield At(part, name), title, has
 
     def _state(self, where: At, has: Has | None) -> State:
-        if self._seen and self._seen[-1] == where:
+        if self._seen and self._seen[-1] == where and not self._is_at_end:
             return State.NOW
-        is_past = where in self._seen or self._is_behind(where)
+        is_past = self._is_at_end or where in self._seen or self._is_behind(where)
         if is_past if has is None else has(self._draft, where.part):
             return State.DONE
         return State.PASSED if is_past else State.NEXT

@@ -12,7 +12,7 @@ from gateway.commission.axes import Axis, axes_of
 from gateway.commission.bench import Bench
 from gateway.commission.dialogue import At, Say, Talk, word
 from gateway.commission.draft import Draft
-from gateway.commission.progress import ROBOT
+from gateway.commission.progress import END, ROBOT
 from gateway.commission.sensors import SerialBench, sensors
 from gateway.config.robot import NAME
 
@@ -48,9 +48,9 @@ def commission(
             continue
         left.remove(axis)
         yield from _joint(draft, bench, library, joint, axis, told[axis.node])
-    yield At(ROBOT, "sensors")
+    yield At(END, "sensors")
     yield from sensors(draft, serial, ports)
-    yield At(ROBOT, "file")
+    yield At(END, "file")
 
 
 def _joint(draft: Draft, bench: Bench, library: Library, joint: str, axis: Axis, told: Told) -> Talk[None]:

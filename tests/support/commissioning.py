@@ -84,7 +84,7 @@ class Played:
         """Something comes, and is looked at; then some time passes."""
         self.talker.says(*lines)
         self.model.look()
-        self.now_s += GUARD_S
+        self.now_s += 2 * GUARD_S
 
     def end(self, status: int | None, last_words: str = "") -> None:
         self.talker.ends(status, last_words)
@@ -106,7 +106,7 @@ def steps(now: tuple[str, str] = ("left_knee", "what counts mean")) -> dict[str,
     """All before `now` are done, but one that was passed."""
     every = [("robot", one) for one in FIRST]
     every += [(joint, one) for joint in JOINTS for one in JOINT]
-    every += [("robot", one) for one in LAST]
+    every += [("sensors and file", one) for one in LAST]
     at = every.index(now)
     states = ["done" if place < at else "now" if place == at else "next" for place in range(len(every))]
     states[3 + 4] = "passed"
@@ -130,8 +130,8 @@ def stopped(*, confirmed: bool = True) -> dict[str, Any]:
 
 
 KNEE = asks(
-    "Hold the left knee still at one known angle, such as straight, 0°, and type the angle in degrees (flexion "
-    "positive).",
+    "Hold the left knee still at one known angle, such as straight, 0°, and type the angle in degrees "
+    "(flexion positive).",
     14,
     unit="°",
     bounds=(-180, 360),
@@ -149,8 +149,8 @@ MOVES = lives(
         reading
         for place, node in enumerate((2, 3, 7, 11, 23, 40))
         for reading in (
-            (f"node {node}", "no power: switch on disabled", ""),
             (f"node {node}", 61_234 if place == 2 else place, "counts moved"),
+            (f"node {node}", "no power (switch on disabled)", ""),
         )
     ),
 )
@@ -181,7 +181,7 @@ def typing(played: Played) -> None:
         steps(), {"say": "left knee is node 7 (moved by hand: it counted 61234, the others 5 or less)."}
     )
     played.hear({"say": KNEE["refused"]}, KNEE)
-    played.hear(lives(14, ("node 7", "no power: switch on disabled", ""), ("node 7", -30_500, "counts")))
+    played.hear(lives(14, ("node 7", -30_500, "counts"), ("node 7", "no power (switch on disabled)", "")))
 
 
 def hand(played: Played) -> None:
@@ -192,8 +192,8 @@ def hand(played: Played) -> None:
 def powered(played: Played) -> None:
     played.start()
     text = (
-        "node 7, node 11 may be under power. Switch the drives off (controller off, or STO) before you take hold "
-        "of a joint; this command never switches anything on or off. Then press Enter."
+        "node 7, node 11 may be under power. Switch the drives off (controller off, or STO) before you take "
+        "hold of a joint; this command never switches anything on or off. Then press Enter."
     )
     played.hear(steps(("left_knee", "which drive")), asks(text, 9, press=True))
 
@@ -234,7 +234,7 @@ def left(played: Played) -> None:
 
 def proposed(played: Played) -> None:
     played.start()
-    played.hear(steps(("robot", "the file")), {"say": FILE, "file": WISH.file})
+    played.hear(steps(("sensors and file", "the file")), {"say": FILE, "file": WISH.file})
     played.hear(asks(f"Write this to {WISH.file}?", 60, choices=["y", "n"], default="n"))
 
 

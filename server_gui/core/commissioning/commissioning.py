@@ -4,6 +4,7 @@ The command is a process of its own, behind `Talker`: whatever becomes of it, th
 becomes of the window, the command ends. It belongs to one thread, the window's; only `stop` is for any.
 """
 
+import signal
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
@@ -21,11 +22,11 @@ GUARD_S: Final = 0.4  # a click within it was meant for the question before
 STOP_S: Final = 2.5  # for the command to have stopped the drives; then another one does it
 OLD_S: Final = 2.0  # live values beyond it are not live
 SILENT_S: Final = 60.0  # that long no step takes
-# How the command ends by itself: not finished, wrong usage, by a signal that it has taken.
+# How the command ends by itself: not finished, wrong usage or not there, by a signal that it has taken.
 OWN_ENDS: Final = {
     0: Stage.LEFT,
     1: Stage.LEFT,
-    2: Stage.FAILED,
+    **dict.fromkeys((2, 126, 127), Stage.FAILED),
     **dict.fromkeys((128 + 1, 128 + 2, 128 + 15), Stage.LEFT),
 }
 SSH_FAILED: Final = 255  # it did not connect, or the connection is gone
@@ -295,9 +296,15 @@ class Commissioning:
             return OWN_ENDS[ended.status], words
         if ended.status == SSH_FAILED and self.wish is not None and self.wish.computer:
             return Stage.DIED if self.steps else Stage.FAILED, words
-        return Stage.DIED, words or f"its exit status is {ended.status}"
+        return Stage.DIED, words or _status_text(ended.status)
 
     def _note(self, kind: Kind, text: str) -> None:
         for place, line in enumerate(text.splitlines() or [""]):
             self.log.append((kind.value if place == 0 else "  ") + line)
             self.logged += 1
+
+
+def _status_text(status: int) -> str:
+    return (
+        f"It was killed by {signal.Signals(-status).name}." if status < 0 else f"Its exit status is {status}."
+    )

@@ -19,11 +19,7 @@ class Reading(msgspec.Struct, frozen=True):
         """The value with its unit; a dash where there is none."""
         if self.value is None:
             return f"— {self.unit}".rstrip()
-        told = (
-            self.value
-            if isinstance(self.value, str)
-            else f"{self.value:,.10g}".replace(",", "\N{THIN SPACE}")
-        )
+        told = self.value if isinstance(self.value, str) else f"{self.value:.10g}"
         return f"{told} {self.unit}".rstrip()
 
 

@@ -21,6 +21,10 @@ ABOUT: Final = (
     "without power. Switch the drives' power off (emergency stop, STO, or the controller off), leave their "
     "logic supply on, and plug the sensors in. The how-to “Commission a robot” says more."
 )
+THERE: Final = (
+    "Where the CAN adapter is: this computer, or one that SSH reaches without a password, as user@exo-01, "
+    "where gwrms is installed. File, folders and ports are then that one's."
+)
 
 
 class Form(Card):
@@ -37,20 +41,21 @@ class Form(Card):
         self.bus.addItems(can_interfaces())
         self.bus.setCurrentIndex(-1 if self.bus.count() != 1 else 0)
         hints = {
-            self.file: "exo-01.toml: the robot's file that is to be written",
-            self.bitrate: "bit/s, for interfaces that are opened with one",
-            self.eds: "folders of EDS files, beside those that ship",
-            self.serial: "ports of insoles and IMU, with spaces between them",
-            self.who: "for the record",
-            self.computer: "this one; else user@exo-01, where SSH asks for no password",
+            self.file: ("exo-01.toml", "The robot's file that is to be written"),
+            self.bitrate: ("as it is", "bit/s, for interfaces that are opened with one"),
+            self.eds: ("those that ship", "Folders of EDS files, with spaces between them"),
+            self.serial: ("none", "Ports of insoles and IMU, with spaces between them"),
+            self.who: ("", "Who commissions it, for the record"),
+            self.computer: ("this one", THERE),
+            self.bus.lineEdit() or QLineEdit(): (
+                "can0",
+                "can0, INTERFACE:CHANNEL, or a file that has [can.…]",
+            ),
         }
-        for field, hint in hints.items():
+        for field, (hint, tip) in hints.items():
             field.setPlaceholderText(hint)
+            field.setToolTip(tip)
             field.returnPressed.connect(self.begin)
-        line = self.bus.lineEdit()
-        if line is not None:
-            line.setPlaceholderText("can0, INTERFACE:CHANNEL, or a file that has [can.…]")
-            line.returnPressed.connect(self.begin)
         self.start = QPushButton("Start")
         self.start.setObjectName("primary")
         self.start.clicked.connect(self.begin)

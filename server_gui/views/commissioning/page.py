@@ -49,7 +49,7 @@ class CommissionPage(QWidget):
         self.question.answered.connect(commissioning.answer)
         self.result.connect_to.connect(self.connect_to)
         left = QVBoxLayout()
-        for widget, share in ((self.form, 0), (self.question, 0), (self.result, 2), (self.log, 1)):
+        for widget, share in ((self.question, 0), (self.result, 2), (self.form, 0), (self.log, 1)):
             left.addWidget(widget, share)
         self._columns = QBoxLayout(QBoxLayout.Direction.LeftToRight)
         self._columns.addLayout(left, 3)
@@ -81,7 +81,7 @@ class CommissionPage(QWidget):
             self.form.start.setEnabled(now.can_start)
         self.question.setVisible(now.question is not None)
         self.question.refresh()
-        self.steps.show_steps(now.steps)
+        self.steps.show_steps(now.steps, runs=now.runs)
         self.result.refresh()
         self.log.refresh()
 

@@ -25,7 +25,7 @@ NONE: Final = (
 
 
 class Steps(Card):
-    """A line each part, with every step of it in words."""
+    """A line each part; with every step in words, of the one that is gone through."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__("Steps")
@@ -48,8 +48,10 @@ class Steps(Card):
         """What it says, part by part."""
         return [f"{title.text()}: {words.text()}" for _, title, words in self._rows if not title.isHidden()]
 
-    def show_steps(self, steps: tuple[Step, ...]) -> None:
-        """Show these."""
+    def show_steps(self, steps: tuple[Step, ...], *, runs: bool) -> None:
+        """Show these; where it does not run, none is gone through."""
+        if not runs:
+            steps = tuple(Step(one.part, one.title, NEXT if one.state == NOW else one.state) for one in steps)
         if steps == self._known:
             return
         self._known = steps
@@ -64,9 +66,10 @@ class Steps(Card):
                 name, its = parts[place]
                 icon.show_mark(MARKS[_state(its)])
                 set_text(title, name.replace("_", " "))
-                set_text(words, "   ".join(f"{_glyph(one.state)} {one.title}" for one in its))
+                set_text(words, _told(its))
+                words.setVisible(bool(words.text()))
         done = sum(one.state in (DONE, PASSED) for one in steps)
-        self.set_note(f"{done} of {len(steps)} gone through", f"{done}/{len(steps)}")
+        self.set_note(*((f"{done} of {len(steps)} gone through", f"{done}/{len(steps)}") if steps else ("",)))
 
     def _add(self) -> None:
         icon, title, words = MarkIcon(self._theme), WholeLabel("title"), WholeLabel("dim")
@@ -95,6 +98,16 @@ def _state(steps: list[Step]) -> str:
     if NEXT in states:
         return NEXT
     return DONE if DONE in states else PASSED
+
+
+def _told(steps: list[Step]) -> str:
+    """Every step of the part that is gone through; of another one what is not as its mark says."""
+    state = _state(steps)
+    if state == NOW:
+        return "\n".join(f"{_glyph(one.state)} {one.title}" for one in steps)
+    other = [one.title for one in steps if one.state == (DONE if state == NEXT else PASSED)]
+    words = "done already" if state == NEXT else "without a finding"
+    return f"{words}: {', '.join(other)}" if other and len(other) < len(steps) else ""
 
 
 def _glyph(state: str) -> str:
