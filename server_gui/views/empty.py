@@ -84,6 +84,7 @@ class EmptyView(QWidget):
     def offer_commissioning(self, go: Callable[[], None]) -> None:
         """Offer the page for robots that have no file yet."""
         button = QPushButton("Commission a robot")
+        button.setObjectName("commission")
         button.clicked.connect(go)
         self._column.insertWidget(2, _offer("New robot", COMMISSION, button))
 

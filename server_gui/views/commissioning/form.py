@@ -56,6 +56,7 @@ class Form(Card):
             field.setPlaceholderText(hint)
             field.setToolTip(tip)
             field.returnPressed.connect(self.begin)
+            field.setAccessibleName(f"Commission: {tip}")
         self.start = QPushButton("Start")
         self.start.setObjectName("primary")
         self.start.clicked.connect(self.begin)

@@ -46,7 +46,7 @@ class CommissionPage(QWidget):
         self.bar.stopped.connect(commissioning.stop)
         self.bar.interrupted.connect(commissioning.interrupt)
         self.form.wished.connect(self._start)
-        self.question.answered.connect(commissioning.answer)
+        self.question.answered.connect(self._answer)
         self.result.connect_to.connect(self.connect_to)
         left = QVBoxLayout()
         for widget, share in ((self.question, 0), (self.result, 2), (self.form, 0), (self.log, 1)):
@@ -84,6 +84,11 @@ class CommissionPage(QWidget):
         self.steps.show_steps(now.steps, runs=now.runs)
         self.result.refresh()
         self.log.refresh()
+
+    def _answer(self, text: str) -> None:
+        """The keyboard waits for the next question: what it was on goes."""
+        if self.commissioning.answer(text):
+            self.setFocus()
 
     def _start(self, wish: Wish) -> None:
         self.commissioning.start(wish)
