@@ -20,7 +20,12 @@ from tests.support import commissioning as playing
 from tests.support.commissioning import BEND, EVERY, FILE, KNEE, WISH, Played, asks, lives
 
 # What the page has of windows of 1024x700 and 1480x900.
-SIZES = ((480, 470, 1.5, Look.LIGHT), (560, 520, 1.0, Look.DARK), (800, 600, 1.0, Look.LIGHT))
+SIZES = (
+    (480, 470, 1.5, Look.LIGHT),
+    (560, 420, 2.0, Look.DARK),
+    (560, 520, 1.0, Look.DARK),
+    (800, 600, 1.0, Look.LIGHT),
+)
 GOOD = {playing.was_written, playing.stop_confirmed}
 
 

@@ -9,7 +9,6 @@ from PySide6.QtWidgets import QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 from server_gui.core.commissioning.commissioning import Commissioning
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
-from server_gui.views.widgets.fitted import FittedLabel
 from server_gui.views.widgets.mark import MarkIcon
 from server_gui.views.widgets.stop_button import StopButton
 from server_gui.views.widgets.whole import WholeLabel
@@ -36,7 +35,7 @@ class Bar(QWidget):
         self.setObjectName("dock")
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self._icon = MarkIcon(theme, 14)
-        self.stage, self.words = FittedLabel("title"), WholeLabel()
+        self.stage, self.words = WholeLabel("title"), WholeLabel()
         self.interrupt = QPushButton("Interrupt")
         self.interrupt.setToolTip("End the command; what was found is kept, and gone on with")
         self.interrupt.clicked.connect(self.interrupted)
@@ -62,7 +61,7 @@ class Bar(QWidget):
         now = self._commissioning
         look = now.look_of
         self._icon.show_mark(look.mark)
-        self.stage.say(look.mark.word)
+        set_text(self.stage, look.mark.word)
         set_text(self.words, self._said())
         self.interrupt.setEnabled(now.runs)
         self.stop.setEnabled(now.can_stop)
