@@ -292,13 +292,13 @@ def run(
     with App(qt, settings, kept_settings(), FOLLOWING, record, file, opening) as app:
         app.theme.set(look, scale)
         for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, lambda *_: qt.quit())
+            signal.signal(number, lambda *_: app.window.end())
         if signals:
             app.window.show_signals(signals)
         app.first_look()
         app.window.show()
         if seconds is not None:
-            QTimer.singleShot(round(seconds * 1000), qt.quit)
+            QTimer.singleShot(round(seconds * 1000), app.window.end)
         with stop_keys(qt, app):
             status = qt.exec()
         app.window.hide()

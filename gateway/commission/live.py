@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 
-from drivers.joint.cia402 import ENERGISED
+from drivers.joint.cia402 import ENERGISED, DriveState
 from gateway.commission.axes import Axis, counts, state
 from gateway.commission.bench import Bench
 from gateway.commission.dialogue import Reading
@@ -46,4 +46,6 @@ def _power(bench: Bench, axis: Axis) -> str:
     found = state(bench, axis)
     if found is None:
         return NOT_KNOWN
+    if found is DriveState.SWITCH_ON_DISABLED:
+        return "no power"
     return f"{POWERED if found in ENERGISED else 'no power'} ({found.words})"

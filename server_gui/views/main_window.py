@@ -166,7 +166,7 @@ class MainWindow(QMainWindow):
             self.tabs.addTab(Scrolled(self.cloud), "C&loud")
             self.tabs.addTab(Scrolled(self.models), "&Models")
         self._commissioning = commissioning
-        self._is_closing = False
+        self._is_closing = self._is_ending = False
         if commissioning is not None:
             self.commission = CommissionPage(commissioning, theme)
             self._views += (self.commission,)
@@ -231,7 +231,7 @@ class MainWindow(QMainWindow):
         self.signals.show_around((channel,), at_ns)
 
     def closeEvent(self, event: QCloseEvent) -> None:
-        if self._commissioning is not None and self._commissioning.runs:
+        if self._commissioning is not None and self._commissioning.runs and not self._is_ending:
             event.ignore()
             self._ask_to_end(self._commissioning)
             return
@@ -254,6 +254,11 @@ class MainWindow(QMainWindow):
             commissioning.interrupt()
 
         ask(self, "A robot is being commissioned", CLOSING, "End it and close", end)
+
+    def end(self) -> None:
+        """Close without a question: nobody may be there to answer. Qt asks every window before it quits."""
+        self._is_ending = True
+        QApplication.quit()
 
     def reset_layout(self) -> None:
         """Everything where it was at first."""

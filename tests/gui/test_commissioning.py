@@ -142,7 +142,7 @@ def test_a_refusal_and_the_unit_stand_beside_the_field(page: CommissionPage, pla
     assert page.question.refused.isVisible()
     assert page.question.refused.text() == KNEE["refused"]
     assert (page.question.unit.text(), page.question.range.text()) == ("°", "-180 to 360 °")
-    assert page.question.live.texts == [("node 7", "-30500 counts · no power (switch on disabled)")]
+    assert page.question.live.texts == [("node 7", "-30500 counts · no power")]
 
 
 def test_what_is_typed_stays_while_live_values_come(page: CommissionPage, played: Played) -> None:
@@ -171,6 +171,9 @@ def test_what_was_said_can_be_copied_and_who_reads_is_left_alone(
     played.hear(*({"say": f"line {number}"} for number in range(200)))
     draw(page)
     bar = page.log.text.verticalScrollBar()
+    assert bar.value() == bar.maximum()
+    page.resize(page.width(), page.height() - 60)  # less room, and the newest is seen still
+    draw(page)
     assert bar.value() == bar.maximum()
     bar.setValue(3)
     played.hear({"say": "one more"})
@@ -220,6 +223,13 @@ def test_closing_the_window_asks_first_and_ends_the_command(full_window: MainWin
     assert full_window.isVisible(), "it waits for the end"
     played.end(143)
     full_window.refresh()
+    assert not full_window.isVisible()
+
+
+def test_a_window_that_is_ended_asks_nobody(full_window: MainWindow, played: Played) -> None:
+    playing.hand(played)
+    full_window.end()
+    full_window.close()
     assert not full_window.isVisible()
 
 

@@ -150,7 +150,7 @@ MOVES = lives(
         for place, node in enumerate((2, 3, 7, 11, 23, 40))
         for reading in (
             (f"node {node}", 61_234 if place == 2 else place, "counts moved"),
-            (f"node {node}", "no power (switch on disabled)", ""),
+            (f"node {node}", "no power", ""),
         )
     ),
 )
@@ -181,7 +181,7 @@ def typing(played: Played) -> None:
         steps(), {"say": "left knee is node 7 (moved by hand: it counted 61234, the others 5 or less)."}
     )
     played.hear({"say": KNEE["refused"]}, KNEE)
-    played.hear(lives(14, ("node 7", -30_500, "counts"), ("node 7", "no power (switch on disabled)", "")))
+    played.hear(lives(14, ("node 7", -30_500, "counts"), ("node 7", "no power", "")))
 
 
 def hand(played: Played) -> None:

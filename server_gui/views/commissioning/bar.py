@@ -65,7 +65,7 @@ class Bar(QWidget):
         set_text(self.words, self._said())
         self.interrupt.setEnabled(now.runs)
         self.stop.setEnabled(now.can_stop)
-        self.stop.name(None if now.wish is None else Path(now.wish.bus).name)
+        self.stop.name(None if now.wish is None else Path(now.wish.file).stem)
         self.stop.setAccessibleName("STOP the drives that are commissioned")
 
     def _restyle(self) -> None:

@@ -3,7 +3,7 @@
 from typing import Final
 
 from PySide6.QtCore import Signal
-from PySide6.QtGui import QResizeEvent, QTextCursor
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
     QApplication,
     QBoxLayout,
@@ -105,6 +105,7 @@ class Log(Card):
         self._commissioning = commissioning
         self._theme = theme
         self._shown = 0
+        self._follows = True  # what comes; not while somebody reads what was
         self.text = QPlainTextEdit()
         self.text.setObjectName("framed")
         self.text.setReadOnly(True)
@@ -119,6 +120,9 @@ class Log(Card):
         row.addWidget(self.copy)
         self.body.addWidget(self.text, 1)
         self.body.addLayout(row)
+        bar = self.text.verticalScrollBar()
+        bar.valueChanged.connect(self._scrolled)
+        bar.rangeChanged.connect(self._follow)
         theme.changed.connect(self._restyle)
         self._restyle()
 
@@ -129,11 +133,18 @@ class Log(Card):
         if new <= 0:
             return
         self._shown = now.logged
-        bar = self.text.verticalScrollBar()
-        was_at_end = bar.value() >= bar.maximum() - 1
+        follows = self._follows
         self.text.appendPlainText("\n".join(list(now.log)[-new:]))
-        if was_at_end:
-            self.text.moveCursor(QTextCursor.MoveOperation.End)
+        self._follows = follows
+        self._follow()
+
+    def _scrolled(self, value: int) -> None:
+        self._follows = value >= self.text.verticalScrollBar().maximum() - 1
+
+    def _follow(self) -> None:
+        """Also where there is less room than before."""
+        if self._follows:
+            bar = self.text.verticalScrollBar()
             bar.setValue(bar.maximum())
 
     def _restyle(self) -> None:

@@ -71,7 +71,8 @@ def test_what_was_found_before_is_done_and_a_joint_that_is_left_out_is_passed(tm
 @pytest.mark.parametrize(
     ("statusword", "words"),
     [
-        (0x0250, "no power (switch on disabled)"),
+        (0x0250, "no power"),
+        (0x0231, "no power (ready to switch on)"),
         (ON, "UNDER POWER (operation enabled)"),
         (0x006D, "power not known"),
     ],
