@@ -198,6 +198,17 @@ def powered(played: Played) -> None:
     played.hear(steps(("left_knee", "which drive")), asks(text, 9, press=True))
 
 
+def moving(played: Played) -> None:
+    played.start()
+    played.hear(steps(("left_knee", "ratings")), {"say": "Listening whether somebody else is on the bus …"})
+    played.hear({"moving": "The left knee is under power. STOP: Enter.  searching for home (+3.5°)"})
+
+
+def died_moving(played: Played) -> None:
+    moving(played)
+    played.end(-9)
+
+
 def bus_gone(played: Played) -> None:
     hand(played)
     played.hear(lives(13, problem="node 7 on main: 0x6064:00: no answer within 0.5 s"))
@@ -264,6 +275,19 @@ def died(played: Played) -> None:
 
 
 EVERY: tuple[Callable[[Played], None], ...] = (
-    *(not_started, starting, working, silent, typing, hand, powered, bus_gone, stopping, stop_confirmed),
+    *(
+        not_started,
+        starting,
+        working,
+        silent,
+        typing,
+        hand,
+        powered,
+        moving,
+        died_moving,
+        bus_gone,
+        stopping,
+        stop_confirmed,
+    ),
     *(stop_not_confirmed, ending, left, proposed, was_written, not_usable, failed, died),
 )

@@ -22,6 +22,7 @@ GUARD_S: Final = 0.4  # a click within it was meant for the question before
 STOP_S: Final = 2.5  # for the command to have stopped the drives; then another one does it
 OLD_S: Final = 2.0  # live values beyond it are not live
 SILENT_S: Final = 60.0  # that long no step takes
+MOVING_SILENT_S: Final = 2.0  # and while a joint is under power that is told again and again
 # How the command ends by itself: not finished, wrong usage or not there, by a signal that it has taken.
 OWN_ENDS: Final = {
     0: Stage.LEFT,
@@ -133,7 +134,9 @@ class Commissioning:
 
     @property
     def is_silent(self) -> bool:
-        """Whether it works for longer than anything takes."""
+        """Whether it says nothing for longer than anything takes."""
+        if self.stage is Stage.MOVING:
+            return self.working_s > MOVING_SILENT_S
         return self.stage in (Stage.WORKING, Stage.STARTING) and self.working_s > SILENT_S
 
     @property
@@ -215,6 +218,10 @@ class Commissioning:
             self._asked(line)
         elif line.live is not None:
             self._told(line)
+        elif isinstance(line.moving, str):
+            self._moves(line.moving)
+        elif line.moving is None:
+            self._rests()
         elif line.steps is not None:
             self.steps = line.steps
         elif line.written is not None:
@@ -226,6 +233,16 @@ class Commissioning:
             self._error = line.error.message
         if self.stage is Stage.STARTING:
             self.stage = Stage.WORKING
+
+    def _moves(self, words: str) -> None:
+        if self.stage is not Stage.MOVING:
+            self._note(Kind.NOTED, words)
+        if self.runs:
+            self.stage, self.problem, self.question, self._live = Stage.MOVING, words, None, ()
+
+    def _rests(self) -> None:
+        if self.stage is Stage.MOVING:
+            self.stage, self.problem = Stage.WORKING, ""
 
     def _said(self, line: Line) -> None:
         self._note(Kind.SAID, line.say or "")
@@ -279,10 +296,14 @@ class Commissioning:
     def _see_to_end(self) -> None:
         if self._talker is None or self._stop_s is not None or (ended := self._talker.ended) is None:
             return
+        was_moving = self.stage is Stage.MOVING
         self._talker, self.question, self._live = None, None, ()
         self.stage, self.problem = self._end_of(ended)
         if self.problem:
             self._note(Kind.NOTED, self.problem)
+        if was_moving:  # what it has put under power nobody else would stop
+            self.stop()
+            self._see_to_stop()
 
     def _end_of(self, ended: Exit) -> tuple[Stage, str]:
         if self.written is not None:

@@ -71,6 +71,7 @@ class Line(msgspec.Struct, frozen=True):
     refused: str = ""
     live: tuple[Reading, ...] | None = None
     problem: str = ""
+    moving: str | msgspec.UnsetType | None = msgspec.UNSET  # a joint is under power; None: no longer
     steps: tuple[Step, ...] | None = None
     written: Written | None = None
     stopped: Stopped | None = None

@@ -15,6 +15,7 @@ class Stage(Enum):
     WORKING = "working"
     ASKING = "asking"
     HAND = "waiting for your hand"
+    MOVING = "under power"
     BUS_GONE = "a drive does not answer"
     STOPPING = "STOP sent"
     STOPPED = "STOP confirmed"
@@ -62,6 +63,11 @@ LOOKS: Final = {
         "A drive does not answer: see to its supply and the bus.",
         runs=True,
         answers=True,
+    ),
+    Stage.MOVING: Look(
+        Mark("triangle", "warn", "UNDER POWER"),
+        "A joint is under power and may move: hands off. STOP ends it.",
+        runs=True,
     ),
     Stage.STOPPING: Look(
         Mark("triangle", "warn", "STOP sent"), "STOP is sent, and not confirmed yet …", runs=True

@@ -77,7 +77,7 @@ class Bar(QWidget):
         now = self._commissioning
         words = now.look_of.words
         if now.is_silent:
-            words = f"Nothing was heard for {now.working_s:.0f} s, longer than any step takes: interrupt it."
+            words = f"Nothing was heard for {now.working_s:.0f} s, longer than anything takes: press STOP."
         elif now.runs and not now.look_of.answers and now.working_s > LONG_S:
             words += f" ({now.working_s:.0f} s)"
         return "\n".join(filter(None, (words, now.problem)))

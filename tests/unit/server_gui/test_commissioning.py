@@ -33,6 +33,8 @@ STATES: dict[Callable[[Played], None], Stage] = {
     playing.typing: Stage.HAND,
     playing.hand: Stage.HAND,
     playing.powered: Stage.HAND,
+    playing.moving: Stage.MOVING,
+    playing.died_moving: Stage.STOPPING,
     playing.bus_gone: Stage.BUS_GONE,
     playing.stopping: Stage.STOPPING,
     playing.stop_confirmed: Stage.STOPPED,
@@ -177,6 +179,29 @@ def test_the_file_is_told_with_what_the_check_says(played: Played) -> None:
     assert stage(played) is Stage.WRITTEN
     assert played.model.written is not None
     assert played.model.written.findings == (("warning", "no heartbeat"),)
+
+
+def test_a_joint_that_is_under_power_is_told_until_it_no_longer_is(played: Played) -> None:
+    playing.moving(played)
+    assert "+3.5°" in played.model.problem
+    assert not played.model.answer("")
+    played.hear({"moving": None})
+    assert (played.model.stage, played.model.problem) == (Stage.WORKING, "")
+
+
+def test_silence_while_a_joint_is_under_power_is_told_soon(played: Played) -> None:
+    playing.moving(played)
+    assert not played.model.is_silent
+    played.now_s += 2.0
+    assert played.model.is_silent
+
+
+def test_a_command_that_dies_while_a_joint_is_under_power_is_followed_by_a_stop(played: Played) -> None:
+    playing.died_moving(played)
+    assert "--stop" in played.talker.arguments
+    played.hear(stopped())
+    played.end(0)
+    assert stage(played) is Stage.STOPPED
 
 
 def test_work_that_says_nothing_for_long_is_told(played: Played) -> None:
