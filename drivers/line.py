@@ -5,6 +5,7 @@ from typing import Generic, Protocol, TypeVar
 
 from drivers.parsing import Parser
 from drivers.port import SerialPort
+from drivers.standstill import Standstill
 
 F = TypeVar("F")
 Listening = TypeVar("Listening", contravariant=True)
@@ -44,8 +45,11 @@ class Line(Generic[F]):
         format_name: str,
         make_parser: Callable[[], Parser[F]],
         recognise: Recognise = unrecognised,
+        standstill: Standstill | None = None,
     ) -> None:
+        """`standstill` is that of a bus which the same computer reads: a port's thread only waits."""
         self.path = path
+        self.standstill = standstill or Standstill()
         self.format_name = format_name
         self.parser = make_parser()
         self.reconnects = 0
@@ -78,7 +82,10 @@ class Line(Generic[F]):
         opened_ns = self._port.opened_ns
         if opened_ns is None:
             return f"{self.path} is being opened"
-        silent_s = (now_ns - max(opened_ns, self._last_byte_ns or 0)) / 1e9
+        since_ns = max(opened_ns, self._last_byte_ns or 0)
+        silent_s = (now_ns - since_ns) / 1e9
+        if (stood_still := self.standstill.words(now_ns, since_ns, SILENCE_S)) is not None:
+            return stood_still
         if silent_s > SILENCE_S:
             return f"no byte from {self.path} for {silent_s:.1f} s: check the sensor's power and its TX wire"
         if self._unread < UNREAD:

@@ -22,6 +22,10 @@ class Pace(Noted):
         self._before: tuple[int, int] | None = None
         self._windows = 0
 
+    def skip(self, now_ns: int, frames: int) -> None:
+        """What came until now says nothing of the sensor."""
+        self._before = now_ns, frames
+
     def update(self, now_ns: int, frames: int) -> None:
         """How many have come since the line is there."""
         if self._before is None:

@@ -23,6 +23,10 @@ class Share(Noted):
         self.clear()
         self._before: tuple[int, int, int] | None = None
 
+    def skip(self, now_ns: int, part: int, whole: int) -> None:
+        """What came until now says nothing of the sensor."""
+        self._before = now_ns, part, whole
+
     def update(self, now_ns: int, part: int, whole: int) -> None:
         """How many of how many frames, since the counters began."""
         if self._before is None:

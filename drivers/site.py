@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     import eds
     from drivers.bus.bus import CanBus
     from drivers.bus.channels import Chosen
+    from drivers.standstill import Standstill
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,6 +24,11 @@ class Site:
     descriptions: "dict[str, eds.Description]" = field(default_factory=dict)  # of CANopen devices, by name
     channels: "Mapping[str, Chosen]" = field(default_factory=dict)  # that the robot's file adds to them
     recognise: Recognise = unrecognised  # what speaks on a line instead of the format that is expected
+
+    @property
+    def standstill(self) -> "Standstill | None":
+        """Of a bus, by which serial ports know it too; `None` where there is no bus."""
+        return next((bus.standstill for bus in self.buses.values()), None)
 
     @property
     def folder(self) -> Path:

@@ -46,7 +46,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "trace": ("drivers.cli.trace:main", "every frame of a CAN bus, decoded by EDS; candump and PCAP files"),
     "commission": ("gateway.cli.commission:main", "a robot's file found out on the bench, joint by joint"),
     "sensor": ("drivers.cli.sensor:main", "what is on a serial port; record, replay and decode it"),
-    "calibrate": ("drivers.cli.calibrate:main", "an insole's pressure, an IMU's zero"),
+    "calibrate": ("gateway.cli.calibrate:main", "an insole's pressure, an IMU's or a joint's zero"),
     "collect": ("server_gui.cli.collect:main", "record every robot into the store, without a window"),
     "sessions": (
         "server_gui.cli.sessions:main",
@@ -67,7 +67,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
 }
 
 # The exit status of a failure where 1 is an answer: that of diff(1).
-FAILED: Mapping[tuple[str, ...], int] = {("params", "compare"): 2}
+FAILED: Mapping[tuple[str, ...], int] = {("params", "compare"): 2, ("doctor",): 2}
 
 OUR_PACKAGES = frozenset({"gateway", "drivers", "eds", "server_gui", "ml", "hil_sim"})
 
@@ -189,7 +189,7 @@ def _command(name: str, rest: list[str], *, debug: bool) -> int:
 
             kind = getattr(error, "kind", None) or type(error).__name__
             say_json({"error": {"kind": str(kind), "message": explain(error, name)}})
-        return FAILED.get((name, *rest[:1]), 1)
+        return FAILED.get((name, *rest[:1]), FAILED.get((name,), 1))
 
 
 if __name__ == "__main__":

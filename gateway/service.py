@@ -215,6 +215,7 @@ class Service:
             budget=self._budget.info,
             version=__version__,
             buses=robot.buses,
+            file=self._config.digest,
         )
 
     def _guard_info(self) -> GuardInfo:

@@ -20,6 +20,7 @@ from gateway.wire.stop import Stopped
 from server_gui.core.archive.archive import Archive
 from server_gui.core.commissioning.commissioning import Commissioning
 from server_gui.core.desk.desk import Desk
+from server_gui.core.desk.ending import Ending
 from server_gui.core.desk.feeds import Feeds, Record
 from server_gui.core.desk.station import Station
 from server_gui.core.desk.ticks import Ticks
@@ -34,6 +35,7 @@ from server_gui.processes.own_robot import OwnRobot
 from server_gui.processes.sim_control import SimControl
 from server_gui.processes.talking import talk
 from server_gui.views.application import application, kept_settings, kept_theme
+from server_gui.views.closing import wait_closed
 from server_gui.views.first_run.demo_bar import DemoBar
 from server_gui.views.first_run.opening import Opening
 from server_gui.views.kept import kept_units
@@ -55,8 +57,6 @@ FOLLOWING: Final = FollowSettings(
     buses_s=1.0,
 )
 OWN: Final = "simulated"  # what the window's own robot is called before it has told its name
-COMMISSION_ENDS_S: Final = 8.0
-BREAK_OFF_S: Final = 5.0  # for what is read from the store at the end
 MOST_PREDICTIONS: Final = 4096  # what may wait for a window that hangs
 
 
@@ -72,6 +72,10 @@ class Poster(QObject):
     def deliver(self, call: Callable[[], None]) -> None:
         """Run this soon in the window's thread."""
         self._posted.emit(call)
+
+    def close(self) -> None:
+        """Run nothing more: what it would show is gone."""
+        self._posted.disconnect(self._run)
 
     def _run(self, call: Callable[[], None]) -> None:
         call()
@@ -121,9 +125,9 @@ class App:
         self.theme = kept_theme(qt, kept)
         operator = "" if record is None else record.operator
         self._archive = Archive(settings, self.desk, self._poster.deliver, operator, file)
-        self._ended = True
         self.commissioning = Commissioning(talk)
         self._gateway: FileGateway | None = None  # of a robot that was commissioned here
+        self.ending = Ending(self.feeds, self._close_others, self._close_own)
         self.window = MainWindow(self.desk, self.theme, kept, self._archive, self.commissioning)
         self.window.commission.connect_to.connect(self._start_gateway)
         self.window.stopped.connect(lambda: self.stop("STOP button of the window"))
@@ -147,20 +151,33 @@ class App:
 
     def __exit__(self, *exc: object) -> None:
         self._timer.stop()
-        asked = self.demo is None or self.demo.end(BREAK_OFF_S)
-        try:
-            ended = self.commissioning.close(COMMISSION_ENDS_S)
-            self._ended = self._archive.close(BREAK_OFF_S) and asked and ended
-            self.feeds.__exit__(*exc)
-        finally:
-            self._own.close()  # last, so that nobody misses it
-            if self._gateway is not None:
-                self._gateway.close()
+        self.ending.finish()
 
-    @property
-    def hangs(self) -> bool:
-        """Whether something still runs after all was ended, which only the end of the process ends."""
-        return not self._ended or self.feeds.hangs
+    def close(self) -> None:
+        """End everything, and say what is waited for where that takes a moment."""
+        self._timer.stop()
+        self._poster.close()
+        self.window.setUpdatesEnabled(False)  # nothing is drawn any more
+        self.window.hide()
+        self.ending.begin()
+        wait_closed(self.ending, self.theme)
+
+    def quit(self) -> None:
+        """End the window; asked again, without waiting."""
+        if self.ending.is_begun:
+            self.ending.hurry()
+        self.window.end()
+
+    def _close_others(self, within_s: float) -> bool:
+        asked = self.demo is None or self.demo.end(within_s)
+        ended = self.commissioning.close(within_s)
+        return self._archive.close(within_s) and asked and ended
+
+    def _close_own(self) -> None:
+        """Last, so that nobody misses them."""
+        self._own.close()
+        if self._gateway is not None:
+            self._gateway.close()
 
     def follow(self, name: str, address: Address) -> Station:
         """Another robot, from now on."""
@@ -292,7 +309,7 @@ def run(
     with App(qt, settings, kept_settings(), FOLLOWING, record, file, opening) as app:
         app.theme.set(look, scale)
         for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, lambda *_: app.window.end())
+            signal.signal(number, lambda *_: app.quit())
         if signals:
             app.window.show_signals(signals)
         app.first_look()
@@ -301,8 +318,8 @@ def run(
             QTimer.singleShot(round(seconds * 1000), app.window.end)
         with stop_keys(qt, app):
             status = qt.exec()
-        app.window.hide()
-    if app.hangs:
+        app.close()
+    if app.ending.hangs:
         os._exit(status)  # what an upload under way has done is found out at the next start
     return status
 

@@ -31,7 +31,6 @@ LONG = (
     "tests/newcomer/test_pages.py",
     "tests/explore/",
     "tests/explore_store/",
-    "tests/attack/",
     "tests/gui/walks/",
 )
 SMOKE = "tests/unit/store/test_store.py"  # of all that is tried on an S3 server too, this always is

@@ -20,12 +20,12 @@ from drivers.bus.interfaces.opening import open_transport
 from drivers.bus.master import NMT_COMMAND, NMT_START, NMT_STOP, MasterCycles
 from drivers.bus.sender import Sender, always
 from drivers.bus.settings import CanSettings, Role
-from drivers.bus.standstill import Standstill
 from drivers.bus.thread_switching import FastSwitching
 from drivers.bus.traffic import Traffic
 from drivers.errors import Unavailable
 from drivers.noted import found
 from drivers.samples import Finding
+from drivers.standstill import Standstill
 from drivers.urgency import make_urgent
 
 TICK_S = 0.05  # how long the thread waits for a frame before it looks at the clock

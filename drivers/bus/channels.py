@@ -10,6 +10,7 @@ from functools import partial
 
 from drivers.bus.fields import Field, Linear, unpacker
 from drivers.bus.frames import EXTENDED, FrameHandler
+from drivers.bus.lengths import Lengths
 from drivers.bus.node import Node
 from drivers.bus.pdo import Tpdo
 from drivers.bus.sdo.channel import SdoChannel
@@ -77,7 +78,7 @@ class ObjectChannels:
     def __init__(
         self, node: Node, description: Description, chosen: Chosen, latest: Latest, first: int = 0
     ) -> None:
-        self.short_frames = 0  # shorter than the mapping says; nothing was made of them
+        self.short_frames = 0  # or longer: nothing was made of them
         self._node = node
         self._latest = latest
         self._sources: list[_Source] = []
@@ -175,9 +176,10 @@ class ObjectChannels:
         self, plan: int, size: int, sources: Sequence[_Source], fields: Sequence[Field]
     ) -> FrameHandler:
         unpack, indices = unpacker(fields), tuple(one.channel for one in sources)
+        lengths = Lengths(size, self._node.remapped)
 
         def on_frame(stamp_ns: int, data: bytes) -> None:
-            if len(data) < size:
+            if len(data) != lengths.usual and not lengths.fits(stamp_ns, len(data)):
                 self.short_frames += 1
                 return
             values = [one.value(number) for one, number in zip(sources, unpack(data), strict=True)]

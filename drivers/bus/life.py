@@ -6,7 +6,7 @@ from typing import Protocol
 
 from drivers.bus.emcy import Emcy, parse_emcy
 from drivers.bus.nmt import NmtState, parse_heartbeat
-from drivers.bus.standstill import Standstill
+from drivers.standstill import Standstill
 
 EMCY_HISTORY = 64
 HEARTBEATS_MISSED = 2.5  # periods without a heartbeat, where no time is configured

@@ -6,6 +6,7 @@ it should be, and the only one; else `distrust` says why not.
 """
 
 import threading
+import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from typing import Protocol, TypeVar, cast
@@ -19,6 +20,7 @@ from drivers.bus.nmt import HEARTBEAT, NmtState
 from drivers.bus.objects import identity_problem, read, read_optional, read_rest
 from drivers.bus.outlet import Requests
 from drivers.bus.sdo.channel import SdoChannel
+from drivers.bus.sdo.protocol import confirmed_write
 from drivers.bus.sdo.worker import SdoWorker
 from drivers.bus.settings import NodeTimes, Role
 from drivers.bus.stuck import why_silent
@@ -31,6 +33,8 @@ T = TypeVar("T")
 
 _NOT_ASKED = "it has not come up, so nobody knows what it is: nothing is written to it"
 EMCY = 0x080
+PDO_PARAMETERS = range(0x1400, 0x1C00)  # communication and mapping, of both directions (CiA 301 §7.5.2)
+REMAPPED_S = 0.3  # after the last of them was written: who writes one mostly writes more
 
 
 class NodeUser(Protocol):
@@ -68,6 +72,7 @@ class Node(BusUser):
         self._booting = Booting(self.worker, self._lock, self._come_up, self._explain)
         guard_s = times.guard_time_s if bus.role is Role.MASTER else None
         self._asking = Asking(bus, node_id, self.life, self.worker, guard_s)
+        self._settled_ns = 0  # when nobody has written a PDO's parameters for so long that they can be read
         self._emcy_id = EMCY + node_id
         self._handlers = {HEARTBEAT + node_id: self._on_heartbeat, response_id: self._on_response}
 
@@ -241,6 +246,11 @@ class Node(BusUser):
 
     # What the bus tells.
 
+    def remapped(self) -> None:
+        """Its PDOs are not what was read: nothing is made of them until that was read anew."""
+        self._settled_ns = time.monotonic_ns() + round(REMAPPED_S * 1e9)
+        self._begin_anew()
+
     def bus_opened(self) -> None:
         self._reset()
         self._booting.start()
@@ -249,7 +259,8 @@ class Node(BusUser):
         self._reset()
 
     def tick(self, now_ns: int) -> None:
-        self._booting.retry(now_ns)
+        if now_ns >= self._settled_ns:
+            self._booting.retry(now_ns)
         if self.ready:
             self._asking.tick(now_ns)
         settled = self.bus.standstill.is_settled(now_ns)
@@ -268,6 +279,13 @@ class Node(BusUser):
 
     def _on_response(self, stamp_ns: int, data: bytes) -> None:
         self.life.heard_ns = stamp_ns
+        written = confirmed_write(data)
+        if (
+            written is not None
+            and written[0] in PDO_PARAMETERS
+            and (self.ready or not self.channel.is_unsure(*written))  # while it comes up, we may write them
+        ):
+            self.remapped()
         self.channel.on_response(stamp_ns, data)
 
     # Coming up.

@@ -25,6 +25,7 @@ KINDS = {
     14: "heartbeat",
 }
 OF_NO_NODE = {0x080: "SYNC", 0x7E4: "LSS", 0x7E5: "LSS"}
+OF_ALL = ("NMT", "time")  # one identifier each
 _id_of = itemgetter(1)
 
 
@@ -80,4 +81,6 @@ def kind_of(can_id: int) -> tuple[str, int | None]:
     if can_id in OF_NO_NODE:
         return OF_NO_NODE[can_id], None
     kind, node_id = KINDS.get(can_id >> 7, OTHER), can_id & 0x7F
+    if kind in OF_ALL and node_id:
+        return OTHER, None
     return (kind, node_id or None) if kind != OTHER else (OTHER, None)

@@ -15,16 +15,17 @@ def named(buses: Sequence[str], bitrate: int | None) -> Iterator[tuple[str, CanS
     """Each bus by its name: `can0`, `INTERFACE:CHANNEL` of python-can, or those of a robot's file.
 
     Raises:
-        SettingsError: a robot's file has none, or cannot be read.
+        SettingsError: it is no name, or a robot's file has none or cannot be read.
 
     """
     for bus in buses:
         if bus.endswith(".toml"):
             yield from _of_file(Path(bus))
-        else:
-            interface, colon, channel = bus.partition(":")
-            named = (interface, channel) if colon else ("socketcan", bus)
-            yield bus, CanSettings(interface=named[0], channel=named[1], bitrate=bitrate)
+            continue
+        interface, _, channel = bus.partition(":") if ":" in bus else ("socketcan", ":", bus)
+        if not interface.strip() or not channel.strip():
+            raise SettingsError(f"{bus!r} names no bus: can0, or INTERFACE:CHANNEL, or a robot's file")
+        yield bus, CanSettings(interface=interface, channel=channel, bitrate=bitrate)
 
 
 def _of_file(path: Path) -> Iterator[tuple[str, CanSettings]]:

@@ -37,10 +37,12 @@ from drivers.site import Site
 
 STANDARD_GRAVITY = 9.80665
 AVERAGE_S = 2.0
-USAGE = """usage: gwrms calibrate COMMAND PORT --write FILE …
+USAGE = """usage: gwrms calibrate insole|imu PORT --write FILE …
+       gwrms calibrate joint ROBOT.toml:NAME …
 
   insole   its cells' pressure, by the unloaded insole and known weights
   imu      the present posture as upright
+  joint    its zero, in the posture in which it was found before
 
 gwrms calibrate COMMAND --help says more.
 """

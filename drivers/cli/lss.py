@@ -4,20 +4,19 @@ import argparse
 import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
 from typing import Any
 
 import msgspec
 
 from drivers.bus.bus import CanBus
 from drivers.bus.settings import CanSettings
+from drivers.cli import bit_rate
 from drivers.cli.buses import named
 from drivers.errors import NotPermitted, SettingsError
 from drivers.lss.change import Device, give_bitrate, give_node_id, inquire
 from drivers.lss.fastscan import unconfigured
 from drivers.lss.master import BITRATES, SCAN_S, UNCONFIGURED, Identity, LssMaster
 from drivers.lss.surroundings import Surroundings, identity_of, is_taken, listen
-from drivers.scan.scan import await_open
 
 MORE = """\
 examples:
@@ -32,9 +31,11 @@ it, `new` for the only one without a node id, or `only` for the only device on t
 
 The bus is listened to first. Where a device is operational, or somebody leads the bus, nothing is sent. What
 will happen is told, and asked for. A node id is stored and booted with, then the device is asked for it
-again. A bit rate is stored, and counts from when the device is switched on next.
+again. A bit rate is stored, and counts from when the device is switched on next; with --activate at once,
+where the device is alone on a bus whose interface is opened with a bit rate (USB adapters; not SocketCAN).
 """
 WAIT_S = 3.0  # longer than most heartbeats
+AGAIN_S = 1.0  # after the question
 NODE_IDS = range(1, 128)
 
 
@@ -56,6 +57,9 @@ def _parser() -> argparse.ArgumentParser:
         choices=tuple(BITRATES),
         metavar="N",
         help="set: the bit rate that it stores",
+    )
+    parser.add_argument(
+        "--activate", action="store_true", help="set: let the bit rate count at once, and look for the device"
     )
     parser.add_argument("--no-store", action="store_true", help="set: a node id until it is switched off")
     parser.add_argument("--bitrate", type=int, help="bit/s of the bus now, for interfaces opened with one")
@@ -84,13 +88,18 @@ def main(arguments: Sequence[str]) -> int:
     if len(buses) != 1:
         parser.error(f"{options.bus} has {len(buses)} buses: name the interface of one")
     name, settings = buses[0]
-    with _opened(name, settings) as bus:
+    with bit_rate.opened(name, settings) as bus:
         wait = threading.Event().wait
         heard = listen(bus, options.seconds, wait)
         if not options.anyway:
             heard.refuse()
         with LssMaster(bus, scan_s=options.timeout) as master:
-            return ACTIONS[options.action](_Task(bus, settings, master, heard, options, wait))
+            task = _Task(bus, settings, master, heard, options, wait)
+            status = ACTIONS[options.action](task)
+    if task.activated is not None:
+        found = bit_rate.look_again(name, settings, options.new_bitrate, task.activated, wait)
+        task.say(f"{name}: at {options.new_bitrate} bit/s it says: {_words(found)}")
+    return status
 
 
 def _misused(options: argparse.Namespace) -> str | None:
@@ -110,20 +119,11 @@ def _misused(options: argparse.Namespace) -> str | None:
         return "say what it is to have: --node-id, --new-bitrate, or both"
     if options.node_id is not None and options.node_id not in NODE_IDS:
         return f"--node-id {options.node_id} is outside 1 to 127"
+    if options.activate and options.new_bitrate is None:
+        return "--activate is for --new-bitrate"
     if options.no_store and options.new_bitrate is not None:
         return "a bit rate that is not stored is lost before it counts: without --no-store"
     return None
-
-
-@contextmanager
-def _opened(name: str, settings: CanSettings) -> Iterator[CanBus]:
-    bus = CanBus(name, settings)
-    bus.start()
-    try:
-        await_open(bus, threading.Event().wait)
-        yield bus
-    finally:
-        bus.stop()
 
 
 class _Task:
@@ -140,6 +140,7 @@ class _Task:
     ) -> None:
         self.bus, self.settings, self.master, self.heard = bus, settings, master, heard
         self.options, self.wait = options, wait
+        self.activated: Device | None = None  # which is at another bit rate now
 
     def say(self, text: str) -> None:
         """For people: on stderr where stdout is for machines."""
@@ -164,6 +165,9 @@ class _Task:
                 )
             return Device(found[0], UNCONFIGURED)
         if text == "only":
+            if len(self.heard.nodes) > 1:  # they would all be asked at once, in frames that look like one
+                nodes = ", ".join(map(str, self.heard.nodes))
+                raise NotPermitted(f"{self.bus.name}: nodes {nodes} are on the bus: say which")
             return inquire(self.master, None)
         if text.isdecimal():
             if int(text) not in NODE_IDS:
@@ -201,17 +205,24 @@ def _set(task: _Task) -> int:
         raise NotPermitted(
             f"{task.bus.name}: another device has node id {node_id} already; nothing was changed"
         )
+    if options.activate:
+        bit_rate.check(task.bus.name, task.settings, bitrate, set(task.heard.nodes) - {device.node_id})
     task.say(f"{task.bus.name}: {_words(device)}")
     task.say("\n".join(_plan(device, node_id, bitrate, stored=not options.no_store)))
     if not _agreed(task):
         task.say("nothing was changed")
         return 1
+    if not (options.yes or options.anyway):  # it may have taken a while
+        listen(task.bus, min(options.seconds, AGAIN_S), task.wait).refuse()
     if node_id is not None:
         device = give_node_id(task.bus, task.master, device, node_id, store=not options.no_store)
         task.say(f"{task.bus.name}: it has booted, and says: {_words(device)}")
     if bitrate is not None:
-        give_bitrate(task.master, device, bitrate, task.settings.bitrate)
-        task.say(f"{task.bus.name}: {bitrate} bit/s stored. {_next(task.settings, bitrate)}")
+        delay_ms = bit_rate.SWITCH_MS if options.activate else None
+        give_bitrate(task.master, device, bitrate, task.settings.bitrate, delay_ms)
+        after = "It changes to it now" if options.activate else bit_rate.next_steps(task.settings, bitrate)
+        task.say(f"{task.bus.name}: {bitrate} bit/s stored. {after}")
+        task.activated = device if options.activate else None
     task.answer(_as_json(device) | {"stored": not options.no_store, "stored_bitrate": bitrate})
     return 0
 
@@ -229,12 +240,6 @@ def _plan(device: Device, node_id: int | None, bitrate: int | None, *, stored: b
         yield f"  it boots as node {node_id}; who knew it by another id, as robot.toml does, must be told"
     if bitrate is not None:
         yield f"  it stores {bitrate} bit/s: switched on next, it is heard at that rate and at no other"
-
-
-def _next(settings: CanSettings, bitrate: int) -> str:
-    line = f"sudo ip link set {settings.channel} down, then up type can bitrate {bitrate} restart-ms 100"
-    how = f" ({line})" if settings.interface == "socketcan" else ""
-    return f"Switch it off, set the bus and all who are on it to that rate{how}, and switch it on"
 
 
 def _agreed(task: _Task) -> bool:

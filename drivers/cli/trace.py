@@ -1,10 +1,11 @@
-"""`gwrms trace`: every frame of a bus or of a recording, decoded; or what takes the bus's time."""
+"""`gwrms trace`: every frame of buses or recordings, decoded; or what takes a bus's time."""
 
 import argparse
 import contextlib
 import datetime
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +14,12 @@ import msgspec
 from drivers.bus.frames import EXTENDED
 from drivers.bus.settings import CanSettings
 from drivers.cli.buses import named
-from drivers.cli.trace_load import show_load
-from drivers.errors import SettingsError
+from drivers.cli.trace_known import Known
+from drivers.cli.trace_load import Meters, show_load
 from drivers.trace.decoding import Decoder, Kind, Line
-from drivers.trace.devices import Device, Devices
+from drivers.trace.devices import Devices
 from drivers.trace.files import SUFFIXES, Captured, Put, is_file, writing
-from drivers.trace.load import Meter
-from drivers.trace.robot_file import described, devices
+from drivers.trace.merged import merged
 from drivers.trace.sources import Batches, live, recorded, until
 from drivers.trace.wanted import Wanted, by_kind, by_node, by_object
 
@@ -27,6 +27,7 @@ MORE = """\
 examples:
   gwrms trace can0 --robot robot.toml                  everything, by the EDS files that robot.toml names
   gwrms trace robot.toml --node left_knee --kind sdo   who asks the knee what
+  gwrms trace can0 can1 --robot robot.toml             two buses, one after the other as frames came
   gwrms trace can0 --eds 5=drive.eds --object 0x6041   node 5's statusword, wherever it comes from
   gwrms trace can0 --write walk.pcap --quiet           record for Wireshark; *.log: for candump's friends
   gwrms trace walk.log --robot robot.toml --json       decode a recording of candump -l, or a PCAP file
@@ -36,13 +37,12 @@ It never sends. PDOs are decoded as the EDS files say, until somebody reads or w
 """
 TICK_S = 0.2
 _IDENTIFIER = 0x1FFF_FFFF
-_NODE_IDS = range(1, 128)
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="gwrms trace",
-        description="Shows the frames of a CAN bus or of a recording, decoded by EDS. Only listens.",
+        description="Shows the frames of CAN buses or of recordings, decoded by EDS. Only listens.",
         epilog=MORE,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
@@ -50,7 +50,8 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "source",
         metavar="SOURCE",
-        help="can0, INTERFACE:CHANNEL of python-can, a robot's file with one bus; or FILE.log, FILE.pcap",
+        nargs="+",
+        help="can0, INTERFACE:CHANNEL of python-can, a robot's file; or FILE.log, FILE.pcap; or several",
     )
     parser.add_argument(
         "--robot", type=Path, metavar="FILE", help="robot's file that names nodes and EDS files"
@@ -60,7 +61,7 @@ def _parser() -> argparse.ArgumentParser:
         action="append",
         default=[],
         metavar="NODE=FILE",
-        help="EDS or DCF of a node (again for others)",
+        help="EDS or DCF of a node (again for others); can1/5=FILE: on that interface alone",
     )
     parser.add_argument(
         "--node", action="append", default=[], metavar="NODE", help="only this one, by id or name (or again)"
@@ -88,36 +89,56 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Trace one bus or one recording; returns the exit status.
+    """Trace buses or recordings; returns the exit status.
 
     Raises:
-        DriverError: the interface cannot be opened or goes, or a file cannot be read.
+        DriverError: an interface cannot be opened or goes, or a file cannot be read.
 
     """
     parser = _parser()
     options = parser.parse_args(arguments)
     if wrong := _misused(options):
         parser.error(wrong)
-    if is_file(options.source):
-        settings, source = None, recorded(Path(options.source))
-    else:
-        buses = list(named([options.source], options.bitrate))
-        if len(buses) != 1:
-            parser.error(f"{options.source} has {len(buses)} buses: name the interface of one, with --robot")
-        settings = buses[0][1]
-        source = live(settings, _tell_lost)
-    known = _known(options, settings)
-    bitrate = options.bitrate or (None if settings is None else settings.bitrate)
-    with contextlib.closing(source), _sink(options, settings) as sink:
+    files = [Path(name) for name in options.source if is_file(name)]
+    buses = {} if files else _by_interface(named(options.source, options.bitrate))
+    source = recorded(files) if files else _live(buses)
+    known = Known(options.robot or _robot(options.source), options.eds, buses)
+    with contextlib.closing(source), _sink(options) as sink:
         if options.load:
-            names = {device.node_id: device.name for device in known}
-            show_load(until(source, options.seconds), Meter(bitrate), names, as_json=options.json)
+            rates = {name: options.bitrate or settings.bitrate for name, settings in buses.items()}
+            meters = Meters(rates, options.bitrate)
+            show_load(until(source, options.seconds), meters, known.names, as_json=options.json)
         else:
-            _show_frames(source, sink, known, options)
+            shown = Shown(known, _wanted(options, known), options, with_interface=len(buses) != 1)
+            _show_frames(source, sink, shown, options)
     return 0
 
 
+def _by_interface(buses: Iterable[tuple[str, CanSettings]]) -> dict[str, CanSettings]:
+    """By the interface's name, as candump has it; by that of the table where two have the same."""
+    found = list(buses)
+    often = Counter(str(settings.channel) for _, settings in found)
+    return {
+        str(settings.channel) if often[str(settings.channel)] == 1 else name: settings
+        for name, settings in found
+    }
+
+
+def _live(buses: Mapping[str, CanSettings]) -> Batches:
+    if len(buses) > 1:
+        return merged(buses, _tell_lost)
+    ((interface, settings),) = buses.items()
+    return live(settings, interface, _tell_lost)
+
+
+def _robot(sources: Sequence[str]) -> Path | None:
+    """A robot's file among what is traced."""
+    return next((Path(name) for name in sources if name.endswith(".toml")), None)
+
+
 def _misused(options: argparse.Namespace) -> str | None:
+    if len({is_file(name) for name in options.source}) > 1:
+        return "buses and recordings cannot be traced together"
     if options.seconds is not None and not 0 < options.seconds <= 1e7:
         return f"--seconds {options.seconds:g} is outside 0 to 10000000"
     if options.count is not None and options.count < 1:
@@ -131,21 +152,6 @@ def _misused(options: argparse.Namespace) -> str | None:
     return None
 
 
-def _known(options: argparse.Namespace, settings: CanSettings | None) -> list[Device]:
-    """The devices that files describe; what `--eds` says counts more than the robot's file."""
-    robot = options.robot or (Path(options.source) if options.source.endswith(".toml") else None)
-    channel = None if settings is None else settings.channel
-    found = {} if robot is None else {device.node_id: device for device in devices(robot, channel)}
-    for word in options.eds:
-        node, equals, file = word.partition("=")
-        if not equals or not node.isdecimal() or int(node) not in _NODE_IDS:
-            raise SettingsError(f"--eds {word}: say NODE=FILE, as in 5=drive.eds")
-        before = found.get(int(node))
-        beside = Path.cwd() / "here"
-        found[int(node)] = described(int(node), before.name if before else None, file, beside)
-    return list(found.values())
-
-
 def _tell_lost(frames: int) -> None:
     sys.stderr.write(f"gwrms trace: {frames} frames were lost on their way to this program\n")
 
@@ -155,37 +161,66 @@ def _nowhere(_captured: Captured) -> None:
 
 
 @contextlib.contextmanager
-def _sink(options: argparse.Namespace, settings: CanSettings | None) -> Iterator[Put]:
+def _sink(options: argparse.Namespace) -> Iterator[Put]:
     if options.write is None:
         yield _nowhere
         return
-    channel = "can" if settings is None else str(settings.channel)
-    with writing(options.write, channel) as put:
+    with writing(options.write) as put:
         yield put
 
 
-def _show_frames(source: Batches, sink: Put, known: list[Device], options: argparse.Namespace) -> None:
-    decoder, wanted = Decoder(Devices(known)), _wanted(options, known)
-    show: Callable[[Line], str] = _json if options.json else _text
+class Shown:
+    """Lines of all buses: each has a decoder of its own, for it has nodes and conversations of its own."""
+
+    def __init__(
+        self, known: Known, wanted: Sequence[Wanted], options: argparse.Namespace, *, with_interface: bool
+    ) -> None:
+        self._known = known
+        self._wanted = wanted
+        self._decoders: dict[str, Decoder] = {}
+        self._as_json = options.json
+        self._with_interface = with_interface
+
+    def line(self, captured: Captured) -> str | None:
+        """What is shown of a frame; `None` where it is not wanted."""
+        interface = captured.interface
+        if interface not in self._decoders:
+            self._decoders[interface] = Decoder(Devices(self._known.on(interface)))
+        line = self._decoders[interface].take(captured)
+        if not all(one(line) for one in self._wanted):
+            return None
+        return _json(line) if self._as_json else self._text(line)
+
+    def _text(self, line: Line) -> str:
+        captured = line.captured
+        moment = datetime.datetime.fromtimestamp(captured.stamp_ns // 10**9).astimezone()
+        clock = f"{moment:%H:%M:%S}.{captured.stamp_ns % 10**9 // 1000:06d}"
+        interface = f" {captured.interface:<5}" if self._with_interface and captured.interface else ""
+        identifier = f"{captured.can_id & _IDENTIFIER:03X}"
+        words = f"{identifier:>3}  {line.title:<10} {line.name or '':<12} {line.words}"
+        return f"{clock}{interface} {words}".rstrip()
+
+
+def _show_frames(source: Batches, sink: Put, shown: Shown, options: argparse.Namespace) -> None:
     left = options.count
     for batch in until(source, options.seconds):
         for captured in batch.frames:
-            line = decoder.take(captured)
-            if not all(one(line) for one in wanted):
+            line = shown.line(captured)
+            if line is None:
                 continue
             sink(captured)
             if not options.quiet:
-                sys.stdout.write(show(line) + "\n")
+                sys.stdout.write(line + "\n")
             if left is not None and (left := left - 1) == 0:
                 return
         if batch.live:
             sys.stdout.flush()
 
 
-def _wanted(options: argparse.Namespace, known: list[Device]) -> list[Wanted]:
+def _wanted(options: argparse.Namespace, known: Known) -> list[Wanted]:
     found: list[Wanted] = []
     if options.node:
-        found.append(by_node(options.node, known))
+        found.append(by_node(options.node, known.all, known.on))
     if options.kind:
         found.append(by_kind(options.kind))
     if options.object:
@@ -193,18 +228,11 @@ def _wanted(options: argparse.Namespace, known: list[Device]) -> list[Wanted]:
     return found
 
 
-def _text(line: Line) -> str:
-    captured = line.captured
-    moment = datetime.datetime.fromtimestamp(captured.stamp_ns // 10**9).astimezone()
-    clock = f"{moment:%H:%M:%S}.{captured.stamp_ns % 10**9 // 1000:06d}"
-    identifier = f"{captured.can_id & _IDENTIFIER:03X}"
-    return f"{clock} {identifier:>3}  {line.title:<10} {line.name or '':<12} {line.words}".rstrip()
-
-
 def _json(line: Line) -> str:
     captured = line.captured
     told: dict[str, Any] = {
         "t": captured.stamp_ns / 1e9,
+        "interface": captured.interface or None,
         "id": captured.can_id & _IDENTIFIER,
         "extended": bool(captured.can_id & EXTENDED),
         "data": captured.data.hex(),

@@ -1,18 +1,39 @@
 """`gwrms trace --load`: who takes the bus's time, a table a second."""
 
+import dataclasses
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 
 import msgspec
 
+from drivers.trace.files import Captured
 from drivers.trace.load import Load, Meter
 from drivers.trace.sources import Batch
 
 SECOND_NS = 10**9
 
+NamesOf = Callable[[str], Mapping[int, str]]  # of the nodes on an interface
 
-def show_load(batches: Iterator[Batch], meter: Meter, names: Mapping[int, str], *, as_json: bool) -> None:
-    """Print a table for each second, and for what is left at the end of a recording."""
+
+class Meters:
+    """One meter a bus; `bitrates` in bit/s by interface, `usual` for others."""
+
+    def __init__(self, bitrates: Mapping[str, int | None], usual: int | None) -> None:
+        self._usual = usual
+        self._by_interface = {name: Meter(bitrate) for name, bitrate in bitrates.items()}
+
+    def take(self, captured: Captured) -> None:
+        """Count one frame."""
+        meter = self._by_interface.setdefault(captured.interface, Meter(self._usual))
+        meter.take(captured)
+
+    def told(self, seconds: float) -> dict[str, Load]:
+        """What came since the last time, which was so long ago, by interface; begins anew."""
+        return {name: meter.told(seconds) for name, meter in self._by_interface.items()}
+
+
+def show_load(batches: Iterator[Batch], meters: Meters, names: NamesOf, *, as_json: bool) -> None:
+    """Print a table a bus for each second, and for what is left at the end of a recording."""
     began_ns: int | None = None
     now_ns, is_recorded = 0, True
     for batch in batches:
@@ -22,18 +43,24 @@ def show_load(batches: Iterator[Batch], meter: Meter, names: Mapping[int, str], 
             if batch.live:  # what has waited for us is not of this second
                 continue
         if now_ns - began_ns >= SECOND_NS:
-            _print(meter.told((now_ns - began_ns) / 1e9), names, as_json=as_json)
+            _print(meters.told((now_ns - began_ns) / 1e9), names, as_json=as_json)
             began_ns = now_ns
         for captured in batch.frames:
-            meter.take(captured)
+            meters.take(captured)
     if is_recorded and began_ns is not None and now_ns > began_ns:
-        _print(meter.told((now_ns - began_ns) / 1e9), names, as_json=as_json)
+        _print(meters.told((now_ns - began_ns) / 1e9), names, as_json=as_json)
 
 
-def _print(load: Load, names: Mapping[int, str], *, as_json: bool) -> None:
-    lines = [msgspec.json.encode(load).decode()] if as_json else [*table(load, names), ""]
-    sys.stdout.write("\n".join(lines) + "\n")
+def _print(loads: Mapping[str, Load], names: NamesOf, *, as_json: bool) -> None:
+    for interface, load in loads.items():
+        head = [f"{interface}:"] if len(loads) > 1 else []
+        lines = [_json(interface, load)] if as_json else [*head, *table(load, names(interface)), ""]
+        sys.stdout.write("\n".join(lines) + "\n")
     sys.stdout.flush()
+
+
+def _json(interface: str, load: Load) -> str:
+    return msgspec.json.encode({"interface": interface or None, **dataclasses.asdict(load)}).decode()
 
 
 def table(load: Load, names: Mapping[int, str]) -> Iterator[str]:
@@ -47,7 +74,8 @@ def table(load: Load, names: Mapping[int, str]) -> Iterator[str]:
     total = f"{load.frames_per_s:>9.1f} {bits / 1000:>8.1f} {_percent(load.percent):>7}"
     yield f"{'all':<14} {'':<12} {total}"
     if load.error_frames:
-        yield f"{load.error_frames} error frames: check termination, wiring and bit rate"
+        frames = "error frame" if load.error_frames == 1 else "error frames"
+        yield f"{load.error_frames} {frames}: check termination, wiring and bit rate"
 
 
 def _percent(value: float | None) -> str:

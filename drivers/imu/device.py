@@ -11,6 +11,7 @@ from drivers.line import Line, Recognise, unrecognised
 from drivers.losses import Losses
 from drivers.samples import Quality, State
 from drivers.shares import beside
+from drivers.standstill import Standstill
 
 
 class Imu(TrunkImu):
@@ -22,11 +23,14 @@ class Imu(TrunkImu):
         settings: ImuSettings,
         beside: Path | None = None,
         recognise: Recognise = unrecognised,
+        standstill: Standstill | None = None,
     ) -> None:
         imu_format = FORMATS[settings.format]
         super().__init__(name, settings, imu_format.conventions, settings.attitude, beside)
-        self.line = Line(settings.port, settings.baudrate, settings.format, imu_format.parser, recognise)
-        self._losses = Losses()
+        self.line = Line(
+            settings.port, settings.baudrate, settings.format, imu_format.parser, recognise, standstill
+        )
+        self._losses = Losses(self.line.standstill)
         self._clock_spec = imu_format.clock
         self._clock = imu_format.clock.make() if imu_format.clock else None
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 def _on_port(name: str, settings: ImuSettings, site: "Site") -> "TrunkImu":
     from drivers.imu.device import Imu
 
-    return Imu(name, settings, site.folder, site.recognise)
+    return Imu(name, settings, site.folder, site.recognise, site.standstill)
 
 
 def _on_bus(name: str, settings: CanImuSettings, site: "Site") -> "TrunkImu":

@@ -19,7 +19,7 @@ def build_insole(name: str, settings: InsoleSettings, site: Site) -> Insole:
     """
     if settings.port not in site.lines:
         layout = layout_of(settings.format, settings.layout, site.folder)
-        site.lines[settings.port] = line_for(settings, layout, site.recognise)
+        site.lines[settings.port] = line_for(settings, layout, site.recognise, site.standstill)
     return Insole(name, settings, site.lines[settings.port], site.folder)
 
 

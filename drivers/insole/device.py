@@ -22,6 +22,7 @@ from drivers.losses import Losses
 from drivers.noted import found
 from drivers.samples import Channel, Finding, Quality, State
 from drivers.shares import beside, saturated_frames
+from drivers.standstill import Standstill
 
 USUAL_LAYOUT = "insole-16"
 CONTACT = {0: "in the air", 1: "on the ground"}
@@ -70,7 +71,7 @@ class Insole:
         self.check = FootCheck(name, len(layout.cells))
         self._feet_check = FeetCheck(name)
         self._swap_check = SwapCheck()
-        self._losses, self._saturated_share = Losses(), saturated_frames()
+        self._losses, self._saturated_share = Losses(self.line.standstill), saturated_frames()
         self._indices = tuple(range(len(self.channels)))
         self._freshness = Freshness(settings.stale_after_s, settings.lost_after_s)
         self._fault: str | None = None  # what the device's own frames say is wrong
@@ -229,7 +230,10 @@ def layout_of(format_name: str, layout_name: str | None, beside: Path | None = N
 
 
 def line_for(
-    settings: InsoleSettings, layout: Layout, recognise: Recognise = unrecognised
+    settings: InsoleSettings,
+    layout: Layout,
+    recognise: Recognise = unrecognised,
+    standstill: Standstill | None = None,
 ) -> Line[InsoleFrame]:
     """The line that `settings` describe.
 
@@ -238,7 +242,7 @@ def line_for(
 
     """
     make_parser = FORMATS[settings.format].parser(layout)
-    return Line(settings.port, settings.baudrate, settings.format, make_parser, recognise)
+    return Line(settings.port, settings.baudrate, settings.format, make_parser, recognise, standstill)
 
 
 def _calibration(settings: InsoleSettings, layout: Layout, beside: Path | None) -> Cells | None:

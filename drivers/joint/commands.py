@@ -2,7 +2,7 @@
 
 A stop sends QUICK_STOP, and as its fallback DISABLE_VOLTAGE. A reset goes the WAY_DOWN. From no state can any
 of these lead to operation enabled, so that a state that has changed since it was read does no harm. Only the
-WAY_UP leads there.
+WAY_UP leads there; START_HOMING is sent where it has led already, on the same word.
 """
 
 from collections.abc import Mapping
@@ -21,6 +21,7 @@ class Controlword(IntEnum):
     SHUTDOWN = 0x0006
     SWITCH_ON = 0x0007
     ENABLE_OPERATION = 0x000F
+    START_HOMING = 0x001F  # in the mode homing, where bit 4 rises
     FAULT_RESET = 0x0080  # where bit 7 rises
 
     @property

@@ -16,8 +16,8 @@ from drivers.bus.arrivals import Arrivals
 from drivers.bus.bus import CanBus
 from drivers.bus.channels import Chosen, ObjectChannels, channels_of
 from drivers.bus.frames import EXTENDED, FrameHandler
+from drivers.bus.lengths import Lengths
 from drivers.bus.node import shared_node
-from drivers.bus.pdo import Tpdo
 from drivers.bus.sdo.channel import SdoChannel
 from drivers.bus.values import Number, decode
 from drivers.component import Kind
@@ -30,7 +30,7 @@ from drivers.joint.plan import Plan, Source, make_plan
 from drivers.joint.power import PowerDrive
 from drivers.joint.quantities import POSITION, STATE, STATUSWORD, Quantity, channels, quantities
 from drivers.joint.reading import DriveReading, read_drive
-from drivers.joint.remap import free_tpdo, put_back, remap
+from drivers.joint.remap import free_tpdos, mappable, remap
 from drivers.joint.scaling import rated_torque
 from drivers.joint.settings import JointSettings
 from drivers.joint.stop_rpdo import find_stop_rpdo
@@ -70,7 +70,7 @@ class JointDrive(PowerDrive):
         self._objects = ObjectChannels(self.node, description, chosen, self.latest, first=len(own))
         self.reading: DriveReading | None = None  # what the drive said about itself when it came up
         self.frames = 0
-        self.short_frames = 0  # shorter than the mapping says; nothing was made of them
+        self.short_frames = 0  # or longer: nothing was made of them
         self._description = description
         self._index = {channel.quantity: index for index, channel in enumerate(self.channels)}
         self._freshness = Freshness(settings.stale_after_s, settings.lost_after_s)
@@ -142,7 +142,7 @@ class JointDrive(PowerDrive):
         reading = read_drive(sdo, self._description, self.settings.axis)
         plan = make_plan(self.settings, self._quantities, reading)
         if self.settings.configure_pdos and (plan.position_from is None or not plan.position_from.cyclic):
-            told = self._remap(sdo, reading)
+            told = self._remap(sdo, reading, plan)
             reading = read_drive(sdo, self._description, self.settings.axis)
             plan = make_plan(self.settings, self._quantities, reading)
             plan = replace(plan, notes=(told, *plan.notes))
@@ -165,17 +165,17 @@ class JointDrive(PowerDrive):
             self._watch.restart()
             self._freshness.disconnected()
 
-    def _remap(self, sdo: SdoChannel, reading: DriveReading) -> str:
-        """Bring the position into a free TPDO; returns what came of it, in words."""
+    def _remap(self, sdo: SdoChannel, reading: DriveReading, plan: Plan) -> str:
+        """Bring what the channels need into free TPDOs; returns what came of it, in words."""
         if self.node.distrust is not None:
             return f"configure_pdos: {self.node.distrust}"
-        free = free_tpdo(reading.tpdos, self.node.node_id, self.node.bus.unclaimed)
-        if free is None:
+        free = list(free_tpdos(reading.tpdos, self.node.node_id, self.node.bus.unclaimed))
+        if not free:
             return "configure_pdos: no TPDO of the drive is free, nothing was changed"
+        more = mappable(self._description, (one.quantity for one in plan.polled_seldom))
         try:
-            return remap(sdo, self._description, *free, self._offset)
+            return remap(sdo, self._description, free, self._offset, list(more))
         except (DeviceAbort, Mismatch) as error:
-            put_back(sdo, self._description, *free)
             return f"configure_pdos: {error}"
 
     # How values come.
@@ -184,7 +184,7 @@ class JointDrive(PowerDrive):
         bus = self.node.bus
         for tpdo, decoder in plan.decoders:
             can_id = tpdo.cob_id | EXTENDED if tpdo.extended else tpdo.cob_id
-            handler = self._handler(tpdo, decoder)
+            handler = self._handler(decoder)
             bus.subscribe(can_id, handler)
             self._undo.append(partial(bus.unsubscribe, can_id, handler))
         if plan.position_from is not None and plan.position_from.cyclic:
@@ -196,15 +196,16 @@ class JointDrive(PowerDrive):
             if hz and polled:
                 self._undo.append(self.node.worker.repeat(1 / hz, partial(self._poll, deque(polled))))
 
-    def _handler(self, tpdo: Tpdo, decoder: Decoder) -> FrameHandler:
+    def _handler(self, decoder: Decoder) -> FrameHandler:
         """What is done with each frame of a TPDO: the hot path."""
-        size, indices, values = tpdo.size, decoder.channels, decoder.values
+        indices, values = decoder.channels, decoder.values
         update, lock = self.latest.update, self._lock
         position = self._index[POSITION] in indices
         arrived = self._arrivals.stamps.append
+        lengths = Lengths(decoder.size, self.node.remapped)
 
         def on_frame(stamp_ns: int, data: bytes) -> None:
-            if len(data) < size:
+            if len(data) != lengths.usual and not lengths.fits(stamp_ns, len(data)):
                 self.short_frames += 1
                 return
             with lock:

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from drivers.bus.fields import Field, Linear
-from drivers.bus.pdo import Tpdo
+from drivers.bus.pdo import MappedObject, Tpdo
 from drivers.joint.decoder import Decoder, make_decoder
 from drivers.joint.quantities import POSITION, STATUSWORD, Quantity
 from drivers.joint.reading import DriveReading
@@ -60,6 +60,7 @@ def make_plan(settings: JointSettings, found: tuple[Quantity, ...], reading: Dri
         contradictions=contradictions(settings, reading.scaling),
         notes=(
             *_unscaled_notes(found, linears),
+            *_width_notes(reading, wanted),
             *_polling_notes(settings, often, reading.tpdos),
         ),
         position_from=_bringer(names.index(POSITION), mapped),
@@ -67,16 +68,27 @@ def make_plan(settings: JointSettings, found: tuple[Quantity, ...], reading: Dri
 
 
 def _fields(tpdo: Tpdo, wanted: Mapping[tuple[int, int], Source]) -> list[Field]:
-    """What this TPDO carries of what is wanted."""
+    """What this TPDO carries of what is wanted, as wide as its type: a part of it would be another number."""
     return [
-        Field(one.channel, mapped.at, mapped.bits, _kind(one.quantity), one.linear)
+        Field(one.channel, mapped.at, mapped.bits, one.quantity.kind, one.linear)
         for mapped in tpdo.objects
-        if mapped.bits >= MIN_BITS and (one := wanted.get((mapped.index, mapped.subindex))) is not None
+        if (one := wanted.get((mapped.index, mapped.subindex))) is not None and _fits(mapped, one.quantity)
     ]
 
 
-def _kind(quantity: Quantity) -> str:
-    return "signed" if quantity.signed else "unsigned"
+def _fits(mapped: MappedObject, quantity: Quantity) -> bool:
+    return mapped.bits == quantity.bits or (quantity.bits is None and mapped.bits >= MIN_BITS)
+
+
+def _width_notes(reading: DriveReading, wanted: Mapping[tuple[int, int], Source]) -> Iterator[str]:
+    for tpdo in reading.tpdos:
+        for mapped in tpdo.objects:
+            one = wanted.get((mapped.index, mapped.subindex))
+            if one is not None and not _fits(mapped, one.quantity):
+                yield (
+                    f"TPDO{tpdo.number} maps {mapped.bits} bits of {one.quantity.name}, which has "
+                    f"{one.quantity.bits} in its EDS: it is not taken from there"
+                )
 
 
 def _bringer(channel: int, mapped: Sequence[tuple[Tpdo, list[Field]]]) -> Tpdo | None:

@@ -5,6 +5,8 @@ Whatever is on its way here ends when a stop is asked for: a way up is neither f
 
 from collections.abc import Callable, Collection
 from concurrent.futures import Future
+from dataclasses import replace
+from typing import TypeVar
 
 from drivers.bus.node import Node
 from drivers.bus.sdo.channel import SdoChannel
@@ -13,11 +15,14 @@ from drivers.bus.sender import always
 from drivers.joint.axis import Axis
 from drivers.joint.cia402 import DriveState
 from drivers.joint.commands import CONTROLWORD, STOPPED_STATES, Controlword
+from drivers.joint.homing import begin
 from drivers.joint.quantities import AXIS_OFFSET
 from drivers.joint.quick_stop import StopOutcome, Stopping
 from drivers.joint.settings import JointSettings
 from drivers.joint.stop_rpdo import StopRpdo
 from drivers.joint.transitions import Errand, Led, lead_down, look, step_up
+
+T = TypeVar("T")
 
 TRANSITION_S = 3.0  # how long one step up may take: brakes open in it
 RESET_S = 3.0  # how long the whole way down may take
@@ -79,10 +84,21 @@ class PowerDrive:
         errand = self._errand(RESET_S, wanted)
         return self.node.run(lambda sdo: lead_down(self._axis(sdo), errand))
 
-    def step_up(self, origin: DriveState, wanted: Callable[[], bool] = always) -> Future[Led]:
-        """Make the one transition up from `origin`, if that is `wanted`."""
-        errand = self._errand(TRANSITION_S, wanted)
+    def step_up(
+        self, origin: DriveState, wanted: Callable[[], bool] = always, still_in: Collection[int] = ()
+    ) -> Future[Led]:
+        """Make the one transition up from `origin`, if that is `wanted`; see `Errand.still_in`."""
+        errand = replace(self._errand(TRANSITION_S, wanted), still_in=still_in)
         return self.node.run(lambda sdo: step_up(self._axis(sdo), errand, origin))
+
+    def home(self, wanted: Callable[[], bool]) -> Future[Led]:
+        """Begin the homing that was set up, where it is enabled in that mode and this is `wanted`."""
+        errand = self._errand(TRANSITION_S, wanted)
+        return self.node.run(lambda sdo: begin(self._axis(sdo), errand))
+
+    def ask(self, question: Callable[[Axis], T]) -> Future[T]:
+        """Read from the axis, or set up what moves nothing, in a row."""
+        return self.node.run(lambda sdo: question(self._axis(sdo)))
 
     def _stop(
         self,

@@ -20,31 +20,32 @@ class Quantity:
     index: int
     subindex: int
     unit: str
-    signed: bool
+    kind: str  # "signed", "unsigned" or "real"
     scale: float | None = None
     enum: dict[int, str] | None = None
     fast: bool = False  # a joint is not known without it
+    bits: int | None = None  # of its type; None: the EDS gives it none that is a number
 
 
 STATE = "state"  # the channel that is made of the statusword
 POSITION, STATUSWORD = "position", "statusword"
 
 _STANDARD = (
-    Quantity(POSITION, 0x6064, 0, "rad", signed=True, fast=True),
-    Quantity("velocity", 0x606C, 0, "rad/s", signed=True),
-    Quantity("torque", 0x6077, 0, "N·m", signed=True),
-    Quantity("current", 0x6078, 0, "A", signed=True),
-    Quantity("following_error", 0x60F4, 0, "rad", signed=True),
-    Quantity(STATUSWORD, 0x6041, 0, "", signed=False, scale=1, fast=True),
-    Quantity("modes_display", 0x6061, 0, "", signed=True, scale=1, enum=MODES),
-    Quantity("error_code", 0x603F, 0, "", signed=False, scale=1),
+    Quantity(POSITION, 0x6064, 0, "rad", kind="signed", fast=True),
+    Quantity("velocity", 0x606C, 0, "rad/s", kind="signed"),
+    Quantity("torque", 0x6077, 0, "N·m", kind="signed"),
+    Quantity("current", 0x6078, 0, "A", kind="signed"),
+    Quantity("following_error", 0x60F4, 0, "rad", kind="signed"),
+    Quantity(STATUSWORD, 0x6041, 0, "", kind="unsigned", scale=1, fast=True),
+    Quantity("modes_display", 0x6061, 0, "", kind="signed", scale=1, enum=MODES),
+    Quantity("error_code", 0x603F, 0, "", kind="unsigned", scale=1),
 )
 
 # Bits 0 to 3: negative and positive limit switch, home switch, interlock; from 16 on the maker's own. The
 # voltage is that of the DC link, in mV (CiA 402-2).
 _SURROUNDINGS = (
-    Quantity("digital_inputs", 0x60FD, 0, "", signed=False, scale=1),
-    Quantity("voltage", 0x6079, 0, "V", signed=False, scale=0.001),
+    Quantity("digital_inputs", 0x60FD, 0, "", kind="unsigned", scale=1),
+    Quantity("voltage", 0x6079, 0, "V", kind="unsigned", scale=0.001),
 )
 
 # Those of every joint, which the robot's file cannot give another object.
@@ -78,7 +79,7 @@ def _makers(description: Description) -> Iterator[Quantity]:
     if profile is None:
         return
     for name, one in profile.found(description)[0].items():
-        yield Quantity(name, one.index, one.subindex, one.unit, signed=True, scale=one.scale)
+        yield Quantity(name, one.index, one.subindex, one.unit, kind="signed", scale=one.scale)
 
 
 def _shift(quantity: Quantity, offset: int) -> Quantity:
@@ -91,9 +92,10 @@ def _described(quantity: Quantity, description: Description) -> bool:
 
 
 def _as_described(quantity: Quantity, description: Description) -> Quantity:
-    """The sign as the device's own data type has it, where that is an integer."""
+    """The number as the device's own data type has it."""
     variable = description.variable(quantity.index, quantity.subindex)
     data_type = None if variable is None else DATA_TYPES.get(variable.data_type or 0)
-    if data_type is None or data_type.kind not in ("signed", "unsigned"):
+    kinds = ("signed", "unsigned") if quantity.name == STATUSWORD else ("signed", "unsigned", "real")
+    if data_type is None or data_type.kind not in kinds:
         return quantity
-    return replace(quantity, signed=data_type.kind == "signed")
+    return replace(quantity, kind=data_type.kind, bits=data_type.bits)

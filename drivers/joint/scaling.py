@@ -27,6 +27,17 @@ LEAST_EFFICIENCY = 0.4  # of a gear: torque at the joint may be this part of mot
 Readings = Mapping[str, float | None]
 
 
+def drive_speed(rad_s: float, counts_per_turn: float, gear_ratio: float, unit: int | None) -> float | None:
+    """A speed of the joint in the drive's own unit of velocity (60A9h); `None` where that is not known.
+
+    `counts_per_turn` are those of the joint. Without 60A9h, or with 0 there, it is counts/s (CiA 402-2).
+    """
+    if not unit:
+        return rad_s * counts_per_turn / math.tau
+    factor = _RPM.get(_VELOCITY_UNITS.get(unit, ""))
+    return None if factor is None else rad_s * gear_ratio * 60 / math.tau / factor
+
+
 def scalings(settings: JointSettings, readings: Readings) -> dict[str, Linear | None]:
     """How each scaled quantity becomes SI; `None` where nobody says how, so that it has no value."""
     rad_per_count = settings.direction * math.tau / (settings.counts_per_revolution * settings.gear_ratio)

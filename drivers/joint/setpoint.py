@@ -3,7 +3,7 @@
 In the cyclic modes the drive adds offsets to it, or feeds them forward; they are zeroed where it has them.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 from drivers.bus.sdo.aborts import NO_OBJECT
 from drivers.errors import DeviceAbort, DriverError, Mismatch
@@ -35,13 +35,15 @@ OFFSETS: Mapping[int, tuple[tuple[int, int], ...]] = {
 }
 
 
-def hold_still(axis: Axis) -> int:
-    """Write it, read it back, and return the mode (6061h).
+def hold_still(axis: Axis, still_in: Collection[int] = ()) -> int:
+    """Write it, read it back, and return the mode (6061h); in the modes `still_in` there is none to write.
 
     Raises `DriverError` where the mode has no setpoint that is known to move nothing, or the drive does not
     confirm it: it must not be enabled then.
     """
     mode = int.from_bytes(axis.read(MODE_DISPLAY, 1), "little", signed=True)
+    if mode in still_in:
+        return mode
     if mode not in SETPOINTS:
         raise DriverError(
             f"{axis.sdo.label}: nobody knows what it would do in its mode of operation "

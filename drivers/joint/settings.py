@@ -30,7 +30,7 @@ class JointSettings(NodeTimes, frozen=True, forbid_unknown_fields=True, kw_only=
         20.0  # position and state no TPDO brings; 0: never
     )
     slow_poll_hz: Annotated[float, msgspec.Meta(ge=0, le=50)] = 4.0  # all else no TPDO brings; 0: never
-    configure_pdos: bool = False  # may the gateway map the position into a TPDO that brings nothing?
+    configure_pdos: bool = False  # may the gateway map what it reads into TPDOs that bring nothing?
     stop_timeout_s: Seconds = 1.0  # how long a quick stop may take to be confirmed
     stale_after_s: LongSeconds = 0.5
     lost_after_s: LongSeconds = 2.0

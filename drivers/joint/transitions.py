@@ -5,7 +5,7 @@ ends either way: nothing is sent any more, and nothing is tried again.
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field, replace
 
 from drivers.bus.sdo.channel import Interrupted
@@ -41,6 +41,9 @@ class Errand:
     wanted: Callable[[], bool]
     timeout_s: float
     counts_per_turn: float  # of the joint
+    still_in: Collection[
+        int
+    ] = ()  # modes of operation that move nothing before a bit of the controlword rises
 
 
 def look(axis: Axis) -> Led:
@@ -136,7 +139,7 @@ def _step_up(axis: Axis, errand: Errand, origin: DriveState) -> Led:
         return led
     mode = None
     if led.state is origin and target is DriveState.OPERATION_ENABLED:
-        mode = hold_still(axis)
+        mode = hold_still(axis, errand.still_in)
         led = _read(axis)
     if led.state is not origin:
         return replace(led, problem=f"it is not in {origin.words}; reset it first")

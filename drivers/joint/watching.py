@@ -3,13 +3,13 @@
 from collections.abc import Callable, Iterable
 
 from drivers.bus.bus import BusUser
-from drivers.bus.standstill import Standstill
 from drivers.joint.cia402 import DriveState
 from drivers.joint.held_off import HeldOff
 from drivers.joint.plausibility import JointCheck, Motion
 from drivers.joint.quantities import POSITION, STATE
 from drivers.latest import Latest
 from drivers.samples import Channel
+from drivers.standstill import Standstill
 from eds import Description
 
 BESIDE_S = 0.03  # PDOs of one SYNC; a velocity that was polled is older the next time

@@ -65,11 +65,13 @@ def give_node_id(bus: Bus, master: LssMaster, device: Device, node_id: int, *, s
     return found
 
 
-def give_bitrate(master: LssMaster, device: Device, bitrate: int, before: int | None) -> None:
+def give_bitrate(
+    master: LssMaster, device: Device, bitrate: int, before: int | None, delay_ms: int | None = None
+) -> None:
     """Let the device have `bitrate` (bit/s) when it is switched on the next time; raises `DriverError`.
 
-    It is stored, and not activated: until the whole bus runs at that rate it is needed at the one it has,
-    which is `before` where that is known.
+    Until then it is needed at the one it has, which is `before` where that is known. With a delay it is also
+    activated: after that time it listens at the new rate alone, and after another one it may answer.
     """
 
     def put_back() -> None:
@@ -80,6 +82,9 @@ def give_bitrate(master: LssMaster, device: Device, bitrate: int, before: int | 
     with _selected(master, device.identity):
         master.set_bitrate(bitrate)
         _store(master, put_back)
+    if delay_ms is not None:
+        master.select(device.identity)
+        master.activate(delay_ms)  # and nothing more at this rate: nobody would acknowledge it
 
 
 def _store(master: LssMaster, put_back: Callable[[], object]) -> None:

@@ -31,7 +31,7 @@ SETTLE_S = 0.01  # after an answer, for those of others to the same question
 GAP_S = 0.02  # after what nobody answers: some devices lose a request that follows at once
 PARTS = ("vendor", "product", "revision", "serial number")
 
-_SWITCH_ALL, _NODE_ID, _BIT_TIMING, _STORE = 0x04, 0x11, 0x13, 0x17
+_SWITCH_ALL, _NODE_ID, _BIT_TIMING, _ACTIVATE, _STORE = 0x04, 0x11, 0x13, 0x15, 0x17
 _SWITCH_ONE, _SWITCHED = 0x40, 0x44
 _FASTSCAN, _IDENTIFIED = 0x51, 0x4F
 _IDENTIFY_UNCONFIGURED, _UNCONFIGURED = 0x4C, 0x50
@@ -178,6 +178,10 @@ class LssMaster:
     def store(self) -> None:
         """Let it keep both without power; raises `LssRefusal`."""
         self._configure(_STORE, b"", "to store")
+
+    def activate(self, delay_ms: int) -> None:
+        """Let the bit rate count: after the delay; after another one it may send again. Nobody answers."""
+        self._tell(_ACTIVATE, delay_ms.to_bytes(2, "little"))
 
     def _configure(self, command: int, content: bytes, what: str) -> None:
         answer = self._ask(command, content, what)

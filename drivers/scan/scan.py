@@ -56,7 +56,10 @@ def scan(settings: CanSettings, seconds: float, wait: Callable[[float], object],
         load = bus.health.load_percent
         asked = traffic.asked() if active else frozenset()
         if active:
-            told = {node: _ask(bus, node) for node in sorted(sweep(bus, set(NODES) - asked, wait))}
+            for node in sorted(sweep(bus, set(NODES) - asked, wait)):
+                if node not in traffic.asked():  # who has begun to ask it meanwhile goes first
+                    told[node] = _ask(bus, node)
+            asked = traffic.asked()
         return Found(
             seconds, traffic, frames_per_s, load, bus.health.error_frames, bus.state, bus.trouble, told, asked
         )

@@ -15,11 +15,15 @@ from drivers.errors import SettingsError
 
 
 class Captured(NamedTuple):
-    """A frame and when it came: ns of Unix time. The identifier carries its flags (`drivers.bus.frames`)."""
+    """A frame and when it came: ns of Unix time. The identifier carries its flags (`drivers.bus.frames`).
+
+    `interface` is where it came, as candump names it: empty where nobody has said, as in PCAP.
+    """
 
     stamp_ns: int
     can_id: int
     data: bytes
+    interface: str = ""
 
 
 CANDUMP, PCAP = ".log", ".pcap"
@@ -82,7 +86,7 @@ def _read_candump(path: Path, file: IO[str]) -> Iterator[Captured]:
 
 
 def _of_candump(found: re.Match[str]) -> Captured | None:
-    seconds, fraction, _, identifier, content, _ = found.groups()
+    seconds, fraction, interface, identifier, content, _ = found.groups()
     can_id = int(identifier, 16)
     if len(identifier) > 3 and not can_id & ERROR:
         can_id |= EXTENDED
@@ -90,10 +94,10 @@ def _of_candump(found: re.Match[str]) -> Captured | None:
         return None
     stamp_ns = int(seconds) * 10**9 + int(fraction.ljust(9, "0"))
     if content.startswith("R"):
-        return Captured(stamp_ns, can_id | REMOTE, b"")
+        return Captured(stamp_ns, can_id | REMOTE, b"", interface)
     if len(content) % 2 or len(content) > 2 * _MOST_BYTES:
         return None
-    return Captured(stamp_ns, can_id, bytes.fromhex(content))
+    return Captured(stamp_ns, can_id, bytes.fromhex(content), interface)
 
 
 def _read_pcap(path: Path, file: IO[bytes]) -> Iterator[Captured]:
@@ -135,7 +139,7 @@ def _pcap_header(path: Path, file: IO[bytes]) -> tuple[str, int]:
 
 
 @contextmanager
-def writing(path: Path, channel: str) -> Iterator[Put]:
+def writing(path: Path) -> Iterator[Put]:
     """Write frames to a file; its name says in which format. Raises `SettingsError`."""
     if path.suffix not in SUFFIXES:
         raise SettingsError(f"{path}: is to be called *{CANDUMP} (candump) or *{PCAP}")
@@ -148,11 +152,11 @@ def writing(path: Path, channel: str) -> Iterator[Put]:
             file.write(struct.pack("<" + _FILE, _NANOSECONDS, 2, 4, 0, 0, _LONGEST, _SOCKETCAN))
             yield lambda frame: file.write(_to_pcap(frame))
         else:
-            name = re.sub(r"\s", "_", channel) or "can"
-            yield lambda frame: file.write(_to_candump(frame, name).encode("ascii"))
+            yield lambda frame: file.write(_to_candump(frame).encode("ascii", "replace"))
 
 
-def _to_candump(frame: Captured, channel: str) -> str:
+def _to_candump(frame: Captured) -> str:
+    interface = re.sub(r"\s", "_", frame.interface) or "can"
     seconds, ns = divmod(frame.stamp_ns, 10**9)
     flags = frame.can_id & ~REMOTE
     if flags & ERROR:
@@ -162,7 +166,7 @@ def _to_candump(frame: Captured, channel: str) -> str:
     else:
         identifier = f"{flags:03X}"
     content = "R" if frame.can_id & REMOTE else frame.data.hex().upper()
-    return f"({seconds}.{ns // 1000:06d}) {channel} {identifier}#{content}\n"
+    return f"({seconds}.{ns // 1000:06d}) {interface} {identifier}#{content}\n"
 
 
 def _to_pcap(frame: Captured) -> bytes:

@@ -1,5 +1,6 @@
 """Where the frames of a trace come from: a bus that is listened to, or a recording."""
 
+import heapq
 import time
 from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass
@@ -24,13 +25,13 @@ class Batch:
 Batches = Generator[Batch, None, None]
 
 
-def recorded(path: Path) -> Batches:
-    """The frames of a file, one by one; raises `SettingsError`."""
-    for captured in read(path):
+def recorded(paths: Sequence[Path]) -> Batches:
+    """The frames of files, one by one, by their times; raises `SettingsError`."""
+    for captured in heapq.merge(*map(read, paths), key=lambda one: one.stamp_ns):
         yield Batch((captured,), captured.stamp_ns, live=False)
 
 
-def live(settings: CanSettings, lost: Callable[[int], object]) -> Batches:
+def live(settings: CanSettings, interface: str, lost: Callable[[int], object]) -> Batches:
     """Frames as they come, or nothing for `TICK_S`; `lost` is told at the end how many did not reach us.
 
     Raises:
@@ -42,7 +43,9 @@ def live(settings: CanSettings, lost: Callable[[int], object]) -> Batches:
         to_unix_ns = time.time_ns() - time.monotonic_ns()
         while True:
             frames = transport.receive(TICK_S)
-            captured = [Captured(stamp_ns + to_unix_ns, can_id, data) for stamp_ns, can_id, data in frames]
+            captured = [
+                Captured(stamp_ns + to_unix_ns, can_id, data, interface) for stamp_ns, can_id, data in frames
+            ]
             yield Batch(captured, time.monotonic_ns() + to_unix_ns, live=True)
     finally:
         if transport.dropped:

@@ -1,8 +1,9 @@
 """Which lines of a trace somebody wants to see: by node, by service, by object."""
 
 import fnmatch
+import functools
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 from drivers.errors import SettingsError
 from drivers.trace.decoding import Kind, Line
@@ -12,11 +13,17 @@ Wanted = Callable[[Line], bool]
 _OBJECT = re.compile(r"(?:0x([0-9a-f]{4})|([0-9a-f]{4})h)(?::(?:0x)?([0-9a-f]{1,2}))?", re.IGNORECASE)
 
 
-def by_node(words: Sequence[str], devices: Sequence[Device]) -> Wanted:
-    """Lines of these nodes, by number or name, and NMT commands to them; raises `SettingsError`."""
-    nodes = frozenset(_node(word, devices) for word in words)
+def by_node(words: Sequence[str], all_: Sequence[Device], on: Callable[[str], Sequence[Device]]) -> Wanted:
+    """Lines of these nodes, by number or name, and NMT commands to them; raises `SettingsError`.
+
+    `all_` are the devices that may be named, `on` tells those of an interface.
+    """
+    for word in words:
+        _check(word, all_)
+    nodes_of = functools.cache(lambda interface: frozenset(_nodes(words, on(interface))))
 
     def wanted(line: Line) -> bool:
+        nodes = nodes_of(line.captured.interface)
         if line.kind is Kind.NMT and len(line.captured.data) == 2:
             return line.captured.data[1] in nodes | {0}
         return line.node_id in nodes
@@ -24,14 +31,20 @@ def by_node(words: Sequence[str], devices: Sequence[Device]) -> Wanted:
     return wanted
 
 
-def _node(word: str, devices: Sequence[Device]) -> int:
+def _nodes(words: Sequence[str], devices: Sequence[Device]) -> Iterator[int]:
+    for word in words:
+        if word.isdecimal():
+            yield int(word)
+        yield from (device.node_id for device in devices if word in device.name.split("/"))
+
+
+def _check(word: str, devices: Sequence[Device]) -> None:
     if word.isdecimal():
-        return int(word)
-    found = [device.node_id for device in devices if word in device.name.split("/")]
-    if not found:
+        if not 0 < int(word) <= 127:
+            raise SettingsError(f"--node {word}: a node id is from 1 to 127")
+    elif not any(word in device.name.split("/") for device in devices):
         names = ", ".join(device.name for device in devices) or "none, give --robot"
         raise SettingsError(f"--node {word}: no device has that name; known are {names}")
-    return found[0]
 
 
 def by_kind(words: Sequence[str]) -> Wanted:

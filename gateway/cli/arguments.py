@@ -20,3 +20,10 @@ def seconds(text: str) -> float:
     if not 0.1 <= value <= MOST_S:
         raise argparse.ArgumentTypeError(f"{text!r} is no time from 0.1 to {MOST_S:.0f} s")
     return value
+
+
+def lines(text: str) -> int:
+    """How many lines are shown."""
+    if not (text.isascii() and text.isdigit() and int(text) > 0):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of lines")
+    return int(text)

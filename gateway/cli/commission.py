@@ -3,9 +3,7 @@
 import argparse
 import datetime
 import getpass
-import shutil
 import signal
-import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -17,28 +15,31 @@ from drivers.bus.settings import CanSettings
 from drivers.cli.buses import named
 from drivers.errors import DriverError, SettingsError
 from drivers.scan.products import Library, files
+from gateway.cli.commission_faces import Terminal
 from gateway.cli.commission_lines import JsonFace, Lines, stdin
 from gateway.cli.text import say, say_json, warn
 from gateway.commission.bench import CanBench
-from gateway.commission.dialogue import Ask, At, Talk, agree, run
+from gateway.commission.dialogue import At, Talk, agree, run
 from gateway.commission.draft import Draft, alone
-from gateway.commission.progress import Progress, Step
+from gateway.commission.homing import NotStopped
+from gateway.commission.keeping import journal, put
+from gateway.commission.progress import Progress
 from gateway.commission.serial_bench import SerialPorts
 from gateway.commission.steps import commission
 from gateway.commission.stopping import Stopped, stop
 from gateway.commission.writing import Written, text, unfinished
-from gateway.config.reading import examine
-from gateway.config.robot import RobotConfig
-from gateway.records import durable
-from gateway.records.records import Records
 
 _EPILOG = """\
 example
   gwrms commission exo-01.toml can0 --eds ~/eds --serial /dev/serial/by-id/usb-left --serial …
 
-The joints are moved by hand, without power: nothing here moves, enables or stops anything. What is to be
-written to a drive is asked for, and read back. Ctrl-C interrupts; the same command goes on where it was, and
-what is known is kept in FILE.commission until FILE is written.
+The joints are moved by hand, without power. What is to be written to a drive is asked for, and read back.
+Only homing, where it is wanted, puts one drive under power: it is told in words before, begins when its
+phrase is typed, and Enter, Ctrl-C or the end of the input stop and disable it. Ctrl-C interrupts; the same
+command goes on where it was, and what is known is kept in FILE.commission until FILE is written.
+
+With --json, {"moving": …} says that a joint is under power: any line is a STOP then. {"moving": null} comes
+when that is over.
 
 exit status
   0 written, 1 not (interrupted, or something failed), 2 usage
@@ -62,7 +63,7 @@ def main(argv: list[str]) -> int:
         bench = CanBench(name, settings)
         ends.callback(bench.close)
         if not options.json:
-            return _lead(draft, bench, settings, options, _Terminal(), None)
+            return _lead(draft, bench, settings, options, Terminal(), None)
         lines = ends.enter_context(Lines(stdin()))
         return _lead(draft, bench, settings, options, JsonFace(lines), lines)
 
@@ -72,7 +73,7 @@ def _lead(
     bench: CanBench,
     settings: CanSettings,
     options: argparse.Namespace,
-    face: "_Terminal | JsonFace",
+    face: "Terminal | JsonFace",
     lines: Lines | None,
 ) -> int:
     """Through all of it; returns the exit status."""
@@ -96,7 +97,15 @@ def _lead(
     except OSError as error:
         warn("commission", f"{error}; {draft.path} has what was found until then")
         return 1
+    except NotStopped as error:
+        return _not_stopped(draft, bench, str(error), lines)
     return 0 if not draft.path.exists() else 1
+
+
+def _not_stopped(draft: Draft, bench: CanBench, why: str, lines: Lines | None) -> int:
+    """A drive that was under power has not confirmed that it is off: it is asked once more."""
+    warn("commission", f"NOT STOPPED: {why}")
+    return _stop(draft, bench, as_json=lines is not None) or 1
 
 
 def _left(draft: Draft, why: str, status: int) -> int:
@@ -204,7 +213,7 @@ def _keep_bus(draft: Draft, settings: CanSettings) -> None:
 
 
 def _all(
-    draft: Draft, bench: CanBench, options: argparse.Namespace, face: "_Terminal | JsonFace"
+    draft: Draft, bench: CanBench, options: argparse.Namespace, face: "Terminal | JsonFace"
 ) -> Talk[bool]:
     """Whether the file is written."""
     library = Library(files(options.eds))
@@ -221,51 +230,13 @@ def _all(
 
 
 def _write(draft: Draft, made: str, who: str) -> Written:
-    if draft.file.exists():
-        shutil.copyfile(draft.file, draft.file.with_name(draft.file.name + ".before"))
-    durable.write(draft.file, made.encode())
-    found = examine(draft.file)
-    findings = tuple((str(one.severity), one.words) for one in found.findings)
+    found = put(draft.file, made)
+    told = tuple((str(one.severity), one.words) for one in found.findings)
     if found.config is None:
-        return Written(str(draft.file), made, findings, usable=False)
-    journaled = _journal(found.config, draft, who)
+        return Written(str(draft.file), made, told, usable=False)
+    findings = {table: msgspec.to_builtins(keys) for table, keys in draft.tables.items()}
+    journaled = journal(found.config, who, "commission", found=findings).strip()
     left = unfinished(draft)
     if not left:
         draft.end()
-    return Written(str(draft.file), made, findings, usable=True, unfinished=left, not_journaled=journaled)
-
-
-def _journal(config: RobotConfig, draft: Draft, who: str) -> str:
-    """Put what was found into the robot's journal; what is in the way of that is told, no more."""
-    records = Records(config.records)
-    try:
-        findings = {table: msgspec.to_builtins(keys) for table, keys in draft.tables.items()}
-        records.journal.append(who, "commission", file=str(draft.file), found=findings).result()
-    except OSError as error:
-        return error.strerror or str(error)
-    finally:
-        records.close()
-    return ""
-
-
-class _Terminal:
-    def say(self, text: str) -> None:
-        say(text + "\n")
-
-    def propose(self, made: str, _file: str) -> None:
-        self.say(made)
-
-    def written(self, written: Written) -> None:
-        self.say(written.words)
-
-    def steps(self, steps: tuple[Step, ...]) -> None:
-        """Questions say it themselves."""
-
-    def ask(self, question: Ask) -> str:
-        choices = f" [{'/'.join(question.choices)}]" if question.choices else ""
-        default = f" (Enter: {question.default})" if question.default else ""
-        say(f"\n{question.text}{choices}{default}\n> ")
-        typed = sys.stdin.readline()
-        if not typed:
-            raise EOFError
-        return typed
+    return Written(str(draft.file), made, told, usable=True, unfinished=left, not_journaled=journaled)

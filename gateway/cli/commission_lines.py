@@ -4,6 +4,9 @@ Out come, a line each: `{"say": …}`, `{"ask": …, "number": …, …}`, `{"li
 question waits, `{"steps": […]}`, at the end `{"written": …}`; `{"stopped": …}` after a stop. In go plain
 lines, each the answer to the next question; or `{"answer": …, "number": …}`, which answers that question
 alone and is passed over where it comes late or twice; or `{"stop": true}` at any time.
+
+`{"moving": …}` comes again and again while a joint is under power, and any line is a STOP then; `{"moving":
+null}` when that is over.
 """
 
 import contextlib
@@ -13,6 +16,7 @@ import select
 import signal
 import sys
 import threading
+import time
 from typing import Any, Self
 
 import msgspec
@@ -23,6 +27,8 @@ from gateway.commission.dialogue import Ask, Live
 from gateway.commission.progress import Step
 from gateway.commission.writing import Written
 
+LOOK_S = 0.03  # for a STOP, each time
+SHOW_S = 0.5  # between two words of a joint that moves
 LIVE_S = 0.2  # between two looks while a question waits
 CHUNK = 4096
 LONGEST = 65_536  # of a line; whoever sends a longer one is not heard any more
@@ -68,6 +74,24 @@ class Lines:
         self._read.put(None)
         raise EOFError
 
+    def waits(self, within_s: float) -> str:
+        """Why nothing is to go on, after so long at most: a line, or that nobody can send one any more."""
+        try:
+            read = self._read.get(timeout=within_s)
+        except queue.Empty:
+            return ""
+        self._read.put(read)
+        return (
+            "STOP was pressed" if read is not None else "nobody can press STOP any more: its input has ended"
+        )
+
+    def drop(self) -> None:
+        """Forget what came meanwhile: it was not an answer."""
+        with contextlib.suppress(queue.Empty):
+            while self._read.get_nowait() is not None:
+                pass
+            self._read.put(None)
+
     def _run(self) -> None:
         held = b""
         while True:
@@ -102,8 +126,23 @@ class JsonFace:
         self._lines = lines
         self._number = 0
         self._steps: tuple[Step, ...] = ()
+        self._moving_s = 0.0  # when words of a motion were told; 0: nothing moves
+
+    def moving(self, text: str) -> str:
+        if time.monotonic() - self._moving_s > SHOW_S:
+            self._moving_s = time.monotonic()
+            say_json({"moving": text})
+        return self._lines.waits(LOOK_S)
+
+    def _rest(self) -> None:
+        """A motion is over, where there was one."""
+        if self._moving_s:
+            self._moving_s = 0.0
+            self._lines.drop()
+            say_json({"moving": None})
 
     def say(self, text: str) -> None:
+        self._rest()
         say_json({"say": text})
 
     def propose(self, made: str, file: str) -> None:
@@ -121,6 +160,7 @@ class JsonFace:
             say_json({"steps": steps})
 
     def ask(self, question: Ask) -> str:
+        self._rest()
         self._number += 1
         asked: dict[str, Any] = {"ask": question.text, "number": self._number}
         for key in ("choices", "default", "unit", "bounds", "press", "refused"):

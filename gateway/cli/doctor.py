@@ -1,22 +1,25 @@
 """`gwrms doctor`: what is wrong with a robot, by which figures, and what mends it."""
 
 import argparse
+import sys
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
 from drivers.errors import DriverError
+from gateway.amounts import counted
 from gateway.cli.connect import address, ask
 from gateway.cli.text import say, say_json, warn
 from gateway.client import Address, ClientError, LinkSettings, Robot
 from gateway.config.reading import examine
 from gateway.config.robot import RobotConfig
+from gateway.doctor.file_edit import NotMended
 from gateway.doctor.gathering.computer import ROOT
 from gateway.doctor.gathering.gather import How, gather
-from gateway.doctor.mending import Mender, NotMended
+from gateway.doctor.mending import Mender
 from gateway.doctor.report import as_json, as_text, findings, status
 from gateway.doctor.table import RULES, judged
-from gateway.doctor.verdicts import Verdict
+from gateway.doctor.verdicts import Finding
 from gateway.tables.finding import lines, mistakes
 
 DESCRIPTION = """\
@@ -31,7 +34,8 @@ how people walk. Standing still, only what devices, bus and computer say is judg
 Where no gateway answers, the robot is looked at as a silent one: buses and sensors are listened to, and not
 one frame is sent. With --active, devices that nobody else asks are asked by SDO; nothing is written.
 
-exit status: 0 nothing wrong was found; 1 findings; 2 nothing could be judged, or wrong usage
+exit status: 0 nothing wrong was found; 1 findings, mended or not (ask again); 2 nothing could be judged, or
+wrong usage
 
 examples
   gwrms doctor /etc/gwrms/robot.toml                   through its gateway, else as a silent robot
@@ -56,11 +60,17 @@ def main(argv: Sequence[str]) -> int:
         parser.error("name the robot's file")
     if options.fix and options.json:
         parser.error("--fix asks people, --json is for machines: say one of both")
+    if options.yes and not options.fix:
+        parser.error("--yes is for --fix")
+    if options.fix and not options.yes and not sys.stdin.isatty():
+        parser.error("--fix asks, and there is no terminal to ask on: say --yes too")
     if not LEAST_S <= options.seconds <= MOST_S:
         parser.error(f"--seconds {options.seconds:g} is outside {LEAST_S:g} to {MOST_S:g}")
     try:
         return _asked(options)
-    except (ClientError, DriverError) as error:
+    except (ClientError, DriverError, OSError) as error:
+        if isinstance(error, BrokenPipeError):
+            raise
         warn("doctor", str(error))
         return NOTHING
 
@@ -84,7 +94,7 @@ def _examined(config: RobotConfig, options: argparse.Namespace) -> int:
             seconds=options.seconds,
             gateway=gateway,
             active=options.active,
-            here=options.robot is None or options.robot.host in LOOPBACK,
+            here=_is_here(options),
             root=options.computer,
             folders=tuple(options.eds),
             say=(lambda text: warn("doctor", text.rstrip())) if not options.json else lambda _: None,
@@ -96,8 +106,13 @@ def _examined(config: RobotConfig, options: argparse.Namespace) -> int:
     else:
         say("\n".join(as_text(verdicts)) + "\n")
     if options.fix:
-        _mend(config, gateway, verdicts, yes=options.yes)
+        _mend(config, gateway, findings(verdicts), options)
     return status(verdicts)
+
+
+def _is_here(options: argparse.Namespace) -> bool:
+    """Whether this is the robot's computer."""
+    return options.robot is None or options.robot.host in LOOPBACK
 
 
 def _gateway(config: RobotConfig, options: argparse.Namespace) -> Address | None:
@@ -107,20 +122,35 @@ def _gateway(config: RobotConfig, options: argparse.Namespace) -> Address | None
     return options.robot or Address("127.0.0.1", config.gateway.port)
 
 
-def _mend(config: RobotConfig, gateway: Address | None, verdicts: Sequence[Verdict], *, yes: bool) -> None:
+def _mend(
+    config: RobotConfig, gateway: Address | None, found: Sequence[Finding], options: argparse.Namespace
+) -> None:
     """Ask for each finding's likeliest fix, where it is ours to do, and do it."""
+    mended = 0
     with ExitStack() as ending:
-        mender = Mender(config, _robot(gateway, ending))
-        for finding in findings(verdicts):
-            fix = finding.fixes[0]
-            if not mender.can(fix) or not ask(
-                f"{finding.about}: {finding.words}\n{fix.words}\nmend it?", yes=yes
-            ):
-                continue
-            try:
-                say(f"{mender.mend(finding, fix)}\n")
-            except NotMended as error:
-                warn("doctor", str(error))
+        mender = Mender(config, _robot(gateway, ending), here=_is_here(options))
+        for finding in found:
+            mended += _mended(mender, finding, found, yes=options.yes)
+    if found:
+        say(f"{mended} of {counted(len(found), 'finding')} mended\n")
+
+
+def _mended(mender: Mender, finding: Finding, others: Sequence[Finding], *, yes: bool) -> bool:
+    fix = finding.fixes[0]
+    if not mender.can(fix):
+        return False
+    why_not = mender.objection(finding, fix, [one for one in others if one is not finding])
+    if why_not is not None:
+        warn("doctor", f"not mended: {finding.about}: {finding.words}: {why_not}")
+        return False
+    if not ask(f"{finding.about}: {finding.words}\n{fix.words}\nmend it?", yes=yes):
+        return False
+    try:
+        say(f"{mender.mend(finding, fix)}\n")
+    except NotMended as error:
+        warn("doctor", f"not mended: {finding.about}: {error}")
+        return False
+    return True
 
 
 def _robot(gateway: Address | None, ending: ExitStack) -> Robot | None:

@@ -2,8 +2,11 @@
 
 import argparse
 from dataclasses import replace
+from typing import Final
 
+from gateway.cli.arguments import lines
 from gateway.cli.connect import UnknownName, connect, parser
+from gateway.cli.od_watch import watch
 from gateway.cli.set import Change, change_of, value_of
 from gateway.cli.text import exact, say, say_json, table
 from gateway.cli.writing import add_trial, write
@@ -21,7 +24,13 @@ examples:
   gwrms od left_knee 0x6060…             from there on
   gwrms od 2 'target position'           of node 2, by words of the name
   gwrms od left_knee 0x60* --read        with what the device holds now
-  gwrms od left_knee 0x6072:0 --set 500"""
+  gwrms od left_knee 0x6041 --watch      again each second, where it holds something else
+  gwrms od left_knee 0x6072:0 --set 500
+  gwrms od 5 0x1018 --interface can0 --eds drive.eds   read from the bus itself, where no gateway runs"""
+
+
+NODES: Final = range(1, 128)
+NO_NODE: Final = "with --interface DEVICE is a node id, 1 to 127"
 
 
 class NotOne(ClientError):
@@ -41,21 +50,62 @@ def main(argv: list[str]) -> int:
     )
     made.add_argument("--read", action="store_true", help="ask the device what it holds now")
     made.add_argument(
+        "--watch", action="store_true", help="a line whenever one holds something else, until Ctrl-C"
+    )
+    made.add_argument("--count", type=lines, metavar="N", help="end --watch after N lines")
+    made.add_argument(
         "--set", metavar="VALUE", type=_value, help="write the one object that SEARCH finds; 3deg, 420mm"
     )
     add_trial(made)
+    made.add_argument(
+        "--interface",
+        metavar="BUS",
+        help="can0, INTERFACE:CHANNEL of python-can, or a robot's file: read node DEVICE there, by --eds",
+    )
+    made.add_argument("--eds", metavar="FILE", help="the node's EDS or DCF, for --interface")
+    made.add_argument("--bitrate", type=int, help="bit/s, for interfaces that are opened with one")
     arguments = made.parse_args(argv)
-    if arguments.trial is not None and arguments.set is None:
-        made.error("--trial is for --set")
+    if wrong := _misused(arguments):
+        made.error(wrong)
+    if arguments.interface is not None:
+        return _show_directly(arguments)
     with connect(arguments, "od") as robot:
         description = robot.describe()
         component = _component(arguments.device, description)
         found = robot.objects(component, arguments.search)
         if not found.objects:
             raise UnknownName(f"{component} has no object that fits {arguments.search!r}")
+        if arguments.watch:
+            return watch(robot, found, arguments.count, as_json=arguments.json)
         if arguments.set is not None:
             return _set(robot, found, description, arguments)
         return _show(robot, found, arguments)
+
+
+def _misused(arguments: argparse.Namespace) -> str | None:
+    if arguments.trial is not None and arguments.set is None:
+        return "--trial is for --set"
+    if arguments.watch and (arguments.set is not None or arguments.interface is not None):
+        return "--watch is neither for --set nor for --interface"
+    if arguments.count is not None and not arguments.watch:
+        return "--count is for --watch"
+    if arguments.interface is None:
+        return "--eds and --bitrate are for --interface" if arguments.eds or arguments.bitrate else None
+    if arguments.set is not None:
+        return "--set goes through a gateway, which has limits and a journal; --interface only reads"
+    if arguments.eds is None:
+        return "--interface needs --eds FILE (gwrms scan --active tells which fits)"
+    return None if arguments.device.isdecimal() and int(arguments.device) in NODES else NO_NODE
+
+
+def _show_directly(arguments: argparse.Namespace) -> int:
+    from gateway.cli.od_direct import read_directly  # for who reads a bus only
+
+    node, search = int(arguments.device), arguments.search
+    objects, values = read_directly(arguments.interface, node, arguments.eds, search, arguments.bitrate)
+    if not objects:
+        raise UnknownName(f"{arguments.eds} has no object that fits {search!r}")
+    return _say(ObjectList(f"node {node}", objects), values, arguments, is_read=True)
 
 
 def _component(device: str, description: Description) -> str:
@@ -76,11 +126,17 @@ def _show(robot: Robot, found: ObjectList, arguments: argparse.Namespace) -> int
         addresses = [one.object for one in found.objects]
         for first in range(0, len(addresses), OBJECTS_READ):
             values |= robot.read_objects(found.component, *addresses[first : first + OBJECTS_READ]).values
+    return _say(found, values, arguments, is_read=arguments.read)
+
+
+def _say(
+    found: ObjectList, values: dict[str, ObjectValue], arguments: argparse.Namespace, *, is_read: bool
+) -> int:
     if arguments.json:
         told = {"component": found.component, "objects": found.objects, "left_off": found.left_off}
         say_json(told | {"values": values})
     else:
-        head = ("OBJECT", "NAME", "TYPE", "ACCESS", "RANGE", *(("HOLDS",) if arguments.read else ()), "")
+        head = ("OBJECT", "NAME", "TYPE", "ACCESS", "RANGE", *(("HOLDS",) if is_read else ()), "")
         say(table(head, [_row(one, values.get(one.object)) for one in found.objects]))
         if found.left_off:
             say(f"and {found.left_off} more: search for less, or from 0x…… on\n")

@@ -10,7 +10,7 @@ from gateway.cli.text import say, say_json, warn
 from gateway.client import Address, pairing
 from gateway.client.keys import keys_folder, server_file
 from gateway.private import forbid_core_dumps
-from gateway.wire.pairing import SCHEME, normal
+from gateway.wire.pairing import is_link, normal
 
 _DESCRIPTION = """\
 Pairs this desk with the robot on which `gwrms keys pair` shows a code. The code is asked for, so that it
@@ -80,7 +80,7 @@ def _typed(arguments: argparse.Namespace) -> tuple[Address, str]:
 
     """
     robot = arguments.robot or _asked("HOST:PORT, or the robot's link: ", arguments)
-    if arguments.code or robot.startswith(SCHEME):
+    if arguments.code or is_link(robot):
         return pairing.typed(robot, arguments.code)
     where = pairing.place(robot)
     while True:

@@ -6,7 +6,7 @@ import itertools
 import sys
 from collections.abc import Iterator, Sequence
 
-from gateway.cli.arguments import number
+from gateway.cli.arguments import lines, number
 from gateway.cli.connect import (
     absent_components,
     channel_names,
@@ -53,7 +53,7 @@ def main(argv: list[str]) -> int:
         "--csv", action="store_true", help="comma-separated, a column a channel; empty is missing"
     )
     add_degrees(made)
-    made.add_argument("--count", type=_count, metavar="N", help="end after N lines")
+    made.add_argument("--count", type=lines, metavar="N", help="end after N lines")
     arguments = made.parse_args(argv)
     with connect(arguments, "watch") as robot:
         description = robot.describe()
@@ -80,12 +80,6 @@ def _rate(text: str) -> float:
     if not 0.1 <= rate_hz <= 1000.0:
         raise argparse.ArgumentTypeError(f"{text!r} is not a rate from 0.1 to 1000 Hz")
     return rate_hz
-
-
-def _count(text: str) -> int:
-    if not (text.isascii() and text.isdigit() and int(text) > 0):
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number of lines")
-    return int(text)
 
 
 def _rows(

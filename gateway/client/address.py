@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 
 from gateway.client.errors import BadAddress
+from gateway.wire.pairing import has_code
 
 DEFAULT_HOST = "127.0.0.1"
 DEFAULT_PORT = 7420
@@ -32,6 +33,11 @@ class Address:
             BadAddress: the text is none of these; an empty one may be a variable that was not set.
 
         """
+        if has_code(text):
+            raise BadAddress(
+                "this has a pairing code in it, and no code is an address: write HOST:PORT here, and the "
+                "code where it is asked for (gwrms pair). A host that is called so: write its domain too"
+            )
         if "://" in text or any(map(str.isspace, text)):
             raise BadAddress(f"{text!r} is not a robot's address; write HOST:PORT, without more")
         if not text:

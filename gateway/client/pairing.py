@@ -27,10 +27,10 @@ from gateway.wire.pairing import (
     PAIRING_PORT,
     ROBOT,
     SAY_S,
-    SCHEME,
     VALID_S,
     Offer,
     Reply,
+    is_link,
     normal,
     of_link,
     proof,
@@ -57,7 +57,7 @@ def typed(where: str, code: str = "") -> tuple[Address, str]:
         ValueError: it is neither; it says which of the two is wrong.
 
     """
-    if where.strip().startswith(SCHEME):
+    if is_link(where):
         where, code = of_link(where)
     return place(where), normal(code)
 

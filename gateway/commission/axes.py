@@ -15,6 +15,7 @@ from gateway.commission.dialogue import Talk, press
 T = TypeVar("T")
 
 STATUSWORD, POSITION = 0x6041, 0x6064
+HALF = 1 << 31  # of what 6064h can count: beyond it goes on at the other end
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +53,11 @@ def counts(bench: Bench, axis: Axis) -> int | None:
     """Of its encoder, now; `None` where it has no position. Raises `DriverError`."""
     data = bench.read(axis.node, axis.index(POSITION))
     return None if data is None else int.from_bytes(data[:4], "little", signed=True)
+
+
+def nearest(counts: int, to: int) -> int:
+    """`counts` of a counter of 32 bits, unwrapped: of all that it can mean the one nearest to `to`."""
+    return to + (counts - to + HALF) % (2 * HALF) - HALF
 
 
 def number(bench: Bench, axis: Axis, index: int, subindex: int = 0) -> int | None:

@@ -1,19 +1,33 @@
-"""What commissioning reaches: a CAN bus whose drives are asked by SDO, one at a time, and never commanded."""
+"""What commissioning reaches: a CAN bus whose drives are asked by SDO, one at a time.
+
+They are commanded by a homing alone, for which one of them is put under power (`power.py`).
+"""
 
 import threading
 import time
+from contextlib import AbstractContextManager
 from typing import Protocol
+
+import msgspec
 
 from drivers.bus.bus import CanBus
 from drivers.bus.outlet import Requests
+from drivers.bus.pdo import read_tpdos
 from drivers.bus.sdo.channel import SdoChannel
 from drivers.bus.settings import SDO_REQUEST, SDO_RESPONSE, CanSettings
 from drivers.errors import DeviceAbort, Mismatch, Unavailable
+from drivers.joint.quantities import AXIS_OFFSET, quantities
+from drivers.joint.remap import free_tpdos, mappable, remap
+from drivers.joint.settings import JointSettings
 from drivers.scan.scan import Found, scan
+from eds import Description
+from gateway.commission.power import Power, opened
 
 LISTEN_S = 2.0
 OPEN_S = 5.0
 TIMEOUT_S = 0.5
+STORE, ALL, SAVE = 0x1010, 1, b"save"  # CiA 301 §7.5.2.13
+STORE_S = 10.0  # for the answer: flash takes its time
 
 
 class Bench(Protocol):
@@ -31,6 +45,17 @@ class Bench(Protocol):
         """Write and read back; raises `DriverError` where the device does not confirm it."""
         ...
 
+    def map(self, node: int, axis: int, description: Description) -> str:
+        """Bring what a joint's channels need into free TPDOs, and store it in the device (1010h).
+
+        Returns what was done, in words. Raises `DriverError` where the device does not take all of it.
+        """
+        ...
+
+    def power(self, joint: JointSettings, description: Description) -> AbstractContextManager[Power]:
+        """The axis as it may be put under power; entering raises `DriverError` where it must not be."""
+        ...
+
 
 class CanBench:
     """A real bus, open between `open` and `close`."""
@@ -39,9 +64,14 @@ class CanBench:
         self._settings = settings
         self._bus = CanBus(name, settings)
         self._channels: dict[int, SdoChannel] = {}
+        self._nodes: frozenset[int] = frozenset()  # that were heard, or answered
+        self._heard: frozenset[int] = frozenset()  # identifiers that are somebody's
 
     def nodes(self) -> Found:
-        return scan(self._settings, LISTEN_S, threading.Event().wait, active=True)
+        found = scan(self._settings, LISTEN_S, threading.Event().wait, active=True)
+        self._nodes = frozenset(found.nodes)
+        self._heard = frozenset(found.traffic.seen)
+        return found
 
     def read(self, node: int, index: int, subindex: int = 0) -> bytes | None:
         try:
@@ -63,6 +93,26 @@ class CanBench:
         if not self._bus.is_open:
             self._open()
         self._bus.send_urgent(SDO_REQUEST + node, data)
+
+    def map(self, node: int, axis: int, description: Description) -> str:
+        channel, offset = self.channel(node), axis * AXIS_OFFSET
+        free = list(free_tpdos(read_tpdos(channel, description), node, self._heard))
+        if not free:
+            raise Unavailable(f"node {node}: no TPDO is free")
+        wanted = (one for one in quantities(description, axis) if not one.fast)
+        done = remap(channel, description, free, offset, list(mappable(description, wanted)))
+        channel.download(STORE, ALL, SAVE, STORE_S)
+        return f"{done}; stored (1010h)"
+
+    def power(self, joint: JointSettings, description: Description) -> AbstractContextManager[Power]:
+        self.close()  # it is opened as its master
+        return opened(self._bus.name, self._as_master(), joint, description, threading.Event().wait)
+
+    def _as_master(self) -> CanSettings:
+        """With a node id of our own that nobody has, and no cycles."""
+        taken = {*self._nodes, self._settings.node_id}
+        ours = self._settings.node_id or next(node for node in range(127, 0, -1) if node not in taken)
+        return msgspec.structs.replace(self._settings, node_id=ours, sync_period_s=None, heartbeat_s=None)
 
     def close(self) -> None:
         for node, channel in self._channels.items():

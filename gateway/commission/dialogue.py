@@ -54,7 +54,14 @@ class Ask:
     live: Live | None = None  # for faces that can show it meanwhile; in the thread of `Face.ask` only
 
 
-Talk = Generator[Say | Ask | At, str, T]
+@dataclass(frozen=True, slots=True)
+class Moving:
+    """A joint is under power now: said again and again, and sent "" as long as nobody has pressed STOP."""
+
+    text: str
+
+
+Talk = Generator[Say | Ask | Moving | At, str, T]
 
 
 class Face(Protocol):
@@ -64,6 +71,13 @@ class Face(Protocol):
 
     def ask(self, question: Ask) -> str:
         """What was typed; raises `EOFError` where nothing more can be."""
+        ...
+
+    def moving(self, text: str) -> str:
+        """Show it, with STOP in reach, and look for some hundredths of a second whether it is pressed.
+
+        Returns why to stop, "" where there is no reason. Nothing that could be a STOP may be missed.
+        """
         ...
 
 
@@ -83,6 +97,8 @@ def run(talk: Talk[T], face: Face, at: Callable[[At], None] | None = None) -> T:
                     at(step)
             elif isinstance(step, Say):
                 face.say(step.text)
+            elif isinstance(step, Moving):
+                typed = face.moving(step.text)
             else:
                 typed = face.ask(step).strip() or (step.default or "")
     except StopIteration as end:

@@ -8,7 +8,7 @@ from functools import partial
 import eds
 from eds.profile import profile_of
 from gateway.commission import scale as scales
-from gateway.commission.axes import Axis, answered, counts, number, powered
+from gateway.commission.axes import HALF, Axis, answered, counts, nearest, number, powered
 from gateway.commission.bench import Bench
 from gateway.commission.dialogue import Say, Talk, choose, press, word
 from gateway.commission.dialogue import number as ask_number
@@ -22,6 +22,11 @@ LEAST_MOVE = 50  # counts
 STILL = 3  # tries for a position that is held still
 MARGIN = 3.0  # ° within the ends that were found by hand
 MOVED, SKIP = "moved", "skip"
+ENDS = "ends"  # among what was told of a joint: how far it goes by hand
+SET_ITS_ZERO = (
+    "without another zero in the drive this joint is not finished. Homing at the present position (below), "
+    "or its maker's tool, gives it one"
+)
 _NAME = re.compile("[a-z][a-z0-9_]*")
 
 
@@ -110,7 +115,7 @@ def which_drive(draft: Draft, bench: Bench, joint: str, axes: Sequence[Axis]) ->
 def _moved(before: Mapping[Axis, int | None], after: Mapping[Axis, int | None]) -> dict[Axis, int]:
     """How far each has counted that has a position."""
     return {
-        axis: abs(now - was)
+        axis: abs(nearest(now, was) - was)
         for axis, was in before.items()
         if was is not None and (now := after[axis]) is not None
     }
@@ -135,11 +140,14 @@ def meaning(draft: Draft, bench: Bench, joint: str, axis: Axis) -> Talk[Scale]:
     if not draft.has(table(joint), "zero_offset"):
         nominal = yield from answered(lambda: _nominal(bench, axis))
         while True:
-            first = yield from _held(bench, joint, axis, "one known angle, such as straight, 0°")
-            second = yield from _held(bench, joint, axis, "another known angle, 30° or more away")
+            first = yield from held(bench, joint, axis, "one known angle, such as straight, 0°")
+            second = yield from held(
+                bench, joint, axis, "another known angle, 30° or more away", first.counts
+            )
             problem = scales.problem(first, second)
             if problem is None and (found := (yield from _settled(first, second, nominal))) is not None:
                 _keep(draft, joint, found, first, second)
+                yield from _fits(found, second)
                 break
             if problem is not None:
                 yield Say(f"That cannot be: {problem}.")
@@ -162,7 +170,8 @@ def _ratio(bench: Bench, axis: Axis, index: int) -> float | None:
     return above / below if above and below and above != below else None
 
 
-def _held(bench: Bench, joint: str, axis: Axis, where: str) -> Talk[Held]:
+def held(bench: Bench, joint: str, axis: Axis, where: str, near: int | None = None) -> Talk[Held]:
+    """Its counts unwrapped: each near the one before, the first near `near`."""
     while True:
         yield from unpowered(bench, [axis])
         degrees = yield from ask_number(
@@ -176,6 +185,7 @@ def _held(bench: Bench, joint: str, axis: Axis, where: str) -> Talk[Held]:
         if not (yield from stayed_off(bench, [axis])):
             continue
         found = [one for one in seen if one is not None]
+        found = [nearest(one, found[0] if near is None else near) for one in found]
         if len(found) == len(seen) and max(found) - min(found) <= LEAST_MOVE:
             return Held(math.radians(degrees), round(sum(found) / len(found)))
         yield Say("It moved while it was read, or has no position: once more.")
@@ -211,6 +221,15 @@ def _settled(first: Held, second: Held, nominal: Nominal) -> Talk[Scale | None]:
     return scales.scale(first, second, counts_per_revolution, ratio)
 
 
+def _fits(found: Scale, second: Held) -> Talk[None]:
+    """The gateway takes counts as they come: of an encoder whose counter wraps near here the angle jumps."""
+    if not -HALF <= second.counts < HALF:
+        yield Say(f"Its counter wraps around within the joint's way: {SET_ITS_ZERO}.")
+    elif not scales.near(found):
+        turns = abs(found.zero_offset) / math.tau
+        yield Say(f"It counts from a zero that is {turns:.0f} turns of the joint away: {SET_ITS_ZERO}.")
+
+
 def _keep(draft: Draft, joint: str, found: Scale, first: Held, second: Held) -> None:
     one = table(joint)
     angles = f"{math.degrees(first.angle):g}° and {math.degrees(second.angle):g}°"
@@ -235,7 +254,8 @@ def limits(draft: Draft, bench: Bench, joint: str, axis: Axis, scale: Scale) -> 
     )
     straight = yield from _end(bench, joint, axis, "as straight as it goes", scale)
     bent = yield from _end(bench, joint, axis, "as bent as it goes", scale)
-    ends = [scales.angle(scale, here) for here in (straight, bent)]
+    ends = [_angle(scale, here) for here in (straight, bent)]
+    draft.put(f"told.{joint}", ENDS, [min(ends), max(ends)], "rad; by hand")
     low, high = min(ends) + math.radians(margin), max(ends) - math.radians(margin)
     if low >= high:
         yield Say(f"Between these ends nothing is left: {words(joint)} has no limits in the file.")
@@ -245,12 +265,16 @@ def limits(draft: Draft, bench: Bench, joint: str, axis: Axis, scale: Scale) -> 
     draft.put(rule, "max", round(high, 4))
 
 
+def _angle(scale: Scale, here: int) -> float:
+    return scales.angle(scale, nearest(here, scales.counts_at_zero(scale)))
+
+
 def _end(bench: Bench, joint: str, axis: Axis, end: str, scale: Scale) -> Talk[int]:
     while True:
         yield from unpowered(bench, [axis])
         yield from press(
             f"Bring the {words(joint)} by hand {end}, and keep it there.",
-            partial(watched, bench, [axis], angle=lambda here: scales.angle(scale, here)),
+            partial(watched, bench, [axis], angle=partial(_angle, scale)),
         )
         here = yield from answered(lambda: counts(bench, axis))
         if not (yield from stayed_off(bench, [axis])):

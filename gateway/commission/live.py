@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 
 from drivers.joint.cia402 import ENERGISED, DriveState
-from gateway.commission.axes import Axis, counts, state
+from gateway.commission.axes import Axis, counts, nearest, state
 from gateway.commission.bench import Bench
 from gateway.commission.dialogue import Reading
 
@@ -36,7 +36,7 @@ def _axis(
         found.append(Reading(name, here, "counts"))
     else:
         was = before.get(axis)
-        moved = None if here is None or was is None else here - was
+        moved = None if here is None or was is None else nearest(here, was) - was
         found.append(Reading(name, moved, "counts moved"))
     return [*found, Reading(name, _power(bench, axis))]
 

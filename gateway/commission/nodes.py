@@ -157,7 +157,7 @@ def heartbeat(draft: Draft, bench: Bench, node: int) -> Talk[None]:
     draft.put(table(node), "heartbeat", HEARTBEAT_MS if yes else 0, how)
 
 
-def mapping(draft: Draft, axis: Axis, told: Told, joint: str) -> Talk[None]:
+def mapping(draft: Draft, bench: Bench, axis: Axis, told: Told, joint: str) -> Talk[None]:
     """Whether its position comes in a PDO; else whether the gateway may map it."""
     key = f"joint.{joint}"
     if draft.has(key, "configure_pdos"):
@@ -176,6 +176,26 @@ def mapping(draft: Draft, axis: Axis, told: Told, joint: str) -> Talk[None]:
         return
     yes = yield from agree(
         f"No PDO brings the position of {axis}: it would be asked for by SDO, 20 times a second. May the "
-        "gateway map it into a disabled PDO whenever it starts?"
+        "gateway map what it reads into disabled PDOs whenever it starts?"
     )
-    draft.put(key, "configure_pdos", yes, "no PDO brought the position; chosen")
+    stored = yes and (yield from _stored(draft, bench, axis))
+    how = "mapped and stored in the drive (1010h)" if stored else "no PDO brought the position; chosen"
+    draft.put(key, "configure_pdos", yes and not stored, how)
+
+
+def _stored(draft: Draft, bench: Bench, axis: Axis) -> Talk[bool]:
+    """Whether the drive holds the mapping by itself from now on."""
+    yes = yield from agree(
+        "Write it into the drive now instead, and store it there (1010h, with all its present settings)? "
+        "Then it holds without the gateway, and after its power was off."
+    )
+    if not yes:
+        return False
+    description = eds.load(eds.locate(draft.value(table(axis.node), "eds"), draft.file), axis.node)
+    try:
+        done = bench.map(axis.node, axis.number, description)
+    except DriverError as error:
+        yield Say(f"It was not taken, or not stored, and the gateway maps it when it starts: {error}")
+        return False
+    yield Say(f"{axis}: {done}.")
+    return True

@@ -50,6 +50,7 @@ FIRST: Mapping[str, tuple[str, Has | None]] = {
     "name": ("its name", lambda draft, _: draft.has("robot", "name")),
     "bus": ("what is on the bus", None),
     "role": ("who leads the bus", lambda draft, _: draft.has("gateway", "role")),
+    "controller": ("who commands the drives", None),
     "joints": ("its joints", lambda draft, _: draft.has("robot", "joints")),
 }
 JOINT: Mapping[str, tuple[str, Has | None]] = {
@@ -60,6 +61,7 @@ JOINT: Mapping[str, tuple[str, Has | None]] = {
     "scale": ("what counts mean", _key("zero_offset")),
     "limits": ("limits", lambda draft, joint: draft.has(f"guard.rule.{joint}_range", "max")),
     "ratings": ("ratings", _rated),
+    "homing": ("homing", lambda draft, joint: draft.has(f"told.{joint}", "homing")),
 }
 LAST: Mapping[str, tuple[str, Has | None]] = {
     "sensors": ("feet and trunk", _sensors),

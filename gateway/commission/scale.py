@@ -1,7 +1,7 @@
 """From two positions with known angles to what counts mean: direction, gear ratio and zero of a joint."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 AGREES = 0.05  # a share by which hand and eye may be off
 LEAST_RAD = math.radians(10.0)  # between the two positions
@@ -73,6 +73,22 @@ def gear(measured: float, counts_per_revolution: float) -> float:
     ratio = abs(measured) / counts_per_revolution
     whole = round(ratio)
     return float(whole) if whole and abs(ratio / whole - 1) <= WHOLE else round(ratio, 3)
+
+
+def near(scale: Scale) -> bool:
+    """Whether the drive's zero is within a turn of the joint's, as the robot's file wants it."""
+    return abs(scale.zero_offset) <= math.tau
+
+
+def counts_at_zero(scale: Scale) -> int:
+    """What its encoder counts where the joint's angle is 0."""
+    per_count = scale.direction * math.tau / (scale.counts_per_revolution * scale.gear_ratio)
+    return round(-scale.zero_offset / per_count)
+
+
+def with_zero(scale: Scale, angle_there: float, counts: int) -> Scale:
+    """The scale by which these counts are this angle (rad)."""
+    return replace(scale, zero_offset=angle_there - angle(replace(scale, zero_offset=0.0), counts))
 
 
 def angle(scale: Scale, counts: int) -> float:

@@ -10,15 +10,18 @@ from drivers.scan.products import Library
 from gateway.commission import joints, nodes
 from gateway.commission.axes import Axis, axes_of
 from gateway.commission.bench import Bench
+from gateway.commission.controller import controller
 from gateway.commission.dialogue import At, Say, Talk, word
 from gateway.commission.draft import Draft
+from gateway.commission.homing import homing
 from gateway.commission.progress import END, ROBOT
 from gateway.commission.sensors import SerialBench, sensors
 from gateway.config.robot import NAME
 
 BEGIN = (
-    "Nothing is moved, enabled or stopped here: the joints are moved by hand, without power. What is written "
-    "to a drive is asked for first. Ctrl-C interrupts; the same command goes on from there."
+    "The joints are moved by hand, without power. What is written to a drive is asked for first. Nothing is "
+    "enabled here but by homing, where you want it and type its phrase. Ctrl-C interrupts; the same command "
+    "goes on from there."
 )
 
 
@@ -37,6 +40,8 @@ def commission(
     yield from nodes.role(draft, found)
     left = list(axes := axes_of(told))
     yield from nodes.same_devices(draft, {axis.node: told[axis.node] for axis in axes})
+    yield At(ROBOT, "controller")
+    yield from controller(draft, library, told)
     yield At(ROBOT, "joints")
     for joint in (yield from joints.names(draft, axes)):
         yield At(joint, "drive")
@@ -59,13 +64,15 @@ def _joint(draft: Draft, bench: Bench, library: Library, joint: str, axis: Axis,
     yield At(joint, "heartbeat")
     yield from nodes.heartbeat(draft, bench, axis.node)
     yield At(joint, "pdo")
-    yield from nodes.mapping(draft, axis, told, joint)
+    yield from nodes.mapping(draft, bench, axis, told, joint)
     yield At(joint, "scale")
     scale = yield from joints.meaning(draft, bench, joint, axis)
     yield At(joint, "limits")
     yield from joints.limits(draft, bench, joint, axis, scale)
     yield At(joint, "ratings")
     yield from joints.ratings(draft, bench, joint, axis, scale.gear_ratio)
+    yield At(joint, "homing")
+    yield from homing(draft, bench, joint, axis, scale)
 
 
 def _name_problem(text: str) -> str | None:

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from gateway.commission.controller import CONTROLLER
 from gateway.commission.draft import Draft, Found
 
 HEAD = """\
@@ -37,7 +38,7 @@ class Written:
         if not self.usable:
             return f"{self.file} is written and cannot be used yet:\n{said}"
         if self.not_journaled:
-            said += f"  It is not in the journal: {self.not_journaled}\n"
+            said += f"  {self.not_journaled}\n"
         if self.unfinished:
             said += f"  {', '.join(self.unfinished)} {NOT_FINISHED}\n"
         return f"{self.file} is written.\n{said}Next: gwrms gateway {self.file}"
@@ -72,7 +73,19 @@ def _tables(draft: Draft) -> Iterator[str]:
     for table in sorted(draft.tables):
         if table.startswith(("insole.", "imu.")):
             yield from _table(table, draft.tables[table])
+    yield from _controller(draft)
     yield from _guard(draft)
+
+
+def _controller(draft: Draft) -> Iterator[str]:
+    """Who commands the drives, and what stops it."""
+    if draft.value(CONTROLLER, "value") is not None:
+        node = draft.value(CONTROLLER, "node_id")
+        device = {"bus": Found("main"), "node_id": Found(node), "eds": draft.tables[f"node.{node}"]["eds"]}
+        stop = {key: draft.tables[CONTROLLER][key] for key in ("object", "value")}
+        yield from _table(CONTROLLER, device)
+        yield "[[stop.controller]]"
+        yield from list(_table("", {"component": Found(CONTROLLER.partition(".")[2]), **stop}))[1:]
 
 
 def _joint(draft: Draft, joint: str, node: int) -> Mapping[str, Found]:
@@ -98,17 +111,18 @@ def _guard(draft: Draft) -> Iterator[str]:
 def _table(name: str, keys: Mapping[str, Found]) -> Iterator[str]:
     yield f"[{name}]"
     for key, found in keys.items():
-        yield f"# {_plain(found.how)}" if key == "#" else _line(key, found)
+        yield f"# {_plain(found.how)}" if key == "#" else line(key, found)
     yield ""
 
 
-def _line(key: str, found: Found) -> str:
-    line = f"{key} = {_value(found.value)}"
+def line(key: str, found: Found) -> str:
+    """A value with its comment, beside it or above."""
+    value = f"{key} = {_value(found.value)}"
     if not found.how:
-        return line
+        return value
     comment = f"# {_plain(found.how)}"
-    beside = f"{line:<{WIDTH - 1}} {comment}"
-    return beside if len(line) < WIDTH and len(beside) <= LONGEST else f"{comment}\n{line}"
+    beside = f"{value:<{WIDTH - 1}} {comment}"
+    return beside if len(value) < WIDTH and len(beside) <= LONGEST else f"{comment}\n{value}"
 
 
 def _plain(text: str) -> str:

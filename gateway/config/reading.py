@@ -1,5 +1,7 @@
 """TOML to the robot's structs, validated once; every error names file, table, key and remedy."""
 
+import hashlib
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -119,7 +121,7 @@ class _Reading:
         parts |= {table: self._named(table, kind, document.get(table, {})) for table, kind in NAMED.items()}
         if "guard" in document:
             parts["guard"] = self._guard(document["guard"])
-        return RobotConfig(path=path, lost=self._lost, **parts)
+        return RobotConfig(path=path, lost=self._lost, digest=_digest(document), **parts)
 
     def _named(self, table: str, kind: type[Struct], entries: Any) -> dict[str, Struct]:
         there = (
@@ -175,6 +177,11 @@ class _Reading:
             self._decoding.complain(where, "watch", unknown(watch, WATCHES) if watch else missing)
             return None
         return self._decoding.struct(where, table, WATCHES[watch].rule)
+
+
+def _digest(document: Table) -> str:
+    said = json.dumps(document, sort_keys=True, default=str)
+    return hashlib.sha256(said.encode("utf-8", "surrogatepass")).hexdigest()
 
 
 def _is_table(entry: Any) -> bool:

@@ -137,6 +137,7 @@ class RobotConfig(Struct, frozen=True, kw_only=True):
     control_loop: ControlLoopSettings | None = None
     # By table, the names of those that could not be read: others may speak of them while the file is checked.
     lost: Mapping[str, frozenset[str]] = {}
+    digest: str = ""  # of all that the file says, whatever its comments and order
 
     def names(self, *tables: str) -> list[str]:
         """Of the tables of these kinds, also those that could not be read."""

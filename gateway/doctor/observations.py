@@ -101,6 +101,8 @@ class Observations:
     proposals: Mapping[str, str] = field(default_factory=dict)  # component → EDS file for what it says it is
     why_no_objects: str = "devices are asked only through a gateway, or with --active"
     bus_obstacles: Mapping[str, str] = field(default_factory=dict)  # bus → why it cannot be opened as it is
+    units: Mapping[str, tuple[float, str]] = field(default_factory=dict)  # parameter's address → scale, unit
+    other_file: str | None = None  # why the gateway judges by another file than this
 
     def heard_on(self, bus: str) -> Mapping[int, Heard] | None:
         """By identifier, what came on a bus; `None` where it was not listened to, or nobody was heard."""

@@ -1,11 +1,11 @@
 """Every finding of the doctor: its name, what it looks at, what it means, and who judges it."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from gateway.doctor.observations import Observations
 from gateway.doctor.rules import components, computer, drive, motion, node, trunk, wire
-from gateway.doctor.verdicts import Verdict
+from gateway.doctor.verdicts import Fix, Unknown, Verdict, Write
 
 Judge = Callable[[Observations], Iterator[Verdict]]
 
@@ -83,5 +83,15 @@ RULES: tuple[Rule, ...] = (
 
 
 def judged(seen: Observations) -> Iterator[Verdict]:
-    """What every rule says, in the table's order."""
-    yield from components.unexplained(seen, (verdict for rule in RULES for verdict in rule.judge(seen)))
+    """What every rule says, in the table's order; values to be written are in their parameters' units."""
+    every = components.unexplained(seen, (verdict for rule in RULES for verdict in rule.judge(seen)))
+    for one in every:
+        yield one if isinstance(one, Unknown) else replace(one, fixes=_in_units(seen, one.fixes))
+
+
+def _in_units(seen: Observations, fixes: tuple[Fix, ...]) -> tuple[Fix, ...]:
+    found = []
+    for fix in fixes:
+        scale, unit = seen.units.get(fix.address, (1.0, "")) if isinstance(fix, Write) else (1.0, "")
+        found.append(replace(fix, scale=scale, unit=unit) if isinstance(fix, Write) else fix)
+    return tuple(found)

@@ -37,6 +37,7 @@ class Together:
 
 # Written by the doctor itself: what watches a drive or limits it, and never what moves it or paces the bus.
 SAFE = frozenset({0x1017, 0x6007, 0x605A, 0x6065, 0x6073})
+BOUNDS = frozenset({0x6065, 0x6073})  # a wider one is for people to say
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,11 +49,14 @@ class Write:
     subindex: int
     value: int
     was: int | None = None
+    scale: float = 1.0  # of the parameter that it is in the robot's file, in `unit`
+    unit: str = ""
 
     @property
     def is_safe(self) -> bool:
-        """Whether it moves nothing."""
-        return (self.index if self.index < 0x6000 else self.index % 0x800 + 0x6000) in SAFE
+        """Whether it moves nothing, and allows no more than before."""
+        index = self.index if self.index < 0x6000 else self.index % 0x800 + 0x6000
+        return index in SAFE and not (index in BOUNDS and (self.was is None or self.value > self.was))
 
     @property
     def address(self) -> str:
@@ -60,8 +64,12 @@ class Write:
 
     @property
     def words(self) -> str:
-        before = "" if self.was is None else f"   # was {self.was}"
-        return f"SDO: gwrms set {self.address}={self.value}{before}"
+        before = "" if self.was is None else f"   # was {self._shown(self.was)}"
+        counts = "" if self.scale == 1 else f"   ({self.value} of the device's own)"
+        return f"SDO: gwrms set {self.address}={self._shown(self.value)}{self.unit}{before}{counts}"
+
+    def _shown(self, value: int) -> str:
+        return str(value) if self.scale == 1 else f"{value * self.scale:.12g}"
 
 
 @dataclass(frozen=True, slots=True)

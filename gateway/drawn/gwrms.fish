@@ -50,8 +50,8 @@ function _shtab_gwrms_using
   test "$_shtab_gwrms_cmdpath" = "$argv"
 end
 
-set -g _shtab_gwrms_commands gateway install-service keys 'keys pair' 'keys list' 'keys push' 'keys add' 'keys revoke' pair check doctor describe snapshot cost bench blame watch top plot get set params 'params save' 'params compare' 'params apply' od store restore journal 'journal tail' 'journal verify' stop reset enable completion docs eds scan lss trace commission sensor 'sensor record' 'sensor replay' 'sensor decode' calibrate 'calibrate insole' 'calibrate imu' collect sessions 'sessions ls' 'sessions show' 'sessions gait' 'sessions resources' 'sessions compare' 'sessions export' label train cloud 'cloud ls' 'cloud du' 'cloud verify' 'cloud mend' 'cloud upload' 'cloud download' 'cloud compact' 'cloud retain' 'cloud vacuum' 'cloud forget' 'cloud witnesses' query models 'models ls' 'models show' 'models promote' 'models rollback' 'models history' 'models export' predict gui evaluate demo sim 'sim run' sim-record sim-fault
-set -g _shtab_gwrms_opts_with_value --activity --adapt-from --author --axes --baud --benchmark --bitrate --bus --certificate --channels --clear --cluster --component --computer --config --consent --controller --count --data --days --dir --drive --eds --falling --falls --file --foot --for --format --from --grace --hand --held-out --host --imu --include --insole --instead-of --junit --key --kind --layout --lean --limit --link --look --mark --minutes --mistake --model --mount --mounting --name --new-bitrate --node --node-id --notes --object --on --onnx --operator --out --path --picture --port --pseudo-labels --rate --reason --remote --report --requests --robot --role --run-as --saturation --scale --scenario --schema --script --seconds --seed --serial --session --set --sort --speed --stamp --subject --subjects --table --task --timeout --to --trial --truth --unconfigured --url --wearer --who --why --without --witness --write -n
+set -g _shtab_gwrms_commands gateway install-service keys 'keys pair' 'keys list' 'keys push' 'keys add' 'keys revoke' pair check doctor describe snapshot cost bench blame watch top plot get set params 'params save' 'params compare' 'params apply' od store restore journal 'journal tail' 'journal verify' stop reset enable completion docs eds scan lss trace commission sensor 'sensor record' 'sensor replay' 'sensor decode' calibrate 'calibrate insole' 'calibrate imu' 'calibrate joint' collect sessions 'sessions ls' 'sessions show' 'sessions gait' 'sessions resources' 'sessions compare' 'sessions export' label train cloud 'cloud ls' 'cloud du' 'cloud verify' 'cloud mend' 'cloud upload' 'cloud download' 'cloud compact' 'cloud retain' 'cloud vacuum' 'cloud forget' 'cloud witnesses' query models 'models ls' 'models show' 'models promote' 'models rollback' 'models history' 'models export' predict gui evaluate demo sim 'sim run' sim-record sim-fault
+set -g _shtab_gwrms_opts_with_value --activity --adapt-from --angle --author --axes --baud --benchmark --bitrate --bus --certificate --channels --clear --cluster --component --computer --config --consent --controller --count --data --days --dir --drive --eds --falling --falls --file --foot --for --format --from --grace --hand --held-out --host --imu --include --insole --instead-of --interface --junit --key --kind --layout --lean --limit --link --look --mark --max-change --minutes --mistake --model --mount --mounting --name --new-bitrate --node --node-id --notes --object --on --onnx --operator --out --path --picture --port --pseudo-labels --rate --reason --remote --report --requests --robot --role --run-as --saturation --scale --scenario --schema --script --seconds --seed --serial --session --set --sort --speed --stamp --subject --subjects --table --task --timeout --to --trial --truth --unconfigured --url --wearer --who --why --without --witness --write -n
 
 complete -c gwrms -e
 complete -c gwrms -f
@@ -209,8 +209,13 @@ complete -c gwrms -n '_shtab_gwrms_using od' -s h -l help -d 'show this help mes
 complete -c gwrms -n '_shtab_gwrms_using od' -l robot -x -d 'the gateway to ask (default 127.0.0.1:7420)'
 complete -c gwrms -n '_shtab_gwrms_using od' -l json -d 'one JSON object a line, for machines'
 complete -c gwrms -n '_shtab_gwrms_using od' -l read -d 'ask the device what it holds now'
+complete -c gwrms -n '_shtab_gwrms_using od' -l watch -d 'a line whenever one holds something else, until Ctrl-C'
+complete -c gwrms -n '_shtab_gwrms_using od' -l count -x -d 'end --watch after N lines'
 complete -c gwrms -n '_shtab_gwrms_using od' -l set -x -d 'write the one object that SEARCH finds; 3deg, 420mm'
 complete -c gwrms -n '_shtab_gwrms_using od' -l trial -x -d 'try it for S seconds (at most 300); exit status 0 if kept'
+complete -c gwrms -n '_shtab_gwrms_using od' -l interface -x -d 'can0, INTERFACE:CHANNEL of python-can, or a robot'"'"'s file: read node DEVICE there, by --eds'
+complete -c gwrms -n '_shtab_gwrms_using od' -l eds -x -d 'the node'"'"'s EDS or DCF, for --interface'
+complete -c gwrms -n '_shtab_gwrms_using od' -l bitrate -x -d 'bit/s, for interfaces that are opened with one'
 complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a store -d 'Make a device keep its parameters as they are now (1010h).'
 complete -c gwrms -n '_shtab_gwrms_using store' -s h -l help -d 'show this help message and exit'
 complete -c gwrms -n '_shtab_gwrms_using store' -l robot -x -d 'the gateway to ask (default 127.0.0.1:7420)'
@@ -269,6 +274,7 @@ complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a 
 complete -c gwrms -n '_shtab_gwrms_using lss' -s h -l help -d 'show this help message and exit'
 complete -c gwrms -n '_shtab_gwrms_using lss' -l node-id -x -d 'set: the node id that it is to have'
 complete -c gwrms -n '_shtab_gwrms_using lss' -l new-bitrate -xka "1000000 800000 500000 250000 125000 50000 20000 10000" -d 'set: the bit rate that it stores'
+complete -c gwrms -n '_shtab_gwrms_using lss' -l activate -d 'set: let the bit rate count at once, and look for the device'
 complete -c gwrms -n '_shtab_gwrms_using lss' -l no-store -d 'set: a node id until it is switched off'
 complete -c gwrms -n '_shtab_gwrms_using lss' -l bitrate -x -d 'bit/s of the bus now, for interfaces opened with one'
 complete -c gwrms -n '_shtab_gwrms_using lss' -l seconds -x -d 'how long to listen first (default 3)'
@@ -277,10 +283,10 @@ complete -c gwrms -n '_shtab_gwrms_using lss' -l anyway -d 'although something i
 complete -c gwrms -n '_shtab_gwrms_using lss' -l yes -d 'do not ask'
 complete -c gwrms -n '_shtab_gwrms_using lss' -l json -d 'one JSON line, for machines'
 complete -c gwrms -n '_shtab_gwrms_using lss; and test $_shtab_gwrms_npos -eq 0' -ka "find inquire set" -d 'what to do'
-complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a trace -d 'Shows the frames of a CAN bus or of a recording, decoded by EDS. Only listens.'
+complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a trace -d 'Shows the frames of CAN buses or of recordings, decoded by EDS. Only listens.'
 complete -c gwrms -n '_shtab_gwrms_using trace' -s h -l help -d 'show this help message and exit'
 complete -c gwrms -n '_shtab_gwrms_using trace' -l robot -xka "(__fish_complete_path (commandline -ct))" -d 'robot'"'"'s file that names nodes and EDS files'
-complete -c gwrms -n '_shtab_gwrms_using trace' -l eds -x -d 'EDS or DCF of a node (again for others)'
+complete -c gwrms -n '_shtab_gwrms_using trace' -l eds -x -d 'EDS or DCF of a node (again for others); can1/5=FILE: on that interface alone'
 complete -c gwrms -n '_shtab_gwrms_using trace' -l node -x -d 'only this one, by id or name (or again)'
 complete -c gwrms -n '_shtab_gwrms_using trace' -l kind -x -d 'only these: nmt, sync, time, emcy, pdo, sdo, heartbeat, lss, error, other'
 complete -c gwrms -n '_shtab_gwrms_using trace' -l object -x -d 'only 0x6041, 0x1018:4 or '"'"'*position*'"'"''
@@ -322,7 +328,7 @@ complete -c gwrms -n '_shtab_gwrms_using sensor; and test $_shtab_gwrms_npos -eq
 complete -c gwrms -n '_shtab_gwrms_using sensor decode' -s h -l help -d 'show this help message and exit'
 complete -c gwrms -n '_shtab_gwrms_using sensor decode' -l format -xka "bno08x-rvc microstrain vectornav witmotion xsens witmotion-can brilliant-star insole-cobs insole-csv insole-frame" -d 'the language of the bytes'
 complete -c gwrms -n '_shtab_gwrms_using sensor decode' -l layout -x -d 'an insole'"'"'s layout file, or one that ships: insole-3, insole-8, insole-16, insole-18, insole-35'
-complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a calibrate -d 'an insole'"'"'s pressure, an IMU'"'"'s zero'
+complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a calibrate -d 'an insole'"'"'s pressure, an IMU'"'"'s or a joint'"'"'s zero'
 complete -c gwrms -n '_shtab_gwrms_using calibrate' -s h -l help -d 'show this help message and exit'
 complete -c gwrms -n '_shtab_gwrms_using calibrate; and test $_shtab_gwrms_npos -eq 0' -a insole -d 'Measures the unloaded cells, then known loads on the whole insole; fits, shows the fit, and asks before it writes. Name the file in [insole.NAME] as `calibration`. ROBOT.toml:NAME instead of a port takes everything from [insole.NAME]. A device that sends pressure needs no calibration.'
 complete -c gwrms -n '_shtab_gwrms_using calibrate insole' -s h -l help -d 'show this help message and exit'
@@ -341,6 +347,11 @@ complete -c gwrms -n '_shtab_gwrms_using calibrate imu' -l format -xka "bno08x-r
 complete -c gwrms -n '_shtab_gwrms_using calibrate imu' -l baud -x -d 'default: 115200'
 complete -c gwrms -n '_shtab_gwrms_using calibrate imu' -l axes -x -d 'as in [imu.NAME], such as '"'"'y -x z'"'"'; in quotes'
 complete -c gwrms -n '_shtab_gwrms_using calibrate imu' -l mounting -x -d 'as in [imu.NAME], rad'
+complete -c gwrms -n '_shtab_gwrms_using calibrate; and test $_shtab_gwrms_npos -eq 0' -a joint -d 'Finds a joint'"'"'s zero again: hold it, without power, as the comment of its zero_offset says, or at --angle. Old and new are shown, and written into the robot'"'"'s file on your word, with a comment and an entry of the journal. Nothing is moved. End this robot'"'"'s gateway first.'
+complete -c gwrms -n '_shtab_gwrms_using calibrate joint' -s h -l help -d 'show this help message and exit'
+complete -c gwrms -n '_shtab_gwrms_using calibrate joint' -l angle -x -d 'at which it is held (flexion positive)'
+complete -c gwrms -n '_shtab_gwrms_using calibrate joint' -l max-change -x -d 'a larger change is refused (default: 10)'
+complete -c gwrms -n '_shtab_gwrms_using calibrate joint' -l who -x -d 'who does it, for the record (default: your user name)'
 complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a collect -d 'Record every robot, whole, into the store; and ask how that goes.'
 complete -c gwrms -n '_shtab_gwrms_using collect' -s h -l help -d 'show this help message and exit'
 complete -c gwrms -n '_shtab_gwrms_using collect' -l config -xka "(__fish_complete_path (commandline -ct))" -d 'the server'"'"'s file'

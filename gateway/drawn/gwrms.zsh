@@ -12,7 +12,7 @@ _shtab_gwrms_commands() {
   local _commands=(
     bench:'Measure a robot'"'"'s gateway: latency, CPU and memory of what it does.'
     blame:'Watch the robot'"'"'s control loop, and name what made it late.'
-    calibrate:'an insole'"'"'s pressure, an IMU'"'"'s zero'
+    calibrate:'an insole'"'"'s pressure, an IMU'"'"'s or a joint'"'"'s zero'
     check:'Checks a robot'"'"'s file, a server'"'"'s file or a scenario as a gateway, a collector or `gwrms sim run` would read'
     cloud:'the store: browse, upload, download, verify, tidy'
     collect:'Record every robot, whole, into the store; and ask how that goes.'
@@ -54,7 +54,7 @@ _shtab_gwrms_commands() {
     stop:'Quick stop on every drive, held until gwrms reset. Needs no lease.'
     store:'Make a device keep its parameters as they are now (1010h).'
     top:'One robot in the terminal, live: its joints, feet, trunk, parameters and computer.'
-    trace:'Shows the frames of a CAN bus or of a recording, decoded by EDS. Only listens.'
+    trace:'Shows the frames of CAN buses or of recordings, decoded by EDS. Only listens.'
     train:'A model from recorded sessions and their labels.'
     watch:'Follow channels live, one line for every tick.'
   )
@@ -65,6 +65,7 @@ _shtab_gwrms_calibrate_commands() {
   local _commands=(
     imu:'Takes the present posture as upright and writes it. Stand upright and still; name the file in [imu.NAME] as `zero`. ROBOT.toml:NAME instead of a port takes everything from [imu.NAME], also for an IMU on a CAN bus.'
     insole:'Measures the unloaded cells, then known loads on the whole insole; fits, shows the fit, and asks before it writes. Name the file in [insole.NAME] as `calibration`. ROBOT.toml:NAME instead of a port takes everything from [insole.NAME]. A device that sends pressure needs no calibration.'
+    joint:'Finds a joint'"'"'s zero again: hold it, without power, as the comment of its zero_offset says, or at --angle. Old and new are shown, and written into the robot'"'"'s file on your word, with a comment and an entry of the journal. Nothing is moved. End this robot'"'"'s gateway first.'
   )
   _describe 'gwrms calibrate commands' _commands
 }
@@ -216,6 +217,17 @@ _shtab_gwrms_calibrate_insole_options=(
 
 # guard to ensure default positional specs are added only once per session
 _shtab_gwrms_calibrate_insole_defaults_added=0
+
+_shtab_gwrms_calibrate_joint_options=(
+  "(- : *)"{-h,--help}"[show this help message and exit]"
+  "--angle[at which it is held (flexion positive)]:DEGREES:"
+  "--max-change[a larger change is refused (default\: 10)]:DEGREES:"
+  "--who[who does it, for the record (default\: your user name)]:who:"
+  ":the joint of a robot\'s file:"
+)
+
+# guard to ensure default positional specs are added only once per session
+_shtab_gwrms_calibrate_joint_defaults_added=0
 
 _shtab_gwrms_check_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
@@ -672,6 +684,7 @@ _shtab_gwrms_lss_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--node-id[set\: the node id that it is to have]:N:"
   "--new-bitrate[set\: the bit rate that it stores]:N:(1000000 800000 500000 250000 125000 50000 20000 10000)"
+  "--activate[set\: let the bit rate count at once, and look for the device]"
   "--no-store[set\: a node id until it is switched off]"
   "--bitrate[bit\/s of the bus now, for interfaces opened with one]:bitrate:"
   "--seconds[how long to listen first (default 3)]:seconds:"
@@ -774,8 +787,13 @@ _shtab_gwrms_od_options=(
   "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
   "--json[one JSON object a line, for machines]"
   "--read[ask the device what it holds now]"
+  "--watch[a line whenever one holds something else, until Ctrl-C]"
+  "--count[end --watch after N lines]:N:"
   "--set[write the one object that SEARCH finds\; 3deg, 420mm]:VALUE:"
   "--trial[try it for S seconds (at most 300)\; exit status 0 if kept]:S:"
+  "--interface[can0, INTERFACE\:CHANNEL of python-can, or a robot\'s file\: read node DEVICE there, by --eds]:BUS:"
+  "--eds[the node\'s EDS or DCF, for --interface]:FILE:"
+  "--bitrate[bit\/s, for interfaces that are opened with one]:bitrate:"
   ":a joint or device by name, or a node id:"
   ":0x6041, 0x1018\:4, 0x60\*, 0x6060-0x607F, 0x6060\…, or words of the name (default\: all):"
 )
@@ -1171,7 +1189,7 @@ _shtab_gwrms_top_defaults_added=0
 _shtab_gwrms_trace_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--robot[robot\'s file that names nodes and EDS files]:FILE:_files"
-  "*--eds[EDS or DCF of a node (again for others)]:NODE=FILE:"
+  "*--eds[EDS or DCF of a node (again for others)\; can1\/5\=FILE\: on that interface alone]:NODE=FILE:"
   "*--node[only this one, by id or name (or again)]:NODE:"
   "*--kind[only these\: nmt, sync, time, emcy, pdo, sdo, heartbeat, lss, error, other]:KIND:"
   "*--object[only 0x6041, 0x1018\:4 or \'\*position\*\']:OBJECT:"
@@ -1182,7 +1200,7 @@ _shtab_gwrms_trace_options=(
   "--seconds[end after N seconds (default\: Ctrl-C)]:N:"
   "--count[end after N frames that are shown]:N:"
   "--json[one JSON line a frame, or a table]"
-  ":can0, INTERFACE\:CHANNEL of python-can, a robot\'s file with one bus\; or FILE.log, FILE.pcap:"
+  "(*):can0, INTERFACE\:CHANNEL of python-can, a robot\'s file\; or FILE.log, FILE.pcap\; or several:"
 )
 
 # guard to ensure default positional specs are added only once per session
@@ -1311,6 +1329,7 @@ _shtab_gwrms_calibrate() {
       case $line[1] in
         imu) _arguments -C -s $_shtab_gwrms_calibrate_imu_options ;;
         insole) _arguments -C -s $_shtab_gwrms_calibrate_insole_options ;;
+        joint) _arguments -C -s $_shtab_gwrms_calibrate_joint_options ;;
       esac
   esac
 }

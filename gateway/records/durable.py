@@ -2,11 +2,12 @@
 
 import contextlib
 import os
+import stat
 from pathlib import Path
 
 
-def write(path: Path, data: bytes) -> None:
-    """Replace the file's content.
+def write(path: Path, data: bytes, like: os.stat_result | None = None) -> None:
+    """Replace the file's content; with the owner and mode of `like`, where that is given.
 
     Raises:
         OSError: it is as it was before; where only its folder could not be synced, perhaps as it is to be.
@@ -15,6 +16,9 @@ def write(path: Path, data: bytes) -> None:
     draft = path.with_name(f"{path.name}.draft")
     try:
         with draft.open("wb") as file:
+            if like is not None:
+                os.fchown(file.fileno(), like.st_uid, like.st_gid)
+                os.fchmod(file.fileno(), stat.S_IMODE(like.st_mode))
             file.write(data)
             file.flush()
             os.fsync(file.fileno())

@@ -24,7 +24,9 @@ class ObjectListParams(Params, frozen=True):
 class ObjectInfo(Struct, frozen=True):
     """One object of a device, as its EDS has it.
 
-    `parameter` is its name where it is one; `read_only` says why it cannot be written, in a word.
+    `parameter` is its name where it is one; `read_only` says why it cannot be written, in a word, `locked`
+    in full, and `release` has the lines of the robot's file that would let it be written. `unit` is that of
+    the device's number, where the EDS names one; `pdos` are those that it is mapped in, by the EDS.
     """
 
     object: str
@@ -36,6 +38,10 @@ class ObjectInfo(Struct, frozen=True):
     default: Number | str | None
     parameter: str | None
     read_only: str | None
+    unit: str = ""
+    pdos: list[str] = []
+    locked: str | None = None
+    release: str | None = None
 
 
 class ObjectList(Struct, frozen=True):

@@ -5,6 +5,7 @@ certificates as that side sees them: whoever is in between has another one, and 
 """
 
 import hmac
+import re
 import secrets
 from typing import Final
 
@@ -17,6 +18,11 @@ SAY_S: Final = 5.0  # how long one side may take for its handshake and its line
 LINE_BYTES: Final = 8192
 _SIGNS: Final = "0123456789ABCDEFGHJKMNPQRSTVWXYZ"  # Crockford's base 32: no I, L, O, U
 _LENGTH: Final = 16  # of them, five bits each
+# In groups, as it is shown; in one, where it has a digit: a host is rarely called so.
+_CODE: Final = (
+    r"(?<![0-9A-Z])(?:[0-9A-Z]{4}([- ])(?:[0-9A-Z]{4}\1){2}[0-9A-Z]{4}"
+    r"|(?=[A-Z]*[0-9])[0-9A-Z]{16})(?![0-9A-Z.])"
+)
 _MISREAD: Final = str.maketrans("ILO", "110")
 ROBOT, DESK = "robot", "desk"  # whose proof it is
 SCHEME: Final = "gwrms://"
@@ -60,10 +66,21 @@ def link(where: str, code: str) -> str:
     return f"{SCHEME}{where}/{code}"
 
 
+def is_link(text: str) -> bool:
+    """Whether a text is meant as such a link; some readers of QR codes and keyboards write capitals."""
+    return text.strip().lower().startswith(SCHEME)
+
+
+def has_code(text: str) -> bool:
+    """Whether a text has what looks like a code, which is then shown to nobody."""
+    is_path = text.lstrip().startswith(("/", ".", "~"))
+    return not is_path and re.search(_CODE, text.upper()) is not None
+
+
 def of_link(text: str) -> tuple[str, str]:
     """Both again; raises `ValueError` where the text is no such link."""
-    where, slash, code = text.strip().removeprefix(SCHEME).partition("/")
-    if not (text.strip().startswith(SCHEME) and where and slash):
+    where, slash, code = text.strip()[len(SCHEME) :].partition("/")
+    if not (is_link(text) and where and slash):
         raise ValueError(f"a robot's link is {SCHEME}HOST:PORT/CODE, as it shows it")
     return where, normal(code)
 

@@ -99,6 +99,7 @@ class Description(Struct, frozen=True):
     budget: BudgetInfo | None = None
     version: str | None = None  # as in `hello`
     buses: list[BusInfo] = []
+    file: str | None = None  # digest of what the robot's file said when the gateway read it
 
 
 HELLO = Method("hello", HelloParams, Hello, role=Role.VIEWER)

@@ -9,8 +9,9 @@ from hil_sim.drive import objects as od
 from hil_sim.drive import options, supervision
 from hil_sim.drive.mechanics import STEP_S, Joint
 from hil_sim.drive.modes import MODES
-from hil_sim.drive.modes.homing import METHODS, NO_METHOD
+from hil_sim.drive.modes.homing import NO_METHOD
 from hil_sim.drive.modes.mode import BIT_13, TARGET_REACHED, Mode, ModeNumber
+from hil_sim.drive.modes.searching import METHODS
 from hil_sim.drive.objects import Objects
 from hil_sim.drive.options import Ramp
 from hil_sim.drive.power import Power
@@ -34,7 +35,7 @@ _CURRENT_REDUCED = 1 << 14  # the manufacturer's: I²t leaves less than the peak
 _HOMED = 1 << 15  # the manufacturer's
 
 # Bits of 60FDh.
-_LOW_SWITCH, _HIGH_SWITCH = 1 << 0, 1 << 1
+_LOW_SWITCH, _HIGH_SWITCH, _HOME_SWITCH = 1 << 0, 1 << 1, 1 << 2
 _TORQUE_OFF = 1 << 16  # the manufacturer's
 
 _NO_MODE_CHANGE = 0  # of 6060h
@@ -95,7 +96,7 @@ class JointDrive(Node):
         checks: dict[Key, Callable[[Value], None]] = {
             od.CONTROLWORD: self._write_controlword,
             od.MODE: self._write_mode,
-            od.HOMING_METHOD: _check_homing_method,
+            od.HOMING_METHOD: self._check_homing_method,
             **{key: self._target_taker(key) for key in _TARGETS if self.objects.has(key)},
             **{key: _option_check(allowed) for key, allowed in options.ALLOWED.items()},
         }
@@ -135,6 +136,7 @@ class JointDrive(Node):
 
     def _digital_inputs(self) -> int:
         switches = _LOW_SWITCH * self.joint.at_low_switch | _HIGH_SWITCH * self.joint.at_high_switch
+        switches |= _HOME_SWITCH * self.joint.at_home_switch
         return switches | _TORQUE_OFF * self.power.torque_off | self.inputs
 
     def statusword(self) -> int:
@@ -177,6 +179,10 @@ class JointDrive(Node):
             self.power.do(command)
         if self.power.follows:
             self._mode.command(controlword, controlword & ~previous)
+
+    def _check_homing_method(self, value: Value) -> None:
+        if value != NO_METHOD and value not in (self.objects.homing_methods() or METHODS):
+            raise SdoAbort(AbortCode.INVALID_VALUE)
 
     def _target_taker(self, key: Key) -> Callable[[Value], None]:
         entry = self.dictionary[key]
@@ -291,8 +297,3 @@ def _option_check(allowed: tuple[int, ...]) -> Callable[[Value], None]:
             raise SdoAbort(AbortCode.INVALID_VALUE)
 
     return check
-
-
-def _check_homing_method(value: Value) -> None:
-    if value != NO_METHOD and value not in METHODS:
-        raise SdoAbort(AbortCode.INVALID_VALUE)

@@ -20,6 +20,7 @@ class JointConstants:
     stop_stiffness: float = 50_000.0  # N·m/rad
     stop_damping: float = 200.0  # N·m·s/rad: little comes back from a stop
     limit_switch: float = math.radians(2.0)  # how far before its stop a limit switch closes
+    home_switch: tuple[float, float] | None = None  # from where to where it is closed; None: there is none
 
 
 class Joint:
@@ -54,6 +55,11 @@ class Joint:
     @property
     def at_low_switch(self) -> bool:
         return self.position <= self.constants.low_stop + self.constants.limit_switch
+
+    @property
+    def at_home_switch(self) -> bool:
+        switch = self.constants.home_switch
+        return switch is not None and switch[0] <= self.position <= switch[1]
 
     @property
     def at_high_switch(self) -> bool:

@@ -74,6 +74,7 @@ HOMING_METHOD = (0x6098, 0)
 HOMING_SWITCH_SPEED = (0x6099, 1)
 HOMING_ZERO_SPEED = (0x6099, 2)
 HOMING_ACCELERATION = (0x609A, 0)
+HOMING_METHODS = 0x60E3  # those that it has, from sub-index 1 on
 POSITION_OFFSET = (0x60B0, 0)
 VELOCITY_OFFSET = (0x60B1, 0)
 TORQUE_OFFSET = (0x60B2, 0)
@@ -198,6 +199,11 @@ class Objects:
     def number(self, key: Key) -> int:
         entry = self._counting.get(key)
         return _OTHERWISE[key] if entry is None else entry.number()
+
+    def homing_methods(self) -> frozenset[int]:
+        """Those that 60E3h names; none where it names none."""
+        keys = [key for key in self._counting if key[0] == HOMING_METHODS and key[1] > 0]
+        return frozenset(number for key in keys if (number := self._counting[key].number()))
 
     def positive(self, key: Key) -> int:
         """Return a number that cannot be 0."""

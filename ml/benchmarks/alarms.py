@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ml.benchmarks import fall, folds, ipol, sisfall, status
-from ml.benchmarks.models.falling import FallDetector
+from ml.benchmarks.models.falling import FallDetector, probability_of
 from ml.benchmarks.models.gait_status import status_model
 from ml.features import features
 from ml.features.falling import FALLING, RATE_HZ
@@ -53,7 +53,7 @@ def falls(path: Path) -> list[Told]:
 
     def told(split: folds.Split) -> Floats:
         train, held_out = split
-        return _falling(_detector(data, train[~data.stumble[train]]), data.features[held_out])
+        return probability_of(_detector(data, train[~data.stumble[train]]), data.features, held_out)
 
     splits = list(fall.grouped(recordings, data))
     for (_, held_out), found in zip(splits, folds.over(told, splits), strict=True):
@@ -77,7 +77,7 @@ def walks(path: Path, falls_path: Path) -> list[Told]:
     for trial in ipol.read(path):
         samples = trial.samples[::TO_FALLING, : len(FALLING.channels)]
         ends = np.arange(fall.FIRST, len(samples), fall.STEP)
-        probability = _falling(detector, features(FALLING, samples, ends))
+        probability = probability_of(detector, features(FALLING, samples, ends), np.arange(len(ends)))
         found.append(_told_falling(str(trial.subject), ends, probability, len(samples), {}))
     return found
 
@@ -105,14 +105,7 @@ def statuses(path: Path) -> list[Told]:
 
 
 def _detector(data: fall.Decisions, rows: folds.Rows) -> FallDetector:
-    return FallDetector(fall.SETTINGS).fit(
-        data.features[rows], data.to_impact[rows], data.recording[rows], data.subject[rows]
-    )
-
-
-def _falling(detector: FallDetector, rows: npt.NDArray[np.float32]) -> Floats:
-    found: Floats = detector.predict_proba(rows)[:, 1]
-    return found
+    return FallDetector(fall.SETTINGS).fit(data.features, data.to_impact, data.recording, data.subject, rows)
 
 
 def _rows(data: fall.Decisions, recordings: int) -> Iterator[folds.Rows]:

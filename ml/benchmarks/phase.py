@@ -21,9 +21,9 @@ GRID: Final = (
 )
 WITHIN: Final = 0.05  # of a cycle: what `accuracy` counts as right
 WHY: Final = (
-    "The labels of some trials drift away from the sensors' samples, up to two seconds within a walk. "
-    "hindsight_rmse_percent is how far the heel strikes in the foot's own signal, known before and after, "
-    "are from these labels. in_step_… counts the strides where both agree within 0.12 s."
+    "Labels have an error of their own: hindsight_rmse_percent is how far the heel strikes in the foot's own "
+    "signal, known before and after, are from them. in_step_… counts the strides where both agree within "
+    "0.12 s."
 )
 
 

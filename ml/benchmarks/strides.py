@@ -86,6 +86,7 @@ def _of_foot(
     step: int,
 ) -> tuple[Any, ...]:
     labelled, own = ipol.strikes(in_air), heel_strikes(pitch) + LABELLED_LATER
+    own = own[own < len(in_air)]  # moved later, the last one may lie beyond what was recorded
     phase = ipol.phase(labelled, len(in_air))
     ends = np.arange(0, len(phase), step)
     ends = ends[~np.isnan(phase[ends])]
@@ -106,6 +107,8 @@ def _of_foot(
 
 def heel_strikes(pitch: npt.NDArray[np.float64]) -> npt.NDArray[np.intp]:
     """Where a foot's pitch rate falls through zero after a swing; with hindsight, for judging labels."""
+    if len(pitch) < AT_LEAST:
+        return np.array([], dtype=np.intp)
     smooth = np.convolve(pitch, np.ones(3) / 3.0, mode="same")
     falling = np.flatnonzero((smooth[:-1] > 0) & (smooth[1:] <= 0)) + 1
     found: list[int] = []

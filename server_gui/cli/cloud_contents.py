@@ -9,6 +9,7 @@ from gateway.amounts import NONE, size
 from gateway.cli.text import say, say_json, table, warn
 from ml.store.errors import NoSuchTable, StoreError
 from ml.store.objects import Object
+from ml.store.snapshot import Snapshot
 from server_gui.cli.cloud_options import add_url, parser, progress, reach, spool, url, when
 from server_gui.core.cloud import usage
 from server_gui.core.cloud import verify as checks
@@ -89,7 +90,7 @@ def _verify(arguments: argparse.Namespace) -> int:
             f"{url(arguments)} looks at the files alone"
         )
     try:
-        store = reach(arguments)
+        store = Snapshot.existing(url(arguments))  # each table is opened once
     except NoSuchTable:
         if not checks.sent_to(url(arguments), mine):
             raise

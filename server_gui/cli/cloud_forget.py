@@ -37,7 +37,9 @@ remove: what others have exported, what was saved from a window's plots or a que
 that a bucket itself keeps.
 
 Interrupted, the same command goes on. Exit status 0: gone, as is proven; 1: something is left, or was not
-removed, and it says what; 2: not looked."""
+removed, and it says what; 2: not looked; 3: gone from store and spool, but what was exported here was moved,
+and is for you to find."""
+OUT_OF_REACH = 3
 
 
 def forget(argv: list[str]) -> int:
@@ -128,16 +130,21 @@ def _not_reached(known: Plan) -> Iterator[str]:
             f"not looked into: the spools of other computers that write to this store "
             f"({', '.join(known.others)}): run the same command there, before they record or mend again"
         )
-    for each in known.exported:
-        if each.state is State.GONE:
-            yield f"not looked into: what was exported to {each.place}, which {each.state.value}"
+    for place in _moved(known):
+        yield f"not looked into: what was exported to {place}, which {State.GONE.value}: find it, remove it"
 
 
 def _tell(arguments: argparse.Namespace, known: Plan, left: Sequence[str]) -> int:
     if arguments.json:
         removed = not (arguments.dry_run or left)
         say_json(
-            {"plan": known, "removed": removed, "left": left, "sha256": forgetting.digest(arguments.wearer)}
+            {
+                "plan": known,
+                "removed": removed,
+                "left": left,
+                "moved": _moved(known),
+                "sha256": forgetting.digest(arguments.wearer),
+            }
         )
     elif arguments.dry_run:
         _say(arguments, known)
@@ -146,6 +153,15 @@ def _tell(arguments: argparse.Namespace, known: Plan, left: Sequence[str]) -> in
             warn("cloud", problem)
         for note in _not_reached(known):
             warn("cloud", note)
-        if not left:
+        if not left and _moved(known):
+            say("gone from this store and this spool; what was exported and moved has rows of theirs still\n")
+        elif not left:
             say("gone: no file of this store, of this spool or of this desk's exports has a row of theirs\n")
-    return 1 if left or not known.sessions else 0
+    if left or not known.sessions:
+        return 1
+    return OUT_OF_REACH if not arguments.dry_run and _moved(known) else 0
+
+
+def _moved(known: Plan) -> list[str]:
+    """What was exported and is there no more: removed, or somewhere else with all its rows."""
+    return [each.place for each in known.exported if each.state is State.GONE]

@@ -227,6 +227,10 @@ class BusHealthView(QWidget):
         self._column.addWidget(self.said)
         self._column.addStretch(1)
 
+    def read_now(self) -> None:
+        """Let the next frame show it anew: what stands above the tab is shown anew then."""
+        self._frame = 0
+
     def refresh(self) -> None:
         """Show how it is now; called each frame while the tab is visible."""
         self._frame += 1

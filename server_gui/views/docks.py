@@ -15,6 +15,7 @@ WIDTHS: Final = ((1600, (225, 600)), (1340, (190, 474)), (0, (225, 400)))
 ROOMY: Final = 1200  # wide, at text of 100 %: what is narrower has no room for everything at once
 BELOW: Final = (120, 96)  # high, likewise: events, where the window is `HIGH` and where it is not
 HIGH: Final = 820
+TIGHT: Final = 800  # wide, likewise: what is narrower begins without panels, which would hide the robot
 STACK: Final = 356  # wide, likewise: panels that are one behind the other
 MOVES: Final = (QEvent.Type.Move, QEvent.Type.Resize, QEvent.Type.Show)
 Area = Qt.DockWidgetArea
@@ -39,7 +40,7 @@ class Docks(QObject):
         self._window = window
         self._uncovered = uncovered
         self._theme = theme
-        self.is_narrow = False
+        self.is_narrow = self._is_tight = False
         self._widths: tuple[int, int] | None = None
         window.setCorner(Qt.Corner.BottomLeftCorner, Area.LeftDockWidgetArea)
         window.setCorner(Qt.Corner.BottomRightCorner, Area.RightDockWidgetArea)
@@ -71,15 +72,16 @@ class Docks(QObject):
 
     def put_away(self) -> None:
         """Leave all the room to the tabs; or, where that is so, show what was there again."""
-        in_sight = [dock for dock in self.all if not dock.isHidden() and not dock.isFloating()]
+        in_sight = self._in_sight
         again = [] if in_sight else self._put_away or self.all[:-1]
         for dock in in_sight or again:
             dock.setVisible(not in_sight)
         self._put_away = in_sight
 
     def bring(self, dock: QDockWidget) -> None:
-        """Show this one, in front of those that are at its place."""
-        dock.show()
+        """Show this one, in front of those that are at its place, whose names stand beside its own."""
+        for one in (*(self.all[:-1] if self.is_narrow else ()), dock):
+            one.show()
         dock.raise_()
 
     @property
@@ -96,8 +98,21 @@ class Docks(QObject):
                 self._stack()
             else:
                 self._unstack()
+        self._fit_tight()
         if scaled or (self._usual_widths != self._widths and not self.is_narrow):
             self._size()
+
+    def _fit_tight(self) -> None:
+        """Put them away where they would leave too little room to the tabs, until there is more again."""
+        is_tight = self._window.width() < self._theme.px(TIGHT)
+        if is_tight is not self._is_tight:
+            self._is_tight = is_tight
+            if bool(self._in_sight) is is_tight:
+                self.put_away()
+
+    @property
+    def _in_sight(self) -> list[QDockWidget]:
+        return [dock for dock in self.all if not dock.isHidden() and not dock.isFloating()]
 
     def _dock(self, title: str, widget: QWidget, area: Area) -> QDockWidget:
         dock = QDockWidget(title)

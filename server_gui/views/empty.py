@@ -6,7 +6,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QPushButton, QVBoxLayout, QWidget
 
 from gateway.client import Address, BadAddress
-from gateway.wire.pairing import SCHEME
+from gateway.wire.pairing import is_link
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card
 from server_gui.views.widgets.plain import PlainLabel
@@ -102,7 +102,7 @@ class EmptyView(QWidget):
 
     def _add(self) -> None:
         text = self.address.text().strip()
-        if text.startswith(SCHEME):
+        if is_link(text):
             self.pairing.emit(text)
             return
         try:

@@ -24,7 +24,7 @@ STOP_MARKS: Final = {
     StopState.CONFIRMED: Mark("triangle", "warn", "STOPPED"),
     StopState.NOT_CONFIRMED: Mark("square", "bad", "NOT CONFIRMED"),
 }
-STOP_SHARE: Final = 0.3  # of the width, which STOP may take at most
+STOP_SHARE: Final = 0.4  # of the width, which STOP may take at most
 RESETTING: Final = "Ends a held stop. Every drive stays switched off: nothing is enabled."
 # Left out in this order where there is less room; alarms stand below the header.
 SPARE: Final = ("status", "robot", "recording", "link", "drives")

@@ -15,6 +15,7 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import (
     QApplication,
+    QDockWidget,
     QHBoxLayout,
     QMainWindow,
     QMenu,
@@ -44,7 +45,9 @@ from server_gui.views.help import Help
 from server_gui.views.kept import keep_bytes, kept_bytes
 from server_gui.views.keys_sheet import KeysSheet
 from server_gui.views.models.panel import ModelsPage
+from server_gui.views.objects.panel import ObjectsPage
 from server_gui.views.overview import Overview
+from server_gui.views.page_bar import PageBar
 from server_gui.views.parameters.panel import ParametersPanel
 from server_gui.views.parameters.trial_bar import TrialBar
 from server_gui.views.recording_chip import ask_recording
@@ -114,6 +117,15 @@ class MainWindow(QMainWindow):
         self._is_arranged = False  # the panels, which may wait for the window to be shown
         self.setWindowTitle("GWRMS")
         self.resize(USUAL.boundedTo(self.screen().availableSize()))
+        with theme.styled_at_the_end():
+            self._make(desk, theme, archive, commissioning)
+        self._restore()
+        self._opened_as = self.size()
+        theme.scaled.connect(self._scaled)
+
+    def _make(
+        self, desk: Desk, theme: Theme, archive: Archive | None, commissioning: Commissioning | None
+    ) -> None:
         menu = QPushButton("View")
         self.header = Header(desk, theme, menu)
         self.header.stopped.connect(self.stopped)
@@ -136,6 +148,8 @@ class MainWindow(QMainWindow):
         self.overview.opened.connect(self._open_in_signals)
         self.resources = Resources(desk, theme)
         self.buses = BusHealthView(desk, theme)
+        self.objects = ObjectsPage(desk, theme)
+        self.objects.edited.connect(self._edit_parameter)
         self.audit = Audit(desk, theme, None if archive is None else archive.journals)
         self.help, self.help_button = Help(theme), QPushButton("?")
         self.empty = EmptyView(theme)
@@ -150,10 +164,11 @@ class MainWindow(QMainWindow):
             self.signals,
             self.resources,
             self.buses,
+            self.objects,
             self.audit,
         )
         for title, view in zip(
-            ("&Overview", "&Signals", "&Resources", "&Bus", "&Audit"), self._views, strict=True
+            ("&Overview", "&Signals", "&Resources", "&Bus", "Ob&jects", "&Audit"), self._views, strict=True
         ):
             self.tabs.addTab(Scrolled(view), title)
         self._live = len(self._views)  # tabs that show the robot that is looked at
@@ -177,12 +192,10 @@ class MainWindow(QMainWindow):
         self._pages = QStackedWidget()
         self._pages.addWidget(Scrolled(self.empty))
         self._pages.addWidget(self.tabs)
+        self.page_bar = PageBar(self.tabs, self._help_corner())
         self._build()
-        self._offer_help()
+        self._bind_keys()
         menu.setMenu(self._view_menu())
-        self._restore()
-        self._opened_as = self.size()
-        theme.scaled.connect(self._scaled)
 
     def refresh(self) -> None:
         """Draw a frame: what moves each time, what is read now and then, and only what is visible."""
@@ -193,13 +206,15 @@ class MainWindow(QMainWindow):
         self._bar.frame()
         due = self._is_due()
         if due:
-            self.overview.read_now()  # what header and overview say is of the same moment
+            for page in (self.overview, self.buses):
+                page.read_now()  # what header, alarms and page say is of the same moment
         shown = self._desk.selected is not None or self.tabs.currentIndex() >= self._live
         if shown:
             self._views[self.tabs.currentIndex()].refresh()
         if not due:
             return
         self._pages.setCurrentIndex(1 if shown else 0)
+        self.page_bar.setVisible(shown)
         self.header.refresh()
         self.alarms.refresh()
         self._hold_header()
@@ -285,8 +300,11 @@ class MainWindow(QMainWindow):
         """Show what the manual says of the panel that has the keyboard, or of the tab."""
         tab = self.tabs.tabText(self.tabs.currentIndex()).replace("&", "")
         self.help.show_section("Parameters" if _within(self.parameters) else tab)
-        self._manual.show()
-        self._manual.raise_()
+        self.bring(self._manual)
+
+    def bring(self, dock: QDockWidget) -> None:
+        """Show a panel, in front of those that are at its place."""
+        self._panels.bring(dock)
 
     def _open_in_signals(self, channels: Sequence[str]) -> None:
         self.tabs.setCurrentIndex(self._views.index(self.signals))
@@ -298,8 +316,12 @@ class MainWindow(QMainWindow):
 
     def _find(self) -> None:
         """Words that are typed are seen, also where the panel was hidden."""
-        self._panels.bring(self.docks[1])
+        self.bring(self.docks[1])
         self.parameters.find_parameter()
+
+    def _edit_parameter(self, name: str) -> None:
+        self._panels.bring(self.docks[1])
+        self.parameters.edit_parameter(name)
 
     def _end_trial(self, *, keep: bool) -> None:
         station = self._desk.selected
@@ -322,6 +344,7 @@ class MainWindow(QMainWindow):
         top = _column(above)
         top.addWidget(self.header)
         top.addWidget(self.alarms)
+        top.addWidget(self.page_bar)
         self.setMenuWidget(above)
         left, right, below = Area.LeftDockWidgetArea, Area.RightDockWidgetArea, Area.BottomDockWidgetArea
         panels = {
@@ -352,13 +375,13 @@ class MainWindow(QMainWindow):
         needed = QSize(self.header.minimumSizeHint().width(), self._theme.px(LEAST))
         self.setMinimumSize(needed.boundedTo(self.screen().availableSize()))
 
-    def _offer_help(self) -> None:
+    def _help_corner(self) -> QWidget:
         self.help_button.setAccessibleName("Help")
         self.help_button.setToolTip("What the manual says of this (F1)")
         self.help_button.clicked.connect(self.show_help)
         self.panels_button = QPushButton("Panels")
         self.panels_button.setToolTip("Hide robots, parameters and events, or show them again (F9)")
-        self.panels_button.clicked.connect(self._panels.put_away)
+        self.panels_button.clicked.connect(lambda: self._panels.put_away())
         self.panels_button.hide()
         corner = QWidget()
         row = QHBoxLayout(corner)
@@ -366,7 +389,9 @@ class MainWindow(QMainWindow):
         row.setSpacing(2)
         row.addWidget(self.panels_button)
         row.addWidget(self.help_button)
-        self.tabs.setCornerWidget(corner)
+        return corner
+
+    def _bind_keys(self) -> None:
         QShortcut(QKeySequence.StandardKey.HelpContents, self, self.show_help)
         QShortcut(QKeySequence.StandardKey.Find, self, self._find)
         QShortcut(QKeySequence("?"), self, self.keys.turn)

@@ -12,7 +12,7 @@ from server_gui.core.tuning.writing import Trial
 from server_gui.views.marks import Mark, drives_mark, enabled_text
 from server_gui.views.predictions import STOPPED, activity
 from server_gui.views.theme import Theme
-from server_gui.views.trial_words import changes, ends
+from server_gui.views.trial_words import changes, ends, wordings
 from server_gui.views.widgets.fitted import FittedLabel
 from server_gui.views.widgets.mark import MarkIcon
 from server_gui.views.widgets.plain import set_tip
@@ -74,12 +74,17 @@ class NowLine(QFrame):
         self.take_back.setToolTip("The values from before are in force again")
         self.keep.clicked.connect(lambda: desk.selected.keep_trial() if desk.selected else None)
         self.take_back.clicked.connect(lambda: desk.selected.end_trial() if desk.selected else None)
-        self.trial.row.addWidget(self.take_back)
-        self.trial.row.addWidget(self.keep)
+        self._decide = QWidget()
+        row = QHBoxLayout(self._decide)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.addStretch(1)
+        for button in (self.take_back, self.keep):
+            row.addWidget(button)
         self._grid = QGridLayout(self)
         self._grid.setContentsMargins(10, 3, 10, 3)
         self._grid.setHorizontalSpacing(18)
         self._placed: tuple[int, bool] = (0, False)
+        self._is_offered = True
         self._arrange(2, on_trial=False)
 
     def minimumSizeHint(self) -> QSize:
@@ -91,13 +96,15 @@ class NowLine(QFrame):
 
     def offer(self, wanted: bool) -> None:
         """Whether what is on trial is kept or taken back here: not where its own panel is in sight."""
-        for button in (self.keep, self.take_back):
-            button.setVisible(wanted)
+        self._is_offered = wanted
+        self._decide.setVisible(wanted and self._placed[1])
 
     def refresh(self) -> None:
         """Show how it is now."""
         station = self._desk.selected
         trial = None if station is None else station.writing.trial
+        if station is not None and trial is not None:
+            self._show_trial(station, trial)
         self._fit(on_trial=trial is not None)
         if station is None:
             return
@@ -110,18 +117,19 @@ class NowLine(QFrame):
         cadence = f"  {gait.cadence_spm:.0f} steps/min" if walks else ""
         details = tuple(dict.fromkeys((line.detail, line.short or line.detail)))
         self.activity.say(line.mark, (f"{line.text}{cadence}", line.text), details, line.tip)
-        if trial is not None:
-            self._show_trial(station, trial)
 
     def _show_trial(self, station: Station, trial: Trial) -> None:
-        said = changes(station, trial, self._desk.shown.units)
-        count = f"{len(said)} values" if len(said) > 1 else said[0]
-        wordings = (f"On trial: {', '.join(said)}", f"On trial: {count}", "On trial")
-        self.trial.say(ON_TRIAL, wordings, (ends(trial),))
+        units = self._desk.shown.units
+        tip = "\n".join(changes(station, trial, units))
+        self.trial.say(ON_TRIAL, wordings(station, trial, units), (ends(trial),), tip)
 
     def _fit(self, *, on_trial: bool) -> None:
-        columns = min(max(self.width() // self._theme.px(A_FACT), 1), 2 + on_trial)
+        """What is on trial stands beside the other facts where all its words have room, else below them."""
+        a_fact, around = self._theme.px(A_FACT), self.width() - self._grid.contentsRect().width()
+        needed = 2 * a_fact + 2 * self._grid.horizontalSpacing() + self.trial.sizeHint().width() + around
+        columns = 3 if on_trial and self.width() >= needed else min(max(self.width() // a_fact, 1), 2)
         self._arrange(columns, on_trial=on_trial)
+        self._grid.setColumnMinimumWidth(2, self.trial.sizeHint().width() if columns > 2 else 0)
 
     def _arrange(self, columns: int, *, on_trial: bool) -> None:
         if (columns, on_trial) == self._placed:
@@ -133,7 +141,12 @@ class NowLine(QFrame):
             is_last = place == len(facts) - 1
             span = columns - column if is_last else 1
             self._grid.addWidget(fact, row, column, 1, span, Qt.AlignmentFlag.AlignVCenter)
+        if columns > 1:
+            self.trial.row.addWidget(self._decide)
+        else:  # below it: beside them its value has no room
+            self._grid.addWidget(self._decide, len(facts), 0)
         self.trial.setVisible(on_trial)
+        self._decide.setVisible(on_trial and self._is_offered)
         for column in range(3):
             self._grid.setColumnStretch(column, 1 if column < columns else 0)
 

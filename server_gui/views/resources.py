@@ -55,8 +55,8 @@ class Resources(QWidget):
         self._frame = 0
         self.setObjectName("page")
         self.cpu, self.memory = Trend(theme, "CPU", 20.0), Trend(theme, "Memory", 256.0, 1 / MIB)
-        self.top = Trend(theme, "CPU use by process, % of a core", 10.0)
-        self.devices = Trend(theme, "Disk and network, KiB/s", 10.0, 1 / KIB)
+        self.top = Trend(theme, "CPU by process", 10.0, unit="% of a core")
+        self.devices = Trend(theme, "Disk and network", 10.0, 1 / KIB, unit="KiB/s")
         self.temperature = Trend(theme, "Temperature", 10.0)
         self.facts = PlainLabel()
         self.facts.setWordWrap(True)

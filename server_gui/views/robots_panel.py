@@ -14,7 +14,7 @@ from PySide6.QtWidgets import (
 )
 
 from gateway.client import Address, BadAddress
-from gateway.wire.pairing import SCHEME
+from gateway.wire.pairing import is_link
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.views.ask import ask
@@ -53,6 +53,7 @@ class RobotCard(Choosable):
         self.setAccessibleName(f"Robot {station.name}")
         self._icon = MarkIcon(theme, 12)
         self._name, self._state, self._link = ElidedLabel("title"), FittedLabel("dim"), FittedLabel("dim")
+        self._where = FittedLabel("dim")  # only where another robot is called so, too
         self._state.setMinimumWidth(1)
         self.stop = StopButton("robot_stop")
         self.remove = QToolButton()
@@ -62,7 +63,7 @@ class RobotCard(Choosable):
         self.remove.clicked.connect(self.removed)
         words = QVBoxLayout()
         words.setSpacing(1)
-        for label in (self._name, self._state, self._link):
+        for label in (self._name, self._where, self._state, self._link):
             words.addWidget(label)
         row = QHBoxLayout()
         row.addWidget(self._icon, 0, Qt.AlignmentFlag.AlignTop)
@@ -77,14 +78,17 @@ class RobotCard(Choosable):
     @property
     def texts(self) -> tuple[str, str, str]:
         """What it says."""
-        return self._name.text(), self._state.text(), self._link.text()
+        return self.station.title, self._state.text(), self._link.text()
 
     def refresh(self, *, selected: bool) -> None:
         """Show how it is now."""
         station, robot = self.station, self.station.robot
         mark = station.mark
         self._icon.show_mark(mark)
-        set_text(self._name, station.title)
+        has_twin = station.title != station.name and station.has_twin
+        set_text(self._name, station.called if has_twin else station.title)
+        self._where.say(f"at {station.address}", station.address, f":{station.address.rpartition(':')[2]}")
+        self._where.setVisible(has_twin)
         self.stop.name(station.title)
         self.remove.setAccessibleName(f"Remove {station.title}")
         worst = station.alarms.worst
@@ -189,7 +193,7 @@ class RobotsPanel(QWidget):
 
     def _add(self) -> None:
         text = self.address.text().strip()
-        if text.startswith(SCHEME):
+        if is_link(text):
             self.begin_pairing(text)
             return
         try:

@@ -1,12 +1,14 @@
 """Colours, dark and light, and the style that everything is drawn in. Left is blue, right is orange."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import Enum
 from typing import Final
 
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtGui import QColor, QFont, QFontDatabase, QPalette
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QWidget
 
 SMALLEST_SCALE, LARGEST_SCALE = 0.8, 2.0
 BASE_POINTS: Final = 9.0
@@ -148,6 +150,10 @@ QPushButton:checked, QPushButton#primary {{ background: {accent}; color: {on_acc
     border-color: {accent}; }}
 QPushButton#primary {{ font-weight: bold; }}
 QPushButton#primary:disabled {{ background: {card}; color: {old}; border-color: {border}; }}
+QPushButton#page_name {{ background: transparent; color: {dim}; padding: 7px 11px; border: none;
+    border-bottom: 2px solid transparent; border-radius: 0; }}
+QPushButton#page_name:checked {{ color: {text}; border-bottom: 2px solid {accent}; }}
+QPushButton#page_name:focus, QPushButton#page_name:hover {{ color: {text}; background: {card}; }}
 QPushButton#stop {{ background: {stop}; color: white; border: 3px solid {stop_border}; border-radius: 6px;
     font-weight: bold; padding: 6px 14px; }}
 QPushButton#stop:pressed {{ background: #7d0a1d; }}
@@ -201,6 +207,9 @@ class Theme(QObject):
         super().__init__(application)
         self._application = application
         self._family = QFontDatabase.systemFont(QFontDatabase.SystemFont.GeneralFont).family()
+        # Without any sheet Qt 6.11 forgets to hear of the end of what it has measured, and crashes later.
+        self._never_shown = QWidget()
+        self._never_shown.setStyleSheet("QWidget#none { color: black; }")
         self.look, self.scale = look, scale
         self.colours = PALETTES[look]
         self.set(look, scale)
@@ -213,12 +222,21 @@ class Theme(QObject):
         self.colours = PALETTES[self.look]
         font = QFont(self._family)
         font.setPointSizeF(BASE_POINTS * self.scale)
-        self._application.setFont(font)
-        self._application.setPalette(self._palette())
-        self._application.setStyleSheet(self._style())
+        with self.styled_at_the_end():
+            self._application.setFont(font)
+            self._application.setPalette(self._palette())
         self.changed.emit()
         if self.scale != before:
             self.scaled.emit()
+
+    @contextmanager
+    def styled_at_the_end(self) -> Iterator[None]:
+        """Style at once what is put together meanwhile: else Qt styles it again with each parent it gets."""
+        self._application.setStyleSheet("")
+        try:
+            yield
+        finally:
+            self._application.setStyleSheet(self._style())
 
     def colour(self, name: str) -> QColor:
         """Return a colour of the palette by its name."""

@@ -1,10 +1,12 @@
 """One card of something over the last minutes: curves, and their names with the newest values."""
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
+from PySide6.QtGui import QShowEvent
 
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card
@@ -18,19 +20,29 @@ SPANS_S: Final = (30.0, 60.0, 120.0, 300.0, 600.0)  # of the past, the shortest 
 class Trend(Card):
     """`least` is the smallest range that is shown, in the unit of `scale` times what comes."""
 
-    def __init__(self, theme: Theme, title: str, least: float, scale: float = 1.0) -> None:
+    def __init__(self, theme: Theme, title: str, least: float, scale: float = 1.0, *, unit: str = "") -> None:
         super().__init__(title)
+        self.set_note(unit, unit.partition(" ")[0], "")
         self._theme = theme
-        self._scale = scale
+        self._name, self._least, self._scale = title, least, scale
         self._shown: tuple[object, ...] = ()
         self._rows = object()  # another one where what is drawn is no longer only added to
-        self.plot = Plot(theme, SPANS_S[0], least)
-        self.plot.setAccessibleName(title)
         self.legend = Wrapped(f"Values of {title}")
         self.body.addWidget(self.legend)
-        self.body.addWidget(self.plot, 1)
         self._resize()
         theme.scaled.connect(self._resize)
+
+    @cached_property
+    def plot(self) -> Plot:
+        """Made when it is first shown: a window that opens on another tab need not wait for it."""
+        made = Plot(self._theme, SPANS_S[0], self._least)
+        made.setAccessibleName(self._name)
+        self.body.addWidget(made, 1)
+        return made
+
+    def showEvent(self, event: QShowEvent) -> None:
+        self.plot.show()
+        super().showEvent(event)
 
     def show_rows(
         self,

@@ -8,18 +8,34 @@ from server_gui.core.tuning.writing import Trial
 
 def changes(station: Station, trial: Trial, units: Units) -> list[str]:
     """Return each value with the one from before: `gait step length 400 → 430 mm`."""
-    said = []
-    for name, value in trial.values.items():
-        info = station.known.get(name)
-        unit = unit_of(name, "" if info is None else info.unit, units)
-        before = trial.before.get(name)
-        old = "?" if before is None else unit.editable(before)
-        short = name.replace("_", " ").replace(".", " ")
-        said.append(f"{short} {old} → {unit.editable(value)} {unit.symbol}".rstrip())
-    return said
+    return [f"{name} {values}" for name, values in _changes(station, trial, units)]
+
+
+def wordings(station: Station, trial: Trial, units: Units) -> tuple[str, ...]:
+    """Return what to say where there is less and less room: each value whole, and how many more there are."""
+    first, *others = _changes(station, trial, units)
+    said = changes(station, trial, units)
+    full = ", ".join(said)
+    if not others:
+        return f"On trial: {full}", full, first[1]
+    some = [f"{', '.join(said[:count])} and {len(said) - count} more" for count in range(len(others), 0, -1)]
+    return f"On trial: {full}", full, *some, f"{len(said)} values"
 
 
 def ends(trial: Trial) -> str:
     """Return when it goes back."""
     left_s = trial.left_s()
     return f"taken back in {left_s:.0f} s" if left_s else "its time is over: reading …"
+
+
+def _changes(station: Station, trial: Trial, units: Units) -> list[tuple[str, str]]:
+    """Of each a name to read, and its values before and now."""
+    found = []
+    for name, value in trial.values.items():
+        info = station.known.get(name)
+        unit = unit_of(name, "" if info is None else info.unit, units)
+        before = trial.before.get(name)
+        old = "?" if before is None else unit.editable(before)
+        values = f"{old} → {unit.editable(value)} {unit.symbol}".rstrip()
+        found.append((name.replace("_", " ").replace(".", " "), values))
+    return found

@@ -25,8 +25,8 @@ def destroy(widget: QWidget) -> None:
 
 
 def stop_is_whole(window: MainWindow) -> bool:
-    """Whether the STOP button lies within the window, with all of its text."""
+    """Whether the STOP button lies within the window, with its word and some of its name."""
     stop = window.header.stop
     corners = (stop.rect().topLeft(), stop.rect().bottomRight())
     inside = all(window.rect().contains(stop.mapTo(window, corner)) for corner in corners)
-    return inside and stop.width() >= stop.fontMetrics().horizontalAdvance(stop.text())
+    return inside and stop.width() >= stop.minimumSizeHint().width()

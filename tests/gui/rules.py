@@ -22,6 +22,7 @@ from server_gui.views.theme import Theme
 from server_gui.views.widgets.elided import ElidedLabel
 from server_gui.views.widgets.fitted import FittedLabel
 from server_gui.views.widgets.mark import MarkIcon
+from server_gui.views.widgets.stop_button import StopButton
 
 DIGIT = re.compile(r"\d")
 QTS_OWN = ("qt_", "ScrollLeftButton", "ScrollRightButton")  # parts of other controls
@@ -65,7 +66,9 @@ def halved_numbers(window: QWidget) -> list[str]:
             found.append(f"{_path(widget)}: {widget.text()}")
         if isinstance(widget, FittedLabel) and DIGIT.search(widget.shown) and not widget.is_whole:
             found.append(f"{_path(widget)}: {widget.shown}")
-        if isinstance(widget, QAbstractButton) and DIGIT.search(widget.text()):
+        if isinstance(widget, StopButton):
+            found += [] if widget.is_whole else [f"{_path(widget)}: {widget.lines}"]
+        elif isinstance(widget, QAbstractButton) and DIGIT.search(widget.text()):
             whole = widget.width() >= widget.fontMetrics().horizontalAdvance(widget.text())
             found += [] if whole else [f"{_path(widget)}: {widget.text()}"]
         if isinstance(widget, QTableView):

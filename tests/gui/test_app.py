@@ -3,11 +3,13 @@
 from collections.abc import Iterator
 from pathlib import Path
 
+import msgspec
 import pytest
 from PySide6.QtCore import QSettings, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
+from gateway.wire.dictionary import ObjectList
 from server_gui.app import App
 from server_gui.core.desk.station import Station
 from server_gui.core.settings.server_file import ServerSettings, add_robots
@@ -15,6 +17,7 @@ from server_gui.core.tuning.stop import StopState
 from server_gui.core.tuning.writing import WriteState
 from tests.fake_robot import FakeRobot
 from tests.gui.running import running, wait
+from tests.support.dictionaries import HOLDS, OBJECTS
 
 
 @pytest.fixture
@@ -84,6 +87,31 @@ def test_processes_are_asked_for_only_while_they_are_looked_at(app: App, robot: 
     assert [params for params in asked if params.get("limit") != 1 or params["include"]] == []
     app.window.tabs.setCurrentIndex(2)
     wait(lambda: app.window.resources.table.processes.rowCount() == 12, "showed the processes")
+
+
+def test_objects_are_asked_for_only_while_they_are_looked_at(app: App, robot: FakeRobot) -> None:
+    told = msgspec.to_builtins(ObjectList("left_knee", list(OBJECTS)))
+    robot.overrides["object.list"] = lambda _params: told
+    robot.overrides["object.read"] = lambda params: {
+        "component": params["component"],
+        "values": {address: msgspec.to_builtins(HOLDS[address]) for address in params["objects"]},
+    }
+    wait(lambda: not app.desk.stations[0].robot.is_stale(), "saw live data")
+    assert not robot.called("object.list")
+    page = app.window.objects
+    app.window.tabs.setCurrentIndex(app.window._views.index(page))
+    reading = app.desk.stations[0].objects.reading
+    wait(lambda: len(reading.held) == len(OBJECTS), "read what is in sight")
+    wait(lambda: page.count.text() == f"{len(OBJECTS)} objects, {len(OBJECTS)} read", "said so")
+    app.window.tabs.setCurrentIndex(0)
+    app.window.refresh()
+    asked = len(robot.called("object.read"))
+    rows = app.desk.stations[0].rings.newest_ns
+    wait(
+        lambda: (app.desk.stations[0].rings.newest_ns or 0) > (rows or 0) + 1_500_000_000,
+        "went on for a while",
+    )
+    assert len(robot.called("object.read")) <= asked + 1, "what was under way"
 
 
 def test_a_robot_is_added_while_the_window_runs(app: App, robot: FakeRobot) -> None:

@@ -229,12 +229,16 @@ def test_the_controls_of_the_player_stay_in_sight_at_every_size(
     record(settings)
     play(whole, archive)
     player = full_window.recordings.player
-    for width, height, scale in ((1366, 768, 1.0), (1920, 1080, 2.0)):
+    for width, height, scale in ((1366, 768, 1.0), (1024, 700, 1.5), (1920, 1080, 2.0)):
         if scale != theme.scale:
             theme.set(Look.LIGHT, scale)
         full_window.resize(width, height)
         whole.draw()
         assert (full_window.width(), full_window.height()) == (width, height)
+        if not player.labelling.isChecked():
+            assert player._stack.height() > full_window.tabs.height() / 3, "the robot is not seen"
+            player.labelling.click()
+            whole.draw()
         for control in (player.timeline, player.play, player.labels.give):
             assert full_window.tabs.rect().contains(
                 control.mapTo(full_window.tabs, control.rect().bottomLeft())

@@ -8,8 +8,9 @@ from msgspec.structs import replace
 
 from gateway.wire.bus import BusInfo, NodeInfo, TalkInfo
 from server_gui.core.follow.events import BusesSeen
+from server_gui.core.processing.bus_health import TAKEN
 from server_gui.views.bus_health import NOT_NOW, TOO_OLD, BusHealthView
-from server_gui.views.main_window import MainWindow
+from server_gui.views.main_window import SLOW, MainWindow
 from server_gui.views.theme import Theme
 from tests.gui.fakes import Bench, destroy
 
@@ -79,3 +80,18 @@ def test_the_last_line_has_the_worst_bus(window: MainWindow, bench: Bench) -> No
         "CAN main 100 %, 4 errors: it is full: 100 % of its time is taken · most: left knee 90 %"
     )
     assert window._bar._bus_icon.accessibleName() == "ALARM"
+
+
+def test_page_and_alarms_tell_of_a_full_bus_in_the_same_frame(window: MainWindow, bench: Bench) -> None:
+    bench.draw(window)
+    window.tabs.setCurrentIndex(3)
+    for before in range(1, SLOW):
+        for load in (41.0, 100.0):
+            for _ in range(before):
+                window.refresh()
+            bench.station.take([BusesSeen((replace(BUS, load_percent=load),), time.monotonic_ns())])
+            for _ in range(SLOW):
+                window.refresh()
+                on_page = "FULL" in window.buses.cards[0].load.text() if window.buses.cards else False
+                assert on_page is any(TAKEN in text for text in window.alarms.texts), (before, load)
+    assert on_page

@@ -141,6 +141,8 @@ def test_a_refusal_and_the_unit_stand_beside_the_field(page: CommissionPage, pla
     draw(page)
     assert page.question.refused.isVisible()
     assert page.question.refused.text() == KNEE["refused"]
+    assert page.question.news.text().startswith("left knee is node 7"), "and not the refusal again"
+    assert KNEE["refused"] not in page.question.news.text()
     assert (page.question.unit.text(), page.question.range.text()) == ("°", "-180 to 360 °")
     assert page.question.live.texts == [("node 7", "-30500 counts · no power")]
 
@@ -162,6 +164,17 @@ def test_stop_is_sent_when_it_is_pressed_whatever_else_is_so(page: CommissionPag
     played.model.look()
     draw(page)
     assert page.bar.stage.text() == "STOP sent"
+
+
+def test_return_is_a_stop_while_a_joint_is_under_power(page: CommissionPage, played: Played) -> None:
+    playing.working(played)
+    draw(page)
+    QTest.keyClick(page, Qt.Key.Key_Return)
+    assert played.talker.told == []
+    played.hear({"moving": "The left knee is under power. STOP: Enter."})
+    draw(page)
+    QTest.keyClick(page, Qt.Key.Key_Return)
+    assert played.talker.told == ['{"stop": true}']
 
 
 def test_what_was_said_can_be_copied_and_who_reads_is_left_alone(

@@ -53,7 +53,7 @@ def test_a_window_opens_whatever_is_kept(qt: QApplication, kept: QSettings, valu
         QApplication.processEvents()
         assert stop_is_whole(app.window)
         app.desk.shown.units.unit("", "rad")
-        app.theme.set(Look.DARK, 1.0)
+    app.theme.set(Look.DARK, 1.0)
 
 
 def test_of_what_is_kept_is_used_what_this_version_knows(kept: QSettings) -> None:

@@ -1,5 +1,6 @@
 """The overview shows what is so, in the units of choice, and how old it is when it is so no more."""
 
+import itertools
 import math
 import time
 from collections.abc import Iterator
@@ -12,18 +13,21 @@ from PySide6.QtGui import QImage
 from gateway.client import ConnectionState
 from gateway.units import Units
 from gateway.wire.component import LayoutInfo
-from server_gui.core.desk.leg_phase import leg_phase, phase_at
+from server_gui.core.desk.leg_phase import LegPhase, leg_phase, phase_at
 from server_gui.core.desk.soles import cells_of, sole
 from server_gui.core.follow.events import LinkChanged
 from server_gui.core.processing.gait_events import Leg
 from server_gui.core.tuning.stop import Proof
 from server_gui.core.tuning.writing import Trial
 from server_gui.views.joint_table import ERROR, STOP, TORQUE, JointModel
+from server_gui.views.now_line import NowLine
 from server_gui.views.overview import Overview
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.figure import ANKLE, SHANK, THIGH, Pose, chain
+from server_gui.views.widgets.gait_ring import GaitRing, Phases
 from server_gui.views.widgets.pressure_map import COLUMNS, ROWS, PressureMap, weights
 from tests.gui.fakes import Bench, destroy
+from tests.gui.rules import settle
 from tests.support.desk import described, looked, telemetry, walking
 
 
@@ -264,6 +268,30 @@ def test_a_trial_is_kept_or_taken_back_where_it_is_seen(overview: Overview, benc
     assert bench.first.named("revert") == [(7,)]
 
 
+@pytest.mark.parametrize("others", [0, 2])
+def test_a_trial_is_never_shown_without_its_value(theme: Theme, bench: Bench, others: int) -> None:
+    names = ["gait.step_length", "left_knee.max_torque", "right_knee.max_torque"][: 1 + others]
+    until_ns = time.monotonic_ns() + 24 * 10**9
+    trial = Trial(7, dict.fromkeys(names, 0.42), dict.fromkeys(names, 0.4), until_ns)
+    bench.station.writing.trial = trial
+    now = NowLine(bench.desk, theme)
+    now.show()
+    for scale in (1.0, 1.5):
+        theme.set(scale=scale)
+        for width, is_offered in itertools.product(range(220, 1000, 60), (True, False)):
+            now.offer(is_offered)
+            now.resize(round(width * scale), 200)
+            now.refresh()
+            settle()
+            shown, end = now.trial.main, now.trial.detail
+            assert "400 → 420" in shown.shown or f"{1 + others} values" in shown.shown, (width, scale)
+            assert shown.is_whole, (width, scale, shown.shown)
+            assert end.is_whole, (width, scale, end.shown)
+            assert now.keep.isVisible() is is_offered
+    assert now.trial.main.shown.startswith("On trial: gait step length 400 → 420 mm")
+    destroy(now)
+
+
 @pytest.mark.parametrize("happened", ["nothing", "link lost", "old"])
 def test_nothing_on_the_overview_is_green_where_nothing_is_known(
     overview: Overview, theme: Theme, bench: Bench, happened: str
@@ -282,3 +310,21 @@ def test_nothing_on_the_overview_is_green_where_nothing_is_known(
     model.refresh()
     assert "good" not in {cell.colour for row in model._cells for cell in row}
     assert "text" not in {row[column].colour for row in model._cells for column in range(2, 7)}
+
+
+@pytest.mark.parametrize("scale", [1.0, 1.5, 2.0])
+def test_the_ring_says_what_the_wearer_does_however_small_it_is(theme: Theme, scale: float) -> None:
+    theme.set(scale=scale)
+    ring = GaitRing(theme)
+    ring.resize(ring.minimumSizeHint().expandedTo(ring.minimumSize()))
+    known: Phases = dict.fromkeys(Leg, LegPhase(30.0, "mid-stance"))
+    for word, least in (("Walk 94 %", "Walk"), ("Stopped", "Stopped"), ("Turn 61 %", "Turn")):
+        ring.show_phases(known, known, word, "120 steps/min", live=True)
+        assert (ring.read[0], ring.read[-1]) == ("L  30 %", "R  30 %"), scale
+        assert ring.read[1].startswith(least), scale
+    ring.show_phases(dict.fromkeys(Leg), dict.fromkeys(Leg), "Not known", "", live=False)
+    assert " ".join(ring.read) == "Not known"
+    ring.setFixedSize(theme.px(400), theme.px(400))
+    ring.show_phases(known, known, "Walk 94 %", "120 steps/min", live=True)
+    assert ring.read[:2] == ["Walk 94 %", "120 steps/min"]
+    destroy(ring)

@@ -11,7 +11,7 @@ from gateway.units import Units
 from gateway.wire.control import Lease
 from gateway.wire.parameter import Confirmed, Reverted, Written
 from server_gui.views.parameters.panel import ParametersPanel
-from server_gui.views.parameters.review import SETTLE_MS
+from server_gui.views.parameters.review import NUMBERS, SETTLE_MS
 from server_gui.views.parameters.tree import NAME, NEW, ROBOT, SAID, TITLES
 from tests.gui.fakes import Bench
 from tests.gui.running import wait
@@ -94,6 +94,37 @@ def test_what_the_robot_would_refuse_cannot_be_written(panel: ParametersPanel) -
     QTest.qWait(SETTLE_MS + 100)
     assert not panel.review.write_it.isEnabled()
     assert "above the largest allowed, 600 mm" in panel.review.said.text()
+    panel.refresh()
+    assert "above the largest" not in panel.banner.text(), "it is said twice"
+    assert not panel.review.leave_out.isVisible(), "nothing would be left"
+
+
+def test_a_review_says_how_far_each_change_goes_and_writes_the_rest_of_what_is_refused(
+    panel: ParametersPanel, bench: Bench
+) -> None:
+    panel.stage_text("gait.step_length", "430")
+    panel.stage_text("left_knee.max_torque", "200")
+    panel.begin_review()
+    panel.resize(700, 900)
+    QApplication.processEvents()
+    table = panel.review.table
+    model = table.model()
+    told = [model.index(0, column).data() for column in range(model.columnCount())]
+    assert told == ["gait.step_length", "400", "→", "430", "mm", "+30 (+7.5 %)", "200 … 600", ""]
+    assert not any(table.isColumnHidden(column) for column in range(table.columnCount()))
+    for width in (700, 420, 300):
+        panel.resize(width, 900)
+        QApplication.processEvents()
+        for column in (column for column in NUMBERS if not table.isColumnHidden(column)):
+            assert table.columnWidth(column) >= table.sizeHintForColumn(column), (width, column)
+        assert width < 420 or table.columnWidth(0) >= table.sizeHintForColumn(0), "the name is cut"
+    assert not panel.review.write_it.isEnabled()
+    panel.review.leave_out.click()
+    panel.refresh()
+    settle(panel)
+    assert [change.name for change in panel.review.changes] == ["gait.step_length"]
+    assert not panel.review.leave_out.isVisible()
+    assert panel.review.write_it.isEnabled()
 
 
 @pytest.mark.parametrize("text", ["", "abc", "nan", "inf", "1e999"])

@@ -423,7 +423,8 @@ def test_a_spool_that_cannot_be_used_keeps_nothing_from_being_shown(
         wait(lambda: app.desk.recording.problem is not None, "found nobody")
         said = app.desk.recording.said(station.address)
         assert (said.tone, said.text) == (Tone.BAD, "NOT RECORDING")
-        assert "cannot be used" in said.detail
+        assert said.detail.startswith("the spool's folder ")
+        assert said.detail.endswith("; this window records as soon as it can")
         monkeypatch.setattr(feeds, "GIVE_WAY_S", 0.0)
         (tmp_path / "spool").unlink()
         wait(lambda: rows(app, "exo-01") > 0, "recorded, once it could")

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QTextDocument
+from PySide6.QtWidgets import QApplication
 
 from gateway.client import ConnectionState
 from gateway.wire.cost import BudgetInfo, ClientCost, GatewayCost
@@ -20,6 +22,7 @@ from server_gui.views.resources import Resources
 from server_gui.views.theme import Theme
 from server_gui.views.trend import Trend
 from server_gui.views.widgets.plot import Curve
+from server_gui.views.widgets.wrapped import Wrapped
 from tests.gui.fakes import Bench, destroy
 from tests.support.desk import resources
 
@@ -46,6 +49,35 @@ def show(view: Resources, bench: Bench, *uses: ProcessUse) -> list[str]:
 
 def use(name: str, pid: int, cpu: float | None, memory: int = MIB) -> ProcessUse:
     return ProcessUse(pid, name, cpu, memory)
+
+
+@pytest.mark.parametrize("scale", [1.0, 1.5])
+def test_a_legend_breaks_a_long_name_and_never_its_number(theme: Theme, scale: float) -> None:
+    theme.set(scale=scale)
+    legend = Wrapped("values")
+    legend.say([("#ffffff", "━", "gateway, of one core % 10.7"), ("#ffffff", "━", f"{'x' * 60} 93.4")])
+    legend.show()
+    for width in (90, 140, 230, 600):
+        legend.resize(round(width * scale), 200)
+        QApplication.processEvents()
+        text = QTextDocument()
+        text.setDefaultFont(legend.font())
+        text.setHtml(legend.text())
+        text.setTextWidth(legend.contentsRect().width())
+        text.setDocumentMargin(0)
+        assert text.idealWidth() <= legend.width(), width
+        assert {"10.7", "93.4"} <= set(text.toPlainText().replace("\N{NO-BREAK SPACE}", " ").split())
+    destroy(legend)
+
+
+def test_every_title_of_the_resources_is_whole_where_they_are_narrow(view: Resources, theme: Theme) -> None:
+    for scale in (1.0, 1.5):
+        theme.set(scale=scale)
+        view.resize(theme.px(320), 900)
+        QApplication.processEvents()
+        for card in (view.cpu, view.memory, view.top, view.devices, view.temperature):
+            title = card._title
+            assert title.fontMetrics().horizontalAdvance(title.text()) <= title.contentsRect().width()
 
 
 def test_before_the_first_look_nothing_is_counted(view: Resources) -> None:

@@ -19,6 +19,7 @@ from tests.gui.fakes import Bench, stop_is_whole
 from tests.gui.test_screens import busy, live
 from tests.support.desk import JOINTS, described, looked, walking
 
+STRIDES = 300  # rows: three of them
 LOST = "nothing came from 127.0.0.1:7420 for 3.0 s; the link is given up"
 
 
@@ -33,7 +34,7 @@ def _never_reached(bench: Bench) -> None:
 
 
 def _link_lost(bench: Bench) -> None:
-    live(bench)
+    live(bench, STRIDES)
     bench.look_again([looked(), LinkChanged(ConnectionState.WAITING, LOST, time.monotonic_ns())])
 
 
@@ -42,30 +43,30 @@ def _stale(bench: Bench) -> None:
 
 
 def _walks(bench: Bench) -> None:
-    live(bench)
+    live(bench, STRIDES)
     bench.look_again([looked()])
 
 
 def _fault(bench: Bench) -> None:
-    live(bench)
+    live(bench, STRIDES)
     bench.look_again([looked(state="fault", problem="overcurrent, 0x2310")])
 
 
 def _stopped(bench: Bench) -> None:
-    live(bench)
+    live(bench, STRIDES)
     bench.station.stop("STOP button of the window")
     bench.first.answer(Stopped(dict.fromkeys(JOINTS, "confirmed"), held=True))
 
 
 def _unconfirmed(bench: Bench) -> None:
-    live(bench)
+    live(bench, STRIDES)
     bench.station.stop("STOP button of the window")
     bench.first.fail(NotConnected(LOST))
 
 
 def _two_robots(bench: Bench) -> None:
     busy(bench)
-    live(bench)
+    live(bench, STRIDES)
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -85,8 +86,8 @@ SIZES = ((1024, 700, 1.0), (1024, 700, 2.0), (1366, 768, 1.5))
 OWN = ("link", "control", "Store", "recording")
 
 
-@pytest.mark.parametrize(("width", "height", "scale"), SIZES[:2])
 @pytest.mark.parametrize("state", [*UNKNOWN, *KNOWN])
+@pytest.mark.parametrize(("width", "height", "scale"), SIZES[:2])
 def test_every_view_in_every_state(
     request: pytest.FixtureRequest,
     bench: Bench,
@@ -96,9 +97,9 @@ def test_every_view_in_every_state(
     height: int,
     scale: float,
 ) -> None:
+    theme.set(scale=scale)
     page: Shown = request.getfixturevalue("whole")
     full = request.getfixturevalue("full_window")
-    theme.set(scale=scale)
     full.resize(width, height)
     broken: list[str] = []
     for place in range(full.tabs.count()):
@@ -124,10 +125,10 @@ def test_every_view_in_every_state(
 def test_a_recording_in_its_views(
     request: pytest.FixtureRequest, bench: Bench, theme: Theme, width: int, height: int, scale: float
 ) -> None:
+    theme.set(scale=scale)
     page: Shown = request.getfixturevalue("whole")
     full = request.getfixturevalue("full_window")
     record(request.getfixturevalue("settings"))
-    theme.set(scale=scale)
     full.resize(width, height)
     play(page, request.getfixturevalue("archive"))
     player = full.recordings.player

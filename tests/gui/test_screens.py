@@ -54,9 +54,9 @@ def busy(bench: Bench) -> None:
     bench.station.edits.stage("gait.step_length", 0.43, bench.station.robot.parameters["gait.step_length"])
 
 
-def live(bench: Bench) -> None:
+def live(bench: Bench, rows: int = 1000) -> None:
     """What a robot that walks has just told, and which is not stale before it has been drawn."""
-    bench.station.take([walking(1000, -60.0)])
+    bench.station.take([walking(rows, -60.0)])
     bench.station.take_prediction(predicted("walk", {"walk": 0.94, "turn": 0.04, "stand": 0.02}))
     bench.station.take_prediction(predicted("steady", {"steady": 0.99, "fall": 0.01}, "falling"))
 

@@ -178,7 +178,33 @@ def test_a_very_long_name_makes_no_card_wider_and_hides_no_stop(window: MainWind
         corners = (card.stop.rect().topLeft(), card.stop.rect().bottomRight())
         assert all(area.contains(card.stop.mapTo(window.robots, corner)) for corner in corners)
         assert card.stop.text().startswith("STOP")
-        assert card.stop.width() >= card.stop.fontMetrics().horizontalAdvance(card.stop.text())
+        assert card.stop.width() >= card.stop.fontMetrics().horizontalAdvance("STOP")
+
+
+@pytest.mark.parametrize("scale", [1.0, 1.5, 2.0])
+def test_two_robots_of_one_name_are_told_apart_on_their_stops(
+    window: MainWindow, bench: Bench, theme: Theme, scale: float
+) -> None:
+    theme.set(scale=scale)
+    window.resize(1024, 700)
+    bench.station.take([described("simulated-exo")])
+    bench.add("second", 43113).take([described("simulated-exo")])
+    for station in bench.desk.stations:
+        bench.desk.select(station)
+        bench.draw(window)
+        stop = window.header.stop
+        assert stop_is_whole(window)
+        assert stop.is_whole, stop.lines
+        assert station.address in " ".join(stop.lines)
+        assert window.header._chips["drives"].isVisible()
+    for dock in window.docks:
+        dock.show()
+    window.docks[0].raise_()
+    bench.draw(window)
+    for card in window.robots.cards:
+        assert card.station.address in card._where.shown
+        assert card._where.is_whole
+        assert card._name.text() == "simulated-exo"
 
 
 def test_header_and_overview_say_the_same_of_a_stop_at_once(window: MainWindow, bench: Bench) -> None:

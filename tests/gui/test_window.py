@@ -1,5 +1,6 @@
 """The window as a whole: first run, robots, looks, sizes, layout, words that are always there."""
 
+import itertools
 import re
 import time
 
@@ -160,7 +161,7 @@ def test_a_window_without_room_has_its_panels_behind_each_other_and_gives_them_b
     window.resize(1366, 768)
     bench.draw(window)
     before = [dock.geometry() for dock in window.docks]
-    theme.set(scale=2.0)
+    theme.set(scale=1.5)
     bench.draw(window)
     assert (window.width(), window.height()) == (1366, 768)
     robots, parameters, events = window.docks
@@ -179,6 +180,54 @@ def test_a_window_without_room_has_its_panels_behind_each_other_and_gives_them_b
     bench.draw(window)
     assert [dock.geometry() for dock in window.docks] == before
     assert not window.panels_button.isVisible()
+
+
+def test_a_tight_window_begins_with_the_robot_and_has_its_panels_a_click_away(
+    window: MainWindow, bench: Bench, theme: Theme
+) -> None:
+    window.resize(1024, 700)
+    theme.set(scale=1.5)
+    bench.draw(window)
+    assert window.overview.width() > 1000
+    assert window.overview._columns == 3
+    assert not any(dock.isVisible() for dock in window.docks)
+    QTest.mouseClick(window.panels_button, Qt.MouseButton.LeftButton)
+    bench.draw(window)
+    assert set(window.tabifiedDockWidgets(window.docks[0])) == set(window.docks[1:])
+    QTest.mouseClick(window.panels_button, Qt.MouseButton.LeftButton)
+    QTest.keyClick(window, Qt.Key.Key_F, Qt.KeyboardModifier.ControlModifier)
+    bench.draw(window)
+    assert not window.parameters.visibleRegion().isEmpty()
+    for button in (window.parameters.review_button, window.parameters.more):
+        assert button.visibleRegion().boundingRect() == button.rect(), "it is below the edge"
+    bench.look_again([looked()])
+    window.parameters.stage_text("gait.step_length", "430")
+    window.parameters.begin_review()
+    bench.draw(window)
+    review = window.parameters.review
+    for control in (review.try_it, review.seconds, review.write_it):
+        assert control.visibleRegion().boundingRect() == control.rect(), "it is below the edge"
+    assert set(window.tabifiedDockWidgets(window.docks[1])) == {window.docks[0], window.docks[2]}
+    window._panels.put_away()
+    theme.set(scale=1.0)
+    bench.draw(window)
+    assert all(dock.isVisible() for dock in window.docks)
+
+
+def test_every_page_is_in_sight_by_its_name(full_window: MainWindow, bench: Bench, theme: Theme) -> None:
+    bar, sizes = full_window.page_bar, ((1024, 700), (1366, 768), (1920, 1080))
+    for scale, size in itertools.product((1.0, 1.5, 2.0), sizes):
+        theme.set(scale=scale)
+        full_window.resize(*size)
+        bench.draw(full_window)
+        for button in (*bar.buttons, full_window.help_button):
+            assert button.width() >= button.sizeHint().width()
+            assert button.visibleRegion().boundingRect() == button.rect(), (button.text(), size, scale)
+        assert stop_is_whole(full_window)
+    for place, button in enumerate(bar.buttons):
+        QTest.mouseClick(button, Qt.MouseButton.LeftButton)
+        assert full_window.tabs.currentIndex() == place
+        assert [one.isChecked() for one in bar.buttons].index(True) == place
 
 
 def test_in_a_window_without_room_seldom_things_are_behind_one_button(

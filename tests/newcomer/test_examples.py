@@ -1,25 +1,28 @@
-"""Every example of every `--help` is one that its command takes; those for a robot do something at one."""
+"""What every `--help` and page shows is taken by its command; examples for a robot do something at one."""
 
 import re
 import shlex
 import shutil
 from collections.abc import Iterator, Mapping
+from functools import cache
 from pathlib import Path
 from typing import Final, NamedTuple
 
 import pytest
 
 from tests.newcomer.newcomer import Newcomer
-from tests.newcomer.pages import Command
+from tests.newcomer.pages import Command, Page, blocks, pages
+from tests.newcomer.pages import commands as typed_in
 from tools.draw.commands import commands, parser_of
 
 ROOT: Final = Path(__file__).parents[2]
 _LINE: Final = re.compile(
     r"^ +(gwrms (?:[^\s#]|(?<=\S) (?=\S))+)"
 )  # up to what is said of it, two blanks away
-_BEYOND: Final = frozenset({"|", ">", "&"})  # words that are the shell's, with all that follows
+_BEYOND: Final = frozenset({"|", "||", ">", "&", "&&"})  # words that are the shell's, with all that follows
 _PLACE: Final = re.compile(r"\b(FILE|DIR|HOST:PORT)\b|…")
 
+REPLAY: Final = " --replay "  # with it, `gwrms sim` has another parser
 ROBOT: Final = "~/robot"
 # Typed at a simulated robot, in this order; the rest needs what no robot on a bench has.
 AT_A_ROBOT: Final = (
@@ -60,7 +63,21 @@ def examples() -> Iterator[Example]:
 def test_an_example_is_taken_by_its_command(example: Example) -> None:
     if _PLACE.search(example.typed) or example.typed.count('"') % 2:
         pytest.skip("it has a place for something else, or goes on in the next line")
-    words = shlex.split(example.typed)[1:]
+    _is_taken(example.typed)
+
+
+@pytest.mark.parametrize("page", pages(), ids=lambda page: page.name)
+def test_what_a_page_shows_is_taken_by_its_command(page: Page) -> None:
+    """Also where it is typed by night only, or by hand."""
+    for block in blocks(page):
+        for command in typed_in(block) if block.is_shell else ():
+            for line in command.typed.replace("\\\n", " ").splitlines():
+                if line.startswith("gwrms ") and not line.startswith("gwrms -") and REPLAY not in line:
+                    _is_taken(line)
+
+
+def _is_taken(typed: str) -> None:
+    words = shlex.split(typed, comments=True)[1:]
     words = words[: next((at for at, word in enumerate(words) if word in _BEYOND), len(words))]
     name = tuple(words[:2]) if f"{words[0]} {' '.join(words[1:2])}" in _known() else (words[0],)
     parser_of(name).parse_intermixed_args(words[len(name) :])
@@ -94,5 +111,6 @@ def _prepare(home: Path) -> None:
     shutil.copy(ROOT / "eds" / "files" / "joint_drive.eds", home / "one.dcf")
 
 
+@cache
 def _known() -> frozenset[str]:
     return frozenset(" ".join(one.words) for one in commands())

@@ -98,6 +98,7 @@ def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Commissioned]:
 def test_its_file_passes_the_check(robot: Commissioned) -> None:
     done = gwrms("check", str(robot.file))
     assert done.returncode == 0, done.stdout + done.stderr
+    assert "controller" not in done.stdout + done.stderr, "what commands the drives was asked"
 
 
 def test_it_walks_with_the_angles_that_its_joints_have(robot: Commissioned) -> None:
@@ -152,4 +153,4 @@ def test_the_doctor_is_content_with_it(robot: Commissioned) -> None:
     computer = str(robot.folder / "computer")
     done = gwrms("doctor", str(robot.file), "--robot", robot.address, "--computer", computer, "--json")
     bill = json.loads(done.stdout)
-    assert (done.returncode, bill["findings"], bill["not_judged"]) == (0, [], []), done.stderr
+    assert (done.returncode, bill["findings"], bill["not_judged"]) == (0, [], []), done.stdout

@@ -8,8 +8,8 @@ from server_gui.core.commissioning.commissioning import GUARD_S, Commissioning, 
 from server_gui.core.commissioning.wish import Wish
 
 WISH = Wish("/home/ada/exo-01.toml", "can0", who="Ada")
-JOINT = ("which drive", "its EDS", "heartbeat", "PDO", "what counts mean", "limits", "ratings")
-FIRST = ("its name", "what is on the bus", "who leads the bus", "its joints")
+JOINT = ("which drive", "its EDS", "heartbeat", "PDO", "what counts mean", "limits", "ratings", "homing")
+FIRST = ("its name", "what is on the bus", "who leads the bus", "who commands the drives", "its joints")
 LAST = ("feet and trunk", "the file")
 JOINTS = ("left_hip", "left_knee", "left_ankle", "right_hip", "right_knee", "right_ankle")
 FILE = '# exo-01, commissioned by Ada.\n\n[robot]\nname = "exo-01"\n\n[joint.left_hip]\nnode_id = 11\n'
@@ -109,7 +109,7 @@ def steps(now: tuple[str, str] = ("left_knee", "what counts mean")) -> dict[str,
     every += [("sensors and file", one) for one in LAST]
     at = every.index(now)
     states = ["done" if place < at else "now" if place == at else "next" for place in range(len(every))]
-    states[3 + 4] = "passed"
+    states[len(FIRST) + 3] = "passed"
     return {
         "steps": [
             {"part": part, "title": title, "state": state}
@@ -200,7 +200,7 @@ def powered(played: Played) -> None:
 
 def moving(played: Played) -> None:
     played.start()
-    played.hear(steps(("left_knee", "ratings")), {"say": "Listening whether somebody else is on the bus …"})
+    played.hear(steps(("left_knee", "homing")), {"say": "Listening whether somebody else is on the bus …"})
     played.hear({"moving": "The left knee is under power. STOP: Enter.  searching for home (+3.5°)"})
 
 

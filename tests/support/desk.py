@@ -84,6 +84,12 @@ class FakeCommands:
     def reset(self) -> "Future[Any]":
         return self._ask("reset")
 
+    def objects(self, component: str, search: str) -> "Future[Any]":
+        return self._ask("objects", component, search)
+
+    def read_objects(self, component: str, objects: Sequence[str]) -> "Future[Any]":
+        return self._ask("read_objects", component, tuple(objects))
+
     def show_processes(self, wanted: bool) -> None:
         self.asked.append(("show_processes", (wanted,)))
 

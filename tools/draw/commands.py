@@ -19,7 +19,7 @@ WORDS: Final[Mapping[str, tuple[str, ...]]] = {
     "journal": ("tail", "verify"),
     "keys": ("pair", "list", "push", "add", "revoke"),
     "sensor": ("record", "replay", "decode"),
-    "calibrate": ("insole", "imu"),
+    "calibrate": ("insole", "imu", "joint"),
     "sessions": ("ls", "show", "gait", "resources", "compare", "export"),
     "cloud": (
         "ls",

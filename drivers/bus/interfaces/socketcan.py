@@ -14,6 +14,7 @@ from pathlib import Path
 from drivers.bus.frames import EXTENDED, REMOTE, Frame
 from drivers.bus.interfaces.link_report import blocking_problem, missing_link, warning
 from drivers.bus.interfaces.netlink import read_link
+from drivers.bus.nmt import HEARTBEAT
 from drivers.bus.settings import CanSettings
 from drivers.errors import Unavailable
 
@@ -26,6 +27,7 @@ _ERRORS = 0x1FF  # every class, such as a controller's state or a violation on t
 _STATISTICS = Path("/sys/class/net")
 _ANCILLARY_BYTES = socket.CMSG_SPACE(16) + socket.CMSG_SPACE(4)
 _MAX_FILTERS = 512
+_NODE = 0x7F  # of an identifier, the bits of its node
 RECEIVE_BUFFER = 4 * 1024 * 1024  # the kernel gives what net.core.rmem_max allows
 CLOCK_ATTEMPTS, CLOCK_APART_NS = 3, 1_000_000
 QUEUE_LOOK_S = 0.001  # nobody tells when a queue that was full has room: a frame of 8 bytes takes 0.13 ms
@@ -102,14 +104,9 @@ class SocketCanTransport:
         return rx + tx, rx_bytes + tx_bytes
 
     def accept(self, can_ids: frozenset[int] | None) -> None:
-        """Let the kernel pass only these identifiers, and error frames."""
-        filters = (
-            b"".join(_FILTER.pack(can_id, _mask(can_id)) for can_id in sorted(can_ids))
-            if can_ids is not None and len(can_ids) <= _MAX_FILTERS
-            else _FILTER.pack(0, 0)
-        )
+        """Let the kernel pass only these identifiers, heartbeats of whomever, and error frames."""
         if self._socket.family == socket.AF_CAN:
-            self._socket.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER, filters)
+            self._socket.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER, filters(can_ids))
 
     def close(self) -> None:
         self._socket.close()
@@ -180,6 +177,15 @@ def _both_clocks() -> tuple[int, int]:
         if time.monotonic_ns() - now_ns < CLOCK_APART_NS:
             break
     return now_ns, wall_ns  # at the worst a stamp is too old
+
+
+def filters(can_ids: frozenset[int] | None) -> bytes:
+    """As the kernel takes them: who boots on the bus later, by an id that nobody knows, is heard too."""
+    others = sorted(one for one in can_ids or () if one & ~_NODE != HEARTBEAT)
+    if can_ids is None or len(others) >= _MAX_FILTERS:
+        return _FILTER.pack(0, 0)
+    heartbeats = _FILTER.pack(HEARTBEAT, _mask(HEARTBEAT) & ~_NODE)
+    return heartbeats + b"".join(_FILTER.pack(can_id, _mask(can_id)) for can_id in others)
 
 
 def _mask(can_id: int) -> int:

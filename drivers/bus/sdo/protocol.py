@@ -20,6 +20,7 @@ _SEGMENT = 7
 EXPEDITED = 4  # bytes that fit into the first request
 _UPLOAD, _UPLOAD_SEGMENT, _DOWNLOAD, _DOWNLOAD_SEGMENT = 0x40, 0x60, 0x20, 0x00  # client's specifiers
 _UPLOADED, _UPLOADED_SEGMENT, _DOWNLOADED, _DOWNLOADED_SEGMENT = 0x40, 0x00, 0x60, 0x20  # the server's
+_BLOCK_DOWNLOADED = 0xA0  # of another client's: block transfers are not ours
 _ANSWERS = {
     _UPLOAD: _UPLOADED,
     _UPLOAD_SEGMENT: _UPLOADED_SEGMENT,
@@ -73,6 +74,13 @@ def concludes(response: bytes, request: bytes) -> bool:
     """Whether a response ends the upload that this request began: with data, or refused."""
     ends = response[0] == ABORT or response[0] & (SPECIFIER | 0x02) == _UPLOADED | 0x02
     return ends and request[0] & SPECIFIER == _UPLOAD
+
+
+def confirmed_write(response: bytes) -> tuple[int, int] | None:
+    """The object of which a response says that a write of it was taken, or begins; of whomever's."""
+    if len(response) == 8 and response[0] & SPECIFIER in (_DOWNLOADED, _BLOCK_DOWNLOADED):
+        return int.from_bytes(response[1:3], "little"), response[3]
+    return None
 
 
 def is_expedited_download(request: bytes) -> bool:

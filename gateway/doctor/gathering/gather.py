@@ -3,7 +3,7 @@
 import contextlib
 import threading
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import eds
@@ -11,15 +11,17 @@ from drivers.bus.interfaces.opening import obstacle
 from drivers.scan.asking import Told
 from drivers.scan.products import Library, files
 from eds.shipped import SHIPPED
-from gateway.client import Address, LinkSettings, Robot, Unreachable
+from gateway.client import Address, ClientError, LinkSettings, Robot, Unreachable
 from gateway.config.robot import RobotConfig
 from gateway.doctor.gathering import running, silent
 from gateway.doctor.gathering.computer import ROOT, computer
 from gateway.doctor.gathering.listening import Listening, Wait
 from gateway.doctor.observations import BusFacts, Computer, NodeTable, Object, Observations, Samples, Value
+from gateway.wire.robot import Description as Robots
 
 NOT_ACTIVE = "devices are asked only through a gateway, or with --active"
 NOT_HERE = "it was asked, and did not answer"
+OTHER = "the gateway goes by another file than this one"
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,10 +43,21 @@ class _Seen:
     objects: Mapping[str, Mapping[Object, Value]]
     samples: Samples
     why_no_objects: str
+    units: Mapping[str, tuple[float, str]] = field(default_factory=dict)
+    other_file: str | None = None
+
+
+class OtherRobot(ClientError):
+    """The gateway that answers is that of another robot than the file's."""
 
 
 def gather(config: RobotConfig, how: How) -> Observations:
-    """Everything that the doctor goes by; what could not be seen is not there, and says why."""
+    """Everything that the doctor goes by; what could not be seen is not there, and says why.
+
+    Raises:
+        ClientError: the gateway cannot be asked, or is another robot's.
+
+    """
     descriptions = dict(_descriptions(config))
     empty = Observations(config, descriptions, {}, {}, Samples(), Computer())
     with _gateway(how) as robot:
@@ -58,6 +71,8 @@ def gather(config: RobotConfig, how: How) -> Observations:
         proposals=dict(_proposals(empty, seen.objects, how.folders)),
         why_no_objects=seen.why_no_objects,
         bus_obstacles=dict(_obstacles(config)) if how.here else {},
+        units=seen.units,
+        other_file=seen.other_file,
     )
 
 
@@ -95,18 +110,40 @@ def _obstacles(config: RobotConfig) -> Iterator[tuple[str, str]]:
 
 def _running(empty: Observations, how: How, robot: Robot) -> _Seen:
     described = robot.describe()
+    _check_robot(empty.config, described, how)
+    other_file = _other_file(empty.config, described)
     ears = empty.config.can if how.here else {}
     with Listening(ears, _waiting()) as listening:
         before = robot.buses()
-        samples = running.samples(robot, described, how.seconds)
+        samples = (
+            running.samples(robot, described, how.seconds) if other_file is None else Samples(why_none=OTHER)
+        )
         if not samples.columns:
             _waiting()(how.seconds)
         after = robot.buses()
         buses = running.by_figures(before, after)
         facts = listening.facts(running.begun_between(before, after))
         buses |= {name: one for name, one in facts.items() if one.heard is not None}
+    if other_file is not None:
+        return _Seen(buses, {}, samples, OTHER, other_file=other_file)
     objects = running.objects(robot, empty.nodes(), empty.descriptions)
-    return _Seen(buses, objects, samples, NOT_HERE)
+    units = {f"{one.component}.{one.object}": (one.scale, one.unit) for one in described.parameters}
+    return _Seen(buses, objects, samples, NOT_HERE, units)
+
+
+def _check_robot(config: RobotConfig, described: Robots, how: How) -> None:
+    if described.robot != config.robot.name:
+        raise OtherRobot(
+            f"the gateway at {how.gateway} is that of {described.robot}, and {config.path} is of "
+            f"{config.robot.name}: name its own (--robot HOST:PORT), or none (--silent)"
+        )
+
+
+def _other_file(config: RobotConfig, described: Robots) -> str | None:
+    """Why what the gateway tells is not judged by this file; gateways of before do not say."""
+    if described.file in (None, config.digest):
+        return None
+    return f"it read {described.file[:8] if described.file else '–'}…, this file is {config.digest[:8]}…"
 
 
 def _silent(empty: Observations, how: How) -> _Seen:

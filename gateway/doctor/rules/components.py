@@ -2,15 +2,22 @@
 
 from collections.abc import Iterable, Iterator
 
+from drivers.bus.nmt import HEARTBEAT
 from gateway.config.robot import COMPONENT_TABLES, header
 from gateway.doctor.observations import Observations
 from gateway.doctor.verdicts import Advice, Finding, Unknown, Verdict
 
+_RESTART = Advice("start the gateway again while nobody is in the robot, so that it takes the file")
+_COPY = Advice("where this is a copy of the robot's file, or an old one: take that which the gateway serves")
 _DESCRIBE = Advice("gwrms describe says since when, and what to check")
 
 
 def component(seen: Observations) -> Iterator[Verdict]:
-    """Every joint and sensor of which its driver says that something is wrong."""
+    """Every joint and sensor of which its driver says that something is wrong; the file that it goes by."""
+    if seen.other_file is not None:
+        words = "the gateway goes by another file than this one: joints and sensors are not judged"
+        yield Finding("component", str(seen.config.path), words, (seen.other_file,), (_RESTART, _COPY))
+    yield from _strangers(seen)
     sampled = {name.partition(".")[0] for name in seen.samples.columns}
     for kind in COMPONENT_TABLES:
         for name in getattr(seen.config, kind):
@@ -20,6 +27,20 @@ def component(seen: Observations) -> Iterator[Verdict]:
                 yield Finding("component", header(kind, name), words, (problem,), (_DESCRIBE,))
             elif name not in sampled and kind != "device":  # a device has no channels
                 yield Unknown("component", header(kind, name), seen.samples.why_none)
+
+
+def _strangers(seen: Observations) -> Iterator[Verdict]:
+    """Nodes that no table has: a master's, perhaps, or a drive with another id than it should have."""
+    for bus, settings in seen.config.can.items():
+        known = {place.table.node_id for place in seen.nodes() if place.table.bus == bus}
+        known |= {
+            one.node_id for _, one in seen.config.on_buses() if one.bus == bus and hasattr(one, "node_id")
+        }
+        heard = {can_id - HEARTBEAT for can_id in seen.heard_on(bus) or ()} & set(range(1, 128))
+        if others := sorted(heard - known - {settings.node_id}):
+            nodes = ", ".join(map(str, others))
+            why = f"node {nodes} is heard, and no table has it: gwrms scan says what it is"
+            yield Unknown("component", header("can", bus), why)
 
 
 def unexplained(seen: Observations, verdicts: Iterable[Verdict]) -> Iterator[Verdict]:

@@ -258,9 +258,13 @@ def zero(seen: Observations) -> Iterator[Verdict]:
     yield from (Unknown("zero", place.header, ALONE) for place in _single(seen))
     pairs = list(_pairs(seen))
     walks = _walks(seen, pairs)
+    scaled = {verdict.about for verdict in figures(seen)}
     for pair in pairs:
         if isinstance(pair, str):
             yield _unjudged(seen, "zero", pair)
+            continue
+        if not scaled.isdisjoint(_place(seen, side, pair.kind).header for side in SIDES):
+            yield Unknown("zero", f"{pair.kind}s", "counts or gear ratio are off: mend that first")
             continue
         spans = [span(pair.of(side)) for side in SIDES]
         means = {side: fmean(pair.of(side)) for side in SIDES}

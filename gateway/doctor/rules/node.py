@@ -84,7 +84,9 @@ def _hears(seen: Observations, place: Place) -> bool | None:
 
 def _no_heartbeat(seen: Observations, place: Place, period_ms: int | None) -> Finding:
     others = [seen.whole(other, 0x1017) for other in seen.nodes()]
-    wanted = max((one for one in others if one), default=HEARTBEAT_MS)
+    timeout_s = place.table.heartbeat_timeout_s
+    usual = max((one for one in others if one), default=HEARTBEAT_MS)
+    wanted = usual if timeout_s is None else min(usual, max(1, round(1000 * timeout_s / USUAL_FACTOR)))
     facts = seen.buses.get(place.table.bus)
     evidence = [] if period_ms is None else [f"1017h = {period_ms}"]
     if facts is not None and facts.heard is not None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import msgspec
 from msgspec import Struct
 
-from gateway.access.folder import AccessFolder
+from gateway.access.folder import AccessFolder, Stamp
 from gateway.records import durable
 from gateway.records.records import Records
 from gateway.wire.role import Role
@@ -32,18 +32,24 @@ People = Mapping[str, Admitted]  # by `client NAME`, `user NAME` or `group NAME`
 class AdmissionsJournal:
     """What was told last is kept beside the journal; an entry comes first, so that none is ever lost."""
 
-    def __init__(self, records: Records) -> None:
+    def __init__(self, records: Records, folder: AccessFolder) -> None:
+        self._folder = folder
+        self._stamp: Stamp | None = None  # of the folder when it was looked at last
         self._journal = records.journal
         self._file = records.folder.path / "admitted.json"
         self._told: People | None = None
 
-    def look(self, folder: AccessFolder) -> None:
-        """At who is let in now; what cannot be seen is in nobody's way."""
+    def look(self) -> None:
+        """At who is let in now, if that has changed; what cannot be seen is in nobody's way."""
         try:
-            if folder.table.exists() or folder.files() or self._file.exists():
+            stamp = self._folder.stamp()
+            if stamp == self._stamp:
+                return
+            self._stamp = stamp
+            if stamp or self._file.exists():
                 from gateway.access.known import known_in  # for robots that know somebody
 
-                self.tell(known_in(folder))
+                self.tell(known_in(self._folder))
         except OSError as error:
             log.warning("who is let in cannot be seen, and is not told: %s", error)
 

@@ -1,6 +1,5 @@
 """Any object of a device that has an EDS: found by address or name, and read; writing is for parameters."""
 
-import re
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
@@ -8,11 +7,17 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from msgspec.structs import replace
+
 from drivers.errors import DeviceTimeout, DriverError
 from eds import Description
 from eds.datatypes import DATA_TYPES, DOMAIN
+from eds.naming import remark
+from eds.report import pdo_rows
+from gateway.config.robot import RobotConfig
 from gateway.connections.turns import Client
 from gateway.modules.component.module import ComponentModule
+from gateway.modules.control.locked import Table, locked
 from gateway.modules.control.parameters import READABLE, WRITABLE, Parameter
 from gateway.modules.control.unanswered import Unanswered
 from gateway.process.futures import back, done, gather, then
@@ -27,15 +32,10 @@ from gateway.wire.dictionary import (
 )
 from gateway.wire.framing import Kind, refuse
 from gateway.wire.limits import OBJECTS_LISTED
+from gateway.wire.object_search import fitting
 
 if TYPE_CHECKING:
     from canopen.objectdictionary import ODVariable
-
-_ADDRESS = re.compile(r"0x([0-9a-f]{1,4})(?::([0-9]{1,3}))?")
-_RANGE = re.compile(r"0x([0-9a-f]{1,4})\s*(?:-\s*(?:0x([0-9a-f]{1,4}))?|…|\.\.\.)")
-_LAST = 0xFFFF
-
-Fits = Callable[[int, int, str], bool]
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +56,7 @@ class Objects:
 
     def __init__(
         self,
-        described: frozenset[str],
+        config: RobotConfig,
         component: ComponentModule,
         loop: Loop,
         parameters: Mapping[str, Parameter],
@@ -64,13 +64,25 @@ class Objects:
         unanswered: Unanswered,
         ask: "Callable[[Client, Sequence[Wanted]], Future[dict[str, ObjectValue]]]",
     ) -> None:
-        """`described` are the joints and devices; `ask` has objects read in their turn, by `read_all`."""
-        self._described = described
+        """`ask` has objects read in their turn, by `read_all`."""
+        self._tables = {
+            name: Table(name, f"[{kind}.{name}]", settings)
+            for kind, tables in (("joint", config.joint), ("device", config.device))
+            for name, settings in tables.items()
+        }
+        self._config = config
         self._component = component
         self._loop = loop
         self._silence = silence
         self._unanswered = unanswered
-        self._parameters = {(one.component, one.object): one for one in parameters.values()}
+        self._names = frozenset(parameters)
+        # By node: what all axes of one share, and what is another axis's, is a parameter all the same.
+        self._parameters = {
+            (config.node_of(one.component), one.object): one
+            for one in parameters.values()
+            if one.component in self._tables
+        }
+        self._mapped: dict[str, dict[tuple[int, int], list[str]]] = {}  # by component, once it was asked for
         self._ask = ask
 
     def listed(self, params: ObjectListParams) -> ObjectList:
@@ -86,7 +98,8 @@ class Objects:
             for variable in description.variables()
             if fits(variable.index, variable.subindex, variable.qualname)
         ]
-        shown = [self._info(params.component, variable) for variable in found[:OBJECTS_LISTED]]
+        mapped = self._mapped_in(params.component, description)
+        shown = [self._info(params.component, variable, mapped) for variable in found[:OBJECTS_LISTED]]
         return ObjectList(params.component, shown, len(found) - len(shown))
 
     def read(self, params: ObjectReadParams, client: Client) -> "Future[ObjectValues]":
@@ -101,11 +114,11 @@ class Objects:
 
     def _description(self, component: str) -> Description:
         descriptions = self._component.robot.descriptions
-        if component in self._described and component in descriptions:
+        if component in self._tables and component in descriptions:
             return descriptions[component]
         if component in self._component.absent:
             raise refuse(Kind.UNAVAILABLE, f"{component}: {self._component.absent[component]}")
-        known = ", ".join(one for one in descriptions if one in self._described) or "none"
+        known = ", ".join(one for one in descriptions if one in self._tables) or "none"
         raise refuse(Kind.UNKNOWN_NAME, f"{component!r} has no object dictionary; those that have: {known}")
 
     def _wanted(self, component: str, text: str, description: Description) -> Wanted:
@@ -115,21 +128,31 @@ class Objects:
             raise refuse(Kind.UNKNOWN_NAME, f"{description.path.name} has no object {wanted.name}")
         return wanted
 
-    def _info(self, component: str, variable: "ODVariable") -> ObjectInfo:
-        data_type = DATA_TYPES.get(variable.data_type or 0)
+    def _mapped_in(self, component: str, description: Description) -> Mapping[tuple[int, int], list[str]]:
+        """The PDOs that each object is mapped in."""
+        if component not in self._mapped:
+            found: dict[tuple[int, int], list[str]] = {}
+            for pdo in pdo_rows(description):
+                for index, subindex, _bits in pdo.mapped if pdo.enabled is not False else ():
+                    found.setdefault((index, subindex), []).append(pdo.name)
+            self._mapped[component] = found
+        return self._mapped[component]
+
+    def _info(
+        self, component: str, variable: "ODVariable", mapped: Mapping[tuple[int, int], list[str]]
+    ) -> ObjectInfo:
         where = address(variable.index, variable.subindex)
-        parameter = self._parameters.get((component, where))
-        default = variable.default
-        return ObjectInfo(
-            where,
-            variable.qualname,
-            "?" if data_type is None else data_type.name,
-            variable.access_type.lower(),
-            variable.min,
-            variable.max,
-            default if isinstance(default, int | float | str) else None,
-            None if parameter is None else parameter.name,
-            _read_only(variable, parameter),
+        parameter = self._parameters.get((self._config.node_of(component), where))
+        owner = self._tables[component if parameter is None else parameter.component]
+        pdos = mapped.get((variable.index, variable.subindex), [])
+        found = locked(variable, parameter, owner, self._names, pdos)
+        return replace(
+            by_eds(variable),
+            parameter=None if parameter is None else parameter.name,
+            read_only=_read_only(variable, parameter),
+            pdos=pdos,
+            locked=None if found is None else found.why,
+            release=None if found is None else found.lines,
         )
 
     # -- what the device holds -------------------------------------------------------------------------------
@@ -168,12 +191,7 @@ class Objects:
         return self._unanswered.why(component) if silence is None else f"{component} is not there: {silence}"
 
     def _unreadable(self, wanted: Wanted) -> str | None:
-        variable = self._description(wanted.component).variable(wanted.index, wanted.subindex)
-        if variable is None or variable.access_type.lower() not in READABLE:
-            return "it cannot be read, the EDS says"
-        if variable.data_type == DOMAIN:
-            return "a domain is not read: nobody knows how long it would keep the device busy"
-        return None
+        return unreadable(self._description(wanted.component).variable(wanted.index, wanted.subindex))
 
     def _unread(self, wanted: Wanted, why: str | None) -> ObjectValue:
         return ObjectValue(None, "", None, why or self._unreadable(wanted))
@@ -192,20 +210,30 @@ def address(index: int, subindex: int) -> str:
     return f"0x{index:04X}:{subindex}"
 
 
-def fitting(search: str) -> Fits:
-    """Which objects a search means: see `ObjectListParams`."""
-    text = search.strip().lower()
-    if text.startswith("0x") and text.endswith("*"):
-        prefix = text[2:-1]
-        return lambda index, _subindex, _name: f"{index:04x}".startswith(prefix)
-    if found := _RANGE.fullmatch(text):
-        first, last = int(found[1], 16), int(found[2], 16) if found[2] else _LAST
-        return lambda index, _subindex, _name: first <= index <= last
-    if found := _ADDRESS.fullmatch(text):
-        wanted, member = int(found[1], 16), None if found[2] is None else int(found[2])
-        return lambda index, subindex, _name: index == wanted and member in (None, subindex)
-    words = text.split()
-    return lambda _index, _subindex, name: all(word in name.lower() for word in words)
+def by_eds(variable: "ODVariable") -> ObjectInfo:
+    """What the EDS alone says of an object."""
+    known, default = DATA_TYPES.get(variable.data_type or 0), variable.default
+    return ObjectInfo(
+        address(variable.index, variable.subindex),
+        variable.qualname,
+        "?" if known is None else known.name,
+        variable.access_type.lower(),
+        variable.min,
+        variable.max,
+        default if isinstance(default, int | float | str) else None,
+        None,
+        None,
+        remark(variable.name),
+    )
+
+
+def unreadable(variable: "ODVariable | None") -> str | None:
+    """Why an object is not read; `None` where it is."""
+    if variable is None or variable.access_type.lower() not in READABLE:
+        return "it cannot be read, the EDS says"
+    if variable.data_type == DOMAIN:
+        return "a domain is not read: nobody knows how long it would keep the device busy"
+    return None
 
 
 def _read_only(variable: "ODVariable", parameter: Parameter | None) -> str | None:

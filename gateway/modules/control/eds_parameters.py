@@ -144,19 +144,13 @@ class _Offer:
         )
 
     def _lock(self, variable: "ODVariable", name: str, address: str) -> Lock | None:
-        index = _of_first_axis(variable.index)
-        if index == CONTROLWORD:
-            return Lock.CONTROLWORD
-        if index in _COMMUNICATION:
-            return Lock.STORAGE if index in (STORE, RESTORE) else Lock.COMMUNICATION
         release = self._table.release
+        lock = own_lock(variable.index, is_led=(variable.index, variable.subindex) in self._mapped)
+        if lock in (Lock.CONTROLWORD, Lock.STORAGE, Lock.COMMUNICATION):
+            return lock
         if name in release or address in release:
             return None
-        if index in _COMMANDS or (variable.index, variable.subindex) in self._mapped:
-            return Lock.COMMANDED
-        if index in _STOPPING:
-            return Lock.STOPPING
-        return None if matches(name, release) else Lock.UNRELEASED
+        return lock or (None if matches(name, release) else Lock.UNRELEASED)
 
     def _unmatched(self, variables: list["ODVariable"], names: list[str]) -> Iterator[Parameter]:
         """What is to be released and does not exist, to be seen where parameters are."""
@@ -174,6 +168,18 @@ class _Offer:
                 yield Parameter(
                     f"{self._component}.{entry}", self._component, settings, 0, 0, problem=problem
                 )
+
+
+def own_lock(index: int, *, is_led: bool) -> Lock | None:
+    """What locks an object by what it is, whoever describes it; `is_led`: an RPDO of the EDS brings it."""
+    index = _of_first_axis(index)
+    if index == CONTROLWORD:
+        return Lock.CONTROLWORD
+    if index in _COMMUNICATION:
+        return Lock.STORAGE if index in (STORE, RESTORE) else Lock.COMMUNICATION
+    if index in _COMMANDS or is_led:
+        return Lock.COMMANDED
+    return Lock.STOPPING if index in _STOPPING else None
 
 
 def _is_number(variable: "ODVariable") -> bool:

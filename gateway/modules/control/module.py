@@ -75,6 +75,8 @@ from gateway.wire.stop import (
     Stopped,
 )
 
+LOOK_S = 1.0  # between looks who is let in
+
 if TYPE_CHECKING:
     from gateway.access.known import Known
     from gateway.connections.session import Session
@@ -102,6 +104,7 @@ class ControlModule:
         self._context = context
         self._component = cast("ComponentModule", context.needs["component"])
         self._leases = Leases(context.loop, self._lease_changed)
+        self._watching = False
         self._awake: set[str] = set()  # why the bus is kept, clients or not
         self._signer = HeadSigner(AccessFolder(context.config.access), context.config.robot.name)
         self.armed: Callable[[str], bool] = lambda _name: False  # the guard's, where there is one
@@ -135,17 +138,20 @@ class ControlModule:
                 config, self._component, loop, self._records, self._stop.authority, self._trials_changed
             )
             opened.callback(self._tuning.close)
-            self._admissions = AdmissionsJournal(self._records)
-            self._admissions.look(AccessFolder(config.access))
+            self._admissions = AdmissionsJournal(self._records, AccessFolder(config.access))
+            self._admissions.look()
             self._stop.claim = self._tuning.claim
             left = self._tuning.load()
             self._stop.start()
             opened.pop_all()
+        self._watching = True
+        loop.post(self._look_who_is_known)
         loop.post(lambda: self._tuning.resume(left))
         self._context.stops_by(self.stop_robot)
         loop.post(self._hold_changed)  # a stop that is held keeps the module from its first moment on
 
     def stop(self) -> None:
+        self._watching = False
         self._context.stops_by(None)
         self._stop.close()
         self._tuning.close()
@@ -179,6 +185,12 @@ class ControlModule:
     def who_is_known(self, known: "Known") -> None:
         """Who is let in, or what they may, has changed. In the loop's thread."""
         self._admissions.tell(known)
+
+    def _look_who_is_known(self) -> None:
+        """Whoever is there or not: that somebody was let in, or is no more, is told when it happens."""
+        if self._watching:
+            self._admissions.look()
+            self._context.loop.call_later(LOOK_S, self._look_who_is_known)
 
     def _hold_changed(self) -> None:
         self.keep_awake("stop", self._stop.held)

@@ -29,6 +29,11 @@ class Lock(Enum):
     STORAGE = "storage"
     CONTROLWORD = "controlword"
 
+    @property
+    def remedy(self) -> str:
+        """What to do about it, where there is no parameter to be named."""
+        return _REMEDIES[self]
+
 
 _REMEDIES = {
     Lock.TEXT: "it is no number, and can only be read",
@@ -149,8 +154,11 @@ class Parameter:
         if self.access not in WRITABLE:
             raise self.refusal(Kind.READ_ONLY, f"{self.object} is read-only, the EDS says {self.access!r}")
         if self.lock is not None:
-            remedy = _REMEDIES[self.lock].format(name=self.name.partition(".")[2], table=self.table)
-            raise self.refusal(Kind.READ_ONLY, f"{self.object} is read-only: {remedy}")
+            raise self.refusal(Kind.READ_ONLY, f"{self.object} is read-only: {self.remedy(self.lock)}")
+
+    def remedy(self, lock: Lock) -> str:
+        """In full words, what to do about this lock of it."""
+        return lock.remedy.format(name=self.name.partition(".")[2], table=self.table)
 
     def encode(self, value: Number) -> bytes:
         """The bytes to write, checked against access, type and limits.

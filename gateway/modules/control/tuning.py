@@ -89,9 +89,8 @@ class Tuning:
         self._rules = Rules(config, component, self._parameters)
         self._reads: Reads[Parameter | Wanted, Any] = Reads(loop, self._rules.device, self._read_any)
         self._unanswered = Unanswered()
-        described = frozenset({*config.joint, *config.device})
         silence, ask = self._rules.silence, self._reads.ask
-        self.objects = Objects(described, component, loop, self._parameters, silence, self._unanswered, ask)
+        self.objects = Objects(config, component, loop, self._parameters, silence, self._unanswered, ask)
         self._known: dict[str, tuple[int, float | str]] = {}  # parameter → when, what the device held
         self._asked: set[_Asked] = set()  # writes that have not been answered
         self._ending: str | None = None

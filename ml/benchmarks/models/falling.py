@@ -22,6 +22,7 @@ Integers = npt.NDArray[np.int_]
 Flags = npt.NDArray[np.bool_]
 
 FAR: Final = 1_000_000  # samples to an impact where there is none
+TOGETHER: Final = 32_768  # rows judged at a time
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,24 +46,35 @@ class FallDetector(ClassifierMixin, BaseEstimator):  # type: ignore[misc]  # sci
     def __init__(self, settings: FallSettings | None = None) -> None:
         self.settings = settings or FallSettings()
 
-    def fit(self, x: Features, to_impact: Integers, recording: Integers, subject: Integers) -> Self:
-        """Learn from every decision (row) of whole recordings, in their order.
+    def fit(
+        self,
+        x: Features,
+        to_impact: Integers,
+        recording: Integers,
+        subject: Integers,
+        rows: npt.NDArray[np.intp] | None = None,
+    ) -> Self:
+        """Learn from every decision (row) of whole recordings, in their order; or from `rows` alone.
 
-        `to_impact`: samples until a fall's impact, FAR where there is none.
+        `to_impact`: samples until a fall's impact, FAR where there is none. Features are large: those of
+        `rows` are never copied as a whole.
 
         Raises:
             UnusableData: falls, or daily life, are those of too few people.
 
         """
         tuned = self.settings
-        falling, learned = self._lessons(to_impact, moving(x))
-        self.trees_, unseen = [], np.zeros(len(x))
-        for train, held_out in GroupKFold(min(tuned.folds, len(np.unique(subject)))).split(x, groups=subject):
-            rows = train[learned[train]]
-            if len(np.unique(falling[rows])) < 2:
+        rows = np.arange(len(x)) if rows is None else rows
+        to_impact, recording, subject = to_impact[rows], recording[rows], subject[rows]
+        falling, learned = self._lessons(to_impact, moving(x)[rows])
+        self.trees_, unseen = [], np.zeros(len(rows))
+        folds = GroupKFold(min(tuned.folds, len(np.unique(subject))))
+        for train, held_out in folds.split(rows, groups=subject):
+            lessons = train[learned[train]]
+            if len(np.unique(falling[lessons])) < 2:
                 raise UnusableData("too few people fall, or too few do not: some have nobody to learn from")
-            trees = fall_trees(tuned).fit(x[rows], falling[rows])
-            unseen[held_out] = trees.predict_proba(x[held_out])[:, 1]
+            trees = fall_trees(tuned).fit(x[rows[lessons]], falling[lessons])
+            unseen[held_out] = probability_of(trees, x, rows[held_out])
             self.trees_.append(trees)
         daily = ~np.isin(recording, recording[falling])
         self.threshold_ = self._threshold(unseen[daily], recording[daily])
@@ -74,11 +86,11 @@ class FallDetector(ClassifierMixin, BaseEstimator):  # type: ignore[misc]  # sci
         mean: Floats = every.mean(axis=0)
         return mean
 
-    def alarms(self, x: Features, recording: Integers) -> Flags:
-        """The rows of whole recordings at which the mean of the last decisions is over the threshold."""
-        return (
-            trailing_mean(self.predict_proba(x)[:, 1], recording, self.settings.decisions) >= self.threshold_
-        )
+    def alarms(self, x: Features, recording: Integers, rows: npt.NDArray[np.intp] | None = None) -> Flags:
+        """Whether the mean of the last decisions is over the threshold, at every row or at `rows`."""
+        rows = np.arange(len(x)) if rows is None else rows
+        falls = probability_of(self, x, rows)
+        return trailing_mean(falls, recording[rows], self.settings.decisions) >= self.threshold_
 
     def _lessons(self, to_impact: Integers, somebody_moves: Flags) -> tuple[Flags, Flags]:
         """Which rows are falling, and which rows are learned from."""
@@ -97,6 +109,15 @@ class FallDetector(ClassifierMixin, BaseEstimator):  # type: ignore[misc]  # sci
         highest = np.zeros(number.max(initial=0) + 1)
         np.maximum.at(highest, number, mean)
         return float(np.quantile(highest, 1.0 - self.settings.false_alarms))
+
+
+def probability_of(model: Any, x: Features, rows: npt.NDArray[np.intp]) -> Floats:
+    """The probability of falling at each of `rows`, in parts: scikit-learn copies what it is given."""
+    said = np.empty(len(rows))
+    for begin in range(0, len(rows), TOGETHER):
+        part = slice(begin, begin + TOGETHER)
+        said[part] = model.predict_proba(x[rows[part]])[:, 1]
+    return said
 
 
 def trailing_mean(values: Floats, recording: Integers, count: int) -> Floats:

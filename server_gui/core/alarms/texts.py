@@ -112,7 +112,7 @@ TEXTS: Final = dict(
         _text(
             Kind.BUS_FAILS, "square", "bad", "check termination, wiring, bitrate and load (gwrms describe)"
         ),
-        _text(Kind.NOT_RECORDED, "square", "bad", "what comes now is not kept: see to it, or stop the trial"),
+        _text(Kind.NOT_RECORDED, "square", "bad", "see to it: what comes until then may be lost"),
         _text(Kind.RECORDING, "triangle", "warn", "see to the disk of the spool (gwrms collect --status)"),
         _text(Kind.UPLOAD, "triangle", "warn", "nothing is lost: it waits in the spool; check the store"),
         _text(

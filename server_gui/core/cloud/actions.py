@@ -13,6 +13,7 @@ import pyarrow as pa
 from gateway.amounts import counted, size
 from ml.store import Store, StoreError
 from ml.store.sessions import Session
+from ml.store.snapshot import Snapshot
 from ml.store.url import checked_url
 from server_gui.core.cloud import exports, partial_copy, spool_upload, transfer, verify
 from server_gui.core.cloud.jobs import Job, Work
@@ -88,8 +89,7 @@ def check(settings: ServerSettings, *, deep: bool) -> Work:
     """Check that every file of the store is whole, and every batch there that the spool has sent."""
 
     def work(job: Job) -> str:
-        store = Store.existing(settings.store.url)
-
+        store = Snapshot.existing(settings.store.url)
         found = verify.whole(store, settings.recorder.spool, _steps(job, "steps"), deep=deep)
         if found.problems:
             told = "; ".join(found.problems[:PROBLEMS_TOLD])

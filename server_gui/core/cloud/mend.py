@@ -11,17 +11,24 @@ from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 
-from ml.store import durable, mending
+import pyarrow.compute as pc
+
+from ml.store import durable, mending, reading
 from ml.store.errors import StoreError
 from ml.store.fragments import DataFile
 from ml.store.private import FILE
+from ml.store.snapshot import Snapshot
 from ml.store.store import Store
+from ml.store.tables import EVENTS
+from ml.store.translation import translated
 from server_gui.core.cloud import verify
 from server_gui.core.cloud.counting import Advance, Batch
 from server_gui.core.cloud.receipt_check import Proof, prove
 from server_gui.core.cloud.repeated_upload import Again, Untouched, Whose, whose
+from server_gui.core.recording.batching import EventKind
 from server_gui.core.recording.errors import Damaged, SpoolUnusable
 from server_gui.core.recording.receipts import RECEIPTS, Altered, Part, Receipt, Receipts
 from server_gui.core.recording.segment import Segment
@@ -78,9 +85,7 @@ def plan(store: Store, spool: Spool, expect: Callable[[int], AbstractContextMana
     kept = _kept(broken, proof, held)
     waiting = spool.waiting()  # the next upload brings these
     nowhere = sorted(number for _, number in proof.lacking - set(copies.values()) if number not in waiting)
-    lost = (
-        [f"the spool has no second copy of {verify.told_batches(nowhere)}: bring one back"] if nowhere else []
-    )
+    lost = [_nowhere(store, nowhere)] if nowhere else []
     staying = [file for file in broken if whose(file) in kept]
     going = [file for file in broken if whose(file) not in kept]
     open_ = {batch for batch, part, _ in proof.missing if whose(part) not in kept}
@@ -90,6 +95,21 @@ def plan(store: Store, spool: Spool, expect: Callable[[int], AbstractContextMana
     lost += [_told(store, file) for file in staying]
     later = sorted(number for number in again if copies[number] in behind)
     return Plan(going, sorted(now), lost, staying, later)
+
+
+def _nowhere(store: Store, batches: Sequence[int]) -> str:
+    """That nobody here can bring them, and what else may have become of them: no other computer tells it."""
+    words = f"the spool has no second copy of {verify.told_batches(batches)}: bring one back"
+    wanted = pc.field("kind") == EventKind.FORGOTTEN.value
+    times: list[datetime] = []
+    with contextlib.suppress(StoreError), translated(f"{store.url}/{EVENTS.name} cannot be read"):
+        times = reading.dataset(store, EVENTS).to_table(columns=["utc"], filter=wanted)["utc"].to_pylist()
+    if not times:
+        return words
+    return (
+        f"{words}. A wearer was forgotten here on {max(times):%Y-%m-%d %H:%M} UTC (gwrms cloud forget): "
+        "where these were their rows nothing is lost, and --accept-loss counts what is there as what was sent"
+    )
 
 
 def _told(store: Store, file: DataFile) -> str:
@@ -189,6 +209,7 @@ def _look(
     values: bool,
 ) -> tuple[list[DataFile], Proof]:
     """Which files are damaged or gone, and what the others prove; with `values` whether it is as sent."""
+    store = Snapshot.existing(store.url)  # each table is opened once
     found = verify.files(store)
     with expect(2 * len(found)) as advance:
         broken = verify.broken(store, found, advance, deep=True)

@@ -18,6 +18,7 @@ from server_gui.core.commissioning.stages import LOOKS, Look, Stage
 from server_gui.core.commissioning.wish import Wish
 
 MOST_LINES: Final = 2000  # of what was said
+MOST_NEWS: Final = 16  # and since the last answer
 GUARD_S: Final = 0.4  # a click within it was meant for the question before
 STOP_S: Final = 2.5  # for the command to have stopped the drives; then another one does it
 OLD_S: Final = 2.0  # live values beyond it are not live
@@ -89,6 +90,7 @@ class Commissioning:
         self.problem = ""  # in words, of whatever is wrong now
         self.log: deque[str] = deque(maxlen=MOST_LINES)
         self.logged = 0  # lines ever
+        self.news: deque[str] = deque(maxlen=MOST_NEWS)  # said since the last answer
         self._talk = talk
         self._clock = clock
         self._talker: Talker | None = None
@@ -156,6 +158,7 @@ class Commissioning:
         self.question, self.steps, self.proposed, self.written = None, (), None, None
         self.problem, self._error, self._stopped, self._stop_s, self._ending = "", "", None, None, False
         self._live = ()
+        self.news.clear()
         self._note(Kind.NOTED, wish.typed)
         self._heard_s = self._clock()
         self.stage = Stage.STARTING
@@ -169,6 +172,7 @@ class Commissioning:
         line = " ".join(text.split())
         self._note(Kind.ANSWERED, line or (question.default or ("done" if question.press else "")))
         self.question, self._live, self.problem = None, (), ""
+        self.news.clear()
         self._heard_s = self._clock()
         self.stage = Stage.WORKING
         talker.send(spoken.answer(line, question.number))
@@ -228,6 +232,7 @@ class Commissioning:
             self.written = line.written
         elif line.stopped is not None:
             self._stopped = line.stopped
+            self._stop_s = self._clock() if self._stop_s is None else self._stop_s  # by itself, too
             self._note(Kind.NOTED, line.stopped.words)
         elif line.error is not None:
             self._error = line.error.message
@@ -248,6 +253,8 @@ class Commissioning:
         self._note(Kind.SAID, line.say or "")
         if line.file:
             self.proposed = (line.file, line.say or "")
+        else:
+            self.news.extend((line.say or "").splitlines())
 
     def _asked(self, line: Line) -> None:
         if self.question == line or not self.runs:  # told twice

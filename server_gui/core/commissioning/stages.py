@@ -43,7 +43,7 @@ BY_HAND: Final = "Use the hardware emergency stop."
 LOOKS: Final = {
     Stage.NOT_STARTED: Look(
         Mark("ring", "dim", "not started"),
-        "Nothing is moved, enabled or stopped: you move the joints by hand, without power.",
+        "You move the joints by hand, without power; only homing, on your word, puts one under power.",
     ),
     Stage.STARTING: Look(Mark("half", "accent", "starting"), "The command is starting …", runs=True),
     Stage.WORKING: Look(

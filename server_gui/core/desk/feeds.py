@@ -105,6 +105,16 @@ class Feeds:
         return self._collector is not None and self._collector.hangs
 
     @property
+    def ends(self) -> str:
+        """What it waits for while it is left."""
+        return "" if self._collector is None else self._collector.ends
+
+    def hurry(self) -> None:
+        """Wait for nothing but what goes to the disk, from any thread."""
+        if self._collector is not None:
+            self._collector.hurry()
+
+    @property
     def by_source(self) -> bool:
         """Whether single sources' samples come, which views cannot draw."""
         return self._collector is not None and self._settings.recorder.rate_hz == 0

@@ -237,7 +237,7 @@ class Recording:
         if ended:
             return Said(Tone.BAD, "RECORDING HAS STOPPED", "; ".join(ended))
         if self.problem is not None:
-            return Said(Tone.BAD, "NOT RECORDING", f"{SOON}: {self.why or self.problem}")
+            return Said(Tone.BAD, "NOT RECORDING", f"{self.why or self.problem}; {SOON}")
         if self._asking and self._asked_ns is not None and time.monotonic_ns() - self._asked_ns > UNKNOWN_NS:
             return Said(Tone.BAD, "RECORDING: NO ANSWER", "whether anything is recorded now is not known")
         if report is None:

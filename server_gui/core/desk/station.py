@@ -40,6 +40,7 @@ from server_gui.core.follow.events import (
 from server_gui.core.follow.news import News, NewsKind
 from server_gui.core.follow.robot import Robot
 from server_gui.core.follow.robot_news import RobotNews
+from server_gui.core.objects.objects import Objects
 from server_gui.core.prediction.current import StationPredictions
 from server_gui.core.prediction.news import PredictionNews, Ruled
 from server_gui.core.processing.robot_processing import RobotProcessing
@@ -90,6 +91,7 @@ class Station:
         self.file: Comparison | None = None  # what its parameters are compared with
         self.audit = Audit()
         self.flash = Flash(self.audit)
+        self.objects = Objects(commands, deliver)
         self._commands = commands
         self._deliver = deliver
         self.news = news
@@ -227,7 +229,9 @@ class Station:
             self.tell(NewsKind.WARNING, f"the robot's computer stood still for {stall.lasted_s:.1f} s")
 
     def _described(self, description: Description, before: Description | None) -> None:
-        if before is not None and before.boot_id != description.boot_id:
+        is_another = before is not None and before.boot_id != description.boot_id
+        self.objects.described(is_another=is_another)
+        if is_another:
             self.rings.clear()
             self.flags.clear()
             self._states = StateWatch()

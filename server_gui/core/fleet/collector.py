@@ -44,6 +44,7 @@ JOURNAL_S: Final = 5.0
 ON_DISK_S: Final = 4.0  # for what was asked to be kept
 LAST_UPLOAD_S: Final = 20.0  # what waits at the end may take so long; the spool keeps the rest
 BREAK_OFF_S: Final = 5.0  # for an upload under way
+HURRIED_S: Final = 0.3  # likewise, where nobody waits
 
 
 class CollectorReport(Struct, frozen=True):
@@ -84,7 +85,8 @@ class Collector:
         stop: StopRobot | None = None,
         worn: Worn = NOBODY,
     ) -> None:
-        self.hangs = False
+        self.hangs = self._hurries = False
+        self.ends = ""  # what it waits for while it is left
         self._disk = concurrent.futures.ThreadPoolExecutor(1, "disk")
         self._settings = settings
         self._began_s = time.time()
@@ -122,15 +124,26 @@ class Collector:
         return self
 
     def __exit__(self, *exc: object) -> None:
+        self.ends = "what came last goes to the disk"
         if self._prediction is not None:
             self._prediction.__exit__()
         self.network.__exit__()
         self._disk.shutdown()
         self._recorder.close()
+        self._upload_last()
+        self.hangs = not self._uploader.close(HURRIED_S if self._hurries else BREAK_OFF_S)
+        self._spool.close()
+
+    def hurry(self) -> None:
+        """Leave without the last upload, from any thread: all that was recorded is in the spool."""
+        self._hurries = True
+        self._uploader.hurry()
+
+    def _upload_last(self) -> None:
+        waiting = len(self._spool.waiting())
+        self.ends = f"{waiting} {'batch' if waiting == 1 else 'batches'} of the recording go to the store"
         if self._settings.recorder.upload is not Upload.MANUAL and not self._uploader.drain(LAST_UPLOAD_S):
             log.warning("%d batches wait in the spool for the next start", len(self._spool.waiting()))
-        self.hangs = not self._uploader.close(BREAK_OFF_S)
-        self._spool.close()
 
     @property
     def untold(self) -> int:

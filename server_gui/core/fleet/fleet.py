@@ -115,7 +115,7 @@ class Fleet:
         task = self._following_tasks.pop(robot, None)
         if task is not None:
             task.cancel()
-        self._recorder.end(robot)
+        self._recorder.leave(robot)
 
     def pause(self) -> None:
         """Follow all of them as before, and record nothing of it."""

@@ -180,6 +180,10 @@ class Recorder:
         """End the robot's session."""
         return self._put(robot, 1, functools.partial(self._robots.end, robot, Moment.now()), control=True)
 
+    def leave(self, robot: str) -> int:
+        """End the robot's session; it is followed no more."""
+        return self._put(robot, 1, functools.partial(self._robots.leave, robot, Moment.now()), control=True)
+
     def resources(self, robot: str, snapshot: ResourceSnapshot) -> int:
         """Keep a look at the robot's computer."""
         return self._put(robot, 1, functools.partial(self._robots.resources, robot, Moment.now(), snapshot))

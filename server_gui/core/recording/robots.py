@@ -79,6 +79,12 @@ class Robots:
         session = self._sessions.pop(robot, None)
         return [] if session is None else [session.ended(known.clock.recorded_ns(now)).record()]
 
+    def leave(self, robot: str, now: Moment) -> list[Record]:
+        """End its session, and take it for one of those that are followed no more: its name is free."""
+        self._names.pop(robot, None)
+        self._told = {told for told in self._told if told[0] != robot}
+        return self.end(robot, now)
+
     def sessions(self) -> list[Record]:
         """Of every session that goes on what is known of it, once more."""
         return [session.record() for session in self._sessions.values()]

@@ -66,6 +66,7 @@ class Uploader:
         self._compared = False  # whether the store is ahead of the spool
         self._ending = threading.Event()
         self._asked = threading.Event()
+        self._hurries = threading.Event()
         self._turned = threading.Event()  # it has looked at everything that waits
         self.worker = Worker("uploader", self._run, UPLOAD_S)
 
@@ -87,14 +88,21 @@ class Uploader:
         return self.worker.join(within_s)
 
     def drain(self, within_s: float) -> bool:
-        """Upload everything that waits, wanted or not; False where that fails or takes longer."""
+        """Upload everything that waits, wanted or not; False where it fails, takes longer, or is hurried."""
         until_s = time.monotonic() + within_s
         while self._spool.waiting():
             self._turned.clear()
+            if self._hurries.is_set():
+                return False
             self.now()
             if not self._turned.wait(max(0.0, until_s - time.monotonic())) or self.state.problem is not None:
                 return False
         return True
+
+    def hurry(self) -> None:
+        """Nobody waits for a `drain` any more, from any thread: what is in the spool stays there."""
+        self._hurries.set()
+        self._turned.set()
 
     def now(self) -> None:
         """Upload everything that waits, wanted or not."""

@@ -1,10 +1,11 @@
 """What a window can ask of one robot; tests bring their own."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Future
 from typing import Protocol
 
 from gateway.wire.control import Lease
+from gateway.wire.dictionary import ObjectList, ObjectValues
 from gateway.wire.parameter import Confirmed, Reverted, Stored, Written
 from gateway.wire.stop import Reset, Stopped
 
@@ -42,6 +43,14 @@ class Commands(Protocol):
 
     def reset(self) -> "Future[Reset]":
         """End a held stop; takes control first. Enables nothing."""
+        ...
+
+    def objects(self, component: str, search: str) -> "Future[ObjectList]":
+        """What an EDS says of those objects that the search means."""
+        ...
+
+    def read_objects(self, component: str, objects: Sequence[str]) -> "Future[ObjectValues]":
+        """What a device holds of these now."""
         ...
 
     def show_processes(self, wanted: bool) -> None:

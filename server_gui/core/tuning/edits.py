@@ -34,6 +34,16 @@ class Change:
     new: float
     elsewhere: bool  # somebody else has changed it since this edit was begun
     problem: str | None = None  # why the robot would refuse it
+    allowed: tuple[Number | None, Number | None] = None, None  # the least and the most
+
+    @property
+    def by(self) -> str:
+        """How far it goes, in its unit and as a share of what is there: `+30 (+7.5 %)`."""
+        if self.old is None:
+            return ""
+        step = float(f"{self.new - self.old:.6g}")
+        share = f" ({100 * step / abs(self.old):+.3g} %)" if self.old else ""
+        return f"{'-' if step < 0 else '+'}{self.unit.editable(abs(step))}{share}"
 
 
 @dataclass(slots=True)
@@ -88,6 +98,7 @@ class Edits:
             new=staged.value,
             elsewhere=old != staged.base,
             problem=refusal(staged.value, old, info, unit),
+            allowed=(None, None) if info is None else (info.min, info.max),
         )
 
 

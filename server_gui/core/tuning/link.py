@@ -3,12 +3,13 @@
 import asyncio
 import contextlib
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from typing import Final
 
 from gateway.client import Address, Client, ClientError, ConnectionState, LinkSettings
 from gateway.wire.control import Lease
+from gateway.wire.dictionary import ObjectList, ObjectValues
 from gateway.wire.parameter import Confirmed, Reverted, Stored, Written
 from gateway.wire.resource import ResourceSnapshotParams
 from gateway.wire.stop import Reset, Stopped
@@ -82,6 +83,12 @@ class Link:
 
     def reset(self) -> "Future[Reset]":
         return self._network.run(self._reset())
+
+    def objects(self, component: str, search: str) -> "Future[ObjectList]":
+        return self._network.run(self._client.objects(component, search))
+
+    def read_objects(self, component: str, objects: Sequence[str]) -> "Future[ObjectValues]":
+        return self._network.run(self._client.read_objects(component, *objects))
 
     def show_processes(self, wanted: bool) -> None:
         self._network.run(self._show_processes(wanted))

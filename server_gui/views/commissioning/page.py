@@ -2,8 +2,8 @@
 
 from typing import Final
 
-from PySide6.QtCore import Signal
-from PySide6.QtGui import QResizeEvent
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QKeyEvent, QResizeEvent
 from PySide6.QtWidgets import (
     QApplication,
     QBoxLayout,
@@ -16,6 +16,7 @@ from PySide6.QtWidgets import (
 )
 
 from server_gui.core.commissioning.commissioning import MOST_LINES, Commissioning
+from server_gui.core.commissioning.stages import Stage
 from server_gui.core.commissioning.wish import Wish
 from server_gui.views.commissioning.bar import Bar
 from server_gui.views.commissioning.form import Form
@@ -70,6 +71,14 @@ class CommissionPage(QWidget):
         is_narrow = self.width() < self._theme.px(NARROW)
         direction = QBoxLayout.Direction
         self._columns.setDirection(direction.TopToBottom if is_narrow else direction.LeftToRight)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """While a joint is under power, Return is a STOP as it is in a terminal."""
+        keys = (Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Escape)
+        if event.key() in keys and self.commissioning.stage is Stage.MOVING:
+            self.commissioning.stop()
+        else:
+            super().keyPressEvent(event)
 
     def refresh(self) -> None:
         """Show how it is now; what has come was taken by whoever looks at it, also while this is not seen."""

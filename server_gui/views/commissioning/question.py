@@ -40,7 +40,7 @@ class Question(Card):
         self._commissioning = commissioning
         self._theme = theme
         self._shown: Line | None = None
-        self.text = WholeLabel()
+        self.news, self.text = WholeLabel("dim"), WholeLabel()
         self.refused = WholeLabel("banner")
         self.refused.setProperty("tone", "bad")
         self.field, self.unit = QLineEdit(), PlainLabel()
@@ -61,7 +61,7 @@ class Question(Card):
         row.addStretch(1)
         self.live = Live(theme)
         self.body.setSpacing(8)
-        for widget in (self.text, self.refused, self._typing):
+        for widget in (self.news, self.text, self.refused, self._typing):
             self.body.addWidget(widget)
         self.body.addLayout(self._choices)
         self.body.addWidget(self.live)
@@ -87,6 +87,9 @@ class Question(Card):
     # --- inside
 
     def _ask(self, question: Line | None) -> None:
+        news = [one for one in self._commissioning.news if question is None or one != question.refused]
+        set_text(self.news, "\n".join(news))
+        self.news.setVisible(bool(news))
         set_text(self.text, "" if question is None else question.question)
         set_text(self.refused, "" if question is None else question.refused)
         self.refused.setVisible(bool(self.refused.text()))

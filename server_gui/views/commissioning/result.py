@@ -103,5 +103,5 @@ def checked(written: Written) -> str:
     if written.unfinished:
         lines.append(f"▲ not in it, because not finished: {', '.join(written.unfinished)}")
     if written.not_journaled:
-        lines.append(f"▲ it is not in the journal: {written.not_journaled}")
+        lines.append(f"▲ {written.not_journaled}")
     return "\n".join(lines) or "● The check (gwrms check) has found nothing against it."

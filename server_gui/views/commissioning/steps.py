@@ -20,7 +20,7 @@ MARKS: Final = {
     NEXT: Mark("ring", "dim", "next"),
 }
 NONE: Final = (
-    "They are listed once it runs: name, bus and joints of the robot, seven steps a joint, sensors, the file."
+    "They are listed once it runs: name, bus and joints of the robot, eight steps a joint, sensors, the file."
 )
 
 

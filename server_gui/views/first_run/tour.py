@@ -51,7 +51,7 @@ STOPS: Final = (
     Stop(
         "afterwards",
         "everything is recorded: Recordings plays it, Audit says who changed what, F1 explains each tab.",
-        lambda window: window.tabs.tabBar(),
+        lambda window: window.page_bar,
     ),
 )
 
@@ -129,7 +129,7 @@ class Tour(QWidget):
         self.back.setEnabled(self.at > 0)
         self.next.setText("Done" if self.at == len(STOPS) - 1 else "Next")
         self.skip.setVisible(self.at < len(STOPS) - 1)
-        _bring_forward(stop.where(self._window))
+        _bring_forward(self._window, stop.where(self._window))
         self.refresh()
 
     def end(self) -> None:
@@ -144,11 +144,10 @@ class Tour(QWidget):
             self._outline.surround(STOPS[self.at].where(self._window))
 
 
-def _bring_forward(part: QWidget) -> None:
+def _bring_forward(window: MainWindow, part: QWidget) -> None:
     """Show the panel that it is in, which may be behind others or hidden."""
     around: QWidget | None = part
     while around is not None and not isinstance(around, QDockWidget):
         around = around.parentWidget()
     if isinstance(around, QDockWidget):
-        around.show()
-        around.raise_()
+        window.bring(around)

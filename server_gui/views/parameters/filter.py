@@ -90,6 +90,11 @@ class FilterBar(QWidget):
                 chosen = names
         return chosen
 
+    def show_all(self) -> None:
+        """Leave nothing out."""
+        self.words.clear()
+        self.buttons["All"].setChecked(True)
+
     def be_short(self, is_short: bool) -> None:
         """Take little width."""
         self._is_short = is_short

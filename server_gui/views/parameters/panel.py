@@ -54,7 +54,7 @@ class ParametersPanel(QWidget):
         self.filters, self.file = FilterBar(desk, theme), FileBar(desk)
         self.storing = StorePage(desk, theme)
         self.pages = QStackedWidget()
-        self.pages.addWidget(self._edit_page())
+        self.pages.addWidget(Scrolled(self._edit_page()))  # what leads on, below, stays in sight
         for page in (Scrolled(self.review), Scrolled(self.storing)):
             page.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Ignored)
             self.pages.addWidget(page)
@@ -67,7 +67,9 @@ class ParametersPanel(QWidget):
         everything.addWidget(self.pages, 1)
         everything.addWidget(self.banner)
         everything.addWidget(self.trial)
-        everything.addLayout(self._buttons())
+        self._below = QWidget()
+        self._below.setLayout(self._buttons())
+        everything.addWidget(self._below)
         self._connect()
 
     def refresh(self) -> None:
@@ -89,6 +91,7 @@ class ParametersPanel(QWidget):
         if not_stored:
             self.store_button.setEnabled(False)
         set_tip(self.store_button, not_stored or STORING)
+        self._below.setVisible(editing)  # a page that leads on itself has that room
         self._filter()
         self._refresh_banner(station, staged)
         if self.pages.currentIndex() == REVIEW and station is not None:
@@ -142,6 +145,13 @@ class ParametersPanel(QWidget):
         self.pages.setCurrentIndex(EDIT)
         self.filters.words.setFocus(Qt.FocusReason.ShortcutFocusReason)
         self.filters.words.selectAll()
+
+    def edit_parameter(self, name: str) -> None:
+        """Let a new value be typed for this one, as a double click on it does; nothing is staged yet."""
+        self.pages.setCurrentIndex(EDIT)
+        self.filters.show_all()
+        self.refresh()
+        self.tree.edit_name(name)
 
     def open_file(self, path: Path) -> None:
         """Compare with a file from now on; nothing is staged and nothing is sent."""
@@ -198,6 +208,7 @@ class ParametersPanel(QWidget):
         self.store_button = QPushButton("Store to flash …")
         set_tip(self.store_button, STORING)
         grid = self._buttons_grid = QGridLayout()
+        grid.setContentsMargins(0, 0, 0, 0)
         grid.addWidget(self.undo, 0, 0)
         grid.addWidget(self._discard, 0, 1)
         grid.addWidget(self.review_button, 0, 2)
@@ -243,6 +254,7 @@ class ParametersPanel(QWidget):
         self.review_button.clicked.connect(self.begin_review)
         self.review.back.connect(lambda: self.pages.setCurrentIndex(EDIT))
         self.review.write.connect(self._write)
+        self.review.dropped.connect(lambda names: self._with(lambda station: station.edits.drop(*names)))
         self._compare.clicked.connect(lambda: ask_open(self, "Compare with", ("toml", "dcf"), self.open_file))
         self._save.clicked.connect(
             lambda: ask_save(self, "Save parameters", "toml", self.save_file, self._title)
@@ -325,11 +337,13 @@ class ParametersPanel(QWidget):
         return "\n".join(said)
 
     def _refresh_banner(self, station: Station | None, staged: int) -> None:
-        text, tone = _banner(station, staged, self._problem or self._refused(station))
+        is_review = self.pages.currentIndex() == REVIEW  # which says itself what would be refused
+        text, tone = _banner(station, staged, self._problem or ("" if is_review else self._refused(station)))
         if (self.banner.text(), self.banner.property("tone")) != (text, tone):
             self.banner.setText(text)
             self.banner.setProperty("tone", tone)
             self.banner.style().polish(self.banner)
+        self.banner.setVisible(not is_review or tone == "bad")
 
 
 def _enable_alike(actions: Mapping[QPushButton, QAction]) -> None:

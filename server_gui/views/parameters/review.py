@@ -3,7 +3,7 @@
 from typing import Final
 
 from PySide6.QtCore import QPointF, Qt, QTimer, Signal
-from PySide6.QtGui import QPainter, QPaintEvent, QPolygonF, QWheelEvent
+from PySide6.QtGui import QPainter, QPaintEvent, QPolygonF, QResizeEvent, QWheelEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QHBoxLayout,
@@ -17,10 +17,15 @@ from PySide6.QtWidgets import (
 )
 
 from server_gui.core.tuning.edits import Change
+from server_gui.views.parameters.tree import range_text
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.plain import PlainLabel, set_tip
 
-TITLES: Final = ("Parameter", "Robot now", "", "New", "Unit", "")
+TITLES: Final = ("Parameter", "Robot now", "", "New", "Unit", "Change", "Allowed", "")
+NAME, OLD, ARROW, NEW, UNIT, BY, ALLOWED, MARK = range(len(TITLES))
+NUMBERS: Final = (OLD, NEW, BY, ALLOWED)
+SPARE: Final = (ALLOWED, BY)  # left out in this order where there is less room: no number is cut
+BESIDE: Final = 16  # pixels of the table's frame and its bar
 TRIAL_S: Final = 30
 SETTLE_MS: Final = 400  # a click that was meant for what stood there before does not count
 
@@ -50,9 +55,13 @@ class CalmSpin(QSpinBox):
 
 
 class Review(QWidget):
-    """`write` brings the changes that are shown, and the seconds of the trial or None; `back` leaves."""
+    """`write` brings the changes that are shown, and the seconds of the trial or None; `back` leaves.
+
+    `dropped` brings the names of changes that are not wanted any more.
+    """
 
     write = Signal(tuple, object)
+    dropped = Signal(tuple)
     back = Signal()
 
     def __init__(self, theme: Theme) -> None:
@@ -76,7 +85,7 @@ class Review(QWidget):
         header.setMinimumSectionSize(theme.px(16))
         for column in range(len(TITLES)):
             header.setSectionResizeMode(column, QHeaderView.ResizeMode.ResizeToContents)
-        header.setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
+        header.setSectionResizeMode(NAME, QHeaderView.ResizeMode.Stretch)
         self.said = PlainLabel()
         self.said.setObjectName("banner")
         self.said.setWordWrap(True)
@@ -93,6 +102,10 @@ class Review(QWidget):
         self.write_it.setObjectName("primary")
         self.write_it.setToolTip("One transaction: all or none, read back. It does not store to flash")
         self.write_it.clicked.connect(lambda: self.write.emit(self.changes, None))
+        self.leave_out = QPushButton("Leave out what is refused")
+        self.leave_out.setToolTip("The other changes can be written then")
+        self.leave_out.clicked.connect(lambda: self.dropped.emit(self._refused))
+        self.leave_out.hide()
         back = QPushButton("Back")
         back.setShortcut("Esc")
         back.clicked.connect(self.back)
@@ -107,6 +120,7 @@ class Review(QWidget):
         everything.addWidget(title)
         everything.addWidget(self.table, 1)
         everything.addWidget(self.said)
+        everything.addWidget(self.leave_out)
         everything.addLayout(row)
 
     def show_changes(self, changes: tuple[Change, ...]) -> None:
@@ -115,9 +129,11 @@ class Review(QWidget):
         self.table.setRowCount(len(changes))
         for row, change in enumerate(changes):
             self._fill(row, change)
+        self._fit()
         problems = [f"{change.name}: {change.problem}" for change in changes if change.problem]
         elsewhere = [change.name for change in changes if change.elsewhere]
         said = [*problems]
+        self.leave_out.setVisible(0 < len(problems) < len(changes))
         if elsewhere:
             said.append(
                 f"Changed elsewhere since you began: {', '.join(elsewhere)}. Writing overwrites that."
@@ -132,6 +148,28 @@ class Review(QWidget):
         self._settled.start(SETTLE_MS)
         self.write_it.setText(f"Overwrite {len(elsewhere)}" if elsewhere else f"Write {len(changes)}")
 
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._fit()
+
+    @property
+    def _refused(self) -> tuple[str, ...]:
+        return tuple(change.name for change in self.changes if change.problem)
+
+    def _fit(self) -> None:
+        """Leave out whole columns where the name has no room beside them."""
+        header = self.table.horizontalHeader()
+        wide = [
+            max(self.table.sizeHintForColumn(column), header.sectionSizeHint(column))
+            for column in range(len(TITLES))
+        ]
+        shown = set(range(len(TITLES)))
+        for column in SPARE:
+            if sum(wide[known] for known in shown) + BESIDE > self.width():
+                shown.discard(column)
+        for column in range(len(TITLES)):
+            self.table.setColumnHidden(column, column not in shown)
+
     def _enable(self, on: bool) -> None:
         self.try_it.setEnabled(on)
         self.write_it.setEnabled(on)
@@ -139,14 +177,15 @@ class Review(QWidget):
     def _fill(self, row: int, change: Change) -> None:
         old = "–" if change.old is None else change.unit.editable(change.old)
         mark = "✕ refused" if change.problem else ("⚠ changed elsewhere" if change.elsewhere else "")
-        texts = (change.name, old, "→", change.unit.editable(change.new), change.unit.symbol, mark)
+        new, allowed = change.unit.editable(change.new), range_text(*change.allowed, change.unit)
+        texts = (change.name, old, "→", new, change.unit.symbol, change.by, allowed, mark)
         for column, text in enumerate(texts):
             item = QTableWidgetItem(text)
-            if column in (1, 3):
+            if column in NUMBERS:
                 item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-            if column == 3:
+            if column == NEW:
                 item.setFont(self._theme.text_font(bold=True))
-            if column == 5:
+            if column == MARK:
                 item.setForeground(self._theme.colour("bad"))
-            set_tip(item, change.problem or "")
+            set_tip(item, change.problem or change.name)
             self.table.setItem(row, column, item)

@@ -18,6 +18,7 @@ from PySide6.QtWidgets import (
 
 from gateway.parameter_files.comparison import Verdict
 from gateway.units import Unit
+from gateway.wire.method import Number
 from gateway.wire.parameter import ParameterInfo
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
@@ -145,6 +146,14 @@ class ParameterTree(QTreeView):
             index = self.filter.mapFromSource(self._rows[name][NEW].index())
             self.setCurrentIndex(index)
 
+    def edit_name(self, name: str) -> None:
+        """Choose a parameter, and let its new value be typed."""
+        self.select_name(name)
+        if self.current_name == name:
+            self.setFocus(Qt.FocusReason.OtherFocusReason)
+            self.scrollTo(self.currentIndex())
+            self.edit(self.currentIndex())
+
     @property
     def current_name(self) -> str | None:
         """The parameter that is chosen."""
@@ -200,7 +209,7 @@ class ParameterTree(QTreeView):
         unit = unit_of(name, info.unit, self._desk.shown.units)
         items = [QStandardItem() for _ in TITLES]
         items[UNIT].setText(unit.symbol)
-        items[RANGE].setText(range_text(info, unit))
+        items[RANGE].setText(range_text(info.min, info.max, unit))
         items[DEFAULT].setText("–" if info.default is None else brief(unit, info.default))
         tip = f"{name}\nobject {info.object} {info.type}\n{info.unit}"
         for place, item in enumerate(items):
@@ -319,10 +328,10 @@ class ParameterTree(QTreeView):
         header.setSectionResizeMode(NAME, QHeaderView.ResizeMode.Stretch)
 
 
-def range_text(info: ParameterInfo, unit: Unit) -> str:
+def range_text(least: Number | None, most: Number | None, unit: Unit) -> str:
     """Return the smallest and the largest value that are allowed, in four digits."""
-    low = "" if info.min is None else f"{info.min * unit.scale:.4g}"
-    high = "" if info.max is None else f"{info.max * unit.scale:.4g}"
+    low = "" if least is None else f"{least * unit.scale:.4g}"
+    high = "" if most is None else f"{most * unit.scale:.4g}"
     return f"{low} … {high}" if low or high else "–"
 
 

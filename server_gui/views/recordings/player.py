@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Final
 
 from PySide6.QtCore import Signal
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
     QButtonGroup,
     QComboBox,
@@ -33,6 +34,7 @@ from server_gui.views.widgets.files import ask_save
 from server_gui.views.widgets.plain import PlainLabel, set_tip
 from server_gui.views.widgets.scrolled import Scrolled
 
+ROOMY: Final = 440  # high, at text of 100 %: what is lower shows the robot rather than what labels it
 SLOW: Final = 5  # frames between two looks at what people read
 
 
@@ -45,6 +47,7 @@ class Player(QWidget):
         super().__init__()
         self._archive = archive
         self._playback = archive.playback
+        self._theme = theme
         self._frame = 0
         self._told: object = None  # which recording and journal have been told of
         self.overview = Overview(self._playback.desk, theme)
@@ -70,6 +73,15 @@ class Player(QWidget):
         everything.addWidget(self.timeline)
         everything.addLayout(self._transport())
         everything.addWidget(self.labels)
+        self._is_roomy = True
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Where the height begins or ends to be enough for all; else labels stay as somebody wants them."""
+        super().resizeEvent(event)
+        is_roomy = self.height() >= self._theme.px(ROOMY)
+        if is_roomy is not self._is_roomy:
+            self._is_roomy = is_roomy
+            self.labelling.setChecked(is_roomy)
 
     def heightForWidth(self, width: int) -> int:
         """As low as it can be: what scrolls it would give the views all that they would like to have."""
@@ -139,6 +151,12 @@ class Player(QWidget):
         for widget in (self.play, self._speed, self.events, self.place):
             row.addWidget(widget)
         row.addStretch(1)
+        self.labelling = QPushButton("Labels")
+        self.labelling.setCheckable(True)
+        self.labelling.setChecked(True)
+        self.labelling.setToolTip("Label a span of it, or leave that room to the robot")
+        self.labelling.toggled.connect(self.labels.setVisible)
+        row.addWidget(self.labelling)
         row.addWidget(self.export)
         return row
 

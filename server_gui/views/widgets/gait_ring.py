@@ -4,6 +4,7 @@ A line across a ring is what the steps that were seen say, a dot in it what a mo
 """
 
 import math
+import re
 from collections.abc import Mapping
 from typing import Final
 
@@ -17,11 +18,13 @@ from server_gui.views.theme import Theme
 
 GAP_DEG: Final = 2.4  # between two phases
 SMALL: Final = 0.75  # of the size that text has elsewhere: what is smaller is not read
+LEAST: Final = 90  # wide and high, at text of 100 %: three lines have room in its middle
 READ: Final = 0.85  # of it, for a phase's name
 DIM: Final = 70  # opacity of the phases that are not now, of 255
 
 
 Phases = dict[Leg, LegPhase | None]
+Row = tuple[str, str, float, bool, float]  # text, colour, size, whether it is bold, how far it may stand out
 
 
 class GaitRing(QWidget):
@@ -45,7 +48,7 @@ class GaitRing(QWidget):
         return self.minimumSize()
 
     def _restyle(self) -> None:
-        side = self._theme.px(84)
+        side = self._theme.px(LEAST)
         self.setMinimumSize(side, side)
 
     def show_phases(self, phases: Phases, modelled: Phases, word: str, below: str, *, live: bool) -> None:
@@ -59,13 +62,7 @@ class GaitRing(QWidget):
     def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        side = min(self.width(), self.height()) - 6.0
-        box = QRectF((self.width() - side) / 2, (self.height() - side) / 2, side, side)
-        band = side * 0.075
-        outer = box.adjusted(band / 2, band / 2, -band / 2, -band / 2)
-        inset = band * 1.35
-        inner = outer.adjusted(inset, inset, -inset, -inset)
-        rings = {Leg.LEFT: outer, Leg.RIGHT: inner}
+        rings, band, middle = self._places()
         painter.drawPixmap(0, 0, self._picture(rings, band))
         for leg, ring in rings.items():
             now = self._phases[leg]
@@ -73,8 +70,23 @@ class GaitRing(QWidget):
                 self._draw_needle(painter, ring, band, now.percent)
             if (modelled := self._modelled[leg]) is not None:
                 self._draw_dot(painter, ring, band, modelled.percent)
-        self._draw_words(painter, inner.adjusted(band, band, -band, -band))
+        self._draw_words(painter, middle)
         painter.end()
+
+    @property
+    def read(self) -> list[str]:
+        """The lines in the middle, as there is room for them."""
+        return [text for text, *_ in self._rows(self._places()[2])[0]]
+
+    def _places(self) -> tuple[dict[Leg, QRectF], float, QRectF]:
+        """Where the rings are, how wide each is, and what is left in the middle."""
+        side = min(self.width(), self.height()) - 6.0
+        box = QRectF((self.width() - side) / 2, (self.height() - side) / 2, side, side)
+        band = side * 0.075
+        outer = box.adjusted(band / 2, band / 2, -band / 2, -band / 2)
+        inset = band * 1.35
+        inner = outer.adjusted(inset, inset, -inset, -inset)
+        return {Leg.LEFT: outer, Leg.RIGHT: inner}, band, inner.adjusted(band, band, -band, -band)
 
     def _colour(self, leg: Leg) -> QColor:
         return self._theme.colour(leg.value if self._live else "old")
@@ -127,30 +139,47 @@ class GaitRing(QWidget):
         painter.drawEllipse(place, band * 0.3, band * 0.3)
 
     def _draw_words(self, painter: QPainter, box: QRectF) -> None:
-        theme = self._theme
-        line = box.height() / 5.2
-        size = max(0.45, min(1.6, box.width() / theme.px(140)))
-        is_short = size < SMALL
-        if is_short:  # fewer words that can be read, rather than all of them
-            size = 1.0
-        word = self._word if self._is_read(self._word, box) else ""
-        rows = [(word, "text" if self._live else "old", 1.5 * size, True)]
-        rows += [("" if is_short else self._below, "dim", 0.95 * size, False)]
-        for leg in Leg:
-            now = self._phases[leg] or self._modelled[leg]
-            said = "" if now is None else self._phase_text(leg, now, box.width(), is_short=is_short)
-            rows.append((said, leg.value if self._live else "old", 0.9 * size, False))
-        rows = [row for row in rows if row[0]]
-        line = max(line, QFontMetricsF(theme.text_font(0.8 * size)).height())
-        rows = rows[: max(1, int(box.height() / line))]
+        rows, line = self._rows(box)
         top = box.center().y() - line * len(rows) / 2
-        for text, colour, factor, bold in rows:
-            spare = 0.0 if is_short else 12.0
+        for text, colour, factor, bold, spare in rows:
             place = QRectF(box.left() - spare, top, box.width() + 2 * spare, line)
             painter.setFont(self._fitting(text, factor, place, bold=bold))
-            painter.setPen(theme.colour(colour))
+            painter.setPen(self._theme.colour(colour))
             painter.drawText(place, Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextDontClip, text)
             top += line
+
+    def _rows(self, box: QRectF) -> tuple[list[Row], float]:
+        """The lines that have room, and how high each is; in a small ring the word has its widest part."""
+        size = min(1.6, box.width() / self._theme.px(140))
+        is_short = size < SMALL
+        line = max(
+            box.height() / 5.2,
+            QFontMetricsF(self._theme.text_font(READ if is_short else 0.8 * size)).height(),
+        )
+        spare = 0.0 if is_short else 12.0
+        plain, bold = (READ, READ) if is_short else (0.9 * size, 1.5 * size)
+        colour = "text" if self._live else "old"
+        legs: list[Row] = []
+        for leg in Leg:
+            if (now := self._phases[leg] or self._modelled[leg]) is not None:
+                said = self._phase_text(leg, now, box.width(), is_short=is_short)
+                legs.append((said, leg.value if self._live else "old", plain, False, spare))
+        most = max(1, int(box.height() / line))
+        words: list[Row] = [
+            (one, colour, bold, True, spare) for one in self._word_lines(box, most - len(legs))
+        ]
+        if is_short:
+            return [*legs[:1], *words, *legs[1:]], line
+        below: list[Row] = [(self._below, "dim", 0.95 * size, False, spare)] if self._below else []
+        return [*words, *below, *legs][:most], line
+
+    def _word_lines(self, box: QRectF, most: int) -> list[str]:
+        """The word in one line or several; without its number, which stands above the cards, if need be."""
+        parts = re.split(r"\s(?=[^%])", self._word)
+        names = [part for part in parts if not any(sign.isdigit() for sign in part)]
+        forms = ([self._word], parts, [" ".join(names)], names)
+        fits = (form for form in forms if len(form) <= most and all(self._is_read(one, box) for one in form))
+        return [one for one in next(fits, []) if one]
 
     def _phase_text(self, leg: Leg, now: LegPhase, room: float, *, is_short: bool) -> str:
         """With the phase's name where that has room in letters that are read."""
@@ -160,11 +189,11 @@ class GaitRing(QWidget):
         return full if fits else f"{letter}  {now.percent:.0f} %"
 
     def _is_read(self, text: str, box: QRectF) -> bool:
-        """Whether it has room in letters that are read; it stands above the cards, too."""
+        """Whether it has room in letters that are read."""
         return self._width(text) <= box.width()
 
     def _width(self, text: str) -> float:
-        return QFontMetricsF(self._theme.text_font(READ)).horizontalAdvance(text)
+        return QFontMetricsF(self._theme.text_font(SMALL, bold=True)).horizontalAdvance(text)
 
     def _fitting(self, text: str, factor: float, place: QRectF, *, bold: bool) -> QFont:
         """As large as wanted, or as there is room for."""

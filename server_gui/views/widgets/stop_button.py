@@ -1,8 +1,17 @@
 """The STOP button: acts when it is pressed, not when it is let go, and names the robot that it stops."""
 
-from PySide6.QtCore import QSize, Qt, Signal
-from PySide6.QtGui import QFontMetrics, QKeyEvent, QResizeEvent
-from PySide6.QtWidgets import QPushButton, QWidget
+from typing import Final
+
+from PySide6.QtCore import QRect, QSize, Qt, Signal
+from PySide6.QtGui import QFont, QFontMetrics, QKeyEvent, QPaintEvent, QPalette
+from PySide6.QtWidgets import (
+    QApplication,
+    QPushButton,
+    QStyle,
+    QStyleOptionButton,
+    QStylePainter,
+    QWidget,
+)
 
 from gateway.plain import plain
 
@@ -10,6 +19,7 @@ HINT = (
     "Quick stop on every drive (F12 or Ctrl+Space). It is software over a network, NOT a safety-rated "
     "emergency stop: keep the hardware one within reach."
 )
+MIDDLE: Final = Qt.TextElideMode.ElideMiddle
 AROUND = 34  # pixels of frame and padding at both sides
 
 
@@ -29,10 +39,23 @@ class StopButton(QPushButton):
         self.pressed.connect(self.stopped)
 
     def name(self, robot: str | None) -> None:
-        """Say whom it stops; a name that has no room is cut in its middle, the word STOP never."""
-        self._robot = robot
+        """Say whom it stops, in smaller letters or in two lines where that has no room in one."""
+        self._robot = None if robot is None else plain(robot)
         self.setAccessibleName("STOP" if robot is None else f"STOP {plain(robot)}")
-        self._fit()
+        text = "STOP" if robot is None else f"STOP  {plain(robot)}"
+        if self.text() != text:
+            self.setText(text)
+            self.updateGeometry()
+
+    @property
+    def lines(self) -> list[str]:
+        """The name as it is drawn; where even two lines have no room, each is cut in its middle."""
+        return self._lines[0]
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether the word STOP and all of the name have room."""
+        return "…" not in "".join(self.lines) and self.width() >= self.sizeHint().width()
 
     def minimumSizeHint(self) -> QSize:
         """Of the word alone: a long name makes nothing wider."""
@@ -41,16 +64,58 @@ class StopButton(QPushButton):
 
     def sizeHint(self) -> QSize:
         """As wide as it may be where that is said, else as little as it needs: layouts stretch it."""
-        return super().sizeHint() if self.most is not None else self.minimumSizeHint()
+        if self.most is None or self._robot is None:
+            return self.minimumSizeHint()
+        lines, font = self._lines
+        wide = max(QFontMetrics(font).horizontalAdvance(line) for line in lines)
+        return QSize(self._word + self._gap + wide + AROUND, super().sizeHint().height())
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        option = QStyleOptionButton()
+        self.initStyleOption(option)
+        option.text = ""
+        painter = QStylePainter(self)
+        painter.drawControl(QStyle.ControlElement.CE_PushButton, option)
+        painter.setPen(self.palette().color(QPalette.ColorRole.ButtonText))
+        lines, font = self._lines
+        metrics = QFontMetrics(font)
+        wide = max((metrics.horizontalAdvance(line) for line in lines), default=-self._gap)
+        left = (self.width() - self._word - self._gap - wide) // 2
+        middle = Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft
+        painter.setFont(self.font())
+        painter.drawText(QRect(left, 0, self._word + 1, self.height()), middle, "STOP")
+        painter.setFont(font)
+        high, left = metrics.lineSpacing(), left + self._word + self._gap
+        top = (self.height() - high * len(lines)) // 2
+        for place, line in enumerate(lines):
+            painter.drawText(QRect(left, top + place * high, wide + 1, high), middle, line)
+        painter.end()
 
     @property
     def _word(self) -> int:
         return QFontMetrics(self.font()).horizontalAdvance("STOP")
 
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
-        if self._robot is not None:
-            self._fit()
+    @property
+    def _gap(self) -> int:
+        return QFontMetrics(self.font()).horizontalAdvance("  ")
+
+    @property
+    def _lines(self) -> tuple[list[str], QFont]:
+        """In large letters if that has room, else in those of other text, in one line or two."""
+        large, small, light = self.font(), QFont(QApplication.font()), QApplication.font()
+        small.setBold(True)
+        light.setBold(False)  # said, since a painter takes what a font leaves open from its widget
+        if self._robot is None:
+            return [], large
+        room = (self.width() if self.most is None else self.most) - AROUND - self._word - self._gap
+        two = _in_two(self._robot)
+        forms = [([self._robot], large), ([self._robot], small), (two, small), (two, light)]
+        if super().sizeHint().height() < 2 * QFontMetrics(small).lineSpacing():
+            forms, two = forms[:2], forms[0][0]
+        for lines, font in forms:
+            if all(QFontMetrics(font).horizontalAdvance(line) <= room for line in lines):
+                return lines, font
+        return [QFontMetrics(light).elidedText(line, MIDDLE, max(room, 0)) for line in two], light
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Return presses it too."""
@@ -59,13 +124,9 @@ class StopButton(QPushButton):
         else:
             super().keyPressEvent(event)
 
-    def _fit(self) -> None:
-        text = "STOP"
-        if self._robot is not None:
-            metrics = QFontMetrics(self.font())
-            room = (self.width() if self.most is None else self.most) - AROUND
-            room -= metrics.horizontalAdvance("STOP  ")
-            name = metrics.elidedText(plain(self._robot), Qt.TextElideMode.ElideMiddle, max(room, 0))
-            text = f"STOP  {name}"
-        if self.text() != text:
-            self.setText(text)
+
+def _in_two(name: str) -> list[str]:
+    """A name, and where that is said, its address below; else halves."""
+    first, at, address = name.partition(" at ")
+    half = -(-len(name) // 2)
+    return [first, address] if at else [name[:half], name[half:]]

@@ -74,6 +74,14 @@ def two_channels(hand: Hand) -> None:
     hand.click("Cursors")
 
 
+def a_locked_object(hand: Hand) -> None:
+    """Found by its address, with what it holds, and why it may not be written."""
+    hand.click("Search of the objects")
+    hand.type("0x606*")
+    hand.click("0x6060:0")
+    hand.sees("cyclic synchronous")
+
+
 def a_core_is_eaten(bench: Bench) -> None:
     """Whoever does that stands first in the table."""
     hand, program = bench.hand, bench.folder / EATER
@@ -122,6 +130,7 @@ def replay(bench: Bench) -> None:
     hand.keep("replay")
     hand.click("Play", exactly=True)
     hand.sees("steps/min", within_s=AGAIN_S)
+    hand.reveal("The span is the whole recording", "Labels")
     hand.click("The span is the whole recording")
     hand.click("Label span")
     hand.sees("walk", "Ada", "person")
@@ -201,5 +210,6 @@ PAGES: Final[tuple[tuple[str, Callable[[Hand], None], str], ...]] = (
     ("Signals", two_channels, "Box zoom"),
     ("Resources", lambda _: None, "processes"),
     ("Bus", lambda _: None, "main"),
+    ("Objects", a_locked_object, "Read all"),
     ("Audit", lambda _: None, "journal"),
 )

@@ -84,7 +84,9 @@ class Hand:
         return False
 
     def reveal(self, name: str, panel: str) -> None:
-        """Where a panel stands behind another, bring it to the front."""
+        """Where a panel stands behind another, bring it to the front; where all are put away, show them."""
+        if not self.can_see(name) and not self.can_see(panel):
+            self.click("Panels")
         if not self.can_see(name):
             self.click(panel)
 

@@ -36,6 +36,7 @@ IN_DOCS: Final = Walk(
 PICTURES: Final = {
     "alive": "overview",
     "signals": "signals",
+    "objects": "objects",
     "eaten": "resources",
     "review": "review",
     "trial": "trial",

@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.bus.frames import ERROR, EXTENDED
+from drivers.bus.frames import ERROR, EXTENDED, REMOTE
 from drivers.bus.interfaces.link_report import blocking_problem, missing_link, warning
 from drivers.bus.interfaces.netlink import Link, link_request, parse_link, read_link
 from drivers.bus.interfaces.opening import open_transport
-from drivers.bus.interfaces.socketcan import SocketCanTransport
+from drivers.bus.interfaces.socketcan import SocketCanTransport, filters
 from drivers.bus.settings import CanSettings
 from drivers.errors import Unavailable
 
@@ -199,3 +199,19 @@ def test_another_bitrate_and_no_restart_are_warned_about_and_block_nothing() -> 
     )
     assert warning("can0", CAN, 500_000) is None
     assert warning("can0", Link(True, "vcan", None, None, None), 500_000) is None
+
+
+PASSES = {0x182: True, 0x183: False, 0x702: True, 0x733: True, 0x700 | REMOTE: False, 0x80000733: False}
+
+
+@pytest.mark.parametrize("can_id", PASSES)
+def test_once_all_is_ready_the_kernel_passes_what_is_asked_for_and_every_heartbeat(can_id: int) -> None:
+    """A node with an id that no table has, which boots later, is to be told (CiA 301 §7.2.8.3.2)."""
+    rules = list(struct.iter_unpack("=II", filters(frozenset({0x182, 0x702, 0x582}))))
+    assert len(rules) == 3, "no frame comes twice"
+    assert any(can_id & mask == wanted & mask for wanted, mask in rules) is PASSES[can_id]
+
+
+def test_what_is_too_much_for_the_kernel_is_not_filtered() -> None:
+    for many in (None, frozenset(range(0x180, 0x180 + 600))):
+        assert filters(many) == bytes(8)

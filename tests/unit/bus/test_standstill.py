@@ -10,10 +10,10 @@ import eds
 from drivers.bus.bus import CanBus
 from drivers.bus.interfaces.socketcand import server_ns, waited_stamps
 from drivers.bus.life import NodeLife
-from drivers.bus.standstill import MANY, SHOWN_S, STOOD_NS, Standstill
 from drivers.joint.watching import JointWatch
 from drivers.latest import Latest
 from drivers.samples import Channel
+from drivers.standstill import MANY, SHOWN_S, STOOD_NS, Standstill
 from tests.support.waiting import until
 
 MS = 1_000_000

@@ -25,6 +25,8 @@ SECOND_NS = 1_000_000_000
         (0x7E4, "LSS", None),
         (0x7E5, "LSS", None),
         (0x7F0, "other", None),
+        (0x005, "other", None),
+        (0x123, "other", None),
         (0x1234567, "other", None),
     ],
 )

@@ -15,6 +15,7 @@ from ml.store import Store, StoreUnreachable, upkeep
 from ml.store.labels import WEARER, Label
 from ml.store.sessions import rows_of, sessions
 from ml.store.tables import EVENTS, LABELS, PREDICTIONS, SESSIONS, TELEMETRY
+from server_gui.core.cloud import spool_reader
 from server_gui.core.cloud.forget import digest
 from server_gui.core.recording import records
 from server_gui.core.recording.records import Facts, Worn
@@ -209,3 +210,21 @@ def test_what_stays_beside_theirs_is_found_by_whose_it_is(server: Server) -> Non
     found = server.store.dataset(SESSIONS.name)
     for robot, count in (("left", 1), ("exo", 2), ("nobody", 0)):
         assert found.count_rows(filter=column("robot") == robot) == count
+
+
+def test_another_computer_is_told_why_its_rows_are_missing(server: Server, tmp_path: Path) -> None:
+    spool = tmp_path / "other"
+    with Spool(spool, reserve_bytes=0) as opened:
+        opened.append([run("20261121T193000Z-eeeeee")], recorded("20261121T193000Z-eeeeee", "P01"))
+        opened.freeze()
+        for number in opened.waiting():
+            send(opened, number, server.store)
+        for number in spool_reader.uploaded(spool):
+            opened.drop(number)
+    server.run("forget", "--wearer", "P01", "--yes")
+    config = tmp_path / "other.toml"
+    config.write_text(f'[recorder]\nspool = "{spool}"\n[store]\nurl = "{server.url}"\n')
+    assert main(["cloud", "mend", "--config", str(config)]) == 1
+    said = server.told()
+    assert "A wearer was forgotten here on 20" in said
+    assert "--accept-loss counts what is there as what was sent" in said

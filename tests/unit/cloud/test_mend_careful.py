@@ -188,9 +188,9 @@ def test_beside_a_file_that_stays_everything_else_is_brought(place: Place) -> No
     assert "robot=exo-01" not in place.verify()[1]
 
 
-@pytest.mark.parametrize("robot", ["lab@exo", "exo:1", "exo+1", "exo 1", "exo%1"])
-def test_a_robot_may_have_any_name(place: Place, robot: str) -> None:
-    record(place.url, place.spool, robot)
+def test_a_robot_may_have_any_name(place: Place) -> None:
+    for robot in ("lab@exo", "exo:1", "exo+1", "exo 1", "exo%1"):
+        record(place.url, place.spool, robot)
     before = rows(place.url)
     compact(Store(place.url))
     for file in place.files():

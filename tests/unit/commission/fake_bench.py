@@ -1,15 +1,19 @@
 """A bus of drives that a test bends by hand, switches on, and takes away."""
 
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 
 from drivers.bus.interfaces.controller_state import BusState
 from drivers.errors import DeviceTimeout
+from drivers.joint.settings import JointSettings
 from drivers.scan.asking import Axis as ToldAxis
 from drivers.scan.asking import Told
 from drivers.scan.scan import Found
 from drivers.scan.traffic import Traffic
+from eds import Description
 from gateway.commission.dialogue import Ask
+from gateway.commission.power import Power
 
 OFF, ON = 0x0250, 0x0237  # switch on disabled, operation enabled
 SHIPPED_DRIVE = (0x0, 0x4A44_0001)
@@ -59,6 +63,12 @@ class FakeBench:
     def write(self, node: int, index: int, subindex: int, data: bytes) -> None:
         raise AssertionError(f"nobody agreed to write {index:04X}h of node {node}")
 
+    def map(self, node: int, axis: int, description: Description) -> str:
+        raise AssertionError(f"nobody agreed to map PDOs of node {node}, axis {axis}, {description.product}")
+
+    def power(self, joint: JointSettings, description: Description) -> AbstractContextManager[Power]:
+        raise AssertionError(f"nobody agreed to power for node {joint.node_id}, {description.product}")
+
 
 def _told(drive: FakeDrive) -> Told:
     vendor, product = SHIPPED_DRIVE
@@ -75,6 +85,9 @@ class Hands:
 
     def say(self, text: str) -> None:
         self.read.append(text)
+
+    def moving(self, text: str) -> str:
+        raise AssertionError(f"nobody agreed to a motion: {text}")
 
     def ask(self, question: Ask) -> str:
         self.read.append(question.text)

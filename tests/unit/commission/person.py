@@ -39,6 +39,9 @@ class Person:
     def say(self, text: str) -> None:
         self.read.append(text)
 
+    def moving(self, text: str) -> str:
+        raise AssertionError(f"nobody agreed to a motion: {text}")
+
     def ask(self, question: Ask) -> str:
         self.read.append(question.text)
         assert len(self.read) < 150, self.read[:12]
@@ -65,6 +68,10 @@ class Person:
             self._move(joint, 90.0)
         elif "Counts of its encoder" in asked:
             return "4096"
+        elif "Which node commands" in asked:
+            return "16"
+        elif "Which of its objects stops" in asked:
+            return "0x2000:0"
         elif "rated current" in asked:
             return "5"
         elif "rated torque" in asked:

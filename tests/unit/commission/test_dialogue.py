@@ -17,6 +17,9 @@ class Typed:
     def say(self, text: str) -> None:
         self.read.append(text)
 
+    def moving(self, text: str) -> str:
+        raise AssertionError(f"nobody agreed to a motion: {text}")
+
     def ask(self, question: Ask) -> str:
         try:
             return next(self._lines)

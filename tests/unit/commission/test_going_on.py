@@ -36,6 +36,9 @@ class Forgetful:
     def say(self, text: str) -> None:
         pass
 
+    def moving(self, text: str) -> str:
+        raise AssertionError(f"nobody agreed to a motion: {text}")
+
     def ask(self, question: Ask) -> str:
         self.asked += 1
         self._move(question.text)

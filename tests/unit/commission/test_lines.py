@@ -11,7 +11,7 @@ from drivers.errors import DeviceTimeout
 from gateway.cli.commission import Ended, _ending
 from gateway.cli.commission_lines import JsonFace, Lines
 from gateway.commission.dialogue import Ask, Reading, number, run
-from tests.support.waiting import WAIT_S
+from tests.support.waiting import WAIT_S, until
 
 
 class Pipe:
@@ -92,12 +92,16 @@ def test_what_drives_tell_comes_until_the_answer_and_one_that_is_silent_is_told(
     assert (two["live"], two["problem"]) == ([], "node 7 does not answer")
 
 
+def stopped_in(pipe: Pipe, lines: Lines, busy: Callable[[Lines], object]) -> None:
+    pipe.write('{"stop": true}', '{"stop": true}')
+    busy(lines)
+
+
 @pytest.mark.parametrize("busy", [lambda lines: lines.get(1, None), lambda _: threading.Event().wait(WAIT_S)])
 def test_a_stop_ends_whatever_is_done_and_once(pipe: Pipe, busy: Callable[[Lines], object]) -> None:
     with _ending(), Lines(pipe.source) as lines:
-        pipe.write('{"stop": true}', '{"stop": true}')
         with pytest.raises(Ended):
-            busy(lines)
+            stopped_in(pipe, lines, busy)
         assert lines.stop_asked
 
 
@@ -106,3 +110,24 @@ def test_a_line_without_end_is_not_waited_for(pipe: Pipe, monkeypatch: pytest.Mo
     os.write(pipe._sink, b"x" * 200)
     with Lines(pipe.source) as lines, pytest.raises(EOFError):
         JsonFace(lines).ask(Ask("?"))
+
+
+def test_any_line_while_a_joint_moves_is_a_stop_and_no_answer(
+    pipe: Pipe, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with Lines(pipe.source) as lines:
+        face = JsonFace(lines)
+        assert face.moving("under power") == ""
+        pipe.write('{"answer": "late", "number": 7}')
+        assert until(lambda: face.moving("under power")) == "STOP was pressed"
+        pipe.end()
+        face.say("over")
+        assert (
+            until(lambda: face.moving("under power")) == "nobody can press STOP any more: its input has ended"
+        )
+        with pytest.raises(EOFError):
+            face.ask(Ask("?"))
+    assert [line for line in told(capsys) if "moving" in line][:2] == [
+        {"moving": "under power"},
+        {"moving": None},
+    ]

@@ -7,7 +7,7 @@ import pytest
 from drivers.scan.products import Library
 from eds.shipped import SHIPPED
 from gateway.commission.axes import Axis
-from gateway.commission.dialogue import At, run
+from gateway.commission.dialogue import Ask, At, run
 from gateway.commission.draft import Draft
 from gateway.commission.live import watched
 from gateway.commission.progress import END, Progress, State, Step
@@ -15,6 +15,15 @@ from gateway.commission.serial_bench import SerialPorts
 from gateway.commission.steps import commission
 from tests.unit.commission.fake_bench import ON, FakeBench, FakeDrive
 from tests.unit.commission.test_going_on import Forgetful, bench
+
+
+class CalledAway(Forgetful):
+    """At the first angle."""
+
+    def ask(self, question: Ask) -> str:
+        if "one known" in question.text:
+            raise EOFError
+        return super().ask(question)
 
 
 def gone_through(draft: Draft, robot: FakeBench, person: Forgetful) -> tuple[Progress, list[At]]:
@@ -48,7 +57,7 @@ def test_every_step_that_is_gone_through_is_in_the_list(tmp_path: Path) -> None:
 
 def test_somebody_who_was_called_away_sees_where_it_is(tmp_path: Path) -> None:
     robot = bench()
-    progress, _ = gone_through(Draft(tmp_path / "exo.toml"), robot, Forgetful(robot, away_at=7))
+    progress, _ = gone_through(Draft(tmp_path / "exo.toml"), robot, CalledAway(robot))
     knee = states(progress, "left_knee")
     now = [title for title, state in knee.items() if state is State.NOW]
     assert now == ["what counts mean"]

@@ -1,16 +1,18 @@
 """Every mistake that the simulator makes is found from outside, named, and mended by the right line first."""
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from msgspec import structs
 
 import eds
 from drivers.bus.interfaces.controller_state import BusState
-from gateway.doctor.observations import BusFacts, Computer, Observations, Samples
+from gateway.doctor.observations import BusFacts, Computer, Heard, Observations, Samples
 from gateway.doctor.report import status, well
 from gateway.doctor.table import RULES, judged
-from gateway.doctor.verdicts import Edit, Finding, Write
+from gateway.doctor.verdicts import Edit, Finding, Unknown, Write
 from hil_sim.exoskeleton import JOINTS
 from hil_sim.mistakes.registry import MISTAKES
 from tests.unit.doctor.patient import Patient
@@ -153,6 +155,40 @@ def test_a_velocity_that_is_only_polled_now_and_then_is_no_other_unit(walker: Pa
         for name, column in seen.samples.columns.items()
     }
     assert findings(replace(seen, samples=replace(seen.samples, columns=late))) == []
+
+
+def test_a_zero_is_not_judged_by_a_wrong_gear(walker: Patient) -> None:
+    seen = walker.seen("zero")
+    hip = seen.config.joint["right_hip"]
+    joints = seen.config.joint | {"right_hip": structs.replace(hip, gear_ratio=110.0)}
+    wrong = replace(seen, config=structs.replace(seen.config, joint=joints))
+    assert {(one.rule, one.about) for one in findings(wrong)} == {("gear", "[joint.right_hip]")}
+
+
+def test_a_heartbeat_is_not_proposed_slower_than_what_waits_for_it(walker: Patient) -> None:
+    seen = walker.seen()
+    joint = structs.replace(seen.config.joint["left_hip"], heartbeat_timeout_s=0.1)
+    config = structs.replace(seen.config, joint=seen.config.joint | {"left_hip": joint})
+    objects = {**seen.objects, "left_hip": {**seen.objects["left_hip"], (0x1017, 0): 0}}
+    (found,) = findings(replace(seen, config=config, objects=objects))
+    assert found.fixes[0].words.startswith("SDO: gwrms set left_hip.0x1017:0=40")
+
+
+def test_what_is_to_be_written_is_told_in_its_parameters_unit(tmp_path: Path) -> None:
+    seen = Patient(tmp_path, ["following_window"], warm_s=1.0).seen()
+    window = replace(seen, units={"right_knee.0x6065:0": (math.tau / 409600, "rad")})
+    (found,) = findings(window)
+    assert "right_knee.0x6065:0=0.349057328283rad" in found.fixes[0].words
+    assert "22755 of the device's own" in found.fixes[0].words
+
+
+def test_a_node_that_no_table_has_is_told_and_no_mistake(walker: Patient) -> None:
+    seen = walker.seen()
+    heard = dict(seen.buses["main"].heard or {}) | {0x709: Heard(3, 1.0), 0x77F: Heard(1, 0.0)}
+    verdicts = list(judged(replace(seen, buses={"main": replace(seen.buses["main"], heard=heard)})))
+    (told,) = verdicts
+    assert isinstance(told, Unknown)
+    assert (told.about, told.why.partition(" is heard")[0]) == ("[can.main]", "node 9, 127")
 
 
 def test_what_a_driver_says_is_told_unless_another_finding_names_it_better(walker: Patient) -> None:

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from gateway import main as gwrms
+from gateway.cli import doctor
 from gateway.cli.doctor import main
 from gateway.doctor.table import RULES
 from hil_sim.mistakes.registry import MISTAKES
@@ -38,6 +40,8 @@ def test_the_command_tells_its_findings(capsys: pytest.CaptureFixture[str]) -> N
         [],
         ["robot.toml", "--seconds", "0"],
         ["robot.toml", "--fix", "--json"],
+        ["robot.toml", "--fix"],  # without a terminal
+        ["robot.toml", "--yes"],
         ["robot.toml", "--robot", "a b"],
     ],
 )
@@ -45,3 +49,11 @@ def test_what_is_typed_wrong_is_usage(words: list[str]) -> None:
     with pytest.raises(SystemExit) as caught:
         main(words)
     assert caught.value.code == 2
+
+
+def test_a_failure_of_the_doctor_is_no_finding(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    def fail(_file: Path) -> None:
+        raise RuntimeError("a mistake of ours")
+
+    monkeypatch.setattr(doctor, "examine", fail)
+    assert gwrms.main(["doctor", str(tmp_path / "robot.toml")]) == 2

@@ -31,7 +31,7 @@ from gateway.wire.role import Role
 from tests.support.waiting import WAIT_S, until
 from tests.unit.gateway import keyed as keys
 from tests.unit.gateway import processes
-from tests.unit.gateway.harness import CLOCK, STOP, Bench, Client, config, serving
+from tests.unit.gateway.harness import CLOCK, ROBOT, STOP, Bench, Client, config, serving
 from tests.unit.gateway.keyed import KeyedClient, keyed, raw, said
 
 Connect = Callable[["str | tuple[Path, Path] | None"], KeyedClient]
@@ -419,6 +419,16 @@ def test_the_journal_says_who_is_let_in_and_who_no_more(come: Connect, tmp_path:
     until(lambda: set(told()) >= expected, "it is told")
     entries = client.call("journal.tail", n=50)["entries"]
     assert [one["key"] for one in entries if one.get("whom") == "client anna"] == [keys.pin("anna")]
+
+
+def test_who_is_let_in_no_more_is_told_at_once_though_nobody_is_there(bench: Bench, tmp_path: Path) -> None:
+    keyed(tmp_path)
+    with serving(config(tmp_path, ROBOT.replace("linger_s = 0.05", "linger_s = 60"))) as address:
+        with KeyedClient(address, "maintainer") as client:
+            client.call("journal.tail", n=1)
+        (tmp_path / "clients" / "operator.crt").unlink()
+        (journal,) = tmp_path.rglob("journal.jsonl")
+        until(lambda: "let in no more" in journal.read_text(encoding="utf-8"), "it is told")
 
 
 def test_what_changed_while_no_gateway_ran_is_told_once(bench: Bench, tmp_path: Path) -> None:

@@ -2,12 +2,13 @@
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any, cast
 
 import pytest
 
 from drivers.errors import DeviceTimeout
-from gateway.modules.control.dictionary import fitting
 from gateway.wire.limits import OBJECTS_READ
+from gateway.wire.object_search import fitting
 from tests.unit.gateway.harness import DISABLED, ROBOT, Bench, Client, config, serving
 
 EDS = '\nparameters = "eds"\nrelease = ["profile_*"]\n'
@@ -29,7 +30,7 @@ def bench(monkeypatch: pytest.MonkeyPatch) -> Bench:
 
 @pytest.fixture
 def client(bench: Bench, tmp_path: Path) -> Iterator[Client]:
-    text = ROBOT.replace("gear_ratio = 100.0\n", "gear_ratio = 100.0" + EDS)
+    text = ROBOT.replace("gear_ratio = 100.0\n", "gear_ratio = 100.0" + EDS, 1)
     with serving(config(tmp_path, text)) as address, Client(address) as asking:
         yield asking
 
@@ -68,6 +69,59 @@ def test_an_object_is_told_with_its_type_limits_and_whether_it_may_be_written(cl
     assert controlword["read_only"] == "controlword"
     (statusword,) = client.call("object.list", component="left_knee", search="0x6041")["objects"]
     assert (statusword["parameter"], statusword["read_only"]) == (None, "ro in the EDS")
+
+
+def _listed(client: Client, search: str) -> dict[str, Any]:
+    (found,) = client.call("object.list", component="left_knee", search=search)["objects"]
+    return cast("dict[str, Any]", found)
+
+
+@pytest.mark.parametrize(
+    ("search", "why", "lines"),
+    [
+        ("0x6081:0", None, None),
+        (
+            "0x6065:0",
+            'add "following_error_window" to release',
+            '[joint.left_knee]\nrelease = ["profile_*", "following_error_window"]',
+        ),
+        (
+            "0x607A:0",
+            "a glob does not reach it",
+            '[joint.left_knee]\nrelease = ["profile_*", "target_position"]',
+        ),
+        (
+            "0x1017:0",
+            "belongs to who leads it",
+            '[parameter."left_knee.producer_heartbeat_time"]\nobject = "0x1017:0"',
+        ),
+        ("0x1010:1", "gwrms store", None),
+        ("0x6040:0", "it enables drives", None),
+        ("0x1008:0", "its EDS says const", None),
+        ("0x6041:0", "its EDS says ro", None),
+    ],
+)
+def test_what_is_locked_says_why_and_the_lines_that_release_it(
+    client: Client, search: str, why: str | None, lines: str | None
+) -> None:
+    found = _listed(client, search)
+    assert found["release"] == lines
+    assert found["locked"] is None if why is None else why in found["locked"]
+
+
+def test_what_the_file_offers_nothing_of_is_released_by_a_table_of_its_own(client: Client) -> None:
+    (found,) = client.call("object.list", component="right_knee", search="0x6065:0")["objects"]
+    assert found["parameter"] is None
+    assert "it is no parameter" in found["locked"]
+    (mode,) = client.call("object.list", component="right_knee", search="0x605A:0")["objects"]
+    assert "beware: it decides how the drive stops" in mode["locked"]
+    assert found["release"] == '[parameter."right_knee.following_error_window"]\nobject = "0x6065:0"'
+
+
+def test_an_object_names_the_pdos_that_bring_it(client: Client) -> None:
+    assert "TPDO1" in _listed(client, "0x6041:0")["pdos"]
+    assert "RPDO1" in _listed(client, "0x6040:0")["pdos"]
+    assert _listed(client, "0x6065:0")["pdos"] == []
 
 
 def test_what_is_too_much_for_one_answer_is_counted(client: Client, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -19,9 +19,9 @@ from gateway.cli.keys import _confirmed as confirmed
 from gateway.cli.keys import _show as show
 from gateway.client import Address, NotPaired
 from gateway.client.keys import pin_of
-from gateway.client.pairing import pair
+from gateway.client.pairing import pair, typed
 from gateway.main import main
-from gateway.wire.pairing import Reply, link
+from gateway.wire.pairing import Reply, link, normal
 from gateway.wire.role import Role
 from tests.unit.gateway import processes
 from tests.unit.gateway.pairing_robot import CODE, Shown
@@ -97,6 +97,33 @@ def test_what_is_no_code_in_a_pipe_ends_it(
     with pytest.raises(SystemExit, match="2"):
         main(["pair", "192.0.2.7"])
     assert "16 letters and digits" in capsys.readouterr().err
+
+
+SPELLED = (CODE, CODE.lower(), CODE.replace("-", " "), CODE.replace("-", ""))
+
+
+@pytest.mark.parametrize("code", SPELLED)
+@pytest.mark.parametrize("words", ["{}", "gwrms:/exo:7421/{}", "exo:7421/{}", "http://exo:7421/{}"])
+def test_a_code_in_the_place_of_an_address_is_said_and_not_shown(
+    words: str, code: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for command in (["pair"], ["describe", "--robot"]):
+        with pytest.raises(SystemExit) as caught:
+            main([*command, words.format(code)])
+        assert caught.value.code == 2
+        said = capsys.readouterr()
+        assert code not in said.out + said.err
+        assert "no code is an address" in said.err
+
+
+@pytest.mark.parametrize("scheme", ["gwrms://", "GWRMS://", " Gwrms://"])
+def test_a_link_is_taken_in_capitals_too(scheme: str) -> None:
+    assert typed(f"{scheme}EXO:7421/{CODE}") == (Address("EXO", 7421), normal(CODE))
+
+
+@pytest.mark.parametrize("host", ["exo", "exoskeletonrobot", "exo-1234-left-leg0", "fe80::1", "a1.b2"])
+def test_a_host_is_no_code(host: str) -> None:
+    assert Address.parse(f"[{host}]:7420" if "::" in host else f"{host}:7420").host == host
 
 
 @pytest.mark.parametrize("name", ["anna b", "\udcff", "x" * 9000, "a\N{RIGHT-TO-LEFT OVERRIDE}b"])

@@ -22,6 +22,15 @@ def test_the_way_up_is_one_transition_at_a_time(bench: Bench) -> None:
         assert state(bench) == expected
 
 
+def test_the_shipped_file_has_the_objects_of_sync_and_time_that_the_drive_plays(bench: Bench) -> None:
+    bench.boot()
+    assert [bench.read(index) for index in (0x1006, 0x1007, 0x1012)] == [0, 0, 0x100]
+    assert bench.write(0x1012, 0, 0x8000_0100, 4) == "ok"
+    bench.send(0x100, "10 27 00 00 05 00")
+    bench.run(5)
+    assert bench.node.time_of_day == (10_000, 5)
+
+
 def test_enabling_does_not_move_the_joint() -> None:
     bench = Bench(position=0.4)
     bench.start()

@@ -8,7 +8,7 @@ from hil_sim.exoskeleton import JOINTS
 from tests.unit.hil_sim.outside import Outside, positions
 
 RAD = math.tau / (4096 * 100)  # per count
-STRIDES_S = 6.0
+STRIDES_S = 3.5  # two of them
 
 
 def hip_ranges(outside: Outside) -> list[float]:
@@ -18,14 +18,14 @@ def hip_ranges(outside: Outside) -> list[float]:
 
 
 def test_gait_asymmetry_makes_one_hip_swing_further_until_it_is_over(outside: Outside) -> None:
-    outside.run(4.0)
+    outside.run(3.0)
     left, right = hip_ranges(outside)
     assert left == pytest.approx(right, rel=0.15)
     outside.faults.begin("gait_asymmetry", params={"percent": 40})
-    outside.run(4.0)
+    outside.run(3.0)
     left, right = hip_ranges(outside)
     assert left > 1.25 * right
     outside.faults.clear()
-    outside.run(4.0)
+    outside.run(3.0)
     left, right = hip_ranges(outside)
     assert left == pytest.approx(right, rel=0.15)

@@ -1,6 +1,8 @@
 """Homing: where each method finds home, what it shows, and what keeps it from it."""
 
 import math
+from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 
@@ -141,6 +143,72 @@ def test_a_search_for_the_index_that_meets_the_end_stop_has_failed() -> None:
     assert velocity(bench) == 0
     assert state(bench) == 0x27
     assert not has(bench, HOMED)
+
+
+LEFT, RIGHT = math.radians(10.0), math.radians(20.0)  # where the home switch is closed
+BELOW, ON, ABOVE = math.radians(-20.0), math.radians(15.0), math.radians(60.0)
+
+
+@pytest.fixture
+def switched() -> Callable[[float], Bench]:
+    """A joint with a home switch, whose drive names no methods: it has them all."""
+
+    def make(position: float, home_switch: tuple[float, float] | None = (LEFT, RIGHT)) -> Bench:
+        bench = Bench(position=position)
+        bench.joint.constants = replace(bench.joint.constants, home_switch=home_switch)
+        for number in range(1, 9):
+            bench.node.dictionary[0x60E3, number].value = 0
+        return bench
+
+    return make
+
+
+# Where each method finds home (CiA 402-2 §11), without its index: of the switch the edge on this side.
+EDGES = {19: LEFT, 20: LEFT, 21: RIGHT, 22: RIGHT, 23: LEFT, 24: LEFT, 25: RIGHT, 26: RIGHT} | {
+    27: RIGHT,
+    28: RIGHT,
+    29: LEFT,
+    30: LEFT,
+}
+REACHES = {19: (BELOW, ON), 20: (BELOW, ON), 21: (ABOVE, ON), 22: (ABOVE, ON)}  # others turn at the limits
+
+
+@pytest.mark.parametrize("method", EDGES)
+def test_the_home_switch_is_found_from_wherever_its_method_can(
+    switched: Callable[[float], Bench], method: int
+) -> None:
+    for start in REACHES.get(method, (BELOW, ON, ABOVE)):
+        bench = switched(start)
+        assert home(bench, method) == pytest.approx(EDGES[method] * COUNTS_PER_RADIAN, abs=60), start
+
+
+@pytest.mark.parametrize(("method", "side"), [(3, -1), (4, 1), (5, 1), (6, -1), (7, -1), (9, -1), (14, -1)])
+def test_behind_the_edge_of_the_home_switch_the_index_is_home(
+    switched: Callable[[float], Bench], method: int, side: int
+) -> None:
+    bench = switched(ON)
+    edge = EDGES[method + 16] * COUNTS_PER_RADIAN
+    index = math.floor(edge / REVOLUTION) + (side > 0)
+    assert home(bench, method) == pytest.approx(index * REVOLUTION, abs=1)
+
+
+@pytest.mark.parametrize("method", [19, 23, 27])
+def test_a_home_switch_that_is_not_there_is_a_homing_error_at_the_end_of_the_way(
+    switched: Callable[..., Bench], method: int
+) -> None:
+    bench = switched(ON, None)
+    prepare(bench, method)
+    bench.controlword(ENABLE | START)
+    until(bench, lambda: shown(bench) == BIT_13 | REACHED, at_most_ms=40_000)
+    assert state(bench) == 0x27
+    assert not has(bench, HOMED)
+
+
+def test_the_home_switch_is_bit_2_of_the_digital_inputs(switched: Callable[[float], Bench]) -> None:
+    for start, expected in ((BELOW, 0), (ON, 4), (ABOVE, 0)):
+        bench = switched(start)
+        bench.boot()
+        assert bench.read(0x60FD) == expected
 
 
 def test_without_a_method_it_fails(bench: Bench) -> None:

@@ -1,7 +1,8 @@
 """A drive described by an EDS of the test's own, played by a fake node."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import pytest
@@ -67,16 +68,25 @@ def tpdo(number: int, cob_id: int, *mapped: int, transmission_type: int = 1) -> 
     return objects
 
 
-def drive_eds(objects: Objects) -> str:
-    """An EDS of exactly these objects."""
+NO_OTHER: Mapping[int, int] = MappingProxyType({})
+
+
+def drive_eds(
+    objects: Objects, other: Mapping[int, int] = NO_OTHER, mappable: Collection[int] = ()
+) -> str:
+    """An EDS of exactly these objects; `other` are data types by index, those `mappable` may be in a PDO."""
     types = {index: data_type for index, data_type, _, _ in COMMON} | {
         index + axis * 0x800: data_type for index, data_type, _, _ in AXIS + SURROUNDINGS for axis in range(8)
     }
+    types |= other
     sections = []
     for index, subindex in sorted(objects):
         name = f"{index:04X}" if index in types else f"{index:04X}sub{subindex}"
         data_type = types.get(index, {1: 5, 2: 6, 4: 7}[len(objects[index, subindex])])
-        sections.append(f"[{name}]\nParameterName={name}\nDataType={data_type}\nAccessType=rw\n")
+        sections.append(
+            f"[{name}]\nParameterName={name}\nDataType={data_type}\nAccessType=rw\n"
+            f"PDOMapping={int(index in mappable)}\n"
+        )
     return "\n".join(sections)
 
 
@@ -95,10 +105,15 @@ def joint(bus: CanBus, tmp_path: Path) -> Callable[..., JointDrive]:
     """Make a joint for a drive with `objects`, node id 2."""
 
     def make(
-        objects: Objects, name: str = "left_knee", chosen: Chosen | None = None, **more: Any
+        objects: Objects,
+        name: str = "left_knee",
+        chosen: Chosen | None = None,
+        types: Mapping[int, int] = NO_OTHER,
+        mappable: Collection[int] = (),
+        **more: Any,
     ) -> JointDrive:
         path = tmp_path / "drive.eds"
-        path.write_text(drive_eds(objects))
+        path.write_text(drive_eds(objects, types, mappable))
         table: dict[str, Any] = {"counts_per_revolution": 1000, "gear_ratio": 1, "sdo_timeout_s": 0.2, **more}
         settings = JointSettings(bus="main", node_id=2, eds="drive.eds", **table)
         return JointDrive(name, settings, bus, eds.load(path, 2), chosen)

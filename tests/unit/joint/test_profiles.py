@@ -50,5 +50,5 @@ def test_a_rated_torque_in_micronewtonmetres_is_not_taken_for_a_thousand_times_a
 def test_a_joint_has_the_temperature_of_its_product_and_the_voltage_of_the_standard() -> None:
     found = {one.name: one for one in quantities(eds.load(eds.locate("elmo_gold.dcf", None), 5), 0)}
     assert (found["temperature"].index, found["temperature"].scale) == (0x22A3, 1.0)
-    assert not found["temperature"].signed
+    assert found["temperature"].kind == "unsigned"
     assert found["voltage"].index == 0x6079

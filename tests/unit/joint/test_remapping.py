@@ -56,7 +56,7 @@ def test_an_empty_tpdo_that_refuses_a_mapping_is_enabled_and_empty_again(joint: 
         knee.start()
         until(lambda: read(knee, "position") is not None)
         assert "the object cannot be mapped to a PDO" in quality(knee)[1]
-        assert fake.objects[0x1801, 1] == bytes.fromhex("82 02 00 40")
+        assert fake.objects[0x1801, 1] == bytes.fromhex("82 02 00 00")
         assert (fake.objects[0x1801, 2], fake.objects[0x1A01, 0]) == (b"\xfe", b"\x00")
         knee.stop()
 
@@ -103,7 +103,7 @@ def test_a_drive_that_refuses_a_mapping_is_left_as_it_was_and_polled(joint: Make
         knee.start()
         until(lambda: read(knee, "position") is not None)
         assert "the object cannot be mapped to a PDO" in quality(knee)[1]
-        assert fake.objects[0x1801, 1] == bytes.fromhex("82 02 00 C0")
+        assert fake.objects == objects, "it is as it was"
         knee.stop()
 
 
@@ -127,4 +127,49 @@ def test_where_two_drives_have_its_node_id_nothing_is_changed_and_it_is_read(
         until(lambda: read(knee, "position") is not None)
         assert "configure_pdos: two devices answer as node 2: nothing is written" in quality(knee)[1]
         assert fake.writes == []
+        knee.stop()
+
+
+MAPPABLE = {0x6077, 0x606C, 0x603F}
+ROOM = {(0x1A01 + frame, number): bytes(4) for frame in (0, 1) for number in range(1, 5)}
+
+
+def mapped(fake: FakeNode, number: int) -> list[str]:
+    """Index and bits of what a TPDO brings."""
+    entries = range(1, fake.objects[0x1A00 + number - 1, 0][0] + 1)
+    raw = (int.from_bytes(fake.objects[0x1A00 + number - 1, entry], "little") for entry in entries)
+    return [f"{one >> 16:04X} {one & 0xFF}" for one in raw]
+
+
+def test_what_the_channels_need_is_mapped_whole(joint: Make, channel: str) -> None:
+    objects = drive_objects() | tpdo(2, 0x80000282) | tpdo(3, 0x80000382)
+    with FakeNode(channel, 2, dict(objects)) as fake:
+        fake.objects |= ROOM
+        knee = joint(objects, mappable=MAPPABLE, configure_pdos=True)
+        knee.start()
+        until(lambda: knee.node.ready)
+        assert mapped(fake, 2) == ["6041 16", "6064 32", "6077 16"]
+        assert mapped(fake, 3) == ["606C 32", "603F 16"]
+        assert "was given statusword, position and torque, sent every 10 ms" in quality(knee)[1]
+        assert "was given velocity and error_code, sent every 50 ms" in quality(knee)[1]
+        fake.send(0x282, struct.pack("<Hih", 0x0027, 250, 100))
+        fake.send(0x382, struct.pack("<iH", 500, 0))
+        until(lambda: read(knee, "velocity") is not None)
+        assert read(knee, "velocity") == pytest.approx(math.pi)
+        knee.stop()
+
+
+def test_what_does_not_fit_a_drive_is_left_out_and_that_tpdo_is_as_it_was(joint: Make, channel: str) -> None:
+    objects = drive_objects() | tpdo(2, 0x80000282) | tpdo(3, 0xC0000385, 0x60770010, transmission_type=3)
+    refused = {(0x1A01, 3): 0x06040042, (0x1A02, 2): 0x06040042}
+    with FakeNode(channel, 2, dict(objects), aborts=dict(refused)) as fake:
+        fake.objects |= {key: value for key, value in ROOM.items() if key not in objects}
+        before = {key: fake.objects[key] for key in fake.objects if key[0] in (0x1802, 0x1A02)}
+        knee = joint(objects, mappable=MAPPABLE, configure_pdos=True)
+        knee.start()
+        until(lambda: knee.node.ready)
+        assert mapped(fake, 2) == ["6041 16", "6064 32"]
+        kept = {key: before[key] for key in before if key[0] == 0x1802 or key[1] <= 1}
+        assert {key: fake.objects[key] for key in kept} == kept
+        assert "TPDO3 is as it was" in quality(knee)[1]
         knee.stop()

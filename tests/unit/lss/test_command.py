@@ -4,11 +4,18 @@ import io
 import json
 import threading
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 import eds
+from drivers.bus import bus
+from drivers.bus.frames import Transport
+from drivers.bus.interfaces.opening import open_transport
+from drivers.bus.settings import CanSettings
+from drivers.cli import bit_rate
 from drivers.cli.lss import main
 from drivers.errors import NotPermitted, SettingsError
 from hil_sim.bus.can_bus import CanBus
@@ -49,6 +56,31 @@ def run(channel: str, *words: str) -> int:
     return main([action, f"virtual:{channel}", *others, "--seconds", "0.05"])
 
 
+@contextmanager
+def living(
+    channel: str, node_id: int, state: int, since: threading.Event | None = None
+) -> Iterator[FakeNode]:
+    """Another device, which tells its NMT state again and again, from an event on."""
+    done = threading.Event()
+    with FakeNode(channel, node_id) as other:
+
+        def live() -> None:
+            if since is not None:
+                since.wait()
+            while not done.wait(0.005):
+                other.heartbeat(state)
+
+        thread = threading.Thread(target=live)
+        thread.start()
+        try:
+            yield other
+        finally:
+            done.set()
+            if since is not None:
+                since.set()
+            thread.join()
+
+
 @pytest.mark.parametrize("device", ["5", IDENTITY, "only"])
 def test_a_device_is_meant_by_node_id_identity_or_as_the_only_one(
     channel: str, node: Node, device: str, capsys: pytest.CaptureFixture[str]
@@ -73,6 +105,44 @@ def test_what_will_happen_is_told_and_what_has_happened(
     assert (node.lss.node_id, node.storage.layer_settings(0, 0)) == (6, (6, 500_000))
 
 
+def test_a_bit_rate_is_activated_where_the_interface_can_follow(
+    channel: str, node: Node, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The virtual bus stands for a USB adapter; it changes with the device, as that would by being opened."""
+    monkeypatch.setattr(bit_rate, "RATELESS", ())
+    monkeypatch.setattr(bit_rate, "SWITCH_MS", 60)
+    opened = []
+
+    def wire(settings: CanSettings) -> Transport:
+        opened.append(settings.bitrate)
+        node._bus.bitrate = settings.bitrate or 0
+        return open_transport(settings)
+
+    monkeypatch.setattr(bus, "open_transport", wire)
+    words = ("set", "5", "--new-bitrate", "250000", "--activate", "--yes", "--bitrate", "1000000")
+    assert run(channel, *words) == 0
+    assert capsys.readouterr().out.splitlines()[-1].endswith(f"at 250000 bit/s it says: {IDENTITY}, node 5")
+    assert (opened, node.lss.bitrate) == ([1_000_000, 250_000], 250_000)
+
+
+def test_a_bit_rate_is_not_activated_where_the_interface_is_not_set_from_here(
+    channel: str, node: Node
+) -> None:
+    with pytest.raises(NotPermitted, match="not set from here; without --activate it is stored"):
+        run(channel, "set", "5", "--new-bitrate", "250000", "--activate", "--yes", "--bitrate", "1000000")
+    assert node.lss.pending_bitrate == 1_000_000
+
+
+def test_others_are_not_left_behind_at_the_other_rate(
+    channel: str, node: Node, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(bit_rate, "RATELESS", ())
+    words = ("set", "5", "--new-bitrate", "250000", "--activate", "--yes", "--bitrate", "1000000")
+    with living(channel, 9, 0x7F), pytest.raises(NotPermitted, match="node 9 would stay at the other rate"):
+        run(channel, *words)
+    assert node.lss.pending_bitrate == 1_000_000
+
+
 def test_without_a_yes_nothing_is_changed(
     channel: str, node: Node, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -94,24 +164,35 @@ def test_a_node_id_that_somebody_has_is_given_to_nobody(channel: str, node: Node
 
 
 def test_where_somebody_is_at_work_nothing_is_sent_unless_told(channel: str) -> None:
-    done = threading.Event()
-    with FakeNode(channel, 9) as worker:
-
-        def work() -> None:
-            while not done.wait(0.005):
-                worker.heartbeat()
-
-        thread = threading.Thread(target=work)
-        thread.start()
-        try:
-            with pytest.raises(NotPermitted, match="operational: node 9"):
-                run(channel, "find")
-            assert worker.seen == []
-            assert run(channel, "find", "--anyway") == 0
-        finally:
-            done.set()
-            thread.join()
+    with living(channel, 9, 0x05) as worker:
+        with pytest.raises(NotPermitted, match="operational: node 9"):
+            run(channel, "find")
+        assert worker.seen == []
+        assert run(channel, "find", "--anyway") == 0
     assert {can_id for can_id, _ in worker.seen} == {0x7E5}
+
+
+def test_who_begins_to_work_while_a_person_thinks_is_not_disturbed(
+    channel: str, node: Node, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun = threading.Event()
+
+    def readline() -> str:
+        begun.set()
+        return "y\n"
+
+    monkeypatch.setattr("sys.stdin", SimpleNamespace(isatty=lambda: True, readline=readline))
+    with living(channel, 9, 0x05, begun), pytest.raises(NotPermitted, match="operational: node 9"):
+        run(channel, "set", "5", "--node-id", "6")
+    assert (node.lss.node_id, node.lss.pending_node_id) == (5, 5)
+
+
+def test_the_only_device_is_the_only_one(channel: str, node: Node) -> None:
+    assert node.node_id == 5
+    with living(channel, 9, 0x7F) as other, living(channel, 8, 0x7F):
+        with pytest.raises(NotPermitted, match="8, 9 are on the bus"):
+            run(channel, "inquire", "only", "--anyway")
+        assert not {0x7E5} & {can_id for can_id, _ in other.seen}
 
 
 def test_new_is_refused_where_there_is_none(channel: str, node: Node) -> None:
@@ -130,6 +211,7 @@ def test_new_is_refused_where_there_is_none(channel: str, node: Node) -> None:
         ("set", "5", "--node-id", "128"),
         ("set", "5", "--node-id", "0"),
         ("set", "5", "--new-bitrate", "300000"),
+        ("set", "5", "--node-id", "6", "--activate"),
         ("set", "5", "--new-bitrate", "500000", "--no-store"),
     ],
 )

@@ -120,6 +120,19 @@ def test_a_name_that_a_robot_has_given_up_is_free(spool: Spool) -> None:
     ]
 
 
+def test_a_robot_that_was_removed_shares_its_name_with_nobody(spool: Spool) -> None:
+    with Recorder(spool) as recorder:
+        recorder.describe("left", description("exo"))
+        recorder.leave("left")
+        recorder.describe("exo", description("exo"))
+        recorder.describe("left", description("exo"))
+    assert [event["text"] for event in events(spool, "name")] == [
+        "left calls itself exo in its own file",
+        "left calls itself exo in its own file",
+        "left and exo both call themselves exo",
+    ]
+
+
 def test_a_reboot_is_no_clock_that_was_set(spool: Spool) -> None:
     with Recorder(spool) as recorder:
         for link, offset_ns in ((1, 10**15), (2, -(10**12))):

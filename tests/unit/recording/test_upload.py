@@ -7,6 +7,7 @@ import sqlite3
 import threading
 from collections import Counter
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
@@ -299,6 +300,25 @@ def test_emptying_a_spool_ends_when_the_store_cannot_be_reached(spool: Spool) ->
     with Uploader(spool, connect) as uploader:
         assert not uploader.drain(WAIT_S)
         assert spool.waiting() == [1]
+
+
+def test_whoever_waits_for_an_emptied_spool_can_be_told_to_wait_no_more(spool: Spool) -> None:
+    asked, let_go = threading.Event(), threading.Event()
+
+    def connect() -> Store:
+        asked.set()
+        let_go.wait(WAIT_S)
+        raise StoreUnreachable("no network")
+
+    with Recorder(spool) as recorder:
+        recorder.record("exo-01", 1, batch(0))
+    with Uploader(spool, connect) as uploader, ThreadPoolExecutor(1) as pool:
+        emptied = pool.submit(uploader.drain, WAIT_S)
+        assert asked.wait(WAIT_S)
+        uploader.hurry()
+        assert emptied.result(WAIT_S / 2) is False
+        let_go.set()
+    assert spool.waiting() == [1]
 
 
 def test_what_a_library_raises_is_no_end_and_quotes_nothing(spool: Spool, folder_url: str) -> None:

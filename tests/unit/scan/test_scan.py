@@ -101,6 +101,23 @@ def test_a_node_that_somebody_else_asks_is_left_alone(channel: str, found: Calla
     assert [data for can_id, data in other.seen if can_id == 0x605] == []
 
 
+def test_a_node_that_somebody_begins_to_ask_meanwhile_is_left_alone_too(
+    channel: str, found: Callable[..., Found]
+) -> None:
+    other = FakeNode(channel, 9, DRIVE)
+    begin = bytes.fromhex("40 41 60 00 00 00 00 00")
+
+    def also_ask(request: bytes) -> None:
+        if request != begin:
+            other.send(0x605, begin)
+
+    node = FakeNode(channel, 5, DRIVE, on_request=also_ask)
+    seen = found(node, other)
+    assert list(seen.told) == [9]
+    assert seen.not_asked == {5}
+    assert len(node.requests) <= 2, "of us it has heard the first question alone"
+
+
 def test_a_node_that_falls_silent_is_told_as_far_as_it_answered(
     channel: str, found: Callable[..., Found]
 ) -> None:

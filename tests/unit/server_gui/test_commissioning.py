@@ -196,6 +196,13 @@ def test_silence_while_a_joint_is_under_power_is_told_soon(played: Played) -> No
     assert played.model.is_silent
 
 
+def test_a_drive_that_was_homed_and_not_confirmed_off_is_not_called_good(played: Played) -> None:
+    playing.moving(played)
+    played.hear(stopped(confirmed=False))
+    played.end(1, "NOT STOPPED: left knee")
+    assert stage(played) is Stage.NOT_CONFIRMED
+
+
 def test_a_command_that_dies_while_a_joint_is_under_power_is_followed_by_a_stop(played: Played) -> None:
     playing.died_moving(played)
     assert "--stop" in played.talker.arguments

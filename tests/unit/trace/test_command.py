@@ -89,6 +89,100 @@ def test_what_is_shown_is_written_and_reads_the_same(
     ]
 
 
+TWO = """\
+(1732351378.000000) can0 702#05
+(1732351378.100000) can1 702#7F
+(1732351378.200000) can0 182#3712F0D8FFFF
+"""
+TWO_BUSES = """\
+[can.left]
+channel = "can0"
+[can.right]
+channel = "can1"
+[joint.left_knee]
+bus = "left"
+node_id = 2
+eds = "joint_drive.eds"
+[joint.right_knee]
+bus = "right"
+node_id = 2
+eds = "joint_drive.eds"
+"""
+
+
+@pytest.fixture
+def two(tmp_path: Path) -> tuple[Path, Path]:
+    """A recording of two buses, and the file of their robot."""
+    log, robot = tmp_path / "two.log", tmp_path / "two.toml"
+    log.write_text(TWO, encoding="ascii")
+    robot.write_text(TWO_BUSES, encoding="utf-8")
+    return log, robot
+
+
+def test_each_bus_of_a_recording_has_nodes_of_its_own(
+    two: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log, robot = two
+    back = tmp_path / "back.log"
+    lines = shown(capsys, log, "--robot", robot, "--write", back)
+    names = [("can0", "left_knee"), ("can1", "right_knee"), ("can0", "left_knee")]
+    assert [(line.split()[1], line.split()[4]) for line in lines] == names
+    assert back.read_text("ascii") == TWO
+    (line,) = shown(capsys, log, "--robot", robot, "--node", "right_knee", "--json")
+    assert json.loads(line)["interface"] == "can1"
+    (line,) = shown(capsys, log, "--eds", "can1/2=joint_drive.eds", "--object", "0x6041") or [""]
+    assert line == "", "the EDS is of the other bus"
+
+
+def test_recordings_are_merged_by_time(
+    two: tuple[Path, Path], log: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lines = shown(capsys, log, two[0], "--json")
+    stamps = [json.loads(line)["t"] for line in lines]
+    assert len(stamps) == 8
+    assert stamps == sorted(stamps)
+
+
+def test_the_load_of_two_buses_is_a_table_each(
+    two: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    loads = [json.loads(line) for line in shown(capsys, two[0], "--load", "--json")]
+    frames = {one["interface"]: round(one["frames_per_s"] * one["seconds"]) for one in loads}
+    assert frames == {"can0": 2, "can1": 1}
+    text = shown(capsys, two[0], "--load")
+    assert [line for line in text if line.endswith(":")] == ["can0:", "can1:"]
+
+
+def test_two_live_buses_are_one_trace_by_time(channel: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """Frames of both, in the order in which they came, with the interface of each."""
+    done = threading.Event()
+    names = [f"{channel}-0", f"{channel}-1"]
+    with FakeNode(names[0], 9) as first, FakeNode(names[1], 9) as second:
+
+        def talk() -> None:
+            while not done.wait(0.01):
+                first.send(0x709, b"\x05")
+                second.send(0x709, b"\x7f")
+
+        thread = threading.Thread(target=talk)
+        thread.start()
+        try:
+            lines = shown(capsys, *(f"virtual:{name}" for name in names), "--count", "8", "--json")
+        finally:
+            done.set()
+            thread.join()
+    told = [json.loads(line) for line in lines]
+    stamps = [one["t"] for one in told]
+    assert stamps == sorted(stamps)
+    assert {(one["interface"], one["data"]) for one in told} == {(names[0], "05"), (names[1], "7f")}
+    assert first.seen == second.seen == []
+
+
+def test_one_of_two_buses_that_is_not_there_ends_both(channel: str) -> None:
+    with pytest.raises(Unavailable, match="there is no interface nocan0"):
+        main([f"virtual:{channel}", "nocan0"])
+
+
 def test_seconds_are_those_of_the_recording(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert len(shown(capsys, log, "--seconds", "1")) == 3
 
@@ -130,6 +224,7 @@ def test_on_a_live_bus_it_is_mute(channel: str, robot: Path, capsys: pytest.Capt
         ("--count", "0"),
         ("--seconds", "0"),
         ("--load", "--node", "2"),
+        ("can0",),
         ("--write", "a.txt"),
     ],
 )

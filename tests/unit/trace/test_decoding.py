@@ -155,8 +155,8 @@ WALK = [
 @pytest.mark.parametrize(
     ("wanted", "found"),
     [
-        (by_node(["left_knee"], [KNEE]), [0, 2, 3, 5]),
-        (by_node(["5"], []), [0, 1, 4]),
+        (by_node(["left_knee"], [KNEE], lambda _interface: [KNEE]), [0, 2, 3, 5]),
+        (by_node(["5"], [], lambda _interface: []), [0, 1, 4]),
         (by_kind(["nmt,sdo"]), [0, 1, 5]),
         (by_kind(["pdo", "heartbeat"]), [2, 3, 4]),
         (by_object(["0x6064"]), [2, 5]),
@@ -173,7 +173,9 @@ def test_only_what_is_wanted_is_shown(wanted: object, found: list[int]) -> None:
 
 def test_what_nobody_has_is_refused() -> None:
     with pytest.raises(SettingsError, match="known are left_knee"):
-        by_node(["left_kne"], [KNEE])
+        by_node(["left_kne"], [KNEE], lambda _interface: [KNEE])
+    with pytest.raises(SettingsError, match="from 1 to 127"):
+        by_node(["200"], [KNEE], lambda _interface: [KNEE])
     with pytest.raises(SettingsError, match="there are nmt, sync"):
         by_kind(["pdos"])
 

@@ -24,15 +24,20 @@ FRAMES = (
 
 
 def written(path: Path, frames: tuple[Captured, ...]) -> Path:
-    with writing(path, "can0") as put:
+    with writing(path) as put:
         for frame in frames:
             put(frame)
     return path
 
 
+def frames_of(path: Path) -> tuple[Captured, ...]:
+    """Without their interface, which a log always names and PCAP does not have."""
+    return tuple(frame._replace(interface="") for frame in read(path))
+
+
 @pytest.mark.parametrize("name", ["a.log", "a.pcap"])
 def test_frames_of_every_kind_survive_a_file(tmp_path: Path, name: str) -> None:
-    assert tuple(read(written(tmp_path / name, FRAMES))) == FRAMES
+    assert frames_of(written(tmp_path / name, FRAMES)) == FRAMES
 
 
 _IDS = st.one_of(st.integers(0, 0x7FF), st.integers(0, 0x1FFF_FFFF).map(lambda one: one | EXTENDED))
@@ -45,7 +50,7 @@ def test_any_frames_survive_both_formats(
     folder = tmp_path_factory.mktemp("any")
     frames = tuple(Captured(T + 1000 * offset, can_id, data) for offset, can_id, data in rows)
     for name in ("a.log", "a.pcap"):
-        assert tuple(read(written(folder / name, frames))) == frames
+        assert frames_of(written(folder / name, frames)) == frames
 
 
 def test_python_can_reads_what_is_written_as_candump_does(tmp_path: Path) -> None:
@@ -134,4 +139,4 @@ def test_a_file_that_is_there_is_not_written_over(tmp_path: Path) -> None:
     path = written(tmp_path / "a.log", FRAMES)
     with pytest.raises(SettingsError, match="cannot be written"):
         written(path, ())
-    assert tuple(read(path)) == FRAMES
+    assert frames_of(path) == FRAMES

@@ -54,6 +54,11 @@ class Standstill(Noted):
         listened_ns = looked_ns - max(since_ns, self._listening_since_ns)
         return max(0, listened_ns, now_ns - since_ns - EXCUSED_NS)
 
+    def until(self, now_ns: int) -> int:
+        """How often it has stood still, also when it does just now."""
+        passed_ns = self._passed_ns
+        return self.times + (passed_ns is not None and now_ns - passed_ns > STOOD_NS)
+
     def is_settled(self, now_ns: int) -> bool:
         """Whether what comes now has not waited, so that its time is its own."""
         return now_ns >= self._settled_ns

@@ -1,0 +1,120 @@
+"""`gwrms calibrate`: sensors, by the drivers' own command, and a joint's zero, in the robot's file."""
+
+import argparse
+import getpass
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+from drivers.bus.settings import CanSettings
+from drivers.cli import calibrate as sensors
+from drivers.errors import DriverError, SettingsError
+from drivers.scan.scan import scan
+from gateway.cli.commission_faces import Terminal
+from gateway.cli.text import warn
+from gateway.commission.bench import CanBench
+from gateway.commission.dialogue import run
+from gateway.commission.draft import Found, alone
+from gateway.commission.edit import NotEdited, comment_of, with_value
+from gateway.commission.keeping import journal, put
+from gateway.commission.zero import PLAUSIBLE, NotRepeated, Zero, posture, repeated
+from gateway.config.reading import load
+from gateway.config.robot import JointTable, RobotConfig
+
+LISTEN_S = 1.0
+KEY = "zero_offset"
+
+
+def main(argv: list[str]) -> int:
+    """Run `gwrms calibrate`."""
+    if argv[:1] != ["joint"]:
+        return sensors.main(argv)
+    options = _parser().parse_args(argv[1:])
+    file, joint = _named(options.joint)
+    with alone(file):
+        config = load(file)
+        if joint not in config.joint:
+            known = ", ".join(config.joint) or "none"
+            raise SettingsError(f"{file} has no [joint.{joint}]: here are {known}")
+        return _lead(config, joint, options)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="gwrms calibrate joint",
+        description=(
+            "Finds a joint's zero again: hold it, without power, as the comment of its zero_offset says, or "
+            "at --angle. Old and new are shown, and written into the robot's file on your word, with a "
+            "comment and an entry of the journal. Nothing is moved. End this robot's gateway first."
+        ),
+        allow_abbrev=False,
+    )
+    parser.add_argument("joint", metavar="ROBOT.toml:NAME", help="the joint of a robot's file")
+    parser.add_argument(
+        "--angle", type=float, metavar="DEGREES", help="at which it is held (flexion positive)"
+    )
+    parser.add_argument(
+        "--max-change",
+        type=float,
+        default=PLAUSIBLE,
+        metavar="DEGREES",
+        help="a larger change is refused (default: %(default)g)",
+    )
+    parser.add_argument(
+        "--who", default=getpass.getuser(), help="who does it, for the record (default: your user name)"
+    )
+    return parser
+
+
+def _named(where: str) -> tuple[Path, str]:
+    file, colon, joint = where.rpartition(":")
+    if not (colon and file.endswith(".toml")):
+        raise SettingsError(f"{where!r} names no joint of a robot's file: ROBOT.toml:left_knee")
+    return Path(file), joint
+
+
+def _lead(config: RobotConfig, joint: str, options: argparse.Namespace) -> int:
+    settings, text = config.joint[joint], config.path.read_text(encoding="utf-8")
+    face, bench = Terminal(), CanBench(settings.bus, config.can[settings.bus])
+    degrees = options.angle if options.angle is not None else posture(comment_of(text, f"joint.{joint}", KEY))
+    try:
+        _alone_on(config.can[settings.bus], settings)
+        zero = run(repeated(bench, joint, settings, degrees, options.max_change), face)
+        if zero is None:
+            face.say("Nothing is written.")
+            return 1
+        return _write(config, joint, text, zero, options.who, face.say)
+    except (NotRepeated, NotEdited, DriverError, OSError) as error:
+        warn("calibrate", f"{joint}: {error}; nothing is written")
+        return 1
+    except EOFError:
+        warn("calibrate", "nobody answers any more; nothing is written")
+        return 1
+    finally:
+        bench.close()
+
+
+def _alone_on(bus: CanSettings, settings: JointTable) -> None:
+    """Two who ask one node by SDO take each other's answers. Raises `DriverError`."""
+    if settings.sdo_cob_ids is not None:
+        raise SettingsError("it is asked by an SDO channel of its own (sdo_cob_ids), which this does not use")
+    traffic = scan(bus, LISTEN_S, threading.Event().wait, active=False).traffic
+    if settings.node_id in traffic.asked():
+        raise SettingsError(
+            f"node {settings.node_id} is asked by somebody else: end that, or the gateway, first"
+        )
+
+
+def _write(
+    config: RobotConfig, joint: str, text: str, zero: Zero, who: str, say: Callable[[str], None]
+) -> int:
+    table = f"joint.{joint}"
+    made = with_value(text, table, KEY, Found(zero.offset, zero.how))
+    found = put(config.path, made)
+    if found.config is None:
+        say(f"{config.path} is written and cannot be used: {'; '.join(one.words for one in found.findings)}")
+        return 1
+    values = {"before": config.joint[joint].zero_offset, "after": zero.offset, "how": zero.how}
+    told = journal(found.config, who, "calibrate", joint=joint, **values)
+    say(f"{config.path}: [{table}] {KEY} = {zero.offset:.5f}, the file before is beside it.\n{told}".rstrip())
+    return 0

@@ -1,0 +1,50 @@
+"""What is typed, or comes by a pipe: lines, and whether there is something to read without waiting for it."""
+
+import os
+import select
+
+STDIN = 0
+CHUNK = 4096
+
+
+class Typed:
+    """The standard input, read by nobody else: what Python's own reader holds back could be a STOP."""
+
+    def __init__(self, descriptor: int = STDIN) -> None:
+        self._descriptor = descriptor
+        self._held = b""
+        self._over = False
+
+    def line(self) -> str:
+        """The next line, with its end; raises `EOFError` where none comes any more."""
+        while b"\n" not in self._held and not self._over:
+            self._read()
+        if not self._held:
+            raise EOFError
+        line, end, self._held = self._held.partition(b"\n")
+        return (line + end).decode(errors="replace")
+
+    def waits(self, seconds: float) -> str:
+        """Why nothing is to go on, after so long at most: a key, or that nobody can press one any more."""
+        if not self._held and not self._over and self._ready(seconds):
+            self._read()
+        if self._held:
+            return "STOP was pressed"
+        return "nobody can press STOP any more: its input has ended" if self._over else ""
+
+    def drop(self) -> None:
+        """Forget what was typed meanwhile: it was not an answer."""
+        while not self._over and self._ready(0.0):
+            self._read()
+        self._held = b""
+
+    def _ready(self, seconds: float) -> bool:
+        return bool(select.select([self._descriptor], [], [], seconds)[0])
+
+    def _read(self) -> None:
+        try:
+            came = os.read(self._descriptor, CHUNK)
+        except OSError:  # a terminal that was closed
+            came = b""
+        self._held += came
+        self._over = not came

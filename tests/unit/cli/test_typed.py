@@ -1,0 +1,87 @@
+"""While a joint moves, whatever is typed is a STOP, and so is that nobody can type any more."""
+
+import json
+import os
+import pty
+from collections.abc import Iterator
+
+import pytest
+
+from gateway.cli import commission_faces
+from gateway.cli.commission_faces import JsonFace, Terminal
+from gateway.cli.typed import Typed
+from gateway.commission.dialogue import Ask
+
+
+@pytest.fixture
+def pipe() -> Iterator[tuple[Typed, int]]:
+    read, write = os.pipe()
+    yield Typed(read), write
+    os.close(read)
+
+
+def test_lines_come_one_by_one_and_end(pipe: tuple[Typed, int]) -> None:
+    typed, write = pipe
+    os.write(write, b"left_knee\n\nlast")
+    os.close(write)
+    assert [typed.line(), typed.line(), typed.line()] == ["left_knee\n", "\n", "last"]
+    with pytest.raises(EOFError):
+        typed.line()
+
+
+def test_what_was_typed_ahead_is_a_stop_although_it_was_read_already(pipe: tuple[Typed, int]) -> None:
+    typed, write = pipe
+    os.write(write, b"home left_knee\n\n")
+    assert typed.line() == "home left_knee\n"
+    assert typed.waits(0.0) == "STOP was pressed"
+    typed.drop()
+    assert typed.waits(0.0) == ""
+    os.write(write, b"x")  # without Enter, from a face that is no terminal
+    assert typed.waits(1.0) == "STOP was pressed"
+    os.close(write)
+
+
+def test_an_input_that_ends_is_a_stop(pipe: tuple[Typed, int]) -> None:
+    typed, write = pipe
+    assert typed.waits(0.0) == ""
+    os.close(write)
+    assert "nobody can press STOP any more" in typed.waits(1.0)
+    typed.drop()
+    assert "nobody can press STOP any more" in typed.waits(0.0)
+
+
+def test_a_terminal_that_is_closed_is_a_stop() -> None:
+    master, slave = pty.openpty()
+    typed = Typed(slave)
+    assert typed.waits(0.0) == ""
+    os.close(master)
+    assert "nobody can press STOP any more" in typed.waits(1.0)
+    os.close(slave)
+
+
+def test_other_faces_are_told_when_a_motion_begins_and_is_over(
+    pipe: tuple[Typed, int], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(commission_faces, "LOOK_S", 0.0)
+    face, write = JsonFace(), pipe[1]
+    face.typed = pipe[0]
+    assert [face.moving("it moves"), face.moving("it moves on")] == ["", ""]
+    os.write(write, b"stop\n")
+    assert face.moving("it moves on") == "STOP was pressed"
+    face.say("stopped")
+    os.write(write, b"0\n")
+    assert face.ask(Ask("At which angle?")) == "0\n", "the STOP was no answer to it"
+    said = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert said[:3] == [{"moving": "it moves"}, {"moving": None}, {"say": "stopped"}]
+    os.close(write)
+
+
+def test_a_terminal_says_that_it_moves_and_looks_at_the_keys(
+    pipe: tuple[Typed, int], capsys: pytest.CaptureFixture[str]
+) -> None:
+    face, write = Terminal(), pipe[1]
+    face.typed = pipe[0]
+    os.write(write, b"\n")
+    assert face.moving("STOP: Enter") == "STOP was pressed"
+    assert "STOP: Enter" in capsys.readouterr().out
+    os.close(write)
