@@ -119,6 +119,9 @@ class CanBench:
             self._bus.unsubscribe(SDO_RESPONSE + node, channel.on_response)
         self._channels.clear()
         self._bus.stop()
+        self._bus = CanBus(
+            self._bus.name, self._settings
+        )  # that this one was closed is no problem of the next
 
     def channel(self, node: int) -> SdoChannel:
         """To a node, on the open bus. Raises `Unavailable`."""

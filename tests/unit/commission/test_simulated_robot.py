@@ -91,6 +91,8 @@ def test_a_stop_reaches_every_drive_that_was_found_and_tells_of_one_that_is_sile
             assert found.drives == {"node 1": "confirmed", "node 2": "confirmed", "node 77": "unreachable"}
             assert (found.confirmed, found.words) == (False, "NOT CONFIRMED: node 77 is unreachable")
             draft.forget("node.77")
+            bench.close()  # as a homing does, which opens it as its master
+            assert bench._bus.problem is None, "that it was closed is no problem when it is opened again"
             assert stop(bench, draft).confirmed
             draft.tables.clear()
             assert "no drive is known yet" in stop(bench, draft).words
