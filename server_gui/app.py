@@ -18,6 +18,7 @@ from gateway.client import Address
 from gateway.wire.resource import ResourceSnapshotParams
 from gateway.wire.stop import Stopped
 from server_gui.core.archive.archive import Archive
+from server_gui.core.commissioning.commissioning import Commissioning
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.ending import Ending
 from server_gui.core.desk.feeds import Feeds, Record
@@ -29,8 +30,10 @@ from server_gui.core.follow.mailbox import Mailbox
 from server_gui.core.prediction.news import PredictionNews
 from server_gui.core.settings.server_file import ServerSettings, name_of
 from server_gui.core.tuning.link import Link
+from server_gui.processes.file_gateway import FileGateway
 from server_gui.processes.own_robot import OwnRobot
 from server_gui.processes.sim_control import SimControl
+from server_gui.processes.talking import talk
 from server_gui.views.application import application, kept_settings, kept_theme
 from server_gui.views.closing import wait_closed
 from server_gui.views.first_run.demo_bar import DemoBar
@@ -122,8 +125,11 @@ class App:
         self.theme = kept_theme(qt, kept)
         operator = "" if record is None else record.operator
         self._archive = Archive(settings, self.desk, self._poster.deliver, operator, file)
-        self.ending = Ending(self.feeds, self._close_others, self._own.close)
-        self.window = MainWindow(self.desk, self.theme, kept, self._archive)
+        self.commissioning = Commissioning(talk)
+        self._gateway: FileGateway | None = None  # of a robot that was commissioned here
+        self.ending = Ending(self.feeds, self._close_others, self._close_own)
+        self.window = MainWindow(self.desk, self.theme, kept, self._archive, self.commissioning)
+        self.window.commission.connect_to.connect(self._start_gateway)
         self.window.stopped.connect(lambda: self.stop("STOP button of the window"))
         self.window.stop_all.connect(lambda: self.desk.stop_all("STOP ALL of the window"))
         self.window.added.connect(lambda where: self.follow(name_of(where), Address.parse(where)))
@@ -160,11 +166,18 @@ class App:
         """End the window; asked again, without waiting."""
         if self.ending.is_begun:
             self.ending.hurry()
-        self._qt.quit()
+        self.window.end()
 
     def _close_others(self, within_s: float) -> bool:
         asked = self.demo is None or self.demo.end(within_s)
-        return self._archive.close(within_s) and asked
+        ended = self.commissioning.close(within_s)
+        return self._archive.close(within_s) and asked and ended
+
+    def _close_own(self) -> None:
+        """Last, so that nobody misses them."""
+        self._own.close()
+        if self._gateway is not None:
+            self._gateway.close()
 
     def follow(self, name: str, address: Address) -> Station:
         """Another robot, from now on."""
@@ -192,7 +205,9 @@ class App:
         self.desk.remove(station)
 
     def stop(self, reason: str) -> None:
-        """STOP the robot that is looked at; from any thread."""
+        """STOP the robot that is looked at, and one that is commissioned; from any thread."""
+        if self.commissioning.runs:
+            self.commissioning.stop()
         if (station := self.desk.selected) is not None:
             self._stop(station.name, reason)
 
@@ -215,6 +230,8 @@ class App:
                 self._stations[news.robot].take_prediction(news)
         self.feeds.look(self.desk.recording)
         self._look_at_own()
+        self.commissioning.look()
+        self._look_at_gateway()
         self.window.refresh()
 
     def first_look(self) -> None:
@@ -240,6 +257,28 @@ class App:
             self.window.empty.say(own.problem, again=True)
         if self._opening is not None:
             self._opening.look(self.desk.selected, window=self.window.isVisible())
+
+    # --- a robot that was commissioned here
+
+    def _start_gateway(self, file: str) -> None:
+        if self._gateway is not None:
+            self._gateway.close()
+        self._gateway = FileGateway(Path(file))
+        self._gateway.start()
+        self.window.commission.result.say("The gateway is starting …", again=False)
+
+    def _look_at_gateway(self) -> None:
+        gateway, result = self._gateway, self.window.commission.result
+        if gateway is None:
+            return
+        if gateway.problem:
+            result.say(gateway.problem, again=True)
+        elif gateway.address is not None and not gateway.is_followed:
+            gateway.is_followed = True
+            result.say(
+                f"Connected: its gateway listens on {gateway.address}, until this window closes.", again=False
+            )
+            self.desk.select(self.follow(name_of(str(gateway.address)), gateway.address))
 
     def _follow_own(self, address: Address) -> None:
         station = self.follow(OWN, address)
@@ -276,7 +315,7 @@ def run(
         app.first_look()
         app.window.show()
         if seconds is not None:
-            QTimer.singleShot(round(seconds * 1000), qt.quit)
+            QTimer.singleShot(round(seconds * 1000), app.window.end)
         with stop_keys(qt, app):
             status = qt.exec()
         app.close()

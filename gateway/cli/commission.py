@@ -4,25 +4,30 @@ import argparse
 import datetime
 import getpass
 import signal
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import NoReturn
+from types import FrameType
 
 import msgspec
 
 from drivers.bus.settings import CanSettings
 from drivers.cli.buses import named
-from drivers.errors import SettingsError
+from drivers.errors import DriverError, SettingsError
 from drivers.scan.products import Library, files
-from gateway.cli.commission_faces import JsonFace, Terminal
-from gateway.cli.text import warn
+from gateway.cli.commission_faces import Terminal
+from gateway.cli.commission_lines import JsonFace, Lines, stdin
+from gateway.cli.text import say, say_json, warn
 from gateway.commission.bench import CanBench
-from gateway.commission.dialogue import Talk, agree, run
+from gateway.commission.dialogue import At, Talk, agree, run
 from gateway.commission.draft import Draft, alone
 from gateway.commission.homing import NotStopped
 from gateway.commission.keeping import journal, put
+from gateway.commission.progress import Progress
 from gateway.commission.serial_bench import SerialPorts
 from gateway.commission.steps import commission
-from gateway.commission.writing import text, unfinished
+from gateway.commission.stopping import Stopped, stop
+from gateway.commission.writing import Written, text, unfinished
 
 _EPILOG = """\
 example
@@ -40,8 +45,7 @@ exit status
   0 written, 1 not (interrupted, or something failed), 2 usage
 """
 
-_LOSSES = (signal.SIGTERM, signal.SIGHUP)  # of whoever started it, or of the terminal
-NOT_FINISHED = "is not in it, because it was not finished: the same command goes on there."
+ENDS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 def main(argv: list[str]) -> int:
@@ -52,39 +56,102 @@ def main(argv: list[str]) -> int:
     if missing:
         parser.error(f"--eds {', '.join(missing)}: there is no such folder")
     name, settings = _the_bus(options.bus, options.bitrate)
-    with alone(options.file):
+    if options.stop:
+        return _stop(Draft(options.file), CanBench(name, settings), as_json=options.json)
+    with alone(options.file), _ending(), ExitStack() as ends:
         draft = Draft(options.file)
-        return _lead(draft, name, settings, options)
+        bench = CanBench(name, settings)
+        ends.callback(bench.close)
+        if not options.json:
+            return _lead(draft, bench, settings, options, Terminal(), None)
+        lines = ends.enter_context(Lines(stdin()))
+        return _lead(draft, bench, settings, options, JsonFace(lines), lines)
 
 
-def _lead(draft: Draft, name: str, settings: CanSettings, options: argparse.Namespace) -> int:
+def _lead(
+    draft: Draft,
+    bench: CanBench,
+    settings: CanSettings,
+    options: argparse.Namespace,
+    face: "Terminal | JsonFace",
+    lines: Lines | None,
+) -> int:
     """Through all of it; returns the exit status."""
-    face: JsonFace | Terminal = JsonFace() if options.json else Terminal()
-    bench = CanBench(name, settings)
-    before = {number: signal.signal(number, _interrupt) for number in _LOSSES}
+    progress = Progress(draft)
+
+    def at(where: At) -> None:
+        progress.at(where)
+        face.steps(progress.steps())
+
     try:
         _keep_bus(draft, settings)
-        run(_all(draft, bench, options, face), face)
+        if run(_all(draft, bench, options, face), face, at):
+            progress.end()
+            face.steps(progress.steps())
     except EOFError:
-        warn(
-            "commission",
-            f"nobody answers any more; {draft.path} has what was found, go on with the same command",
-        )
-        return 1
-    except KeyboardInterrupt:
-        warn("commission", f"interrupted; {draft.path} has what was found, go on with the same command")
-        return 130
+        return _left(draft, "nobody answers any more", 1)
+    except Ended as end:
+        if lines is not None and lines.stop_asked:
+            return _stop(draft, bench, as_json=True)
+        return _left(draft, "interrupted", end.status)
     except OSError as error:
         warn("commission", f"{error}; {draft.path} has what was found until then")
         return 1
     except NotStopped as error:
-        warn("commission", f"NOT STOPPED: {error}")
-        return 1
+        return _not_stopped(draft, bench, str(error), lines)
+    return 0 if not draft.path.exists() else 1
+
+
+def _not_stopped(draft: Draft, bench: CanBench, why: str, lines: Lines | None) -> int:
+    """A drive that was under power has not confirmed that it is off: it is asked once more."""
+    warn("commission", f"NOT STOPPED: {why}")
+    return _stop(draft, bench, as_json=lines is not None) or 1
+
+
+def _left(draft: Draft, why: str, status: int) -> int:
+    warn("commission", f"{why}; {draft.path} has what was found, go on with the same command")
+    return status
+
+
+def _stop(draft: Draft, bench: CanBench, *, as_json: bool) -> int:
+    """Quick stop to every drive that is known; nothing but SIGKILL keeps it from its end."""
+    for number in ENDS:
+        signal.signal(number, signal.SIG_IGN)
+    try:
+        stopped = stop(bench, draft)
+    except DriverError as error:
+        stopped = Stopped({}, str(error))
     finally:
         bench.close()
+    if as_json:
+        told = {"confirmed": stopped.confirmed, "drives": stopped.drives, "words": stopped.words}
+        say_json({"stopped": told})
+    else:
+        say(stopped.words + "\n")
+    return 0 if stopped.confirmed else 1
+
+
+class Ended(KeyboardInterrupt):
+    """Ctrl-C, SIGTERM or a terminal that is gone: the dialogue is closed, which ends what it has begun."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__()
+        self.status = 128 + number
+
+
+@contextmanager
+def _ending() -> Iterator[None]:
+    """While inside, `ENDS` raise `Ended` in whatever the dialogue does."""
+    before = {number: signal.signal(number, _end) for number in ENDS}
+    try:
+        yield
+    finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-    return 0 if not draft.path.exists() else 1
+
+
+def _end(number: int, _frame: FrameType | None) -> None:
+    raise Ended(number)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -111,6 +178,12 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--json", action="store_true", help="questions and answers as JSON lines, for other faces"
+    )
+    parser.add_argument(
+        "--stop",
+        action="store_true",
+        help="ask nothing: quick stop to every drive that was found until now, and what each confirms "
+        "(software, not a safety-rated emergency stop)",
     )
     return parser
 
@@ -141,34 +214,29 @@ def _keep_bus(draft: Draft, settings: CanSettings) -> None:
 
 def _all(
     draft: Draft, bench: CanBench, options: argparse.Namespace, face: "Terminal | JsonFace"
-) -> Talk[None]:
+) -> Talk[bool]:
+    """Whether the file is written."""
     library = Library(files(options.eds))
     yield from commission(draft, bench, library, SerialPorts(), options.serial)
     when = datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
     made = text(draft, options.who, when)
-    face.say(made)
-    if (yield from agree(f"Write this to {draft.file}?")):
-        face.say(_write(draft, made, options.who))
+    face.propose(made, str(draft.file))
+    agreed = yield from agree(f"Write this to {draft.file}?")
+    if agreed:
+        face.written(_write(draft, made, options.who))
     else:
         face.say(f"Nothing is written; {draft.path} has what was found.")
+    return agreed
 
 
-def _write(draft: Draft, made: str, who: str) -> str:
-    """What became of it, in words."""
+def _write(draft: Draft, made: str, who: str) -> Written:
     found = put(draft.file, made)
-    said = "".join(f"  {finding.severity}: {finding.words}\n" for finding in found.findings)
+    told = tuple((str(one.severity), one.words) for one in found.findings)
     if found.config is None:
-        return f"{draft.file} is written and cannot be used yet:\n{said}"
+        return Written(str(draft.file), made, told, usable=False)
     findings = {table: msgspec.to_builtins(keys) for table, keys in draft.tables.items()}
-    journaled = journal(found.config, who, "commission", found=findings)
+    journaled = journal(found.config, who, "commission", found=findings).strip()
     left = unfinished(draft)
-    if left:
-        said += f"  {', '.join(left)} {NOT_FINISHED}\n"
-    else:
+    if not left:
         draft.end()
-    return f"{draft.file} is written.\n{said}{journaled}Next: gwrms gateway {draft.file}"
-
-
-def _interrupt(_number: int, _frame: object) -> NoReturn:
-    """As Ctrl-C: what was begun is ended in order."""
-    raise KeyboardInterrupt
+    return Written(str(draft.file), made, told, usable=True, unfinished=left, not_journaled=journaled)

@@ -1,18 +1,20 @@
-"""The faces of `gwrms commission`: a terminal for people, JSON lines for other faces; both have a STOP."""
+"""The terminal as a face of commissioning: words, lines that are typed, and a STOP."""
 
 import time
 from collections.abc import Callable
 
-from gateway.cli.text import say, say_json
+from gateway.cli.text import say
 from gateway.cli.typed import Typed
 from gateway.commission.dialogue import Ask
+from gateway.commission.progress import Step
+from gateway.commission.writing import Written
 
 LOOK_S = 0.03  # for a STOP, each time
 SHOW_S = 0.5  # between two words of a joint that moves
 
 
-class _Face:
-    """What both have: lines that come in, and a STOP that is looked for."""
+class Terminal:
+    """Words, and lines that are typed."""
 
     def __init__(self) -> None:
         self.typed = Typed()
@@ -31,13 +33,18 @@ class _Face:
             self.typed.drop()
         return ended
 
-
-class Terminal(_Face):
-    """Words, and lines that are typed."""
-
     def say(self, text: str) -> None:
         self.over()
         say(text + "\n")
+
+    def propose(self, made: str, _file: str) -> None:
+        self.say(made)
+
+    def written(self, written: Written) -> None:
+        self.say(written.words)
+
+    def steps(self, steps: tuple[Step, ...]) -> None:
+        """Questions say it themselves."""
 
     def moving(self, text: str) -> str:
         return self.stop_wanted(lambda: say(f"  {text}\n"))
@@ -47,35 +54,4 @@ class Terminal(_Face):
         default = f" (Enter: {question.default})" if question.default else ""
         self.over()
         say(f"\n{question.text}{choices}{default}\n> ")
-        return self.typed.line()
-
-
-class JsonFace(_Face):
-    """A line each: {"say": …} and {"ask": …, "choices": …, "default": …, "unit": …}; plain lines answer.
-
-    {"moving": …} comes again and again while a joint is under power: any line is a STOP.
-    {"moving": null} comes when that is over.
-    """
-
-    def say(self, text: str) -> None:
-        self._end()
-        say_json({"say": text})
-
-    def moving(self, text: str) -> str:
-        return self.stop_wanted(lambda: say_json({"moving": text}))
-
-    def _end(self) -> None:
-        if self.over():
-            say_json({"moving": None})
-
-    def ask(self, question: Ask) -> str:
-        self._end()
-        say_json(
-            {
-                "ask": question.text,
-                "choices": question.choices,
-                "default": question.default,
-                "unit": question.unit,
-            }
-        )
         return self.typed.line()

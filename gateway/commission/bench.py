@@ -75,12 +75,12 @@ class CanBench:
 
     def read(self, node: int, index: int, subindex: int = 0) -> bytes | None:
         try:
-            return self._channel(node).upload(index, subindex)
+            return self.channel(node).upload(index, subindex)
         except DeviceAbort:
             return None
 
     def write(self, node: int, index: int, subindex: int, data: bytes) -> None:
-        channel = self._channel(node)
+        channel = self.channel(node)
         channel.download(index, subindex, data)
         kept = channel.upload(index, subindex)
         if kept != data:
@@ -88,8 +88,14 @@ class CanBench:
                 f"node {node}: {index:04X}h:{subindex} is {kept.hex(' ')} after {data.hex(' ')} was written"
             )
 
+    def send_urgent(self, node: int, data: bytes) -> None:
+        """An SDO request past all that waits; nobody waits for its answer. Raises `Unavailable`."""
+        if not self._bus.is_open:
+            self._open()
+        self._bus.send_urgent(SDO_REQUEST + node, data)
+
     def map(self, node: int, axis: int, description: Description) -> str:
-        channel, offset = self._channel(node), axis * AXIS_OFFSET
+        channel, offset = self.channel(node), axis * AXIS_OFFSET
         free = list(free_tpdos(read_tpdos(channel, description), node, self._heard))
         if not free:
             raise Unavailable(f"node {node}: no TPDO is free")
@@ -113,8 +119,12 @@ class CanBench:
             self._bus.unsubscribe(SDO_RESPONSE + node, channel.on_response)
         self._channels.clear()
         self._bus.stop()
+        self._bus = CanBus(
+            self._bus.name, self._settings
+        )  # that this one was closed is no problem of the next
 
-    def _channel(self, node: int) -> SdoChannel:
+    def channel(self, node: int) -> SdoChannel:
+        """To a node, on the open bus. Raises `Unavailable`."""
         if not self._bus.is_open:
             self._open()
         if node not in self._channels:

@@ -14,10 +14,30 @@ NO, YES = "n", "y"
 
 
 @dataclass(frozen=True, slots=True)
+class At:
+    """Which step begins: `gateway.commission.progress` knows them all. Nobody answers it."""
+
+    part: str  # of the robot, or a joint
+    step: str
+
+
+@dataclass(frozen=True, slots=True)
 class Say:
     """Something to be read; nobody answers it."""
 
     text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """What a device tells while somebody makes up an answer; `value` is `None` where it tells nothing."""
+
+    name: str
+    value: float | str | None
+    unit: str = ""
+
+
+Live = Callable[[], Sequence[Reading]]  # raises `DriverError` where a device does not answer
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +48,10 @@ class Ask:
     choices: tuple[str, ...] = ()  # one of these; without, whatever the text says
     default: str | None = None
     unit: str = ""  # of a number
+    bounds: tuple[float, float] | None = None  # of a number
+    press: bool = False  # Enter is the answer
+    refused: str = ""  # why the answer before would not do, which was said
+    live: Live | None = None  # for faces that can show it meanwhile; in the thread of `Face.ask` only
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +61,7 @@ class Moving:
     text: str
 
 
-Talk = Generator[Say | Ask | Moving, str, T]
+Talk = Generator[Say | Ask | Moving | At, str, T]
 
 
 class Face(Protocol):
@@ -57,14 +81,21 @@ class Face(Protocol):
         ...
 
 
-def run(talk: Talk[T], face: Face) -> T:
-    """Lead the dialogue to its end; closing it early leaves what was found until then."""
+def run(talk: Talk[T], face: Face, at: Callable[[At], None] | None = None) -> T:
+    """Lead the dialogue to its end; closing it early leaves what was found until then.
+
+    `at` is told where it is. Whatever is raised, by a face or a signal, closes the dialogue: who moves or
+    switches anything in one undoes that in a `finally`.
+    """
     typed: str | None = None
     try:
         while True:
             step = next(talk) if typed is None else talk.send(typed)
             typed = None
-            if isinstance(step, Say):
+            if isinstance(step, At):
+                if at is not None:
+                    at(step)
+            elif isinstance(step, Say):
                 face.say(step.text)
             elif isinstance(step, Moving):
                 typed = face.moving(step.text)
@@ -77,33 +108,37 @@ def run(talk: Talk[T], face: Face) -> T:
         talk.close()
 
 
-def press(text: str) -> Talk[None]:
+def press(text: str, live: Live | None = None) -> Talk[None]:
     """Wait until somebody has done what is said."""
-    yield Ask(f"{text} Then press Enter.")
+    yield Ask(f"{text} Then press Enter.", press=True, live=live)
 
 
 def word(
     text: str, default: str | None = None, check: Callable[[str], str | None] | None = None
 ) -> Talk[str]:
     """A word or more; `check` says what is wrong with it."""
+    refused = ""
     while True:
-        typed = yield Ask(text, default=default)
+        typed = yield Ask(text, default=default, refused=refused)
         problem = "an answer is needed" if not typed else check(typed) if check is not None else None
         if problem is None:
             return typed
-        yield Say(problem)
+        yield Say(refused := problem)
 
 
-def choose(text: str, choices: Sequence[str], default: str | None = None) -> Talk[str]:
+def choose(
+    text: str, choices: Sequence[str], default: str | None = None, live: Live | None = None
+) -> Talk[str]:
     """One of `choices`; the beginning of one will do."""
+    refused = ""
     while True:
-        typed = yield Ask(text, tuple(choices), default)
+        typed = yield Ask(text, tuple(choices), default, refused=refused, live=live)
         found = [one for one in choices if one == typed] or [
             one for one in choices if typed and one.startswith(typed)
         ]
         if len(found) == 1:
             return found[0]
-        yield Say(f"{typed!r} is none of {', '.join(choices)}")
+        yield Say(refused := f"{typed!r} is none of {', '.join(choices)}")
 
 
 def agree(text: str) -> Talk[bool]:
@@ -112,14 +147,17 @@ def agree(text: str) -> Talk[bool]:
     return typed.lower() in (YES, "yes")
 
 
-def number(text: str, unit: str, low: float, high: float, default: float | None = None) -> Talk[float]:
+def number(
+    text: str, unit: str, low: float, high: float, default: float | None = None, live: Live | None = None
+) -> Talk[float]:
     """A number of this range, in this unit."""
+    told, refused = None if default is None else f"{default:g}", ""
     while True:
-        typed = yield Ask(text, default=None if default is None else f"{default:g}", unit=unit)
+        typed = yield Ask(text, (), told, unit, (low, high), refused=refused, live=live)
         found = _number(typed.removesuffix(unit))
         if low <= found <= high:
             return found
-        yield Say(f"{typed!r} is no number of {low:g} to {high:g} {unit}".rstrip())
+        yield Say(refused := f"{typed!r} is no number of {low:g} to {high:g} {unit}".rstrip())
 
 
 def _number(typed: str) -> float:

@@ -13,6 +13,7 @@ from gateway.commission.bench import Bench
 from gateway.commission.dialogue import Say, Talk, choose, press, word
 from gateway.commission.dialogue import number as ask_number
 from gateway.commission.draft import Draft
+from gateway.commission.live import watched
 from gateway.commission.scale import Held, Nominal, Scale
 
 USUAL = ("left_hip", "left_knee", "left_ankle", "right_hip", "right_knee", "right_ankle")
@@ -20,7 +21,7 @@ CLEARLY = 10  # times as far as any other drive
 LEAST_MOVE = 50  # counts
 STILL = 3  # tries for a position that is held still
 MARGIN = 3.0  # ° within the ends that were found by hand
-SKIP = "skip"
+MOVED, SKIP = "moved", "skip"
 ENDS = "ends"  # among what was told of a joint: how far it goes by hand
 SET_ITS_ZERO = (
     "without another zero in the drive this joint is not finished. Homing at the present position (below), "
@@ -89,10 +90,11 @@ def which_drive(draft: Draft, bench: Bench, joint: str, axes: Sequence[Axis]) ->
     while True:
         yield from unpowered(bench, axes)
         before = yield from answered(lambda: {axis: counts(bench, axis) for axis in axes})
-        typed = yield from word(
-            f"Bend the {words(joint)} by hand by a good part of its way, keep it there, and press Enter "
-            f"(or: {SKIP}).",
-            "moved",
+        typed = yield from choose(
+            f"Bend the {words(joint)} by hand by a good part of its way, and keep it there.",
+            (MOVED, SKIP),
+            MOVED,
+            partial(watched, bench, axes, before),
         )
         if typed == SKIP:
             return None
@@ -177,6 +179,7 @@ def held(bench: Bench, joint: str, axis: Axis, where: str, near: int | None = No
             "°",
             -180,
             360,
+            live=partial(watched, bench, [axis]),
         )
         seen = yield from answered(lambda: [counts(bench, axis) for _ in range(STILL)])
         if not (yield from stayed_off(bench, [axis])):
@@ -249,10 +252,9 @@ def limits(draft: Draft, bench: Bench, joint: str, axis: Axis, scale: Scale) -> 
     margin = yield from ask_number(
         f"How far within its ends may the {words(joint)} go before the guard warns?", "°", 0, 30, MARGIN
     )
-    straight = yield from _end(bench, joint, axis, "as straight as it goes")
-    bent = yield from _end(bench, joint, axis, "as bent as it goes")
-    at_zero = scales.counts_at_zero(scale)
-    ends = [scales.angle(scale, nearest(here, at_zero)) for here in (straight, bent)]
+    straight = yield from _end(bench, joint, axis, "as straight as it goes", scale)
+    bent = yield from _end(bench, joint, axis, "as bent as it goes", scale)
+    ends = [_angle(scale, here) for here in (straight, bent)]
     draft.put(f"told.{joint}", ENDS, [min(ends), max(ends)], "rad; by hand")
     low, high = min(ends) + math.radians(margin), max(ends) - math.radians(margin)
     if low >= high:
@@ -263,10 +265,17 @@ def limits(draft: Draft, bench: Bench, joint: str, axis: Axis, scale: Scale) -> 
     draft.put(rule, "max", round(high, 4))
 
 
-def _end(bench: Bench, joint: str, axis: Axis, end: str) -> Talk[int]:
+def _angle(scale: Scale, here: int) -> float:
+    return scales.angle(scale, nearest(here, scales.counts_at_zero(scale)))
+
+
+def _end(bench: Bench, joint: str, axis: Axis, end: str, scale: Scale) -> Talk[int]:
     while True:
         yield from unpowered(bench, [axis])
-        yield from press(f"Bring the {words(joint)} by hand {end}, and keep it there.")
+        yield from press(
+            f"Bring the {words(joint)} by hand {end}, and keep it there.",
+            partial(watched, bench, [axis], angle=partial(_angle, scale)),
+        )
         here = yield from answered(lambda: counts(bench, axis))
         if not (yield from stayed_off(bench, [axis])):
             continue

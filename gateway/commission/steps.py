@@ -11,9 +11,10 @@ from gateway.commission import joints, nodes
 from gateway.commission.axes import Axis, axes_of
 from gateway.commission.bench import Bench
 from gateway.commission.controller import controller
-from gateway.commission.dialogue import Say, Talk, word
+from gateway.commission.dialogue import At, Say, Talk, word
 from gateway.commission.draft import Draft
 from gateway.commission.homing import homing
+from gateway.commission.progress import END, ROBOT
 from gateway.commission.sensors import SerialBench, sensors
 from gateway.config.robot import NAME
 
@@ -29,15 +30,21 @@ def commission(
 ) -> Talk[None]:
     """Find out everything that the file of this robot needs; what is found is in the draft."""
     yield Say(BEGIN)
+    yield At(ROBOT, "name")
     if not draft.has("robot", "name"):
         name = yield from word("How is the robot called (as exo-01)?", check=_name_problem)
         draft.put("robot", "name", name)
+    yield At(ROBOT, "bus")
     found, told = yield from nodes.scanned(bench)
+    yield At(ROBOT, "role")
     yield from nodes.role(draft, found)
     left = list(axes := axes_of(told))
     yield from nodes.same_devices(draft, {axis.node: told[axis.node] for axis in axes})
+    yield At(ROBOT, "controller")
     yield from controller(draft, library, told)
+    yield At(ROBOT, "joints")
     for joint in (yield from joints.names(draft, axes)):
+        yield At(joint, "drive")
         axis = yield from joints.which_drive(draft, bench, joint, left)
         if axis is None:
             continue
@@ -46,16 +53,25 @@ def commission(
             continue
         left.remove(axis)
         yield from _joint(draft, bench, library, joint, axis, told[axis.node])
+    yield At(END, "sensors")
     yield from sensors(draft, serial, ports)
+    yield At(END, "file")
 
 
 def _joint(draft: Draft, bench: Bench, library: Library, joint: str, axis: Axis, told: Told) -> Talk[None]:
+    yield At(joint, "file")
     yield from nodes.file_of(draft, library, axis.node, told)
+    yield At(joint, "heartbeat")
     yield from nodes.heartbeat(draft, bench, axis.node)
+    yield At(joint, "pdo")
     yield from nodes.mapping(draft, bench, axis, told, joint)
+    yield At(joint, "scale")
     scale = yield from joints.meaning(draft, bench, joint, axis)
+    yield At(joint, "limits")
     yield from joints.limits(draft, bench, joint, axis, scale)
+    yield At(joint, "ratings")
     yield from joints.ratings(draft, bench, joint, axis, scale.gear_ratio)
+    yield At(joint, "homing")
     yield from homing(draft, bench, joint, axis, scale)
 
 

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from gateway.commission.controller import CONTROLLER
@@ -15,6 +16,32 @@ HEAD = """\
 WIDTH = 34  # of `key = value`, before its comment
 LONGEST = 120  # with it; a comment that would go beyond stands above
 NEEDED = ("node_id", "configure_pdos", "zero_offset")  # the last of each step that a joint cannot be without
+
+
+NOT_FINISHED = "is not in it, because it was not finished: the same command goes on there."
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """What became of the file."""
+
+    file: str
+    text: str
+    findings: tuple[tuple[str, str], ...]  # of `gwrms check`: how bad, and what
+    usable: bool
+    unfinished: tuple[str, ...] = ()  # joints
+    not_journaled: str = ""  # why
+
+    @property
+    def words(self) -> str:
+        said = "".join(f"  {severity}: {words}\n" for severity, words in self.findings)
+        if not self.usable:
+            return f"{self.file} is written and cannot be used yet:\n{said}"
+        if self.not_journaled:
+            said += f"  {self.not_journaled}\n"
+        if self.unfinished:
+            said += f"  {', '.join(self.unfinished)} {NOT_FINISHED}\n"
+        return f"{self.file} is written.\n{said}Next: gwrms gateway {self.file}"
 
 
 def text(draft: Draft, who: str, when: str) -> str:

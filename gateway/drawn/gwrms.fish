@@ -304,6 +304,7 @@ complete -c gwrms -n '_shtab_gwrms_using commission' -l eds -xka "(__fish_comple
 complete -c gwrms -n '_shtab_gwrms_using commission' -l serial -x -d 'an insole'"'"'s or IMU'"'"'s port'
 complete -c gwrms -n '_shtab_gwrms_using commission' -l who -x -d 'who does it, for the record (default: your user name)'
 complete -c gwrms -n '_shtab_gwrms_using commission' -l json -d 'questions and answers as JSON lines, for other faces'
+complete -c gwrms -n '_shtab_gwrms_using commission' -l stop -d 'ask nothing: quick stop to every drive that was found until now, and what each confirms (software, not a safety-rated emergency stop)'
 complete -c gwrms -n '_shtab_gwrms_using commission; and test $_shtab_gwrms_npos -eq 0' -ka "(__fish_complete_path (commandline -ct))" -d 'the robot'"'"'s file that is to be written'
 complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a sensor -d 'Says what is on a serial port, how well it fits, and shows it live.'
 complete -c gwrms -n '_shtab_gwrms_using sensor' -s h -l help -d 'show this help message and exit'

@@ -412,6 +412,7 @@ _shtab_gwrms_commission_options=(
   "*--serial[an insole\'s or IMU\'s port]:PORT:"
   "--who[who does it, for the record (default\: your user name)]:who:"
   "--json[questions and answers as JSON lines, for other faces]"
+  "--stop[ask nothing\: quick stop to every drive that was found until now, and what each confirms (software, not a safety-rated emergency stop)]"
   ":the robot\'s file that is to be written:_files"
   ":can0, INTERFACE\:CHANNEL, or a file that has only its \[can.\…\]:"
 )

@@ -13,6 +13,7 @@ EPILOG = """keys
                     network, not a safety-rated emergency stop
   Ctrl+F            find a parameter
   Alt+O, S, R, C, L overview, signals, resources, recordings, cloud
+  Alt+N             commission a robot
   Space             in a recording: play, or stand still; I and O begin and end a span
 
 What comes is recorded as gwrms collect records it, into the same spool and store, as long as the window is

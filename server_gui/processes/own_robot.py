@@ -26,6 +26,8 @@ class OwnRobot:
     Without `folder` its files are in a temporary one.
     """
 
+    name = "simulated robot"  # of its thread
+
     def __init__(self, scenario: str = "walk", folder: Path | None = None) -> None:
         self.scenario = scenario
         self.folder = folder  # from the start on where its files are, the control socket among them
@@ -52,7 +54,7 @@ class OwnRobot:
         """Begin; once at a time."""
         if not self.is_running:
             self.ready, self.address, self.problem = (), None, ""
-            self._thread = threading.Thread(target=self._run, name="simulated robot")
+            self._thread = threading.Thread(target=self._run, name=self.name)
             self._thread.start()
 
     def close(self) -> None:

@@ -42,7 +42,7 @@ def simulated_robot(
             simulator.check()
 
         with Child(Part.GATEWAY.value, ["gateway", config, "--port", "0"]) as gateway:
-            address = gateway.wait_ready(_address_in, START_S, check_simulator)
+            address = gateway.wait_ready(address_in, START_S, check_simulator)
             ready(Part.GATEWAY)
 
             def check() -> None:
@@ -61,7 +61,7 @@ def _config_in(line: str) -> str | None:
     return str(said["config"]) if isinstance(said, dict) and said.get("ready") else None
 
 
-def _address_in(line: str) -> Address | None:
+def address_in(line: str) -> Address | None:
     """The gateway says `listening on HOST:PORT`."""
     said = re.fullmatch(r"listening on (\S+)", line.strip())
     return Address.parse(said[1]) if said else None

@@ -1,5 +1,7 @@
 """The page before there is a robot: add one, pair with one, start a simulated one, or open a recording."""
 
+from collections.abc import Callable
+
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QPushButton, QVBoxLayout, QWidget
 
@@ -16,6 +18,7 @@ ADD = (
     "~/.config/gwrms/server.toml."
 )
 SIMULATE = "A whole exoskeleton without hardware walks on this computer. It can be stopped, tuned and broken."
+COMMISSION = "Drives that nobody knows yet become a robot's file: it asks, and you move the joints by hand."
 OPEN = "Everything that was recorded, played in the same views; no robot is needed."
 
 
@@ -77,6 +80,13 @@ class EmptyView(QWidget):
             self.said.setText(text)
             self.said.setVisible(bool(text))
             self.start.setEnabled(again)
+
+    def offer_commissioning(self, go: Callable[[], None]) -> None:
+        """Offer the page for robots that have no file yet."""
+        button = QPushButton("Commission a robot")
+        button.setObjectName("commission")
+        button.clicked.connect(go)
+        self._column.insertWidget(2, _offer("New robot", COMMISSION, button))
 
     # --- inside
 

@@ -28,12 +28,15 @@ from PySide6.QtWidgets import (
 
 from gateway.units import UNITS, Units
 from server_gui.core.archive.archive import Archive
+from server_gui.core.commissioning.commissioning import Commissioning
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.views.alarms import AlarmStrip
+from server_gui.views.ask import ask
 from server_gui.views.audit import Audit
 from server_gui.views.bus_health import BusHealthView
 from server_gui.views.cloud.panel import Cloud
+from server_gui.views.commissioning.page import CommissionPage
 from server_gui.views.docks import Area, Docks
 from server_gui.views.empty import EmptyView
 from server_gui.views.events_panel import EventsPanel
@@ -69,6 +72,10 @@ CHOICES: Final = (
     "A",
 )  # quantities with more than one unit worth choosing
 
+CLOSING: Final = (
+    "A robot is being commissioned. Closing the window ends the command; what was found is kept beside the "
+    "robot's file, and gone on with at the next start."
+)
 ROBOTS: Final = 9  # that have a key
 LEAST: Final = 240  # high, at text of 100 %
 USUAL: Final = QSize(1680, 1000)  # where the screen has room for that
@@ -92,7 +99,14 @@ class MainWindow(QMainWindow):
     simulator = Signal()
     closed = Signal()
 
-    def __init__(self, desk: Desk, theme: Theme, settings: QSettings, archive: Archive | None = None) -> None:
+    def __init__(
+        self,
+        desk: Desk,
+        theme: Theme,
+        settings: QSettings,
+        archive: Archive | None = None,
+        commissioning: Commissioning | None = None,
+    ) -> None:
         super().__init__()
         self._desk = desk
         self._theme = theme
@@ -104,12 +118,14 @@ class MainWindow(QMainWindow):
         self.setWindowTitle("GWRMS")
         self.resize(USUAL.boundedTo(self.screen().availableSize()))
         with theme.styled_at_the_end():
-            self._make(desk, theme, archive)
+            self._make(desk, theme, archive, commissioning)
         self._restore()
         self._opened_as = self.size()
         theme.scaled.connect(self._scaled)
 
-    def _make(self, desk: Desk, theme: Theme, archive: Archive | None) -> None:
+    def _make(
+        self, desk: Desk, theme: Theme, archive: Archive | None, commissioning: Commissioning | None
+    ) -> None:
         menu = QPushButton("View")
         self.header = Header(desk, theme, menu)
         self.header.stopped.connect(self.stopped)
@@ -164,6 +180,13 @@ class MainWindow(QMainWindow):
             self.tabs.addTab(self.recordings, "Re&cordings")
             self.tabs.addTab(Scrolled(self.cloud), "C&loud")
             self.tabs.addTab(Scrolled(self.models), "&Models")
+        self._commissioning = commissioning
+        self._is_closing = self._is_ending = False
+        if commissioning is not None:
+            self.commission = CommissionPage(commissioning, theme)
+            self._views += (self.commission,)
+            self.tabs.addTab(self.commission, "Commissio&n")
+            self.empty.offer_commissioning(lambda: self.tabs.setCurrentWidget(self.commission))
         self._bar = StatusBar(desk, theme)
         self.setStatusBar(self._bar)
         self._pages = QStackedWidget()
@@ -177,6 +200,9 @@ class MainWindow(QMainWindow):
     def refresh(self) -> None:
         """Draw a frame: what moves each time, what is read now and then, and only what is visible."""
         self._frame += 1
+        if self._is_closing and self._commissioning is not None and not self._commissioning.runs:
+            self.close()
+            return
         self._bar.frame()
         due = self._is_due()
         if due:
@@ -220,6 +246,10 @@ class MainWindow(QMainWindow):
         self.signals.show_around((channel,), at_ns)
 
     def closeEvent(self, event: QCloseEvent) -> None:
+        if self._commissioning is not None and self._commissioning.runs and not self._is_ending:
+            event.ignore()
+            self._ask_to_end(self._commissioning)
+            return
         keep_bytes(self.kept, "geometry", self.saveGeometry())
         if self._is_arranged:
             keep_bytes(self.kept, "state", self._panels.state)
@@ -230,6 +260,20 @@ class MainWindow(QMainWindow):
         self.robots.end_pairing()
         super().closeEvent(event)
         self.closed.emit()
+
+    def _ask_to_end(self, commissioning: Commissioning) -> None:
+        """It closes once that has ended: nothing here waits for it."""
+
+        def end() -> None:
+            self._is_closing = True
+            commissioning.interrupt()
+
+        ask(self, "A robot is being commissioned", CLOSING, "End it and close", end)
+
+    def end(self) -> None:
+        """Close without a question: nobody may be there to answer. Qt asks every window before it quits."""
+        self._is_ending = True
+        QApplication.quit()
 
     def reset_layout(self) -> None:
         """Everything where it was at first."""

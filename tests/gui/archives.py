@@ -25,6 +25,7 @@ from server_gui.views.theme import Theme
 from tests.gui.fakes import Bench, destroy
 from tests.gui.foreseen import predicted
 from tests.gui.running import wait
+from tests.support.commissioning import Played
 from tests.support.desk import walking
 
 SECONDS = 12
@@ -75,12 +76,18 @@ def archive(settings: ServerSettings, bench: Bench, posted: list[Callable[[], No
 
 
 @pytest.fixture
+def played() -> Played:
+    """Commissioning whose command is played."""
+    return Played()
+
+
+@pytest.fixture
 def full_window(
-    qt: QApplication, theme: Theme, bench: Bench, archive: Archive, tmp_path: Path
+    qt: QApplication, theme: Theme, bench: Bench, archive: Archive, played: Played, tmp_path: Path
 ) -> Iterator[MainWindow]:
-    """The window with recordings and cloud."""
+    """The window with recordings, cloud and commissioning."""
     kept = QSettings(str(tmp_path / "kept.ini"), QSettings.Format.IniFormat)
-    made = MainWindow(bench.desk, theme, kept, archive)
+    made = MainWindow(bench.desk, theme, kept, archive, played.model)
     made.resize(USUAL)
     made.resize(1480, 900)
     made.show()

@@ -19,6 +19,7 @@ from server_gui.views.theme import Look, Theme
 from tests.gui.archives import (  # noqa: F401  # fixtures, for every test here
     archive,
     full_window,
+    played,
     posted,
     settings,
     shown,

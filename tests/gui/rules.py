@@ -17,7 +17,6 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from server_gui.views.main_window import MainWindow
 from server_gui.views.robots_panel import RobotCard
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.elided import ElidedLabel
@@ -77,7 +76,7 @@ def halved_numbers(window: QWidget) -> list[str]:
     return found
 
 
-def out_of_reach(window: MainWindow) -> list[str]:
+def out_of_reach(window: QWidget) -> list[str]:
     """Every control that is not whole on the screen, and to which nothing scrolls."""
     found = []
     for widget in window.findChildren(QWidget):

@@ -28,7 +28,11 @@ NOT_TYPED: Final[Mapping[str, tuple[str, ...]]] = {
         "root, to make an interface of the kernel",
         "a CAN adapter with real drives",
     ),
-    "how-to/commission.md": ("hands at a robot", "a dialogue with hands at a simulated one"),
+    "how-to/commission.md": (
+        "hands at a robot",
+        "hands at a robot that has been homed",
+        "a dialogue with hands at a simulated one",
+    ),
     "how-to/containers.md": ("Docker", "Docker", "Docker"),
     "how-to/first-robot.md": ("two computers, and root",),
     "how-to/measure-the-cost.md": (

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
-from tests.gui.walks import desk, first_run, robot
+from tests.gui.walks import commissioning, desk, first_run, robot
 from tests.gui.walks.walk import Bench, Made, bench, demo
 
 Moment = Callable[[Bench], None]
@@ -28,6 +28,7 @@ IN_DOCS: Final = Walk(
         desk.trial_runs_out,
         desk.replay,
         desk.uploaded,
+        commissioning.commissioned,
         robot.stopped,
     )
 )
@@ -42,6 +43,7 @@ PICTURES: Final = {
     "run-out": "reverted",
     "labelled": "playback",
     "cloud": "cloud",
+    "commission": "commission",
     "stopped": "stopped",
 }
 WALKS: Final = {
@@ -53,6 +55,7 @@ WALKS: Final = {
             robot.one_glance,
             robot.stopped,
             robot.link_cut,
+            commissioning.commissioned,
             first_run.empty,
             robot.two_robots,
         )

@@ -8,15 +8,18 @@ import pytest
 from drivers.bus.settings import CanSettings
 from drivers.scan.products import Library, files
 from eds.shipped import SHIPPED
+from gateway.commission.axes import Axis, powered
 from gateway.commission.bench import CanBench
 from gateway.commission.dialogue import run
 from gateway.commission.draft import Draft
 from gateway.commission.serial_bench import SerialPorts
 from gateway.commission.steps import commission
+from gateway.commission.stopping import stop
 from gateway.commission.writing import text
 from gateway.config.reading import examine
 from hil_sim.exoskeleton import JOINTS, Scenario
 from hil_sim.robot import SimulatedRobot
+from tests.support.waiting import until
 from tests.unit.commission.person import DRIVES, MOUNTINGS, Person, emergency_stop
 
 CHANNEL = "commission"
@@ -74,3 +77,24 @@ def test_feet_are_told_apart_by_a_stamp_and_the_imu_by_three_postures(
         assert draft.value(f"insole.{foot}", "format") == "insole-cobs"
     assert draft.value("imu.trunk", "axes") == ["x", "y", "z"]
     assert draft.value("imu.trunk", "format") == "witmotion"
+
+
+def test_a_stop_reaches_every_drive_that_was_found_and_tells_of_one_that_is_silent(tmp_path: Path) -> None:
+    draft = Draft(tmp_path / "exo-01.toml")
+    for node in (1, 2, 77):
+        draft.put(f"node.{node}", "identity", [0, 0, node])
+    bench = CanBench("main", CanSettings(interface="virtual", channel="stopped"))
+    with SimulatedRobot(tmp_path / "sim", Scenario.STAND, virtual_channel="stopped"):
+        try:
+            until(lambda: powered(bench, [Axis(1), Axis(2)]) == (Axis(1), Axis(2)), "both have power")
+            found = stop(bench, draft)
+            assert found.drives == {"node 1": "confirmed", "node 2": "confirmed", "node 77": "unreachable"}
+            assert (found.confirmed, found.words) == (False, "NOT CONFIRMED: node 77 is unreachable")
+            draft.forget("node.77")
+            bench.close()  # as a homing does, which opens it as its master
+            assert bench._bus.problem is None, "that it was closed is no problem when it is opened again"
+            assert stop(bench, draft).confirmed
+            draft.tables.clear()
+            assert "no drive is known yet" in stop(bench, draft).words
+        finally:
+            bench.close()

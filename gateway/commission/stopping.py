@@ -1,0 +1,110 @@
+"""STOP while a robot is commissioned: quick stop to every drive that is known, and what each confirms.
+
+Like every stop it can enable nothing (`drivers.joint.commands`). It is software, no emergency stop.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+
+from drivers.bus.sdo.protocol import expedited
+from drivers.errors import DriverError
+from drivers.joint.axis import Axis as SdoAxis
+from drivers.joint.commands import CONTROLWORD, STATUSWORD, STOPPED_STATES, Controlword
+from drivers.joint.quantities import AXIS_OFFSET
+from drivers.joint.quick_stop import StopOutcome, Stopping
+from gateway.commission.axes import Axis
+from gateway.commission.bench import CanBench
+from gateway.commission.draft import Draft
+
+WITHIN_S = 1.5  # for a drive to confirm it
+MOST_AXES = 8  # of a node (CiA 402-2)
+EVERY_NODE = range(1, 128)
+
+
+@dataclass(frozen=True, slots=True)
+class Stopped:
+    """What came of it by drive; of none where none is known yet."""
+
+    drives: Mapping[str, StopOutcome]
+    problem: str = ""  # of the bus
+
+    @property
+    def confirmed(self) -> bool:
+        return bool(self.drives) and set(self.drives.values()) == {StopOutcome.CONFIRMED}
+
+    @property
+    def words(self) -> str:
+        if self.problem:
+            return f"NOT CONFIRMED: {self.problem}"
+        if not self.drives:
+            return "NOT CONFIRMED: no drive is known yet; all 127 node ids were asked to stop"
+        if self.confirmed:
+            return f"STOP is confirmed by {', '.join(self.drives)}"
+        missing = (
+            f"{axis} is {outcome}"
+            for axis, outcome in self.drives.items()
+            if outcome != StopOutcome.CONFIRMED
+        )
+        return f"NOT CONFIRMED: {', '.join(missing)}"
+
+
+def stop(bench: CanBench, draft: Draft) -> Stopped:
+    """Ask all at once, then look until each has confirmed; where no drive is known all node ids are asked.
+
+    Raises:
+        DriverError: the bus does not open.
+
+    """
+    known = sorted(set(axes_of(draft)), key=lambda axis: (axis.node, axis.number))
+    for axis in known or map(Axis, EVERY_NODE):
+        bench.send_urgent(axis.node, _request(axis))
+    found = _confirmed(bench, known)
+    further = [axis for axis in _further(bench, found) if axis not in found]
+    found |= _confirmed(bench, further)
+    return Stopped({str(axis): outcome for axis, outcome in found.items()})
+
+
+def axes_of(draft: Draft) -> Iterator[Axis]:
+    """Every drive that was found until now: the first axis of each node, and each joint's."""
+    for table in draft.tables:
+        kind, _, name = table.partition(".")
+        if kind == "node" and draft.has(table, "identity"):
+            yield Axis(int(name))
+        elif kind == "joint" and draft.has(table, "node_id"):
+            yield Axis(draft.value(table, "node_id"), draft.value(table, "axis", 0))
+
+
+def _request(axis: Axis) -> bytes:
+    return expedited(axis.index(CONTROLWORD), 0, Controlword.QUICK_STOP.data)
+
+
+def _confirmed(bench: CanBench, axes: Iterable[Axis]) -> dict[Axis, StopOutcome]:
+    """Turn and turn about, so that one that is dead keeps no other waiting long."""
+    left = {
+        axis: (
+            Stopping(Controlword.QUICK_STOP, STOPPED_STATES, WITHIN_S, asked=False),
+            SdoAxis(bench.channel(axis.node), axis.number * AXIS_OFFSET),
+        )
+        for axis in axes
+    }
+    found: dict[Axis, StopOutcome] = {}
+    while left:
+        for axis, (stopping, where) in list(left.items()):
+            outcome = stopping.turn(where)
+            if outcome is not None:
+                found[axis] = outcome
+                del left[axis]
+    return {axis: found[axis] for axis in sorted(found, key=lambda axis: (axis.node, axis.number))}
+
+
+def _further(bench: CanBench, found: Mapping[Axis, StopOutcome]) -> Iterator[Axis]:
+    """Axes beyond the first one of nodes that answer."""
+    for node in {axis.node for axis, outcome in found.items() if outcome is not StopOutcome.UNREACHABLE}:
+        for number in range(1, MOST_AXES):
+            axis = Axis(node, number)
+            try:
+                if bench.read(node, axis.index(STATUSWORD)) is None:
+                    break
+            except DriverError:
+                break
+            yield axis

@@ -1,0 +1,92 @@
+"""The states of commissioning as a window shows them: a table, so that none is forgotten."""
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import Final
+
+from server_gui.core.alarms.marks import Mark
+
+
+class Stage(Enum):
+    """How it is."""
+
+    NOT_STARTED = "not started"
+    STARTING = "starting"
+    WORKING = "working"
+    ASKING = "asking"
+    HAND = "waiting for your hand"
+    MOVING = "under power"
+    BUS_GONE = "a drive does not answer"
+    STOPPING = "STOP sent"
+    STOPPED = "STOP confirmed"
+    NOT_CONFIRMED = "STOP NOT CONFIRMED"
+    ENDING = "being ended"
+    WRITTEN = "written"
+    UNUSABLE = "written, not usable yet"
+    LEFT = "interrupted"
+    FAILED = "failed"
+    DIED = "died"
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """How a stage is shown, and what can be done in it."""
+
+    mark: Mark
+    words: str
+    runs: bool = False  # the command does: it can be stopped and interrupted
+    answers: bool = False
+
+
+GO_ON: Final = "What was found is kept: the same goes on there."
+BY_HAND: Final = "Use the hardware emergency stop."
+LOOKS: Final = {
+    Stage.NOT_STARTED: Look(
+        Mark("ring", "dim", "not started"),
+        "You move the joints by hand, without power; only homing, on your word, puts one under power.",
+    ),
+    Stage.STARTING: Look(Mark("half", "accent", "starting"), "The command is starting …", runs=True),
+    Stage.WORKING: Look(
+        Mark("half", "accent", "working"), "It works; its next question comes by itself.", runs=True
+    ),
+    Stage.ASKING: Look(
+        Mark("diamond", "accent", "asking"), "It waits for your answer.", runs=True, answers=True
+    ),
+    Stage.HAND: Look(
+        Mark("diamond", "accent", "waiting for your hand"),
+        "It waits for your hand, then your answer.",
+        runs=True,
+        answers=True,
+    ),
+    Stage.BUS_GONE: Look(
+        Mark("triangle", "warn", "no answer"),
+        "A drive does not answer: see to its supply and the bus.",
+        runs=True,
+        answers=True,
+    ),
+    Stage.MOVING: Look(
+        Mark("triangle", "warn", "UNDER POWER"),
+        "A joint is under power and may move: hands off. STOP ends it.",
+        runs=True,
+    ),
+    Stage.STOPPING: Look(
+        Mark("triangle", "warn", "STOP sent"), "STOP is sent, and not confirmed yet …", runs=True
+    ),
+    Stage.STOPPED: Look(
+        Mark("square", "good", "STOP confirmed"), f"Every drive has confirmed the STOP. {GO_ON}"
+    ),
+    Stage.NOT_CONFIRMED: Look(Mark("triangle", "bad", "STOP NOT CONFIRMED"), BY_HAND),
+    Stage.ENDING: Look(Mark("half", "dim", "being ended"), "It is being ended …", runs=True),
+    Stage.WRITTEN: Look(Mark("disc", "good", "written"), "The robot's file is written, and can be used."),
+    Stage.UNUSABLE: Look(
+        Mark("triangle", "warn", "not usable yet"),
+        f"The file is written, and cannot be used as it is. {GO_ON}",
+    ),
+    Stage.LEFT: Look(Mark("ring", "warn", "interrupted"), f"It has ended without all of the file. {GO_ON}"),
+    Stage.FAILED: Look(Mark("triangle", "bad", "failed"), "It could not go on."),
+    Stage.DIED: Look(
+        Mark("triangle", "bad", "died"),
+        f"The command has died: how the drives are is not known. {BY_HAND} STOP here asks those that were "
+        f"found. {GO_ON}",
+    ),
+}

@@ -1,0 +1,26 @@
+"""A gateway on this computer for a robot's file: started when asked for, ended with the window."""
+
+import contextlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+from server_gui.processes.children import Child
+from server_gui.processes.own_robot import OwnRobot, Running
+from server_gui.processes.simulated import START_S, Part, address_in
+
+
+class FileGateway(OwnRobot):
+    """Of a robot that is there: nothing is simulated."""
+
+    name: Final = "gateway"
+
+    def __init__(self, file: Path) -> None:
+        super().__init__(folder=file.parent)
+        self.is_followed = False
+        self._file = file
+
+    @contextlib.contextmanager
+    def _running(self, _folder: Path) -> Iterator[Running]:
+        with Child(Part.GATEWAY.value, ["gateway", str(self._file), "--port", "0"]) as gateway:
+            yield gateway.wait_ready(address_in, START_S, self._give_up), gateway.check

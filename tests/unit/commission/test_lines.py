@@ -1,0 +1,133 @@
+"""Commissioning by lines: late and doubled answers reach no other question, a stop is always heard."""
+
+import json
+import os
+import threading
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from drivers.errors import DeviceTimeout
+from gateway.cli.commission import Ended, _ending
+from gateway.cli.commission_lines import JsonFace, Lines
+from gateway.commission.dialogue import Ask, Reading, number, run
+from tests.support.waiting import WAIT_S, until
+
+
+class Pipe:
+    """Somebody who writes."""
+
+    def __init__(self) -> None:
+        self.source, self._sink = os.pipe()
+
+    def write(self, *lines: str) -> None:
+        os.write(self._sink, "".join(f"{line}\n" for line in lines).encode())
+
+    def end(self) -> None:
+        if self._sink >= 0:
+            os.close(self._sink)
+        self._sink = -1
+
+
+@pytest.fixture
+def pipe() -> Iterator[Pipe]:
+    made = Pipe()
+    yield made
+    made.end()
+    os.close(made.source)
+
+
+def told(capsys: pytest.CaptureFixture[str]) -> list[dict[str, object]]:
+    return [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+
+
+def test_late_and_doubled_answers_are_passed_over(pipe: Pipe) -> None:
+    pipe.write('{"answer": "1", "number": 1}', '{"answer": "1", "number": 1}', '{"answer": "2", "number": 2}')
+    with Lines(pipe.source) as lines:
+        face = JsonFace(lines)
+        assert [face.ask(Ask("first")), face.ask(Ask("second"))] == ["1", "2"]
+
+
+def test_plain_lines_answer_in_their_order_and_the_last_needs_no_newline(pipe: Pipe) -> None:
+    pipe.write("exo-01", "", '{"not": json')
+    os.write(pipe._sink, b"last")
+    pipe.end()
+    with Lines(pipe.source) as lines:
+        face = JsonFace(lines)
+        assert [face.ask(Ask("?")) for _ in range(4)] == ["exo-01", "", '{"not": json', "last"]
+        for _ in range(2):
+            with pytest.raises(EOFError):
+                face.ask(Ask("?"))
+
+
+def test_a_refusal_stands_at_the_question_that_comes_again(
+    pipe: Pipe, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pipe.write("12,5", "12.5")
+    with Lines(pipe.source) as lines:
+        assert run(number("How far?", "°", 0, 90), JsonFace(lines)) == 12.5
+    first, said, again = told(capsys)
+    assert (first["refused"], first["bounds"], first["unit"]) == ("", [0, 90], "°")
+    assert again["refused"] == said["say"]
+    assert (first["number"], again["number"]) == (1, 2)
+
+
+def test_what_drives_tell_comes_until_the_answer_and_one_that_is_silent_is_told(
+    pipe: Pipe, capsys: pytest.CaptureFixture[str]
+) -> None:
+    looks: list[int] = []
+
+    def live() -> list[Reading]:
+        looks.append(1)
+        if len(looks) == 2:
+            raise DeviceTimeout("node 7 does not answer")
+        if len(looks) == 3:
+            pipe.write("moved")
+        return [Reading("node 7", None, "counts")]
+
+    with Lines(pipe.source) as lines:
+        assert JsonFace(lines).ask(Ask("Bend it", live=live)) == "moved"
+    _, one, two, three, *_ = told(capsys)
+    assert one["live"] == three["live"] == [{"name": "node 7", "value": None, "unit": "counts"}]
+    assert (two["live"], two["problem"]) == ([], "node 7 does not answer")
+
+
+def stopped_in(pipe: Pipe, lines: Lines, busy: Callable[[Lines], object]) -> None:
+    pipe.write('{"stop": true}', '{"stop": true}')
+    busy(lines)
+
+
+@pytest.mark.parametrize("busy", [lambda lines: lines.get(1, None), lambda _: threading.Event().wait(WAIT_S)])
+def test_a_stop_ends_whatever_is_done_and_once(pipe: Pipe, busy: Callable[[Lines], object]) -> None:
+    with _ending(), Lines(pipe.source) as lines:
+        with pytest.raises(Ended):
+            stopped_in(pipe, lines, busy)
+        assert lines.stop_asked
+
+
+def test_a_line_without_end_is_not_waited_for(pipe: Pipe, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("gateway.cli.commission_lines.LONGEST", 100)
+    os.write(pipe._sink, b"x" * 200)
+    with Lines(pipe.source) as lines, pytest.raises(EOFError):
+        JsonFace(lines).ask(Ask("?"))
+
+
+def test_any_line_while_a_joint_moves_is_a_stop_and_no_answer(
+    pipe: Pipe, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with Lines(pipe.source) as lines:
+        face = JsonFace(lines)
+        assert face.moving("under power") == ""
+        pipe.write('{"answer": "late", "number": 7}')
+        assert until(lambda: face.moving("under power")) == "STOP was pressed"
+        pipe.end()
+        face.say("over")
+        assert (
+            until(lambda: face.moving("under power")) == "nobody can press STOP any more: its input has ended"
+        )
+        with pytest.raises(EOFError):
+            face.ask(Ask("?"))
+    assert [line for line in told(capsys) if "moving" in line][:2] == [
+        {"moving": "under power"},
+        {"moving": None},
+    ]
