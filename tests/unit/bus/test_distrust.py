@@ -226,6 +226,7 @@ def test_a_device_whose_answers_cannot_be_assigned_is_not_written(hasty: CanDevi
             hasty.node.download(0x2002, 0, b"\xa4\x01").result(WAIT_S)
         assert "to which request node 5 answers" in problem(hasty)
         fake.silent = False
+        hasty.node.channel.timeout_s = WAIT_S
         assert hasty.node.upload(*STEP).result(WAIT_S) == b"\x90\x01"
         hasty.node.download(0x2002, 0, b"\xa4\x01").result(WAIT_S)
         hasty.stop()
