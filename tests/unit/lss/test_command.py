@@ -4,18 +4,22 @@ import io
 import json
 import threading
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import pytest
 
 import eds
+from drivers.bus.bus import CanBus as Bus
 from drivers.cli.lss import main
 from drivers.errors import NotPermitted, SettingsError
+from drivers.lss.surroundings import Surroundings, listen
 from hil_sim.bus.can_bus import CanBus
 from hil_sim.bus.virtual import VirtualBridge
 from hil_sim.clock import Clock
 from hil_sim.loop import Loop
 from hil_sim.node.node import Node
+from tests.support.waiting import until
 from tests.unit.bus.fake_node import FakeNode
 from tests.unit.hil_sim.device_file import communication
 
@@ -93,7 +97,24 @@ def test_a_node_id_that_somebody_has_is_given_to_nobody(channel: str, node: Node
     assert node.lss.pending_node_id == 5
 
 
-def test_where_somebody_is_at_work_nothing_is_sent_unless_told(channel: str) -> None:
+def _has_more(bus: Bus, before: int) -> bool:
+    return bus.frames > before
+
+
+def listen_until_heard(bus: Bus, seconds: float, wait: object) -> Surroundings:
+    """As long as a busy computer keeps a device from talking: until one batch of frames was taken."""
+
+    def heard(_seconds: float) -> None:
+        for _ in range(2):
+            until(partial(_has_more, bus, bus.frames))
+
+    return listen(bus, seconds, heard)
+
+
+def test_where_somebody_is_at_work_nothing_is_sent_unless_told(
+    channel: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("drivers.cli.lss.listen", listen_until_heard)
     done = threading.Event()
     with FakeNode(channel, 9) as worker:
 
