@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from server_gui.processes.children import Child, ChildFailed
+from tests.scenario.patience import patient
 from tests.support.waiting import WAIT_S, until
 
 
@@ -42,7 +43,7 @@ class Bench:
         self.simulator = self._processes.enter_context(Child("simulator", arguments))
         ready = self.simulator.wait_ready(_json, WAIT_S, nothing)
         assert ready["ready"] is True
-        self.config = Path(ready["config"])
+        self.config = patient(Path(ready["config"]), patience_s=2.5)  # as long as a stop may take there
 
     def start_gateway(self) -> None:
         arguments = ["gateway", str(self.config), "--port", str(self.port)]
@@ -61,12 +62,12 @@ class Bench:
         until(lambda: is_dead(child))
 
     def ask(self, method: str, **params: Any) -> dict[str, Any]:
-        """One request as `nc` sends it: a line, then the sending half is closed; the answer until the end."""
+        """One request, a line, and its answer: however late, as long as the connection stays."""
         with socket.create_connection(("127.0.0.1", self.port), timeout=WAIT_S) as link:
             request = {"jsonrpc": "2.0", "id": 1, "method": method, "params": params}
             link.sendall(json.dumps(request).encode() + b"\n")
-            link.shutdown(socket.SHUT_WR)
-            answer = b"".join(iter(lambda: link.recv(65536), b""))
+            with link.makefile("rb") as lines:
+                answer = lines.readline()
         result: dict[str, Any] = json.loads(answer)["result"]
         return result
 
