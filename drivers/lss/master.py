@@ -226,12 +226,16 @@ class LssMaster:
         self._bus.send(REQUEST, (bytes([command]) + content).ljust(8, b"\0"))
         found: list[bytes] = []
         until = time.monotonic() + timeout_s
-        while (left_s := until - time.monotonic()) > 0:
+        left_s = timeout_s
+        while left_s > 0 or not self._heard.empty():  # what has come is heard, however late one looks
             try:
-                data = self._heard.get(timeout=left_s)
+                data = self._heard.get(timeout=max(0.0, left_s))
             except queue.Empty:
                 break
             if data[0] == wanted:
                 found.append(data)
                 until = time.monotonic() + SETTLE_S
+            elif left_s <= 0:
+                break
+            left_s = until - time.monotonic()
         return found

@@ -102,6 +102,7 @@ def _run(connection: duckdb.DuckDBPyConnection, work: Callable[[], Found]) -> Fo
             while not outcome.done():
                 connection.interrupt()
                 wait([outcome], AGAIN_S)
+        if thread.ident is not None:
             thread.join()
     return outcome.result()
 

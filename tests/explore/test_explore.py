@@ -13,11 +13,11 @@ NIGHT_S = 100
 FEWEST_ORDERS, FEWEST_STATES = 100, 300  # in a night, also on a computer that does much else
 
 
-def _explore(*options: str, timeout_s: float = 50.0) -> subprocess.CompletedProcess[str]:
+def _explore(*options: str) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "tests.explore", "--workers", "2", *options]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     return subprocess.run(
-        command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=timeout_s, check=False
+        command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=250.0, check=False
     )
 
 
@@ -29,7 +29,7 @@ def _number(what: str, said: str) -> int:
 
 @pytest.mark.parametrize("seconds", [5, NIGHT_S])
 def test_no_order_of_events_violates_an_invariant(seconds: int) -> None:
-    done = _explore("--seconds", str(seconds), timeout_s=250.0)
+    done = _explore("--seconds", str(seconds))
     assert done.returncode == 0, done.stdout + done.stderr
     if seconds == NIGHT_S:
         assert _number("orders tried", done.stdout) >= FEWEST_ORDERS

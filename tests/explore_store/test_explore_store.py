@@ -16,7 +16,7 @@ def _explore(*options: str) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "tests.explore_store", *options]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     return subprocess.run(
-        command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=170, check=False
+        command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=250, check=False
     )
 
 

@@ -71,8 +71,12 @@ def theme(only_theme: Theme) -> Theme:
 
 
 @pytest.fixture
-def bench() -> Bench:
-    """A desk with one robot that has described itself."""
+def bench(monkeypatch: pytest.MonkeyPatch) -> Bench:
+    """A desk with one robot that has described itself.
+
+    What it has said gets old in a minute: to draw it takes a busy computer longer than half a second.
+    """
+    monkeypatch.setattr("server_gui.core.follow.robot.STALE_NS", 60_000_000_000)
     made = Bench(Desk())
     made.add("exo-01").take([described()])
     return made

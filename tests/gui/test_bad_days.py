@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PySide6.QtCore import QSettings
-from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QFileDialog, QMessageBox
 
 from gateway.client import ConnectionState
@@ -122,8 +121,7 @@ def test_a_gateway_whose_description_cannot_be_read_says_why_and_is_asked_again(
     with running(qt, settings, QSettings(str(tmp_path / "kept.ini"), QSettings.Format.IniFormat)) as app:
         station = app.desk.stations[0]
         wait(lambda: station.robot.last_failure is not None, "told the failure")
-        QTest.qWait(300)
-        assert any("robot.describe" in item.text for item in app.desk.news.items)
+        wait(lambda: any("robot.describe" in item.text for item in app.desk.news.items), "said it")
         del robot.overrides["robot.describe"]
         wait(lambda: not station.robot.is_stale(), "followed it all the same")
 

@@ -6,14 +6,17 @@ from pathlib import Path
 
 import pytest
 
+from tests.scenario.patience import patient
 from tests.scenario.processes import Bench
+
+STOP_S = 2.5  # within which a stop is answered, whatever the drives do: no drive is waited for longer
 
 
 @pytest.fixture
 def bench(tmp_path: Path) -> Iterator[Bench]:
     """Of its own: what is killed, stopped or started."""
     with ExitStack() as processes:
-        yield _whole(tmp_path, processes)
+        yield _whole(Patient(tmp_path, processes))
 
 
 @pytest.fixture(scope="module")
@@ -23,10 +26,17 @@ def walking(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
     with ExitStack() as processes:
         patch = processes.enter_context(pytest.MonkeyPatch.context())
         patch.setenv("XDG_STATE_HOME", str(folder / "state"))
-        yield _whole(folder, processes)
+        yield _whole(Bench(folder, processes))
 
 
-def _whole(folder: Path, processes: ExitStack) -> Bench:
-    bench = Bench(folder, processes)
+class Patient(Bench):
+    """Its gateway takes no device for silent that a busy computer keeps from answering."""
+
+    def start_gateway(self) -> None:
+        patient(self.config, patience_s=STOP_S)
+        super().start_gateway()
+
+
+def _whole(bench: Bench) -> Bench:
     bench.until_whole()
     return bench

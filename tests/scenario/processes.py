@@ -61,12 +61,12 @@ class Bench:
         until(lambda: is_dead(child))
 
     def ask(self, method: str, **params: Any) -> dict[str, Any]:
-        """One request as `nc` sends it: a line, then the sending half is closed; the answer until the end."""
+        """One request, a line, and its answer: however late, as long as the connection stays."""
         with socket.create_connection(("127.0.0.1", self.port), timeout=WAIT_S) as link:
             request = {"jsonrpc": "2.0", "id": 1, "method": method, "params": params}
             link.sendall(json.dumps(request).encode() + b"\n")
-            link.shutdown(socket.SHUT_WR)
-            answer = b"".join(iter(lambda: link.recv(65536), b""))
+            with link.makefile("rb") as lines:
+                answer = lines.readline()
         result: dict[str, Any] = json.loads(answer)["result"]
         return result
 

@@ -5,6 +5,7 @@ import tomllib
 from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -46,11 +47,16 @@ def doctor(bench: Bench, *more: str) -> tuple[str, ...]:
     )
 
 
+def comes_late(finding: dict[str, Any]) -> bool:
+    """A SYNC that the simulator sends late, because this computer is busy, is rightly found."""
+    return finding["rule"] == "sync" and "is late" in finding["fixes"][0]["words"]
+
+
 def test_a_running_robots_mistakes_are_found_through_its_gateway(ill: Ill) -> None:
     done = gwrms(*doctor(ill, "--json"))
     assert done.returncode == 1, done.stderr
     bill = json.loads(done.stdout)
-    assert {one["rule"] for one in bill["findings"]} == RULES
+    assert {one["rule"] for one in bill["findings"] if not comes_late(one)} == RULES
     assert "bus_load" in bill["well"]
     assert {one["rule"] for one in bill["not_judged"]} >= {"sign", "sides"}
     fixes = {one["rule"]: one["fixes"][0]["words"] for one in bill["findings"]}

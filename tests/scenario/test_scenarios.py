@@ -58,11 +58,13 @@ def run(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
 
 @pytest.mark.parametrize("name", ["drive_fault", "guard_overheat", "node_lost"])
 def test_a_scenario_of_the_tree_holds(name: str, tmp_path: Path) -> None:
+    """What cannot be judged, because the computer was too slow, is no failure, and is said."""
     done = run(FOLDER / f"{name}.toml", "--dir", tmp_path)
-    assert done.returncode == 0, done.stdout + done.stderr
+    slow = "inconclusive: " in done.stdout
+    assert done.returncode == (3 if slow else 0), done.stdout + done.stderr
     assert "FAILED" not in done.stdout
-    assert "expectations met" in done.stdout
-    assert done.stdout.splitlines()[-1] == "1 scenario: 1 passed"
+    assert slow or "expectations met" in done.stdout
+    assert done.stdout.splitlines()[-1] == f"1 scenario: 1 {'inconclusive' if slow else 'passed'}"
 
 
 def test_what_is_not_as_expected_is_told_and_the_exit_status_is_1(tmp_path: Path) -> None:

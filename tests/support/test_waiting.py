@@ -1,9 +1,11 @@
 """Waiting in tests: by the clock, whatever happens meanwhile."""
 
 import time
+from types import SimpleNamespace
 
 import pytest
 
+from tests.support import waiting
 from tests.support.waiting import until
 
 
@@ -21,9 +23,22 @@ def test_what_never_comes_true_fails_with_what_there_was_instead() -> None:
 
 def test_however_often_it_was_looked_in_vain_only_time_ends_it() -> None:
     looks = iter(range(10_000))
-    end_s = time.monotonic() + 0.2
-    until(lambda: next(looks) and time.monotonic() > end_s, within_s=60.0)
-    assert next(looks) > 2
+    until(lambda: next(looks) >= 50, within_s=60.0)
+
+
+def test_what_takes_long_to_look_at_is_left_for_a_second_at_most(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A gateway that nobody asks for some seconds goes to sleep, and is not whole when it is asked again."""
+    now_s = [0.0]
+    pauses: list[float] = []
+    clock = SimpleNamespace(monotonic=lambda: now_s[0], sleep=pauses.append)
+    monkeypatch.setattr(waiting, "time", clock)
+
+    def look() -> bool:
+        now_s[0] += 0.1 if not pauses else 10.0
+        return len(pauses) == 2
+
+    waiting.until(look)
+    assert pauses == [pytest.approx(0.4), waiting.PAUSE_S]
 
 
 def test_what_came_true_while_nobody_looked_counts() -> None:

@@ -7,6 +7,9 @@ from typing import TypeVar
 
 WAIT_S = 120.0  # only what hangs takes so long; pytest itself ends a test far later
 LOOK_S = 0.003
+PAUSE_S = (
+    1.0  # at most: what sleeps again when nobody asks for some seconds, as a gateway, would never wake up
+)
 
 Found = TypeVar("Found")
 
@@ -34,7 +37,8 @@ def until(
         assert now_s < deadline_s, f"not in {within_s:g} s: {what() if callable(what) else what}"
         if step is not None:
             step()
-        time.sleep(max(LOOK_S, 4 * (now_s - began_s)))  # what takes long to look at is left most of the time
+        # What takes long to look at is left most of the time.
+        time.sleep(min(PAUSE_S, max(LOOK_S, 4 * (now_s - began_s))))
 
 
 async def until_in_loop(condition: Callable[[], object], within_s: float = WAIT_S) -> None:

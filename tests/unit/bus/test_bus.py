@@ -151,15 +151,23 @@ class TestUnexpectedErrors:
 
     def test_in_receiving(self, opened: list[NarrowTransport]) -> None:
         bus, user = CanBus("main", CanSettings(interface="odd", channel="x")), Recorder()
+        problems: list[str | None] = []
+
+        class Asking(BusUser):
+            def bus_closed(self) -> None:
+                problems.append(bus.problem)
+
+        asking = Asking()
+        bus.hold(asking)
         bus.hold(user)
         until(lambda: user.events == ["opened"])
         opened[0].incoming.put(ZeroDivisionError("oops"))
-        until(lambda: user.events == ["opened", "closed"])
-        assert bus.problem == "internal error: ZeroDivisionError: oops"
-        assert opened[0].closed
         until(lambda: user.events == ["opened", "closed", "opened"])
+        assert problems == ["internal error: ZeroDivisionError: oops"]
+        assert opened[0].closed
         bus.send(0x601, b"")
         assert opened[1].sent == [(0x601, b"")]
+        bus.release(asking)
         bus.release(user)
 
     def test_in_opening(self, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -188,7 +196,6 @@ class TestUnexpectedErrors:
         until(lambda: user.events == ["opened"])
         monkeypatch.setattr(opened[0], "close", lambda: [][0])
         opened[0].incoming.put(Unavailable("it is gone"))
-        until(lambda: user.events == ["opened", "closed"])
         until(lambda: user.events == ["opened", "closed", "opened"])
         bus.release(user)
 
@@ -301,6 +308,13 @@ class Hub:
         self.listener.close()
 
 
+def used_s(name: str) -> float:
+    """Of a processor, by the thread of that name."""
+    (ident,) = (thread.ident for thread in threading.enumerate() if thread.name == name)
+    assert ident is not None
+    return time.clock_gettime(time.pthread_getcpuclockid(ident))
+
+
 def test_a_hub_that_disappears_is_noticed_costs_no_cpu_and_is_found_again() -> None:
     hub = Hub()
     more = {"host": "127.0.0.1", "port": hub.port}
@@ -311,9 +325,9 @@ def test_a_hub_that_disappears_is_noticed_costs_no_cpu_and_is_found_again() -> N
     hub.kill()
     until(lambda: user.events == ["opened", "closed"])
     until(lambda: "nothing answers as socketcand" in str(bus.problem))
-    began_s = time.process_time()
+    began_s = used_s("can main")
     time.sleep(1.0)  # what it costs meanwhile is what is asked
-    assert time.process_time() - began_s < 0.3
+    assert used_s("can main") - began_s < 0.3
     hub = Hub(hub.port)
     until(lambda: user.events == ["opened", "closed", "opened"])
     assert bus.problem is None

@@ -59,6 +59,11 @@ def refusal(gait: CanDevice) -> str:
     return str(caught.value)
 
 
+def until_distrusted(gait: CanDevice) -> None:
+    until(lambda: gait.node.ready)
+    until(lambda: gait.node.upload(*STEP).result(WAIT_S) and gait.node.ready and gait.node.distrust)
+
+
 def stop_it(gait: CanDevice) -> None:
     gait.node.run(lambda sdo: sdo.download(0x6040, 0, b"\x02\x00"), urgent=True).result(WAIT_S)
 
@@ -155,7 +160,7 @@ def test_where_two_devices_have_its_node_id_neither_is_written(
         FakeNode(channel, 5, dict(OBJECTS), delay_s=delay_s) as other,
     ):
         gait.start()
-        until(lambda: gait.node.upload(*STEP).result(WAIT_S) and gait.node.ready and gait.node.distrust)
+        until_distrusted(gait)
         assert TWO in refusal(gait)
         assert TWO in problem(gait)
         assert gait.node.counters()["sdo_doubled"] >= 2
@@ -168,7 +173,7 @@ def test_where_two_devices_have_its_node_id_neither_is_written(
 def test_once_there_is_but_one_again_it_is_written_again(gait: CanDevice, channel: str) -> None:
     with FakeNode(channel, 5, dict(OBJECTS), repeat_replies=2) as fake:
         gait.start()
-        until(lambda: gait.node.upload(*STEP).result(WAIT_S) and gait.node.ready and gait.node.distrust)
+        until_distrusted(gait)
         fake.repeat_replies = 1
         for _ in range(CLEAN + RECENT + 1):
             gait.node.upload(*STEP).result(WAIT_S)
@@ -180,7 +185,7 @@ def test_once_there_is_but_one_again_it_is_written_again(gait: CanDevice, channe
 def test_a_device_that_boots_is_not_held_to_be_two_any_more(gait: CanDevice, channel: str) -> None:
     with FakeNode(channel, 5, dict(OBJECTS), repeat_replies=2) as fake:
         gait.start()
-        until(lambda: gait.node.upload(*STEP).result(WAIT_S) and gait.node.ready and gait.node.distrust)
+        until_distrusted(gait)
         fake.repeat_replies, begun = 1, gait.node.boots_begun
         fake.boot_up()
         until(lambda: gait.node.boots_begun > begun and gait.node.ready)
@@ -221,6 +226,7 @@ def test_a_device_whose_answers_cannot_be_assigned_is_not_written(hasty: CanDevi
             hasty.node.download(0x2002, 0, b"\xa4\x01").result(WAIT_S)
         assert "to which request node 5 answers" in problem(hasty)
         fake.silent = False
+        hasty.node.channel.timeout_s = WAIT_S
         assert hasty.node.upload(*STEP).result(WAIT_S) == b"\x90\x01"
         hasty.node.download(0x2002, 0, b"\xa4\x01").result(WAIT_S)
         hasty.stop()

@@ -81,7 +81,12 @@ def test_it_ends_when_the_bus_itself_hangs(
     bus.subscribe(0x123, handler)
     heartbeat = Heartbeat(bus, 0.01)
     heartbeat.start()
-    until(lambda: frames(wire))
+
+    def beats() -> bool:
+        heartbeat.feed()
+        return bool(frames(wire))
+
+    until(beats)
     wire.send(can.Message(arbitration_id=0x123, is_extended_id=False))
 
     def silent() -> bool:
@@ -92,11 +97,6 @@ def test_it_ends_when_the_bus_itself_hangs(
 
     until(silent)
     hangs = False
-
-    def beats() -> bool:
-        heartbeat.feed()
-        return bool(frames(wire))
-
     until(beats)
     heartbeat.stop()
 

@@ -10,7 +10,7 @@ import pytest
 from drivers.bus.sdo.channel import Interrupted, SdoChannel
 from drivers.bus.sdo.worker import SdoWorker
 from drivers.errors import DeviceTimeout, DriverError, NotPermitted
-from tests.support.waiting import WAIT_S
+from tests.support.waiting import WAIT_S, until
 from tests.unit.bus.direct import Direct
 from tests.unit.bus.late_server import VALUE, LateServer
 
@@ -74,6 +74,7 @@ def test_a_stop_during_the_decision_goes_out_behind_the_write_and_nothing_behind
         if next(decisions) == 2:  # it is asked before it is offered to the bus, and when its turn has come
             stops.append(threading.Thread(target=machine.stop))
             stops[0].start()
+            until(lambda: machine.stopped)
             stops[0].join(0.05)  # as long as it might need, if nothing held it
         return may
 

@@ -123,6 +123,25 @@ def test_an_urgent_frame_is_taken_at_once_though_others_wait(
     assert narrow.threads == [ME]
 
 
+class Patience(threading.Event):
+    """Of a frame: who waits for it gives up only when the sender's thread has got as far as `reached`."""
+
+    def __init__(self, reached: Callable[[], object]) -> None:
+        super().__init__()
+        self._reached = reached
+
+    def wait(self, timeout: float | None = None) -> bool:
+        until(lambda: self.is_set() or self._reached())
+        return super().wait(timeout)
+
+
+def offered(sender: Sender, can_id: int, data: bytes, reached: Callable[[], object]) -> Callable[[], bool]:
+    """What sends a frame, with that patience."""
+    send = sender.offer(can_id, data)
+    sender._normal[-1].settled = Patience(reached)
+    return send
+
+
 class Hesitant(NarrowTransport):
     """It has no room twice, and takes its time to find out the second time."""
 
@@ -146,8 +165,7 @@ def test_what_its_caller_was_told_that_nobody_sends_does_not_leave_later(
     monkeypatch.setattr(senders, "ROOM_S", WAIT_S)
     hesitant = Hesitant()
     with sending(hesitant) as sender, ThreadPoolExecutor(1) as threads:
-        first = threads.submit(sender.send, 0x80, b"first")
-        assert hesitant.begun.wait(WAIT_S)
+        first = threads.submit(offered(sender, 0x80, b"first", hesitant.begun.is_set))
         until(lambda: first.done() or (sender._in_hand is not None and sender._in_hand.given_up))
         hesitant.go_on.set()
         with pytest.raises(Unavailable, match=r"acknowledge\?$"):
@@ -304,7 +322,7 @@ class TestInterfaceThatBlocks:
         narrow = NarrowTransport(blocks=True)
         with sending(narrow) as sender:
             with pytest.raises(Unavailable, match=r"acknowledge\? It may still leave"):
-                sender.send(0x601, b"")
+                offered(sender, 0x601, b"", lambda: narrow.asked)()
             with pytest.raises(Unavailable, match=r"acknowledge\?$"):
                 sender.send(0x602, b"")
             narrow.open()

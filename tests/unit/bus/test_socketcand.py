@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from drivers.bus import sender as senders
 from drivers.bus.frames import ERROR, EXTENDED, REMOTE, Frame
 from drivers.bus.interfaces import socketcand
 from drivers.bus.interfaces.socketcand import (
@@ -182,7 +183,8 @@ def test_a_frame_that_leaves_in_part_is_mixed_with_no_other() -> None:
     assert lines.decode() == LINES
 
 
-def test_what_is_left_of_a_frame_follows_though_nobody_sends_another() -> None:
+def test_what_is_left_of_a_frame_follows_though_nobody_sends_another(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(senders, "SEND_TIMEOUT_S", WAIT_S)
     with listening() as (port, lines):
         transport = SocketcandTransport("127.0.0.1", port, "can0")
         transport._out = Trickle(transport._out)

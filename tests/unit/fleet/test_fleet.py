@@ -11,7 +11,7 @@ import pytest
 from msgspec.structs import replace
 
 from gateway.client import Robot
-from server_gui.core.follow.events import Event, Journalled, Telemetry
+from server_gui.core.follow.events import Event, Journalled, Looked, Resources, Telemetry
 from tests.fake_robot import FakeRobot
 from tests.support.waiting import WAIT_S
 from tests.unit.fleet.recording import FOLLOWING, Kept, recording
@@ -39,6 +39,8 @@ def gateway(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[str]:
 def test_a_gateway_is_recorded_with_rows_parameters_resources_and_units(gateway: str, tmp_path: Path) -> None:
     with recording(tmp_path / "spool", {"exo-test": gateway}, operator="Ada", notes="first try") as fleet:
         fleet.until_more("exo-test")
+        fleet.until(lambda: any(isinstance(event, Looked) and event.parameters for _, event in fleet.shown))
+        fleet.until(lambda: any(isinstance(event, Resources) for _, event in fleet.shown))
         fleet.until(lambda: fleet.recorder.flush(1))
     kept = Kept.of(tmp_path / "spool")
     assert kept.is_whole("exo-test")

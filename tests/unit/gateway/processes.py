@@ -6,6 +6,7 @@ import re
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
@@ -56,6 +57,16 @@ def kernel_saw(pid: int) -> tuple[int, ...]:
         for number in re.findall(r"ctxt_switches:\s+(\d+)", status.read_text("ascii"))
     ]
     return tuple(map(int, [*ticks, *switches]))
+
+
+def sleeps(pid: int) -> bool:
+    """Whether a second passes in which it uses no tick, of the hundred there are, and nothing wakes it."""
+    before = kernel_saw(pid)
+    for wait_s in (0.1, 0.9):
+        time.sleep(wait_s)
+        if kernel_saw(pid) != before:
+            return False
+    return True
 
 
 def resident_mb(pid: int) -> float:

@@ -171,6 +171,7 @@ def test_a_device_that_never_answers_does_not_keep_who_has_gone(
 def test_who_vanishes_while_its_last_answer_is_awaited_is_gone_at_once(
     connect: Connect, bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(session, "LAST_ANSWERS_S", 10 * WAIT_S)
     gone, other = connect(), connect()
     gone.call("control.acquire", ttl_s=300)
     monkeypatch.setattr(bench.gait.node, "upload", lambda _index, _subindex: Future())
@@ -178,9 +179,7 @@ def test_who_vanishes_while_its_last_answer_is_awaited_is_gone_at_once(
     gone.socket.shutdown(socket.SHUT_WR)
     gone.socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
     gone.close()
-    began = time.monotonic()
     until(lambda: _has_lease(other), "its lease has ended")
-    assert time.monotonic() - began < session.LAST_ANSWERS_S / 2
 
 
 def _has_lease(client: Client) -> bool:

@@ -49,8 +49,10 @@ class LocalClient(Client):
 
 
 @pytest.fixture
-def local(tmp_path: Path) -> Iterator[Path]:
-    """A gateway's Unix socket; nothing is said of anybody yet."""
+def local(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A gateway's Unix socket; nothing is said of anybody yet. The directory of accounts is waited for."""
+    monkeypatch.setattr(accounts, "SHORT_S", WAIT_S)
+    monkeypatch.setattr(accounts, "HANDSHAKE_S", WAIT_S)
     path = tmp_path / "s"
     with serving(config(tmp_path), local=listen_locally(path)):
         yield path

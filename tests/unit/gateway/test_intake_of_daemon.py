@@ -310,11 +310,7 @@ def test_a_client_that_says_nothing_wakes_nobody(tmp_path: Path) -> None:
         Client(processes.address(running)) as client,
     ):
         client.call("clock.read")
-        slept = threading.Event()
-        slept.wait(0.3)  # what it does at once is over
-        before = processes.kernel_saw(running.pid)
-        slept.wait(1.0)
-        assert processes.kernel_saw(running.pid) == before
+        until(lambda: processes.sleeps(running.pid), "what it does at once is over, and nothing wakes it")
 
 
 @pytest.mark.parametrize("line", [b" " + CLOCK % 1, b"\t" + CLOCK % 1])

@@ -14,7 +14,7 @@ from drivers.joint.reading import DriveReading
 from gateway.config import ConfigError
 from gateway.modules.stop.drive import is_enabled
 from gateway.modules.stop.target import Report
-from tests.support.waiting import until
+from tests.support.waiting import WAIT_S, until
 from tests.unit.gateway.harness import DISABLED, ENABLED, ROBOT, Bench, Client, FakeDrive, config, serving
 
 
@@ -162,6 +162,11 @@ class TestFallback:
     """What follows where a quick stop is not confirmed: only where the robot's file says so, and told."""
 
     BOTH = 'fallback = ["disable_voltage", "nmt_stop"]\n'
+
+    @pytest.fixture(autouse=True)
+    def stops_once(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        """A drive that goes on is stopped again, but not while a busy computer counts what was done."""
+        monkeypatch.setattr("gateway.modules.stop.stop_control.LOOK_S", 10 * WAIT_S)
 
     def reads(self, drive: FakeDrive, abort_connection: int | None) -> None:
         drive.reading = DriveReading((), {}, {"quick_stop": 2, "abort_connection": abort_connection})

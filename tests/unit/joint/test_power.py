@@ -15,6 +15,7 @@ from drivers.bus.bus import CanBus
 from drivers.bus.node import Node
 from drivers.bus.sdo.worker import SdoWorker
 from drivers.bus.settings import CanSettings, Role
+from drivers.joint import quick_stop
 from drivers.joint.cia402 import DriveState
 from drivers.joint.drive import JointDrive
 from drivers.joint.power import PowerDrive
@@ -46,13 +47,22 @@ def rpdo(transmission_type: int, *mapped: int, cob_id: int = 0x202) -> Objects:
 
 
 @pytest.fixture
-def make(channel: str, tmp_path: Path) -> Callable[..., JointDrive]:
+def make(channel: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., JointDrive]:
+    """Patient: a drive that answers late is not asked twice."""
+    monkeypatch.setattr(quick_stop, "FIRST_PATIENCE_S", WAIT_S)
+
     def joint(objects: Objects, role: Role, **more: float) -> JointDrive:
         path = tmp_path / "drive.eds"
         path.write_text(drive_eds(objects))
         bus = CanBus("main", CanSettings(interface="virtual", channel=channel, **more), role)  # type: ignore[arg-type]
         settings = JointSettings(
-            bus="main", node_id=2, eds="", counts_per_revolution=1000, gear_ratio=1, sdo_timeout_s=0.2
+            bus="main",
+            node_id=2,
+            eds="",
+            counts_per_revolution=1000,
+            gear_ratio=1,
+            sdo_timeout_s=WAIT_S,
+            stop_timeout_s=WAIT_S,
         )
         return JointDrive("left_knee", settings, bus, eds.load(path, 2))
 
@@ -241,9 +251,11 @@ def test_a_way_up_that_waits_for_its_turn_is_not_begun_after_a_stop(
     with Drive(channel, objects, S.SWITCH_ON_DISABLED) as drive:
         knee = started(make(objects, Role.MASTER))
         drive.deaf_to.add((0x2001, 0))
+        knee.node.channel.timeout_s = 1.0
         knee.node.upload(0x2001, 0)  # keeps the worker
         step = knee.step_up(S.SWITCH_ON_DISABLED)
         assert knee.quick_stop().result(WAIT_S) is StopOutcome.CONFIRMED
+        drive.deaf_to.clear()
         assert step.result(WAIT_S).problem == OVERTAKEN
         knee.stop()
         assert drive.controlwords() == [0x0002]

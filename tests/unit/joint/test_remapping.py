@@ -5,7 +5,7 @@ import struct
 
 import pytest
 
-from tests.support.waiting import until
+from tests.support.waiting import WAIT_S, until
 from tests.unit.bus.fake_node import FakeNode
 from tests.unit.joint.conftest import drive_objects, tpdo
 from tests.unit.joint.test_drive import STATUS_AND_POSITION, Make, quality, read
@@ -52,7 +52,7 @@ def test_an_enabled_tpdo_that_is_empty_is_free_where_no_disabled_one_is(joint: M
 def test_an_empty_tpdo_that_refuses_a_mapping_is_enabled_and_empty_again(joint: Make, channel: str) -> None:
     objects = drive_objects() | tpdo(2, 0x282, transmission_type=254)
     with FakeNode(channel, 2, dict(objects), aborts={(0x1A01, 1): 0x06040041}) as fake:
-        knee = joint(objects, configure_pdos=True)
+        knee = joint(objects, configure_pdos=True, sdo_timeout_s=WAIT_S)
         knee.start()
         until(lambda: read(knee, "position") is not None)
         assert "the object cannot be mapped to a PDO" in quality(knee)[1]
@@ -99,7 +99,7 @@ def test_empty_tpdos_are_told_where_they_may_not_be_taken(joint: Make, channel: 
 def test_a_drive_that_refuses_a_mapping_is_left_as_it_was_and_polled(joint: Make, channel: str) -> None:
     objects = drive_objects() | tpdo(2, 0x80000282)
     with FakeNode(channel, 2, dict(objects), aborts={(0x1A01, 1): 0x06040041}) as fake:
-        knee = joint(objects, configure_pdos=True)
+        knee = joint(objects, configure_pdos=True, sdo_timeout_s=WAIT_S)
         knee.start()
         until(lambda: read(knee, "position") is not None)
         assert "the object cannot be mapped to a PDO" in quality(knee)[1]

@@ -3,7 +3,7 @@
 import io
 import json
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,17 +12,20 @@ import pytest
 
 import eds
 from drivers.bus import bus
+from drivers.bus.bus import CanBus as Bus
 from drivers.bus.frames import Transport
 from drivers.bus.interfaces.opening import open_transport
 from drivers.bus.settings import CanSettings
 from drivers.cli import bit_rate
 from drivers.cli.lss import main
 from drivers.errors import NotPermitted, SettingsError
+from drivers.lss.surroundings import Surroundings, listen
 from hil_sim.bus.can_bus import CanBus
 from hil_sim.bus.virtual import VirtualBridge
 from hil_sim.clock import Clock
 from hil_sim.loop import Loop
 from hil_sim.node.node import Node
+from tests.support.waiting import until
 from tests.unit.bus.fake_node import FakeNode
 from tests.unit.hil_sim.device_file import communication
 
@@ -54,6 +57,19 @@ def node(channel: str, tmp_path: Path) -> Iterator[Node]:
 def run(channel: str, *words: str) -> int:
     action, *others = words
     return main([action, f"virtual:{channel}", *others, "--seconds", "0.05"])
+
+
+def hears(monkeypatch: pytest.MonkeyPatch, nodes: set[int], since: threading.Event | None = None) -> None:
+    """The command listens as long as a busy computer keeps these devices from talking, from an event on."""
+
+    def until_heard(bus: Bus, seconds: float, wait: Callable[[float], object]) -> Surroundings:
+        def again() -> Surroundings | None:
+            found = listen(bus, seconds, wait)
+            return found if (since is not None and not since.is_set()) or nodes <= set(found.nodes) else None
+
+        return until(again)
+
+    monkeypatch.setattr("drivers.cli.lss.listen", until_heard)
 
 
 @contextmanager
@@ -138,6 +154,7 @@ def test_others_are_not_left_behind_at_the_other_rate(
 ) -> None:
     monkeypatch.setattr(bit_rate, "RATELESS", ())
     words = ("set", "5", "--new-bitrate", "250000", "--activate", "--yes", "--bitrate", "1000000")
+    hears(monkeypatch, {9})
     with living(channel, 9, 0x7F), pytest.raises(NotPermitted, match="node 9 would stay at the other rate"):
         run(channel, *words)
     assert node.lss.pending_bitrate == 1_000_000
@@ -163,7 +180,10 @@ def test_a_node_id_that_somebody_has_is_given_to_nobody(channel: str, node: Node
     assert node.lss.pending_node_id == 5
 
 
-def test_where_somebody_is_at_work_nothing_is_sent_unless_told(channel: str) -> None:
+def test_where_somebody_is_at_work_nothing_is_sent_unless_told(
+    channel: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    hears(monkeypatch, {9})
     with living(channel, 9, 0x05) as worker:
         with pytest.raises(NotPermitted, match="operational: node 9"):
             run(channel, "find")
@@ -182,13 +202,15 @@ def test_who_begins_to_work_while_a_person_thinks_is_not_disturbed(
         return "y\n"
 
     monkeypatch.setattr("sys.stdin", SimpleNamespace(isatty=lambda: True, readline=readline))
+    hears(monkeypatch, {9}, begun)
     with living(channel, 9, 0x05, begun), pytest.raises(NotPermitted, match="operational: node 9"):
         run(channel, "set", "5", "--node-id", "6")
     assert (node.lss.node_id, node.lss.pending_node_id) == (5, 5)
 
 
-def test_the_only_device_is_the_only_one(channel: str, node: Node) -> None:
+def test_the_only_device_is_the_only_one(channel: str, node: Node, monkeypatch: pytest.MonkeyPatch) -> None:
     assert node.node_id == 5
+    hears(monkeypatch, {8, 9})
     with living(channel, 9, 0x7F) as other, living(channel, 8, 0x7F):
         with pytest.raises(NotPermitted, match="8, 9 are on the bus"):
             run(channel, "inquire", "only", "--anyway")

@@ -1,6 +1,8 @@
 """Devices without a node id are found, all of them; what a device is given it has, or has what it had."""
 
+import itertools
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -107,6 +109,15 @@ def test_a_device_that_knows_no_fastscan_is_not_overlooked(tmp_path: Path) -> No
 
 
 # Asking
+
+
+def test_an_answer_that_has_come_counts_though_this_computer_stood_still(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    late = SimpleNamespace(monotonic=itertools.count(0.0, 10.0).__next__)  # at every look
+    monkeypatch.setattr(lss, "time", late)
+    with master_of(Line(tmp_path, {7: 5})) as master:
+        assert inquire(master, identity(7)) == Device(identity(7), 5)
 
 
 def test_a_device_says_who_it_is(tmp_path: Path) -> None:

@@ -1,18 +1,26 @@
 """`gwrms calibrate`: known loads give back the gain they were made with, and nothing is written unasked."""
 
+import argparse
 import io
 import math
+import time
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from drivers.cli import calibrate
+from drivers.cli.calibrate import _imu_on_port
 from drivers.errors import SettingsError, Unavailable
 from drivers.imu import zero
+from drivers.imu.device import Imu
 from drivers.insole import layout as layouts
 from drivers.insole.calibration import CellCalibration, Cells, load
 from drivers.insole.fit import BadFit, Load, fit, text
+from drivers.insole.foot import Foot
+from drivers.samples import State
+from tests.support.waiting import until
 from tests.unit.bus.fake_node import FakeNode
 from tests.unit.imu.encode import witmotion
 from tests.unit.imu.test_inclinometer import device as inclinometer
@@ -73,6 +81,37 @@ def terminal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Termin
     terminal.unplug()
 
 
+@pytest.fixture
+def hears(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An insole is listened to until a frame has come: on a busy computer that takes as long as it takes."""
+    made: list[calibrate._Average] = []
+
+    class Noted(calibrate._Average):
+        def __init__(self, foot: Foot | None, cells: int) -> None:
+            super().__init__(foot, cells)
+            made.append(self)
+
+    waits = SimpleNamespace(wait=lambda _s: until(lambda: made[-1].frames or made[-1].refused))
+    monkeypatch.setattr(calibrate, "_Average", Noted)
+    monkeypatch.setattr(calibrate, "threading", SimpleNamespace(Event=lambda: waits))
+
+
+@pytest.fixture
+def feels(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As long as an IMU on a port takes to say something."""
+    made: list[Imu] = []
+
+    def on_port(options: argparse.Namespace) -> Imu:
+        made.append(_imu_on_port(options))
+        return made[-1]
+
+    waits = SimpleNamespace(
+        wait=lambda _s: until(lambda: made[-1].quality(time.monotonic_ns()).state is State.OK)
+    )
+    monkeypatch.setattr(calibrate, "_imu_on_port", on_port)
+    monkeypatch.setattr(calibrate, "threading", SimpleNamespace(Event=lambda: waits))
+
+
 def answer(monkeypatch: pytest.MonkeyPatch, *lines: str) -> None:
     monkeypatch.setattr("sys.stdin", io.StringIO("\n".join(lines) + "\n"))
 
@@ -106,6 +145,7 @@ def test_guided_calibration_shows_its_fit_and_writes_only_when_told(
         assert force == pytest.approx(70 * 9.80665)
 
 
+@pytest.mark.usefixtures("hears")
 def test_counts_are_averaged_from_the_port(
     terminal: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -121,6 +161,7 @@ def test_silent_insole_is_named(terminal: Terminal, tmp_path: Path, monkeypatch:
         calibrate.main(["insole", str(terminal.path), "--write", str(tmp_path / "x.toml")])
 
 
+@pytest.mark.usefixtures("hears")
 @pytest.mark.parametrize(
     ("cells", "flags", "more", "said"),
     [
@@ -139,6 +180,7 @@ def test_an_insole_whose_frames_do_not_count_is_told_why(
         calibrate.main(["insole", str(terminal.path), *more, "--write", "x.toml"])
 
 
+@pytest.mark.usefixtures("hears")
 def test_an_insole_is_found_by_its_table(
     terminal: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -166,6 +208,7 @@ def test_an_insoles_table_that_cannot_be_used_is_said(content: str | None, said:
         calibrate.main(["insole", f"{file}:left_insole", "--write", "x.toml"])
 
 
+@pytest.mark.usefixtures("feels")
 def test_zero_of_an_imu_is_written(
     terminal: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -177,6 +220,7 @@ def test_zero_of_an_imu_is_written(
     assert zero.load(file)[0] < 1.0
 
 
+@pytest.mark.usefixtures("feels")
 def test_axes_that_point_the_other_way_can_be_given(
     terminal: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -9,6 +9,7 @@ import sys
 import threading
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -24,6 +25,9 @@ ANGLE = bytes.fromhex("55 53 04 0c e1 ff 6f f2 cc 46 0b")
 CAN_LOG = bytes.fromhex("55 51 e4 ff e2 04 3d 06 55 53 05 1b 80 00 01 40")
 
 
+PAUSE_S = 0.01
+
+
 @pytest.fixture
 def terminal(tmp_path: Path) -> Iterator[Terminal]:
     terminal = Terminal(tmp_path / "sensor")
@@ -33,25 +37,33 @@ def terminal(tmp_path: Path) -> Iterator[Terminal]:
 
 
 class Talking:
-    """A device that sends the same bytes again and again, until told to stop."""
+    """A device that sends the same bytes again and again, until told to stop.
+
+    Who listens for so many seconds hears what it sends in as many, however late this computer lets it.
+    """
 
     def __init__(self, terminal: Terminal, data: bytes) -> None:
         self._stop = threading.Event()
+        self._clock = pytest.MonkeyPatch()
+        self._sent_s = 0.0
         self._terminal, self._data = terminal, data
         self._thread = threading.Thread(target=self._talk)
 
     def __enter__(self) -> "Talking":
+        self._clock.setattr(listen, "time", SimpleNamespace(monotonic=lambda: self._sent_s))
         self._thread.start()
         return self
 
     def __exit__(self, *_: object) -> None:
         self._stop.set()
         self._thread.join()
+        self._clock.undo()
 
     def _talk(self) -> None:
         at = 0
-        while not self._stop.wait(0.01):
+        while not self._stop.wait(PAUSE_S):
             self._terminal.send((self._data * 2)[at : at + 64])
+            self._sent_s += PAUSE_S
             at = (at + 64) % len(self._data)
 
 

@@ -14,7 +14,7 @@ from server_gui.cli.demo import demo
 from server_gui.processes import children
 from server_gui.processes.children import Child, ChildFailed
 from server_gui.processes.ending import Ended, Ending
-from tests.support.waiting import until
+from tests.support.waiting import WAIT_S, until
 
 
 def nothing() -> None:
@@ -34,19 +34,19 @@ def has_ended(process: psutil.Process) -> bool:
 
 def test_first_words_are_found_and_the_child_is_ended() -> None:
     with Child("helper", ["--version"]) as child:
-        assert child.wait_ready(anything, 30.0, nothing).startswith("gwrms ")
+        assert child.wait_ready(anything, WAIT_S, nothing).startswith("gwrms ")
     assert not psutil.pid_exists(child.pid)
 
 
 def test_child_that_ends_is_named_with_its_last_words() -> None:
     words = r"helper has ended \(exit status 2\)(.|\n)*no-such-command"
     with Child("helper", ["no-such-command"]) as child, pytest.raises(ChildFailed, match=words):
-        child.wait_ready(anything, 30.0, nothing)
+        child.wait_ready(anything, WAIT_S, nothing)
 
 
 def test_child_that_is_killed_is_named_with_the_signal(tmp_path: Path) -> None:
     with Child("simulator", ["sim", "--dir", str(tmp_path)]) as child:
-        child.wait_ready(anything, 30.0, nothing)
+        child.wait_ready(anything, WAIT_S, nothing)
         child.check()
         os.kill(child.pid, signal.SIGKILL)
         with pytest.raises(ChildFailed, match="killed by SIGKILL"):
@@ -62,7 +62,7 @@ def test_child_that_never_says_that_it_is_ready_is_given_up(tmp_path: Path) -> N
 def test_child_that_will_not_end_is_killed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(children, "END_S", 0.2)
     with Child("simulator", ["sim", "--dir", str(tmp_path)]) as child:
-        child.wait_ready(anything, 30.0, nothing)
+        child.wait_ready(anything, WAIT_S, nothing)
         os.kill(child.pid, signal.SIGSTOP)
     assert not psutil.pid_exists(child.pid)
 
