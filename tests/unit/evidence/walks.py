@@ -1,68 +1,92 @@
-"""A simulated walk during which parameters are edited, as a gateway would stream it and keep its journal."""
+"""A simulated walk during which parameters are edited, as a gateway streams it and keeps its journal."""
 
-import math
+import functools
 import struct
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
 from gateway.client import Batch
+from gateway.wire.control import JournalEntries
 from hil_sim.channels import UNITS, reported
 from hil_sim.clock import SECOND_NS
 from hil_sim.controller.objects import ControllerState
 from hil_sim.drive import objects
 from hil_sim.drive.drive import JointDrive
 from hil_sim.exoskeleton import Exoskeleton, Scenario
-from hil_sim.gait.timetable import Entry
-from server_gui.core.follow.events import Telemetry
+from server_gui.core.follow.events import Event, Journalled, Telemetry
+from tests.support.desk import described
 
 ROWS: Final = 10  # of a batch: 0.1 s, as a gateway sends them
 QUANTITIES: Final = ("following_error", "torque", "current", "temperature", "state")
-ENABLED: Final = 4.0  # of the state words
-GAIN, CYCLE_TIME = "position_gain", "gait.cycle_time"
-FIRST_GAIN, FIRST_CYCLE_S = 3000.0, 1.6
+ENABLED: Final = 4.0  # of the state's words
+GAIN, SPEED, CYCLE_TIME = "position_gain", "profile_velocity", "gait.cycle_time"
+FIRST: Final = {GAIN: 3000.0, SPEED: 1.0, "cycle_time": 1.6}  # what the simulated devices begin with
 
 Row = list[float | None]
+Each = Callable[[Exoskeleton, float], None]
 
 
 @dataclass(frozen=True, slots=True)
-class Written:
-    """One parameter written at a time (s) of the walk, and what it was until then."""
+class Edit:
+    """A parameter written at a time (s) of the walk; `end` is what the journal says of it then."""
 
     at_s: float
     name: str
     value: float
-    before: float
+    end: str = "write done"
 
     @property
-    def entries(self) -> tuple[dict[str, Any], dict[str, Any]]:
-        """What the robot's journal says of it: asked, and done 40 ms later."""
-        at_ns, write = round(self.at_s * SECOND_NS), round(self.at_s)
-        common = {"who": "anna", "write": write, "boot_id": "sim", "after": {self.name: self.value}}
-        asked = {"what": "write", "before": {self.name: self.before}, "trial_s": None}
-        return (
-            {**common, **asked, "monotonic_ns": at_ns, "utc_ns": at_ns, "n": 2 * write, "hash": f"{write}a"},
-            {
-                **common,
-                "what": "write done",
-                "monotonic_ns": at_ns + 40_000_000,
-                "utc_ns": at_ns,
-                "n": 2 * write + 1,
-                "hash": f"{write}b",
-            },
-        )
+    def write(self) -> int:
+        """Its number."""
+        return round(self.at_s)
+
+    def entries(self, first: int) -> list[dict[str, Any]]:
+        """What the robot's journal says of it, from the entry with this number on: asked, then done."""
+        at_ns = round(self.at_s * SECOND_NS)
+        trial_s = 60.0 if self.end == "trial begun" else None
+        before = FIRST[self.name.partition(".")[2]]
+        return [
+            entry(first, at_ns, "write", self.write, {self.name: self.value}, {self.name: before}, trial_s),
+            entry(first + 1, at_ns + 40_000_000, self.end, self.write, {self.name: self.value}),
+        ]
+
+
+def entry(
+    n: int,
+    at_ns: int,
+    what: str,
+    write: int,
+    after: dict[str, float] | None = None,
+    before: dict[str, float] | None = None,
+    trial_s: float | None = None,
+) -> dict[str, Any]:
+    """An entry of a journal."""
+    found = {
+        "who": "anna",
+        "what": what,
+        "write": write,
+        "boot_id": "boot-1",
+        "after": after,
+        "before": before,
+    }
+    return found | {
+        "monotonic_ns": at_ns,
+        "utc_ns": at_ns,
+        "n": n,
+        "hash": f"{write:06}{n:06}",
+        "trial_s": trial_s,
+    }
 
 
 def walk(
-    seconds: float,
-    *,
-    seed: int,
-    person: int,
-    writes: Sequence[Written] = (),
-    entries: Sequence[Entry] | None = None,
-    each_s: Callable[[Exoskeleton, float], None] | None = None,
-) -> Iterator[Telemetry]:
-    """Yield what is streamed of a walk of so long; `each_s` may do something to the robot once a second."""
+    seconds: float, *, seed: int, person: int, edits: Sequence[Edit] = (), each_s: Each | None = None
+) -> Iterator[Event]:
+    """Yield what a robot's feed tells of a walk of so long.
+
+    `each_s` may do something to the robot once a second.
+    """
+    yield described()
     robot = Exoskeleton(Scenario.WALK, seed, person=person)
     rows: list[tuple[int, Row]] = []
 
@@ -72,18 +96,21 @@ def walk(
 
     robot.measured.append(listen)
     robot.power_on()
-    if entries is not None:
-        robot.follow(entries)
-    for one in writes:
-        robot.clock.at(round(one.at_s * SECOND_NS), lambda one=one: write(robot, one.name, one.value))
+    for edit in edits:
+        robot.clock.at(round(edit.at_s * SECOND_NS), functools.partial(write, robot, edit.name, edit.value))
     names = [*UNITS, *(f"{joint}.{quantity}" for joint in robot.drives for quantity in QUANTITIES)]
-    for second in range(round(seconds)):
+    journal: list[dict[str, Any]] = []
+    for second in range(1, round(seconds) + 1):
         if each_s is not None:
             each_s(robot, float(second))
-        robot.clock.run_until((second + 1) * SECOND_NS)
+        robot.clock.run_until(second * SECOND_NS)
         for begin in range(0, len(rows), ROWS):
             yield telemetry(names, rows[begin : begin + ROWS])
         rows.clear()
+        for edit in edits:
+            if second - 1 <= edit.at_s < second:
+                journal += edit.entries(len(journal) + 1)
+                yield Journalled(JournalEntries(list(journal)))
 
 
 def telemetry(names: Sequence[str], rows: Sequence[tuple[int, Row]]) -> Telemetry:
@@ -95,14 +122,23 @@ def telemetry(names: Sequence[str], rows: Sequence[tuple[int, Row]]) -> Telemetr
 
 
 def write(robot: Exoskeleton, name: str, value: float) -> None:
-    """As an SDO download does it."""
+    """As an SDO download does it; the speed of profile moves has no part in walking."""
     component, _, parameter = name.partition(".")
     if name == CYCLE_TIME:
         robot.controller.dictionary.write(0x2002, 0, struct.pack("<H", round(value * 1000)))
-    elif parameter == GAIN:
-        robot.drives[component].dictionary.write(*objects.POSITION_GAIN, struct.pack("<H", round(value)))
+        return
+    dictionary = robot.drives[component].dictionary
+    if parameter == GAIN:
+        dictionary.write(*objects.POSITION_GAIN, struct.pack("<H", round(value)))
     else:
-        raise ValueError(name)
+        counts = round(value * robot.drives[component].counts_per_radian)
+        dictionary.write(*objects.PROFILE_VELOCITY, struct.pack("<I", counts))
+
+
+def warming(robot: Exoskeleton, now_s: float) -> None:
+    """Make every bearing worse: friction grows by a fifth a minute."""
+    for drive in robot.drives.values():
+        drive.joint.friction_factor = 1.0 + 0.2 * now_s / 60.0
 
 
 def _of_drives(robot: Exoskeleton) -> Row:
@@ -119,14 +155,3 @@ def _of_drive(drive: JointDrive) -> Row:
         entry[objects.MOTOR_TEMPERATURE].number() * 0.1,
         ENABLED if entry[objects.STATUSWORD].number() & 0x6F == 0x27 else 0.0,
     ]
-
-
-def tiring(robot: Exoskeleton, now_s: float) -> None:
-    """A bearing that warms up: friction grows by a fifth within a minute."""
-    for drive in robot.drives.values():
-        drive.joint.friction_factor = 1.0 + 0.2 * now_s / 60.0
-
-
-def ceil_s(seconds: float) -> int:
-    """Return whole seconds that are not fewer."""
-    return math.ceil(seconds)
