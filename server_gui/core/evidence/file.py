@@ -1,6 +1,6 @@
 """Evidence beside the journal's entries at the desk: a file a robot, of JSON lines.
 
-A line is `{"format": 1, "is_final": …, "edit": {…}, "evidence": {…}}`; of an edit the newest line counts.
+A line is `{"format": 1, "edit": {…}, "evidence": {…}, …}`; of an edit the newest line counts.
 `docs/reference/store.md` says what is in them. Lines are only ever added; what a newer program has written in
 another format is left alone.
 """
@@ -9,7 +9,6 @@ import contextlib
 import logging
 import os
 import re
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Final
 
@@ -26,11 +25,12 @@ FORMAT: Final = 1
 
 
 class Told(Struct, frozen=True):
-    """An edit and its evidence; `is_final` where no more of it can come."""
+    """An edit and its evidence; `is_final` where no more of it can come. `session` is the recording's."""
 
     edit: Edit
     evidence: Evidence
     is_final: bool
+    session: str = ""
     format: int = FORMAT
 
 
@@ -90,14 +90,8 @@ def _ends_whole(path: Path) -> bool:
         return file.read(1) == b"\n"
 
 
-def read_all(folder: Path, robots: Iterable[str] = ()) -> list[Told]:
-    """Return every edit that is kept there, oldest first; of these robots, or of all. Raises `OSError`."""
+def read_all(folder: Path) -> list[Told]:
+    """Return every edit that is kept there, oldest first; raises `OSError`."""
     paths = sorted(folder.glob("*.jsonl")) if folder.is_dir() else []
-    wanted = {EvidenceFile(folder, robot).path for robot in robots}
-    found = [
-        told
-        for path in paths
-        if not wanted or path in wanted
-        for told in EvidenceFile(folder, path.stem).read().values()
-    ]
+    found = [told for path in paths for told in EvidenceFile(folder, path.stem).read().values()]
     return sorted(found, key=lambda told: told.edit.utc_ns)

@@ -7,6 +7,8 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Final, Self
 
+from msgspec.structs import replace
+
 from server_gui.core.evidence.file import EvidenceFile, Told
 from server_gui.core.evidence.robot_evidence import RobotEvidence
 from server_gui.core.follow.events import Event, without_processes
@@ -26,11 +28,15 @@ class EvidenceService:
     """Follows edits from entering to leaving; use it as a context manager, which joins its thread.
 
     `take` gets everything that the robots' feeds tell, `predicted` what models say of them. What is final is
-    kept in `folder`, where one is given, and what is not when it ends; `tell` is told of each change.
+    kept in `folder`, and what is not when this ends: of robots that are recorded now, as `session` tells.
+    Without a folder nothing is kept. `tell` is told of each change.
     """
 
-    def __init__(self, folder: Path | None, tell: Tell | None = None) -> None:
+    def __init__(
+        self, folder: Path | None = None, session: Callable[[str], str] = str, tell: Tell | None = None
+    ) -> None:
         self._folder = folder
+        self._session = session
         self._tell = tell
         self._inbox = Inbox()
         self._robots: dict[str, RobotEvidence] = {}
@@ -81,9 +87,9 @@ class EvidenceService:
             del self._robots[robot]
 
     def _told(self, robot: str, told: Told) -> None:
-        if told.is_final and self._folder is not None:
+        if told.is_final and self._folder is not None and (session := self._session(robot)):
             try:
-                EvidenceFile(self._folder, robot).add(told)
+                EvidenceFile(self._folder, robot).add(replace(told, session=session))
             except OSError as error:
                 log.error("the evidence of edit %s of %s is not kept: %s", told.edit.id, robot, error)
         if self._tell is not None:
