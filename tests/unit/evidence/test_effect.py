@@ -18,7 +18,7 @@ def noise(correlation: float, seed: int = 1) -> Floats:
     values[0] = source.normal(size=COLUMNS)
     for place in range(1, CYCLES):
         values[place] = correlation * values[place - 1] + fresh[place]
-    return values
+    return np.asarray(values)
 
 
 @pytest.mark.parametrize("correlation", [0.0, 0.4, 0.6])

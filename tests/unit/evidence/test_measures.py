@@ -25,7 +25,7 @@ def test_a_lag_is_found_between_samples(seconds: float) -> None:
 def test_overshoot_is_beyond_the_furthest_target_on_either_side() -> None:
     assert overshoot(SWING, SWING * 0.9) == 0.0
     assert overshoot(SWING, SWING * 1.1) == pytest.approx(0.1 * np.abs(SWING).max(), rel=0.01)
-    assert overshoot(SWING, np.where(SWING == SWING.min(), SWING - 0.05, SWING)) == pytest.approx(0.05)
+    assert overshoot(SWING, np.minimum(SWING, SWING - 0.05 * (SWING < -0.4))) == pytest.approx(0.05)
 
 
 def test_jerk_is_the_third_derivative() -> None:
