@@ -11,8 +11,8 @@ from gateway.cli.text import say, say_json, table, warn
 from ml.store.private import private_files
 from server_gui.cli.cloud_options import parser, spool
 from server_gui.core.evidence.comparison import Measured, Word
-from server_gui.core.evidence.edits import Edit
 from server_gui.core.evidence.file import Told, folder_beside, read_all
+from server_gui.core.evidence.wording import changes, number, share
 
 EPILOG: Final = """commands
   gwrms edits            every edit, oldest first: when, who, what from and to, what it did
@@ -101,21 +101,17 @@ def _row(told: Told) -> tuple[str, ...]:
         edit.utc,
         edit.robot,
         edit.who,
-        _changes(edit),
+        changes(edit),
         str(edit.state),
         str(evidence.word),
-        NONE if strongest is None else f"{strongest.title} {_share(strongest)}",
+        NONE if strongest is None else f"{strongest.title} {share(strongest)}",
     )
-
-
-def _changes(edit: Edit) -> str:
-    return ", ".join(f"{one.name} {_number(one.old)} → {_number(one.new)}" for one in edit.changes)
 
 
 def _told(told: Told) -> Iterator[str]:
     edit, evidence = told.edit, told.evidence
     yield f"edit {edit.id} of {edit.robot}, {edit.utc}, by {edit.who}"
-    yield f"  {_changes(edit)}"
+    yield f"  {changes(edit)}"
     yield f"  {edit.state}; entry {edit.n} of the robot's journal; recording {told.session or NONE}"
     yield ""
     before, after = evidence.cycles_before, evidence.cycles_after
@@ -138,27 +134,14 @@ def _order(one: Measured) -> float:
 
 
 def _line(one: Measured) -> tuple[str, ...]:
-    interval = NONE if one.low is None else f"{_number(one.low)} … {_number(one.high)}"
+    interval = NONE if one.low is None else f"{number(one.low)} … {number(one.high)}"
     return (
         one.title,
         f"{one.word}: {one.why}" if one.why else str(one.word),
-        _number(one.before),
-        _number(one.after),
-        _share(one),
+        number(one.before),
+        number(one.after),
+        share(one),
         interval,
         NONE if one.size is None else f"{one.size:+.1f}",
         one.unit,
     )
-
-
-def _share(one: Measured) -> str:
-    """The difference, in percent of what was before where that says something."""
-    if one.difference is None:
-        return NONE
-    if not one.before or abs(one.difference / one.before) > 10.0:
-        return f"{one.difference:+.3g}"
-    return f"{one.difference / abs(one.before):+.1%}".replace("%", " %")
-
-
-def _number(value: float | None) -> str:
-    return NONE if value is None else f"{value:.4g}"

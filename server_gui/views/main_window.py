@@ -34,6 +34,7 @@ from server_gui.views.audit import Audit
 from server_gui.views.bus_health import BusHealthView
 from server_gui.views.cloud.panel import Cloud
 from server_gui.views.docks import Area, Docks
+from server_gui.views.edits import Edits
 from server_gui.views.empty import EmptyView
 from server_gui.views.events_panel import EventsPanel
 from server_gui.views.header import Header
@@ -123,6 +124,7 @@ class MainWindow(QMainWindow):
         self.resources = Resources(desk, theme)
         self.buses = BusHealthView(desk, theme)
         self.audit = Audit(desk, theme, None if archive is None else archive.journals)
+        self.edits = Edits(desk, theme)
         self.help, self.help_button = Help(theme), QPushButton("?")
         self.empty = EmptyView(theme)
         self.empty.added.connect(self.added)
@@ -137,9 +139,10 @@ class MainWindow(QMainWindow):
             self.resources,
             self.buses,
             self.audit,
+            self.edits,
         )
         for title, view in zip(
-            ("&Overview", "&Signals", "&Resources", "&Bus", "&Audit"), self._views, strict=True
+            ("&Overview", "&Signals", "&Resources", "&Bus", "&Audit", "&Edits"), self._views, strict=True
         ):
             self.tabs.addTab(Scrolled(view), title)
         self._live = len(self._views)  # tabs that show the robot that is looked at

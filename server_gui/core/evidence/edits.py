@@ -5,7 +5,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from enum import StrEnum
 from typing import Any, Final
 
-import msgspec
 from msgspec import Struct
 from msgspec.structs import replace
 
@@ -65,6 +64,11 @@ class Edit(Struct, frozen=True):
         return datetime.datetime.fromtimestamp(self.utc_ns // 10**9, datetime.UTC).strftime(
             "%Y-%m-%dT%H:%M:%SZ"
         )
+
+    @property
+    def components(self) -> frozenset[str]:
+        """What it is of."""
+        return frozenset(change.name.partition(".")[0] for change in self.changes)
 
     @property
     def names(self) -> str:
@@ -184,9 +188,3 @@ def _disturbances(
             side = "before" if at_ns <= edit.began_ns else "after"
             who = f"{other.id}, {other.names}"
             yield f"another edit at {other.utc} ({who}) cuts short what is known of {side}"
-
-
-def fields(edit: Edit) -> dict[str, Any]:
-    """Return it as JSON has it."""
-    found: dict[str, Any] = msgspec.to_builtins(edit)
-    return found

@@ -17,6 +17,7 @@ from msgspec import Struct
 
 from ml.store.private import opener, private_folder
 from server_gui.core.evidence.comparison import Evidence
+from server_gui.core.evidence.curves import Curves
 from server_gui.core.evidence.edits import Edit
 
 log = logging.getLogger(__name__)
@@ -31,6 +32,7 @@ class Told(Struct, frozen=True):
     evidence: Evidence
     is_final: bool
     session: str = ""
+    curves: tuple[Curves, ...] = ()
     format: int = FORMAT
 
 

@@ -8,7 +8,8 @@ from msgspec.structs import replace
 
 from gateway.wire.bus import BusInfo
 from gateway.wire.robot import Description
-from server_gui.core.evidence.comparison import Evidence, compare
+from server_gui.core.evidence.comparison import compare
+from server_gui.core.evidence.curves import curves, told_joints
 from server_gui.core.evidence.cycles import ENABLED, STATE, Cycle, CycleCutter
 from server_gui.core.evidence.edits import (
     AFTER_NS,
@@ -86,18 +87,19 @@ class RobotEvidence:
 
     def end(self) -> list[Told]:
         """Return what is known of the edits that were still followed; nothing more will come."""
-        told = [Told(edit, self.evidence(edit), is_final=True) for edit in self._open()]
+        told = [self._told(edit, is_final=True) for edit in self._open()]
         self._over |= {one.edit.id for one in told}
         return told
 
-    def evidence(self, edit: Edit) -> Evidence:
-        """Return what an edit has done, as far as the cycles until now tell."""
-        windows, notes = spell(edit, self._ours())
-        edited = {change.name.partition(".")[0] for change in edit.changes}
-        found = compare(self.cycles, windows, self._joints, edited)
-        return replace(found, notes=found.notes + notes)
-
     # --- inside
+
+    def _told(self, edit: Edit, *, is_final: bool) -> Told:
+        """What an edit has done, as far as the cycles until now tell."""
+        windows, notes = spell(edit, self._ours())
+        edited = [joint for joint in self._joints if joint in edit.components]
+        found = compare(self.cycles, windows, self._joints, edited)
+        drawn = curves(self.cycles, windows, told_joints(found, edited))
+        return Told(edit, replace(found, notes=found.notes + notes), is_final, curves=drawn)
 
     def _rows(self, stamps_ns: list[int], columns: Mapping[str, Any]) -> None:
         if not stamps_ns:
@@ -158,7 +160,7 @@ class RobotEvidence:
         self._seen[edit.id] = self._cut, edit
         if is_final:
             self._over.add(edit.id)
-        return Told(edit, self.evidence(edit), is_final)
+        return self._told(edit, is_final=is_final)
 
 
 def _load(buses: tuple[BusInfo, ...] | None) -> float | None:

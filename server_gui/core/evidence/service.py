@@ -29,12 +29,10 @@ class EvidenceService:
 
     `take` gets everything that the robots' feeds tell, `predicted` what models say of them. What is final is
     kept in `folder`, and what is not when this ends: of robots that are recorded now, as `session` tells.
-    Without a folder nothing is kept. `tell` is told of each change.
+    `tell` is told of each change, and first of what was kept of a robot before.
     """
 
-    def __init__(
-        self, folder: Path | None = None, session: Callable[[str], str] = str, tell: Tell | None = None
-    ) -> None:
+    def __init__(self, folder: Path, session: Callable[[str], str], tell: Tell | None = None) -> None:
         self._folder = folder
         self._session = session
         self._tell = tell
@@ -78,7 +76,10 @@ class EvidenceService:
 
     def _guarded(self, robot: str, work: Callable[[RobotEvidence], Iterable[Told]]) -> None:
         """What one robot sends wrongly disturbs no other."""
-        known = self._robots.setdefault(robot, RobotEvidence(robot))
+        known = self._robots.get(robot)
+        if known is None:
+            known = self._robots[robot] = RobotEvidence(robot)
+            self._tell_kept(robot)
         try:
             for told in work(known):
                 self._told(robot, told)
@@ -86,8 +87,17 @@ class EvidenceService:
             log.exception("%s sent what no evidence can be found in; begun anew", robot)
             del self._robots[robot]
 
+    def _tell_kept(self, robot: str) -> None:
+        if self._tell is None:
+            return
+        try:
+            for told in EvidenceFile(self._folder, robot).read().values():
+                self._tell(robot, told)
+        except OSError as error:
+            log.error("the edits of %s that were kept cannot be read: %s", robot, error)
+
     def _told(self, robot: str, told: Told) -> None:
-        if told.is_final and self._folder is not None and (session := self._session(robot)):
+        if told.is_final and (session := self._session(robot)):
             try:
                 EvidenceFile(self._folder, robot).add(replace(told, session=session))
             except OSError as error:
