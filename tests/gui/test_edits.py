@@ -25,7 +25,7 @@ def worse(write: int = 1, *, is_final: bool = True) -> Told:
 
 
 def test_the_newest_edit_is_shown_with_its_word_and_its_strides(bench: Bench, window: MainWindow) -> None:
-    window.tabs.setCurrentWidget(window.tabs.widget(window._views.index(window.edits)))
+    window.tabs.setCurrentIndex(window._views.index(window.edits))
     window.refresh()
     assert "No edit is known yet" in window.edits.words.text()
     bench.station.take_evidence(worse())

@@ -9,6 +9,7 @@ import contextlib
 import logging
 import os
 import re
+from collections.abc import Collection
 from pathlib import Path
 from typing import Final
 
@@ -16,6 +17,7 @@ import msgspec
 from msgspec import Struct
 
 from ml.store.private import opener, private_folder
+from server_gui.core.atomic_files import draft
 from server_gui.core.evidence.comparison import Evidence
 from server_gui.core.evidence.curves import Curves
 from server_gui.core.evidence.edits import Edit
@@ -45,6 +47,15 @@ class _Line(Struct):
 def folder_beside(spool: Path) -> Path:
     """Return where evidence is kept: beside the recorder's spool."""
     return spool.with_name("edits")
+
+
+class _Robot(Struct):
+    robot: str
+
+
+class _Whose(Struct):
+    edit: _Robot
+    session: str
 
 
 class EvidenceFile:
@@ -90,6 +101,33 @@ def _ends_whole(path: Path) -> bool:
     with path.open("rb") as file:
         file.seek(-1, os.SEEK_END)
         return file.read(1) == b"\n"
+
+
+def forget(folder: Path, sessions: Collection[tuple[str, str]]) -> list[str]:
+    """Remove what was kept of these recordings (robot, session); what could not be, in words.
+
+    A line that is damaged goes, too: whose it was cannot be told any more.
+    """
+    left = []
+    for path in sorted(folder.glob("*.jsonl")) if folder.is_dir() else []:
+        try:
+            lines = path.read_bytes().splitlines(keepends=True)
+            kept = [line for line in lines if (whose := _whose(line)) is not None and whose not in sessions]
+            if len(kept) < len(lines):
+                with draft(path) as written:
+                    written.write_bytes(b"".join(kept))
+        except OSError as error:
+            left.append(f"{path} may have edits of theirs: {error}")
+    return left
+
+
+def _whose(line: bytes) -> tuple[str, str] | None:
+    """The robot and the recording of a line of any format; None where nobody can tell."""
+    try:
+        found = msgspec.json.decode(line, type=_Whose)
+    except msgspec.DecodeError:
+        return None
+    return found.edit.robot, found.session
 
 
 def read_all(folder: Path) -> list[Told]:

@@ -5,10 +5,11 @@ from pathlib import Path
 
 import msgspec
 import pytest
+from msgspec.structs import replace
 
 from server_gui.core.evidence.comparison import compare
 from server_gui.core.evidence.edits import State
-from server_gui.core.evidence.file import EvidenceFile, Told, folder_beside, read_all
+from server_gui.core.evidence.file import EvidenceFile, Told, folder_beside, forget, read_all
 from tests.unit.evidence.synthetic import cycles, spell
 from tests.unit.evidence.test_edits import journal
 
@@ -60,3 +61,18 @@ def test_another_format_is_left_alone(tmp_path: Path, caplog: pytest.LogCaptureF
         lines.write(msgspec.json.encode({"format": 2, "edit": "otherwise"}) + b"\n")
     assert [one.edit.state for one in file.read().values()] == [State.KEPT]
     assert "newer gwrms" in caplog.text
+
+
+def test_what_is_known_of_somebody_who_is_forgotten_goes(tmp_path: Path) -> None:
+    file = EvidenceFile(tmp_path, "exo-01")
+    file.add(told())
+    file.add(replace(told(2), session="20261122T0900"))
+    with file.path.open("ab") as lines:
+        lines.write(b'{"format": 2, "session": "20261121T1530", "edit": {"robot": "exo-01"}}\n')
+        lines.write(b'{"format": 2, "session": "20261122T0900", "edit": {"robot": "exo-01"}}\n{"torn')
+    assert forget(tmp_path, {("exo-01", "20261121T1530")}) == []
+    assert [one.edit.write for one in file.read().values()] == [2]
+    assert b"20261121T1530" not in file.path.read_bytes()
+    assert b"torn" not in file.path.read_bytes()
+    assert b'"format": 2' in file.path.read_bytes()
+    assert stat.S_IMODE(file.path.stat().st_mode) == 0o600
