@@ -23,7 +23,7 @@ before and after the edit; gwrms docs how-to/judge-an-edit explains the words.
 
 exit status
   0 shown, 1 not known or not to be read, 2 wrong usage"""
-HEADER: Final = ("ID", "WHEN (UTC)", "ROBOT", "WHO", "WHAT", "", "VERDICT", "STRONGEST")
+HEADER: Final = ("ID", "WHEN (UTC)", "ROBOT", "WHO", "WHAT", "STATE", "VERDICT", "STRONGEST")
 COLUMNS: Final = ("METRIC", "WORD", "BEFORE", "AFTER", "DIFFERENCE", "95 % INTERVAL", "SIZE", "UNIT")
 NOTHING: Final = "no edit is known here: one is kept once it was made while this computer recorded the robot"
 EXPLAINED: Final = """
