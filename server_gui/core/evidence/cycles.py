@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from server_gui.core.evidence import measures
 from server_gui.core.evidence.measures import CURVES, POINTS, Floats
-from server_gui.core.processing.component import Columns, ComponentProcessing
+from server_gui.core.processing.component import WIRINGS, Columns, ComponentProcessing
 from server_gui.core.processing.gait_events import MAX_GAP_NS, Leg
 from server_gui.core.processing.gait_measures import LONGEST_STRIDE_NS, Stride, symmetry_index
 from server_gui.core.processing.wiring import FORCE, leg_of
@@ -87,6 +87,8 @@ class CycleCutter:
         self._waiting.extend(self._processing.take(stamps_ns, columns).strides)
         names = tuple(columns)
         if names not in self._rings:
+            if len(self._rings) >= WIRINGS:
+                self._rings.clear()
             self._rings[names] = _Ring(names)
         self._rings[names].take(stamps_ns, columns)
         self._newest_ns = stamps_ns[-1]

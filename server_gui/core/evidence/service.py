@@ -76,6 +76,7 @@ class EvidenceService:
 
     def _guarded(self, robot: str, work: Callable[[RobotEvidence], Iterable[Told]]) -> None:
         """What one robot sends wrongly disturbs no other."""
+        self.worker.beat()
         known = self._robots.get(robot)
         if known is None:
             known = self._robots[robot] = RobotEvidence(robot)
