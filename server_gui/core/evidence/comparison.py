@@ -18,11 +18,11 @@ from msgspec import Struct
 
 from server_gui.core.evidence.cycles import Cycle
 from server_gui.core.evidence.effect import Bools, Effects, Floats, effects, holm
-from server_gui.core.evidence.metrics import BY_KEY, OF_JOINTS, OF_ROBOTS, Better, Metric
+from server_gui.core.evidence.metrics import OF_JOINTS, OF_ROBOTS, Better, Metric
 from server_gui.core.processing.gait_events import Leg
 from server_gui.core.processing.wiring import leg_of
 
-ALPHA: Final = 0.05
+ALPHA: Final = 0.01  # evidence is looked at again and again while it grows
 FEWEST: Final = 8  # cycles on each side
 SAME_SPEED: Final = (2.5, 97.5)  # percentiles of the stride time that strides of the other side must lie in
 AROUND: Final = 0.01  # and so much around them
@@ -342,8 +342,3 @@ def _notes(sided: _Sided) -> Iterator[str]:
             f"strides lasted {before:.2f} s before and {after:.2f} s after: "
             "too few are equally long, so that only the cadence can be compared"
         )
-
-
-def metric_of(series: str) -> Metric:
-    """Return the metric of `component.metric`, or of a robot's own."""
-    return BY_KEY[series.rpartition(".")[2]]

@@ -46,7 +46,7 @@ OF_JOINTS: Final = (
     Metric("current_peak", "current peak", "A", LESS, 0.10, 0.1),
     Metric("temperature", "temperature slope", "°C/s", LESS, 0.25, 0.01, is_slope=True),
     Metric("torque_rms", "torque RMS", "N·m", NEITHER, 0.05, 0.2),
-    Metric("power", "mechanical power", "W", NEITHER, 0.05, 0.5),
+    Metric("power", "mechanical power", "W", NEITHER, 0.10, 0.5),
     Metric("jerk", "jerk RMS", "rad/s³", LESS, 0.10, 5.0),
 )
 OF_ROBOTS: Final = (
@@ -57,4 +57,3 @@ OF_ROBOTS: Final = (
     Metric("bus_load", "bus load", "%", LESS, 0.0, 3.0),
     Metric("cpu", "CPU of the robot's computer", "%", LESS, 0.0, 5.0),
 )
-BY_KEY: Final = {metric.key: metric for metric in OF_JOINTS + OF_ROBOTS}
