@@ -1,5 +1,6 @@
 """Edits as a journal tells them, and which stretches of a walk are before and after them."""
 
+from pathlib import Path
 from typing import Any
 
 from server_gui.core.evidence.edits import (
@@ -13,6 +14,7 @@ from server_gui.core.evidence.edits import (
     due_ns,
     spell,
 )
+from tests.support.journals import RobotsJournal
 from tests.unit.evidence.walks import entry
 
 SECOND = 1_000_000_000
@@ -112,3 +114,21 @@ def test_edits_that_are_over_are_forgotten_and_no_trial_is() -> None:
     edits = journal((100, "write", 1), (101, "write done", 1), (200, "write", 2), (201, "trial begun", 2))
     edits.forget(900 * SECOND)
     assert [edit.write for edit in edits.all] == [2]
+
+
+def test_the_robots_own_journal_is_understood(tmp_path: Path) -> None:
+    journal = RobotsJournal(tmp_path)
+    kept = journal.written({NAME: 80.0}, {NAME: 60.0})
+    trial = journal.written({NAME: 60.0}, {NAME: 50.0}, "trial begun")
+    journal.say("taken back", write=trial, outcome={NAME: "taken back"}, reason="its time is over")
+    edits = JournalEdits("exo-01")
+    edits.take(journal.told().journal.entries)
+    journal.close()
+    assert [(edit.write, edit.state, edit.trial_s) for edit in edits.all] == [
+        (kept, State.KEPT, None),
+        (trial, State.REVERTED, 20.0),
+    ]
+    assert [edit.boot_id for edit in edits.all] == ["boot-1", "boot-1"]
+    assert edits.all[1].ended_ns is not None
+    assert edits.all[1].in_force_ns is not None
+    assert edits.all[0].began_ns < edits.all[1].began_ns < edits.all[1].in_force_ns < edits.all[1].ended_ns
