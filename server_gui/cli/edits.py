@@ -1,6 +1,7 @@
 """`gwrms edits`: what each edit of a robot's parameters did to the walk, as evidence before and after it."""
 
 import argparse
+import collections
 from collections.abc import Iterator
 from typing import Any, Final
 
@@ -121,8 +122,11 @@ def _told(told: Told) -> Iterator[str]:
         f"  left out: {counted(count, 'cycle')}, {why}" for why, count in sorted(evidence.left_out.items())
     )
     yield ""
-    known = [one for one in evidence.metrics if one.word is not Word.NO_DATA]
-    yield table(COLUMNS, map(_line, sorted(known, key=_order)), right=(2, 3, 4, 6)).rstrip()
+    judged = [one for one in evidence.metrics if one.p is not None]
+    if judged:
+        yield table(COLUMNS, map(_line, sorted(judged, key=_order)), right=(2, 3, 4, 6)).rstrip()
+    few = collections.Counter(one.why for one in evidence.metrics if one.word is Word.FEW)
+    yield from (f"not enough cycles for {counted(count, 'metric')}: {why}" for why, count in few.items())
     silent = [one for one in evidence.metrics if one.word is Word.NO_DATA]
     if silent:
         yield "\nno data: " + ", ".join(one.title for one in silent)
@@ -137,7 +141,7 @@ def _line(one: Measured) -> tuple[str, ...]:
     interval = NONE if one.low is None else f"{number(one.low)} … {number(one.high)}"
     return (
         one.title,
-        f"{one.word}: {one.why}" if one.why else str(one.word),
+        str(one.word),
         number(one.before),
         number(one.after),
         share(one),

@@ -20,6 +20,8 @@ ENABLED: Final = "operation enabled"  # the word of a drive's state in which it 
 WAIT_NS: Final = 200_000_000  # for what other components tell of the end of a stride
 KEPT_NS: Final = LONGEST_STRIDE_NS + 2 * WAIT_NS + MAX_GAP_NS
 COMPUTER_NS: Final = 6_000_000_000  # what was told of computer and bus longer ago is not known any more
+MOSTLY: Final = 2 / 3  # of what models say within a stride
+LABELS: Final = 1000  # more than they say of two strides
 DRAWN: Final = ("position", "following_error", "current", "torque")  # curves that are kept, of 101 points
 
 
@@ -27,7 +29,7 @@ DRAWN: Final = ("position", "following_error", "current", "torque")  # curves th
 class Cycle:
     """One stride of one leg. `values` by `component.metric`, or by the metric's key where it is the robot's.
 
-    `left_out` says why a joint of this leg has none. `activity` is None where it changed in between.
+    `left_out` says why a joint of this leg has none. `activity` is None where none lasted for most of it.
     """
 
     leg: Leg
@@ -62,7 +64,7 @@ class CycleCutter:
         self._newest: dict[Leg, Stride] = {}
         self._newest_ns = 0
         self._told: dict[str, tuple[int, float]] = {}
-        self._activities: dict[str, tuple[int, str]] = {}
+        self._activities: collections.deque[tuple[int, str]] = collections.deque(maxlen=LABELS)
 
     def distrust(self, components: frozenset[str]) -> None:
         """Take no gait events and no values from these until told otherwise."""
@@ -75,10 +77,9 @@ class CycleCutter:
         else:
             self._told[key] = self._newest_ns, value
 
-    def label(self, task: str, label: str) -> None:
-        """Take what the wearer does, or walks on, as of now."""
-        if self._activities.get(task, (0, ""))[1] != label:
-            self._activities[task] = self._newest_ns, label
+    def label(self, stamp_ns: int, activity: str) -> None:
+        """Take what a model says that the wearer does at an instant."""
+        self._activities.append((stamp_ns, activity))
 
     def take(self, stamps_ns: Sequence[int], columns: Columns) -> list[Cycle]:
         """Take rows; the cycles that are over with them."""
@@ -113,13 +114,16 @@ class CycleCutter:
             drawn |= {
                 f"{joint}.{name}": curves[name][::2].astype(np.float32) for name in DRAWN if name in curves
             }
-        activity = self._activity(stride.began_ns)
+        activity = self._activity(stride)
         return Cycle(stride.leg, stride.began_ns, stride.ended_ns, activity, values, left_out, drawn)
 
-    def _activity(self, since_ns: int) -> str | None:
-        if any(at_ns > since_ns for at_ns, _ in self._activities.values()):
-            return None
-        return ", ".join(label for _, (_, label) in sorted(self._activities.items()))
+    def _activity(self, stride: Stride) -> str | None:
+        """What models said for most of the stride; empty where they said nothing."""
+        said = [word for at_ns, word in self._activities if stride.began_ns <= at_ns <= stride.ended_ns]
+        if not said:
+            return ""
+        (word, times), *_ = collections.Counter(said).most_common(1)
+        return word if times >= MOSTLY * len(said) else None
 
     def _why_not(self, joint: str, curves: Mapping[str, Floats]) -> str | None:
         if joint in self._processing.distrusted:

@@ -77,9 +77,9 @@ class RobotEvidence:
                 return self._described(event.description)
         return []
 
-    def label(self, task: str, label: str) -> None:
-        """Take what a model says that the wearer does."""
-        self._cutter.label(task, label)
+    def label(self, stamp_ns: int, activity: str) -> None:
+        """Take what a model says that the wearer does at an instant."""
+        self._cutter.label(stamp_ns, activity)
 
     def look(self) -> list[Told]:
         """Return the edits of which something new is known since the last look."""

@@ -1,5 +1,6 @@
 """A thread that follows every robot's edits, and keeps what came of them; nobody ever waits for it."""
 
+import collections
 import functools
 import logging
 import time
@@ -9,6 +10,7 @@ from typing import Final, Self
 
 from msgspec.structs import replace
 
+from ml.serving.predictor import Prediction
 from server_gui.core.evidence.file import EvidenceFile, Told
 from server_gui.core.evidence.robot_evidence import RobotEvidence
 from server_gui.core.follow.events import Event, without_processes
@@ -20,6 +22,8 @@ log = logging.getLogger(__name__)
 
 LOOK_S: Final = 1.0  # between looks at edits whose evidence still grows
 STILL_S: Final = 2.0
+ACTIVITY: Final = "activity"  # the task
+MOST_SAID: Final = 4096  # what may wait of what models say
 
 Tell = Callable[[str, Told], None]  # (robot, what is known now), in the service's thread
 
@@ -38,6 +42,7 @@ class EvidenceService:
         self._tell = tell
         self._inbox = Inbox()
         self._robots: dict[str, RobotEvidence] = {}
+        self._said: collections.deque[tuple[str, Prediction]] = collections.deque(maxlen=MOST_SAID)
         self._looked_s = 0.0
         self.worker = Worker("evidence", self._run, STILL_S)
 
@@ -56,14 +61,17 @@ class EvidenceService:
     def predicted(self, news: Iterable[PredictionNews]) -> None:
         """Take what models say; from any thread, returns at once."""
         for one in news:
-            if isinstance(one, Predicted) and (robot := self._robots.get(one.robot)) is not None:
-                robot.label(one.prediction.task, one.prediction.label)
+            if isinstance(one, Predicted) and one.prediction.task == ACTIVITY:
+                self._said.append((one.robot, one.prediction))
 
     # --- its thread
 
     def _run(self) -> None:
         while (taken := self._inbox.take(BEAT_S)) is not None:
             self.worker.beat()
+            for robot, said in [self._said.popleft() for _ in range(len(self._said))]:
+                if robot in self._robots:
+                    self._robots[robot].label(said.stamp_ns, said.label)
             for robot, events in taken.items():
                 self._guarded(robot, functools.partial(_taken, events))
             now_s = time.monotonic()

@@ -56,6 +56,7 @@ def test_one_edit_is_shown_with_every_metric(config: str, capsys: pytest.Capture
     assert row.split()[-1] == "rad"
     assert "…" in row
     assert "no data: " in text
+    assert "not enough cycles for" not in text
     assert main(["show", "bb", "--config", config, "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["edit"]["robot"] == "exo-02"
 
@@ -70,3 +71,14 @@ def test_a_desk_without_edits_says_how_they_come(tmp_path: Path, capsys: pytest.
     file.write_text(f"[recorder]\nspool = {json.dumps(str(tmp_path / 'spool'))}\n", encoding="utf-8")
     assert main(["--config", str(file)]) == 0
     assert "recorded the robot" in capsys.readouterr().err
+
+
+def test_what_could_not_be_compared_is_counted_with_its_reason(
+    tmp_path: Path, config: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    few = replace(told(3), evidence=compare(cycles(until_s=64.0), spell(), ["left_knee"]))
+    EvidenceFile(tmp_path / "edits", "exo-03").add(replace(few, edit=replace(few.edit, id="cc03")))
+    assert main(["show", "cc", "--config", config]) == 0
+    text = capsys.readouterr().out
+    assert "not enough cycles: " in text
+    assert "not enough cycles for 16 metrics: nobody walked in the same way on both sides" in text

@@ -127,3 +127,15 @@ def test_edits_of_before_it_was_followed_are_not_judged(events: list[Event]) -> 
 def test_the_whole_tail_again_makes_no_edit_twice(events: list[Event]) -> None:
     journals = [event for event in events if isinstance(event, Journalled)]
     assert len(followed([*events, *journals, *journals])) == 1
+
+
+def test_what_models_say_now_and_then_cuts_no_walk_in_pieces(events: list[Event]) -> None:
+    """Most of a stride counts; what is said of it otherwise for a moment does not."""
+    robot = RobotEvidence("exo-01")
+    for number, event in enumerate(events):
+        robot.take(event)
+        if isinstance(event, Telemetry):
+            robot.label(event.batch.stamps_ns[-1], "unknown" if number % 5 == 0 else "walk")
+    (told,) = robot.end()
+    assert told.evidence.word is Word.WORSE
+    assert "the activity changed" not in told.evidence.left_out
