@@ -52,6 +52,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
         "server_gui.cli.sessions:main",
         "recordings: list, look into, export as CSV, Parquet, MCAP",
     ),
+    "edits": ("server_gui.cli.edits:main", "what each edit of a parameter did to the walk"),
     "label": ("server_gui.cli.label:main", "what robot and wearer did in a recorded session"),
     "train": ("server_gui.cli.train:main", "a model from labelled sessions, judged before it serves"),
     "cloud": ("server_gui.cli.cloud:main", "the store: browse, upload, download, verify, tidy"),

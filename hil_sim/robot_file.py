@@ -164,12 +164,13 @@ live = true
 
 _JOINT_PARAMETERS_NOTE = """
 # Per joint: the most torque that the drive may use (6072h, per mille of 40 N·m rated at the joint), and the
-# speed of its own moves in profile position mode (6081h, counts/s; 2π / 409 600 rad each).
+# speed of its own moves in profile position mode (6081h, counts/s; 2π / 409 600 rad each); and how stiffly
+# it holds to its target (2030h:1, as its EDS says): half the gain, twice the tracking error.
 """
 
-# By the object that the drive must have for it.
+# By the object that the drive must have for it; a vendor's in the manufacturer's range is another one.
 _JOINT_PARAMETERS = {
-    0x6072: """
+    (0x6072, 0): """
 [parameter."{name}.max_torque"]
 object = "0x6072:0"
 unit = "N·m"
@@ -179,7 +180,7 @@ max = 80.0
 max_step = 40.0
 live = true
 """,
-    0x6081: """
+    (0x6081, 0): """
 [parameter."{name}.profile_velocity"]
 object = "0x6081:0"
 unit = "rad/s"
@@ -187,6 +188,16 @@ scale = 1.5339807878856412e-05
 min = 0.05
 max = 6.0
 max_step = 2.0
+live = true
+""",
+    (0x2030, 1): """
+[parameter."{name}.position_gain"]
+object = "0x2030:1"
+unit = "N·m/rad"
+scale = 1.0
+min = 500.0
+max = 6000.0
+max_step = 1000.0
 live = true
 """,
 }
@@ -252,4 +263,4 @@ def _joint(template: str, drive: JointDrive, mounting: Mounting) -> str:
 
 def _joint_parameters(drive: JointDrive) -> str:
     texts = _JOINT_PARAMETERS.items()
-    return "".join(text.format(name=drive.name) for index, text in texts if drive.description.has(index))
+    return "".join(text.format(name=drive.name) for key, text in texts if drive.objects.has(key))

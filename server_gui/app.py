@@ -24,6 +24,7 @@ from server_gui.core.desk.ending import Ending
 from server_gui.core.desk.feeds import Feeds, Record
 from server_gui.core.desk.station import Station
 from server_gui.core.desk.ticks import Ticks
+from server_gui.core.evidence.file import Told
 from server_gui.core.follow.events import Event
 from server_gui.core.follow.feed import FollowSettings
 from server_gui.core.follow.mailbox import Mailbox
@@ -115,7 +116,16 @@ class App:
         self._stations: dict[str, Station] = {}
         self._predicted: collections.deque[PredictionNews] = collections.deque(maxlen=MOST_PREDICTIONS)
         self._poster = Poster()
-        self.feeds = Feeds(settings, following, record, self._show, self._predicted.extend, self._stop)
+        self._judged: collections.deque[tuple[str, Told]] = collections.deque(maxlen=MOST_PREDICTIONS)
+        self.feeds = Feeds(
+            settings,
+            following,
+            record,
+            self._show,
+            self._predicted.extend,
+            self._stop,
+            lambda robot, told: self._judged.append((robot, told)),
+        )
         self.desk.recording = self.feeds.recording(self._poster.deliver, self.desk.news)
         self._predicts = settings.prediction.enabled
         self._opening = opening
@@ -225,6 +235,9 @@ class App:
             followed.station.take(followed.ticks.take(events) if self.feeds.by_source else events)
             if followed.link.done():
                 followed.link.result()  # it ends only by a mistake of ours, which must not stay unseen
+        for robot, told in [self._judged.popleft() for _ in range(len(self._judged))]:
+            if robot in self._stations:
+                self._stations[robot].take_evidence(told)
         for news in [self._predicted.popleft() for _ in range(len(self._predicted))]:
             if news.robot in self._stations:
                 self._stations[news.robot].take_prediction(news)

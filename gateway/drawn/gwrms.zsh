@@ -23,6 +23,7 @@ _shtab_gwrms_commands() {
     describe:'What a robot is made of: its components and buses and what is wrong with them, since when and what'
     docs:'Prints a page of the docs, which are installed with GWRMS; without a name, the list of all. A page'"'"'s own name'
     doctor:'Finds what is wrong with a robot: by its file, its buses, its sensors and its computer, through its gateway'
+    edits:'What each edit of a robot'"'"'s parameters did to the walk.'
     eds:'Read EDS and DCF files (CiA 306) as a gateway would: the device, whether it can be a joint, its PDOs as the'
     enable:'Enable drives, one confirmed transition at a time.'
     evaluate:'How well predictions hold for people, real or simulated, whom no model has seen.'
@@ -485,6 +486,16 @@ _shtab_gwrms_doctor_options=(
 
 # guard to ensure default positional specs are added only once per session
 _shtab_gwrms_doctor_defaults_added=0
+
+_shtab_gwrms_edits_options=(
+  "(- : *)"{-h,--help}"[show this help message and exit]"
+  "--config[the server\'s file, which names the store]:FILE:_files"
+  "--json[for machines]"
+  "*--robot[of this robot (again\: more)]:NAME:"
+)
+
+# guard to ensure default positional specs are added only once per session
+_shtab_gwrms_edits_defaults_added=0
 
 _shtab_gwrms_eds_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
@@ -1271,6 +1282,7 @@ _shtab_gwrms() {
         describe) _arguments -C -s $_shtab_gwrms_describe_options ;;
         docs) _arguments -C -s $_shtab_gwrms_docs_options ;;
         doctor) _arguments -C -s $_shtab_gwrms_doctor_options ;;
+        edits) _arguments -C -s $_shtab_gwrms_edits_options ;;
         eds) _arguments -C -s $_shtab_gwrms_eds_options ;;
         enable) _arguments -C -s $_shtab_gwrms_enable_options ;;
         evaluate) _arguments -C -s $_shtab_gwrms_evaluate_options ;;

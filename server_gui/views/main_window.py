@@ -38,6 +38,7 @@ from server_gui.views.bus_health import BusHealthView
 from server_gui.views.cloud.panel import Cloud
 from server_gui.views.commissioning.page import CommissionPage
 from server_gui.views.docks import Area, Docks
+from server_gui.views.edits import Edits
 from server_gui.views.empty import EmptyView
 from server_gui.views.events_panel import EventsPanel
 from server_gui.views.header import Header
@@ -151,6 +152,7 @@ class MainWindow(QMainWindow):
         self.objects = ObjectsPage(desk, theme)
         self.objects.edited.connect(self._edit_parameter)
         self.audit = Audit(desk, theme, None if archive is None else archive.journals)
+        self.edits = Edits(desk, theme)
         self.help, self.help_button = Help(theme), QPushButton("?")
         self.empty = EmptyView(theme)
         self.empty.added.connect(self.added)
@@ -166,9 +168,12 @@ class MainWindow(QMainWindow):
             self.buses,
             self.objects,
             self.audit,
+            self.edits,
         )
         for title, view in zip(
-            ("&Overview", "&Signals", "&Resources", "&Bus", "Ob&jects", "&Audit"), self._views, strict=True
+            ("&Overview", "&Signals", "&Resources", "&Bus", "Ob&jects", "&Audit", "&Edits"),
+            self._views,
+            strict=True,
         ):
             self.tabs.addTab(Scrolled(view), title)
         self._live = len(self._views)  # tabs that show the robot that is looked at

@@ -2,6 +2,9 @@
 
 from gateway.units import Units
 from server_gui.core.desk.station import Station
+from server_gui.core.evidence.comparison import Word
+from server_gui.core.evidence.file import Told
+from server_gui.core.evidence.wording import share
 from server_gui.core.tuning.edits import unit_of
 from server_gui.core.tuning.writing import Trial
 
@@ -20,6 +23,18 @@ def wordings(station: Station, trial: Trial, units: Units) -> tuple[str, ...]:
         return f"On trial: {full}", full, first[1]
     some = [f"{', '.join(said[:count])} and {len(said) - count} more" for count in range(len(others), 0, -1)]
     return f"On trial: {full}", full, *some, f"{len(said)} values"
+
+
+def so_far(edit: Told | None) -> str:
+    """Return what it did until now, in one clause."""
+    if edit is None:
+        return "what it does is seen once somebody walks"
+    evidence = edit.evidence
+    if evidence.word is Word.FEW:
+        return f"{evidence.cycles_after} gait cycles until now: not enough to judge it"
+    strongest = next((one for one in evidence.metrics if one.series == evidence.strongest), None)
+    what = "" if strongest is None else f" ({strongest.title.replace('_', ' ')} {share(strongest)})"
+    return f"so far {evidence.word}{what}"
 
 
 def ends(trial: Trial) -> str:

@@ -22,6 +22,7 @@ from server_gui.core.cloud import exports, mend, spool_reader
 from server_gui.core.cloud.counting import Advance
 from server_gui.core.cloud.exports import Exported
 from server_gui.core.cloud.repeated_upload import Again
+from server_gui.core.evidence import file as evidence
 from server_gui.core.recording.batching import EventKind
 from server_gui.core.recording.rows import Record
 from server_gui.core.recording.spool import Spool
@@ -147,6 +148,7 @@ def forget(store: Store, spool: Spool, known: Plan, name: str, expect: Expect) -
     mend.accept(store, spool, expect, MADE)
     _tell(store, spool, known, name)
     left = [*proof(store, spool.folder, known), *exports.remove(known.sessions, store.url)]
+    left += evidence.forget(evidence.folder_beside(spool.folder), known.sessions)
     (spool.folder / _BEGUN).unlink()
     return left
 

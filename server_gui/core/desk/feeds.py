@@ -7,6 +7,7 @@ the same spool, the window follows robots without; it takes over when that progr
 import concurrent.futures
 import functools
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, Self
 
@@ -14,6 +15,9 @@ from msgspec.structs import replace
 
 from gateway.client import Address
 from server_gui.core.desk.recording import By, Recording
+from server_gui.core.evidence.file import folder_beside
+from server_gui.core.evidence.service import EvidenceService
+from server_gui.core.evidence.service import Tell as TellEvidence
 from server_gui.core.fleet.collector import Collector, whole
 from server_gui.core.fleet.fleet import Subscriber
 from server_gui.core.fleet.live_prediction import TellPredictions
@@ -23,6 +27,7 @@ from server_gui.core.follow.events import Event, without_processes
 from server_gui.core.follow.feed import Feed, FollowSettings
 from server_gui.core.follow.network import Network
 from server_gui.core.follow.news import News
+from server_gui.core.prediction.news import PredictionNews
 from server_gui.core.prediction.service import PredictionService
 from server_gui.core.recording.errors import SpoolUnusable
 from server_gui.core.recording.records import NOBODY, Worn
@@ -59,6 +64,7 @@ class Feeds:
         show: Subscriber,
         tell_predictions: TellPredictions,
         stop: StopRobot,
+        tell_evidence: TellEvidence,
     ) -> None:
         self._settings = settings
         self._following = following
@@ -66,6 +72,7 @@ class Feeds:
         self._show = show
         self._tell_predictions = tell_predictions
         self._stop = stop
+        self._tell_evidence = tell_evidence
         self._robots: dict[str, Address] = {}
         self._tasks: dict[str, concurrent.futures.Future[None]] = {}  # what follows each
         self._tried_s = 0.0
@@ -74,20 +81,24 @@ class Feeds:
         self._own: Network | None = None
         self._elsewhere: RemoteCollector | None = None
         self._predicting: PredictionService | None = None
+        self._judging: EvidenceService | None = None
         if self._collector is not None:
             self.network = self._collector.network
         else:
             self.network = self._own = Network()
             self._elsewhere = None if record is None else RemoteCollector(settings.recorder.spool)
             self._predicting = (
-                PredictionService(settings, tell_predictions) if settings.prediction.enabled else None
+                PredictionService(settings, self._predicted) if settings.prediction.enabled else None
             )
+            folder = folder_beside(settings.recorder.spool)
+            self._judging = EvidenceService(folder, lambda _robot: "", tell_evidence)
         predicting = () if self._predicting is None else self._predicting.workers
+        judging = () if self._judging is None else (self._judging.worker,)
         self.others = ThreadWatch(())  # threads of the window itself
-        self._watch = ThreadWatch((self.network.worker, *predicting))  # where no collector has one
+        self._watch = ThreadWatch((self.network.worker, *predicting, *judging))  # where no collector has one
 
     def __enter__(self) -> Self:
-        for part in (self._collector, self._own, self._predicting):
+        for part in (self._collector, self._own, self._predicting, self._judging):
             if part is not None:
                 part.__enter__()
         return self
@@ -175,6 +186,7 @@ class Feeds:
                 self._tell_predictions,
                 self._stop,
                 self._record.worn,
+                self._tell_evidence,
             ), ""
         except SpoolUnusable as error:
             return None, str(error)
@@ -198,12 +210,21 @@ class Feeds:
 
     def _end_showing_only(self) -> None:
         """In a thread: it may take a while."""
-        predicting, elsewhere = self._predicting, self._elsewhere
-        self._predicting = self._elsewhere = None
+        predicting, judging, elsewhere = self._predicting, self._judging, self._elsewhere
+        self._predicting = self._judging = self._elsewhere = None
         if elsewhere is not None:
             self._ending.submit(elsewhere.close)
         if predicting is not None:
             self._ending.submit(predicting.__exit__)
+        if judging is not None:
+            self._ending.submit(judging.__exit__)
+
+    def _predicted(self, news: Sequence[PredictionNews]) -> None:
+        """What is not recorded."""
+        judging = self._judging
+        if judging is not None:
+            judging.predicted(news)
+        self._tell_predictions(news)
 
     def _shown(self, robot: str, event: Event) -> None:
         """What is not recorded."""
@@ -212,6 +233,9 @@ class Feeds:
             return
         if predicting is not None:
             predicting.take(robot, event)
+        judging = self._judging
+        if judging is not None:
+            judging.take(robot, event)
         self._show(robot, without_processes(event))
 
     def _kept(self, robot: str, event: Event) -> None:

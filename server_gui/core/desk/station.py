@@ -27,6 +27,7 @@ from server_gui.core.alarms.worst import worst
 from server_gui.core.audit.journal import Audit
 from server_gui.core.desk.flags import Flag, FlagKind, Flags, StateWatch, of_journal
 from server_gui.core.desk.rings import Rings
+from server_gui.core.evidence.file import Told
 from server_gui.core.follow.events import (
     Costs,
     Described,
@@ -56,6 +57,7 @@ from server_gui.core.tuning.taken_back import OVERDUE_S, TakenBack
 from server_gui.core.tuning.writing import WriteProgress, WriteState
 
 WATCH_NS: Final = 200_000_000  # between looks for news
+JUDGED: Final = 500  # edits that are shown
 
 
 class Station:
@@ -84,6 +86,7 @@ class Station:
         self.most: tuple[ProcessUse, int] | None = None  # who used most CPU, and when that was seen
         self.cost: GatewayCost | None = None  # what monitoring costs the robot, as long as it is looked at
         self.predictions = StationPredictions()
+        self.judged: dict[str, Told] = {}  # edits and what they did, by their ids
         self.stopping = StopProgress()
         self.control = LeaseState()
         self.edits = Edits()
@@ -261,6 +264,20 @@ class Station:
         self.predictions.take(news)
         if isinstance(news, Ruled):
             self.tell(NewsKind.WARNING, news.text)
+
+    def take_evidence(self, told: Told) -> None:
+        """Apply what is known now of an edit."""
+        self.judged.pop(told.edit.id, None)
+        self.judged[told.edit.id] = told
+        while len(self.judged) > JUDGED:
+            del self.judged[next(iter(self.judged))]
+
+    @property
+    def trial_evidence(self) -> Told | None:
+        """What is known of what is on trial."""
+        trial = self.writing.trial
+        mine = (told for told in reversed(self.judged.values()) if trial and told.edit.write == trial.write)
+        return next((told for told in mine if not told.is_final), None)
 
     # --- STOP and reset
 

@@ -2,12 +2,13 @@
 
 import asyncio
 import concurrent.futures
+import functools
 import importlib.metadata
 import logging
 import os
 import shutil
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Final, Self, TypeVar
 
 import msgspec
@@ -16,6 +17,9 @@ from msgspec import Struct
 from gateway.client import Address
 from gateway.wire.resource import ResourceSnapshotParams
 from ml.store import Store
+from server_gui.core.evidence.file import folder_beside
+from server_gui.core.evidence.service import EvidenceService
+from server_gui.core.evidence.service import Tell as TellEvidence
 from server_gui.core.fleet.control_socket import Answers, door
 from server_gui.core.fleet.fleet import Fleet, Subscriber
 from server_gui.core.fleet.link_statistics import LinkReport
@@ -23,6 +27,7 @@ from server_gui.core.fleet.live_prediction import RecordedPrediction, TellPredic
 from server_gui.core.fleet.stop_links import StopLinks, StopRobot
 from server_gui.core.follow.feed import ONCE, FollowSettings
 from server_gui.core.follow.network import Network
+from server_gui.core.prediction.news import PredictionNews
 from server_gui.core.prediction.state import PredictingState
 from server_gui.core.recording.compaction import Compaction
 from server_gui.core.recording.errors import SpoolUnusable
@@ -71,7 +76,8 @@ class Collector:
     Leaving ends the sessions, and uploads what waits, for a while: what is not in the store then stays in the
     spool. Where an upload hangs even so, `hangs` is set, and only the end of the process ends its thread.
     A window records with a `following` of its own; its `subscribers` are told of everything after it is
-    recorded. `tell_predictions` is called in another thread; `stop` stops a robot where a rule wants it.
+    recorded. `tell_predictions` and `tell_evidence` are called in other threads; `stop` stops a robot where a
+    rule wants it.
     """
 
     def __init__(
@@ -84,6 +90,7 @@ class Collector:
         tell_predictions: TellPredictions | None = None,
         stop: StopRobot | None = None,
         worn: Worn = NOBODY,
+        tell_evidence: TellEvidence | None = None,
     ) -> None:
         self.hangs = self._hurries = False
         self.ends = ""  # what it waits for while it is left
@@ -99,24 +106,31 @@ class Collector:
         self._recorder = Recorder(self._spool, settings=RecorderSettings(batch_s=recorder.batch_s))
         self._fleet = Fleet(following or whole(recorder), self._recorder, operator, notes, worn)
         self._stop_links = StopLinks(self.network, settings.rules if stop is None else ())
+        self._evidence = EvidenceService(folder_beside(recorder.spool), self._fleet.session, tell_evidence)
         self._prediction = (
             RecordedPrediction(
-                settings, self._recorder, self._fleet.session, stop or self._stop_links.stop, tell_predictions
+                settings,
+                self._recorder,
+                self._fleet.session,
+                stop or self._stop_links.stop,
+                functools.partial(_tell_all, (self._evidence.predicted, tell_predictions)),
             )
             if settings.prediction.enabled
             else None
         )
         if self._prediction is not None:
             self._fleet.subscribers.append(self._prediction.take)
+        self._fleet.subscribers.append(self._evidence.take)
         self._fleet.subscribers.extend(subscribers)
         self._running: concurrent.futures.Future[None] | None = None
         predicting = () if self._prediction is None else self._prediction.workers
-        workers = (self.network.worker, self._recorder.worker, self._uploader.worker, *predicting)
-        self.watch = ThreadWatch(workers)
+        own = (self.network.worker, self._recorder.worker, self._uploader.worker, self._evidence.worker)
+        self.watch = ThreadWatch((*own, *predicting))
 
     def __enter__(self) -> Self:
         self._uploader.__enter__()
         self._recorder.__enter__()
+        self._evidence.__enter__()
         self.network.__enter__()
         if self._prediction is not None:
             self._prediction.__enter__()
@@ -128,6 +142,7 @@ class Collector:
         if self._prediction is not None:
             self._prediction.__exit__()
         self.network.__exit__()
+        self._evidence.__exit__()
         self._disk.shutdown()
         self._recorder.close()
         self._upload_last()
@@ -283,6 +298,12 @@ def whole(recorder: RecordingSettings) -> FollowSettings:
         resources_s=recorder.resources_s,
         journal_s=JOURNAL_S,
     )
+
+
+def _tell_all(listeners: Sequence[TellPredictions | None], news: Sequence[PredictionNews]) -> None:
+    for listener in listeners:
+        if listener is not None:
+            listener(news)
 
 
 def connect(store: StoreSettings) -> Store:

@@ -5,7 +5,7 @@ from PySide6.QtWidgets import QFrame, QHBoxLayout, QProgressBar, QPushButton, QV
 
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
-from server_gui.views.trial_words import changes, ends
+from server_gui.views.trial_words import changes, ends, so_far
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.plain import PlainLabel
 
@@ -61,7 +61,8 @@ class TrialBar(QFrame):
         self._bar.setValue(round(left_s * 10))
         whose = "" if station is self._desk.selected else f"{station.title}: "
         said = ", ".join(changes(station, trial, self._desk.shown.units))
-        set_text(self.words, f"{whose}on trial: {said}; {ends(trial)}")
+        seen = so_far(station.trial_evidence)
+        set_text(self.words, f"{whose}on trial: {said}; {ends(trial)}; {seen}")
 
     def _whose(self, *, shown: bool) -> Station | None:
         """Whose trial; where there are several, the next one when that is over."""

@@ -89,7 +89,7 @@ def test_robot_toml_names_the_bus_the_sensors_and_the_parameters(tmp_path: Path)
     assert {"gait.step_length", "left_hip.max_torque", "right_ankle.profile_velocity"} <= set(
         config["parameter"]
     )
-    assert len(config["parameter"]) == 16
+    assert len(config["parameter"]) == 22
 
 
 def test_a_second_robot_in_a_folder_is_refused_and_the_next_keeps_port_and_file(tmp_path: Path) -> None:

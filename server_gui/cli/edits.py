@@ -1,0 +1,151 @@
+"""`gwrms edits`: what each edit of a robot's parameters did to the walk, as evidence before and after it."""
+
+import argparse
+import collections
+from collections.abc import Iterator
+from typing import Any, Final
+
+import msgspec
+
+from gateway.amounts import NONE, counted
+from gateway.cli.text import say, say_json, table, warn
+from ml.store.private import private_files
+from server_gui.cli.cloud_options import parser, spool
+from server_gui.core.evidence.comparison import Measured, Word
+from server_gui.core.evidence.file import Told, folder_beside, read_all
+from server_gui.core.evidence.wording import changes, number, share
+
+EPILOG: Final = """commands
+  gwrms edits            every edit, oldest first: when, who, what from and to, what it did
+  gwrms edits show ID    one of them: every metric before and after, with its interval
+
+Evidence is found by the desk that records the robot (the window, or gwrms collect) while somebody walks
+before and after the edit; gwrms docs how-to/judge-an-edit explains the words.
+
+exit status
+  0 shown, 1 not known or not to be read, 2 wrong usage"""
+HEADER: Final = ("ID", "WHEN (UTC)", "ROBOT", "WHO", "WHAT", "STATE", "VERDICT", "STRONGEST")
+COLUMNS: Final = ("METRIC", "WORD", "BEFORE", "AFTER", "DIFFERENCE", "95 % INTERVAL", "SIZE", "UNIT")
+NOTHING: Final = "no edit is known here: one is kept once it was made while this computer recorded the robot"
+EXPLAINED: Final = """
+The difference is the edit's: without a slow drift, and at equal speed; its interval holds in 95 of 100 edits.
+The size is the difference in standard deviations of single cycles. A word needs both: a difference that is
+sure although many metrics were looked at, and one that is large enough to matter.
+"""
+
+
+def main(argv: list[str]) -> int:
+    """Run `gwrms edits`."""
+    private_files()
+    return show(argv[1:]) if argv[:1] == ["show"] else ls(argv)
+
+
+def ls(argv: list[str]) -> int:
+    """List them."""
+    made = parser("edits", "What each edit of a robot's parameters did to the walk.", EPILOG)
+    made.add_argument(
+        "--robot", action="append", default=[], metavar="NAME", help="of this robot (again: more)"
+    )
+    arguments = made.parse_args(argv)
+    found = _read(arguments)
+    if found is None:
+        return 1
+    found = [told for told in found if told.edit.robot in (arguments.robot or (told.edit.robot,))]
+    if arguments.json:
+        say_json([_fields(told) for told in found])
+    elif found:
+        say(table(HEADER, map(_row, found)))
+    else:
+        warn("edits", NOTHING)
+    return 0
+
+
+def show(argv: list[str]) -> int:
+    """Show one."""
+    made = parser("edits show", "Everything that is known of one edit.")
+    made.add_argument("id", metavar="ID", help="of gwrms edits; may be cut off where it is unique")
+    arguments = made.parse_args(argv)
+    found = _read(arguments)
+    if found is None:
+        return 1
+    chosen = [told for told in found if told.edit.id.startswith(arguments.id)]
+    if len(chosen) != 1:
+        what = counted(len(chosen), "edit begins so", "edits begin so") if chosen else NOTHING
+        warn("edits", f"{arguments.id}: {what}; gwrms edits lists them")
+        return 1
+    if arguments.json:
+        say_json(_fields(chosen[0]))
+    else:
+        say("\n".join(_told(chosen[0])) + "\n")
+    return 0
+
+
+def _read(arguments: argparse.Namespace) -> list[Told] | None:
+    folder = folder_beside(spool(arguments))
+    try:
+        return read_all(folder)
+    except OSError as error:
+        warn("edits", f"{folder} cannot be read: {error.strerror or error}")
+        return None
+
+
+def _fields(told: Told) -> dict[str, Any]:
+    fields: dict[str, Any] = msgspec.to_builtins(told)
+    return fields
+
+
+def _row(told: Told) -> tuple[str, ...]:
+    edit, evidence = told.edit, told.evidence
+    strongest = next((one for one in evidence.metrics if one.series == evidence.strongest), None)
+    return (
+        edit.id,
+        edit.utc,
+        edit.robot,
+        edit.who,
+        changes(edit),
+        str(edit.state),
+        str(evidence.word),
+        NONE if strongest is None else f"{strongest.title} {share(strongest)}",
+    )
+
+
+def _told(told: Told) -> Iterator[str]:
+    edit, evidence = told.edit, told.evidence
+    yield f"edit {edit.id} of {edit.robot}, {edit.utc}, by {edit.who}"
+    yield f"  {changes(edit)}"
+    yield f"  {edit.state}; entry {edit.n} of the robot's journal; recording {told.session or NONE}"
+    yield ""
+    before, after = evidence.cycles_before, evidence.cycles_after
+    yield f"{evidence.word}: {counted(before, 'gait cycle')} before, {after} after"
+    yield from (f"  {note}" for note in evidence.notes)
+    yield from (
+        f"  left out: {counted(count, 'cycle')}, {why}" for why, count in sorted(evidence.left_out.items())
+    )
+    yield ""
+    judged = [one for one in evidence.metrics if one.p is not None]
+    if judged:
+        yield table(COLUMNS, map(_line, sorted(judged, key=_order)), right=(2, 3, 4, 6)).rstrip()
+    few = collections.Counter(one.why for one in evidence.metrics if one.word is Word.FEW)
+    yield from (f"not enough cycles for {counted(count, 'metric')}: {why}" for why, count in few.items())
+    silent = [one for one in evidence.metrics if one.word is Word.NO_DATA]
+    if silent:
+        yield "\nno data: " + ", ".join(one.title for one in silent)
+    yield EXPLAINED.rstrip()
+
+
+def _order(one: Measured) -> float:
+    return -abs(one.size or 0.0) if one.word not in (Word.SAME, Word.FEW) else 1.0
+
+
+def _line(one: Measured) -> tuple[str, ...]:
+    interval = NONE if one.low is None else f"{number(one.low)} … {number(one.high)}"
+    return (
+        one.title,
+        str(one.word),
+        number(one.before),
+        number(one.after),
+        share(one),
+        interval,
+        NONE if one.size is None else f"{one.size:+.1f}",
+        one.unit,
+    )

@@ -1,0 +1,190 @@
+"""Edits of a robot's parameters, as its journal tells them: who, what from and to, when it was in force."""
+
+import datetime
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from enum import StrEnum
+from typing import Any, Final
+
+from msgspec import Struct
+from msgspec.structs import replace
+
+from server_gui.core.evidence.comparison import Spell
+
+Entry = Mapping[str, Any]
+
+SETTLE_NS: Final = 1_000_000_000  # after a write: what the robot does until then belongs to neither side
+BEFORE_NS: Final = 120_000_000_000  # of walking before an edit
+AFTER_NS: Final = 120_000_000_000  # with the new values
+BACK_NS: Final = 60_000_000_000  # after they were taken back
+ID: Final = 10  # digits of the hash of the journal's entry
+
+
+class State(StrEnum):
+    """What became of an edit."""
+
+    ASKED = "NOT KNOWN how it ended"
+    ON_TRIAL = "on trial"
+    KEPT = "kept"
+    REVERTED = "reverted"
+    FAILED = "failed"  # it was never in force as a whole
+
+
+class Change(Struct, frozen=True):
+    """One parameter; SI."""
+
+    name: str
+    old: float | None
+    new: float
+
+
+class Edit(Struct, frozen=True):
+    """One write of one or more parameters; stamps are on the robot's monotonic clock, of `boot_id`.
+
+    `id` is the beginning of the hash of the entry in the robot's journal that asked for it (`n` is its number
+    there). New values were in force from `in_force_ns` until `ended_ns`, as far as either is known.
+    """
+
+    id: str
+    robot: str
+    n: int
+    write: int
+    boot_id: str
+    who: str
+    utc_ns: int
+    changes: tuple[Change, ...]
+    trial_s: float | None
+    began_ns: int
+    state: State = State.ASKED
+    in_force_ns: int | None = None
+    ended_ns: int | None = None
+
+    @property
+    def utc(self) -> str:
+        """When, as ISO 8601, UTC."""
+        return datetime.datetime.fromtimestamp(self.utc_ns // 10**9, datetime.UTC).strftime(
+            "%Y-%m-%dT%H:%M:%SZ"
+        )
+
+    @property
+    def components(self) -> frozenset[str]:
+        """What it is of."""
+        return frozenset(change.name.partition(".")[0] for change in self.changes)
+
+    @property
+    def names(self) -> str:
+        """Its parameters."""
+        return ", ".join(change.name for change in self.changes)
+
+
+class JournalEdits:
+    """The edits of one robot, from its journal's entries as they come; oldest first in `all`."""
+
+    def __init__(self, robot: str) -> None:
+        self.all: list[Edit] = []
+        self._robot = robot
+
+    def take(self, entries: Iterable[Entry]) -> None:
+        """Take new entries, oldest first."""
+        for entry in entries:
+            self._take(entry, str(entry.get("what")))
+
+    def forget(self, before_ns: int) -> None:
+        """Forget edits that were over long ago."""
+        self.all = [edit for edit in self.all if (until_ns := due_ns(edit)) is None or until_ns >= before_ns]
+
+    def _take(self, entry: Entry, what: str) -> None:
+        if what == "write":
+            self.all.append(_begun(self._robot, entry))
+            return
+        outcome = _OUTCOMES.get(what)
+        places = [place for place, edit in enumerate(self.all) if edit.write == entry.get("write")]
+        if outcome is None or not places:
+            return
+        edit, stamp_ns = self.all[places[-1]], int(entry["monotonic_ns"])
+        in_force_ns = edit.in_force_ns
+        if outcome in (State.ON_TRIAL, State.KEPT) and in_force_ns is None:
+            in_force_ns = stamp_ns
+        ended_ns = stamp_ns if outcome in (State.REVERTED, State.FAILED) else edit.ended_ns
+        self.all[places[-1]] = replace(edit, state=outcome, in_force_ns=in_force_ns, ended_ns=ended_ns)
+
+
+_OUTCOMES: Final[Mapping[str, State]] = {
+    "write done": State.KEPT,
+    "trial begun": State.ON_TRIAL,
+    "trial confirmed": State.KEPT,
+    "taken back": State.REVERTED,
+    "claimed by the stop": State.REVERTED,
+    "write taken back": State.FAILED,
+    "ROLL-BACK FAILED": State.FAILED,
+}
+
+
+def _begun(robot: str, entry: Entry) -> Edit:
+    before, after = _numbers(entry.get("before")), _numbers(entry.get("after"))
+    trial_s = entry.get("trial_s")
+    return Edit(
+        id=str(entry["hash"])[:ID],
+        robot=robot,
+        n=int(entry["n"]),
+        write=int(entry.get("write") or 0),
+        boot_id=str(entry.get("boot_id")),
+        who=str(entry.get("who")),
+        utc_ns=int(entry.get("utc_ns") or 0),
+        changes=tuple(Change(name, before.get(name), new) for name, new in after.items()),
+        trial_s=float(trial_s) if isinstance(trial_s, int | float) else None,
+        began_ns=int(entry["monotonic_ns"]),
+    )
+
+
+def _numbers(found: object) -> dict[str, float]:
+    known = found.items() if isinstance(found, Mapping) else ()
+    return {str(name): float(value) for name, value in known if isinstance(value, int | float)}
+
+
+def due_ns(edit: Edit) -> int | None:
+    """Return until when there may be more to be seen of an edit; None while that is open."""
+    if edit.state is State.FAILED or edit.in_force_ns is None:
+        return edit.ended_ns
+    if edit.ended_ns is not None:
+        return edit.ended_ns + BACK_NS
+    return None if edit.state is State.ON_TRIAL else edit.in_force_ns + AFTER_NS
+
+
+def spell(edit: Edit, edits: Sequence[Edit]) -> tuple[Spell, tuple[str, ...]]:
+    """Return when old and new values were in force undisturbed by the other `edits`; and what has disturbed.
+
+    Once an edit was taken back, the walk goes on with the old values: that is another stretch of before,
+    which tells a drift from an effect better than anything.
+    """
+    others = [(at_ns, other) for other in edits if other.id != edit.id for at_ns in _instants(other)]
+    began_ns, in_force_ns = edit.began_ns, edit.in_force_ns
+    earlier = [at_ns for at_ns, _ in others if at_ns <= began_ns]
+    since_ns = max([began_ns - BEFORE_NS, *(at_ns + SETTLE_NS for at_ns in earlier)])
+    before = [(since_ns, began_ns)]
+    if in_force_ns is None:
+        return Spell(before, ()), ()
+    later = [at_ns for at_ns, _ in others if at_ns > began_ns]
+    ends = [in_force_ns + AFTER_NS, *later, *([edit.ended_ns] if edit.ended_ns is not None else [])]
+    after = [(in_force_ns + SETTLE_NS, min(ends))]
+    if edit.ended_ns is not None and not any(at_ns <= edit.ended_ns for at_ns in later):
+        before.append((edit.ended_ns + SETTLE_NS, min([edit.ended_ns + BACK_NS, *later])))
+    return Spell(before, after), tuple(_disturbances(edit, others, since_ns, after[0][1]))
+
+
+def _instants(edit: Edit) -> Iterator[int]:
+    """When it changed what the robot does."""
+    yield edit.began_ns if edit.in_force_ns is None else edit.in_force_ns
+    if edit.ended_ns is not None:
+        yield edit.ended_ns
+
+
+def _disturbances(
+    edit: Edit, others: Sequence[tuple[int, Edit]], since_ns: int, until_ns: int
+) -> Iterator[str]:
+    told = set()
+    for at_ns, other in others:
+        if since_ns - SETTLE_NS <= at_ns <= until_ns and other.id not in told:
+            told.add(other.id)
+            side = "before" if at_ns <= edit.began_ns else "after"
+            who = f"{other.id}, {other.names}"
+            yield f"another edit at {other.utc} ({who}) cuts short what is known of {side}"

@@ -1,0 +1,168 @@
+"""One robot's edits and gait cycles, followed live: what each edit has done so far, and in the end."""
+
+import collections
+from collections.abc import Iterator, Mapping
+from typing import Any, Final
+
+from msgspec.structs import replace
+
+from gateway.wire.bus import BusInfo
+from gateway.wire.robot import Description
+from server_gui.core.evidence.comparison import compare
+from server_gui.core.evidence.curves import curves, told_joints
+from server_gui.core.evidence.cycles import ENABLED, STATE, Cycle, CycleCutter
+from server_gui.core.evidence.edits import (
+    AFTER_NS,
+    BACK_NS,
+    BEFORE_NS,
+    Edit,
+    JournalEdits,
+    State,
+    due_ns,
+    spell,
+)
+from server_gui.core.evidence.file import Told
+from server_gui.core.follow.events import (
+    BusesSeen,
+    Described,
+    Event,
+    Journalled,
+    Looked,
+    Resources,
+    Telemetry,
+)
+from server_gui.core.recording.journal_tail import news
+from server_gui.core.recording.rows import JournalHead
+
+KEPT_NS: Final = BEFORE_NS + AFTER_NS + BACK_NS  # of cycles
+LATE_NS: Final = 10_000_000_000  # after which the journal has told everything of an instant
+JOINT: Final = "joint"  # the kind of component
+
+
+class RobotEvidence:
+    """Takes what one robot's feed tells, in order; `look` gives what is new about its edits.
+
+    Only edits that were begun while it was followed: of those before nothing was seen.
+    """
+
+    def __init__(self, robot: str) -> None:
+        self.robot = robot
+        self.cycles: collections.deque[Cycle] = collections.deque()
+        self._cutter = CycleCutter()
+        self._edits = JournalEdits(robot)
+        self._boot_id: str | None = None
+        self._joints: tuple[str, ...] = ()
+        self._head: JournalHead | None = None
+        self._first_ns: int | None = None  # the first row of this boot
+        self._newest_ns = 0
+        self._seen: dict[str, tuple[int, Edit]] = {}  # edits: at how many cycles they were looked at, and how
+        self._cut = 0
+        self._over: set[str] = set()
+
+    def take(self, event: Event) -> list[Told]:
+        """Take one fact; what can become no more where it ends something."""
+        match event:
+            case Telemetry(batch=batch):
+                self._rows(list(batch.stamps_ns), batch.columns)
+            case Journalled():
+                self._journal(event.journal.entries)
+            case Looked():
+                states = event.quality.quality.items()
+                self._cutter.distrust(frozenset(name for name, one in states if one.get("state") == "fault"))
+            case Resources():
+                self._cutter.tell("cpu", event.snapshot.cpu.percent)
+            case BusesSeen():
+                self._cutter.tell("bus_load", _load(event.buses))
+            case Described():
+                return self._described(event.description)
+        return []
+
+    def label(self, stamp_ns: int, activity: str) -> None:
+        """Take what a model says that the wearer does at an instant."""
+        self._cutter.label(stamp_ns, activity)
+
+    def look(self) -> list[Told]:
+        """Return the edits of which something new is known since the last look."""
+        return [told for edit in self._open() if (told := self._look(edit)) is not None]
+
+    def end(self) -> list[Told]:
+        """Return what is known of the edits that were still followed; nothing more will come."""
+        told = [self._told(edit, is_final=True) for edit in self._open()]
+        self._over |= {one.edit.id for one in told}
+        return told
+
+    # --- inside
+
+    def _told(self, edit: Edit, *, is_final: bool) -> Told:
+        """What an edit has done, as far as the cycles until now tell."""
+        windows, notes = spell(edit, self._ours())
+        edited = [joint for joint in self._joints if joint in edit.components]
+        found = compare(self.cycles, windows, self._joints, edited)
+        drawn = curves(self.cycles, windows, told_joints(found, edited))
+        return Told(edit, replace(found, notes=found.notes + notes), is_final, curves=drawn)
+
+    def _rows(self, stamps_ns: list[int], columns: Mapping[str, Any]) -> None:
+        if not stamps_ns:
+            return
+        if self._first_ns is None:
+            self._first_ns = stamps_ns[0]
+        self._newest_ns = stamps_ns[-1]
+        found = self._cutter.take(stamps_ns, columns)
+        self._cut += len(found)
+        self.cycles.extend(found)
+        while self.cycles and self.cycles[0].ended_ns < self._newest_ns - KEPT_NS:
+            self.cycles.popleft()
+
+    def _journal(self, entries: list[dict[str, Any]]) -> None:
+        found = news(entries, self._head)
+        if found.entries:
+            newest = found.entries[-1]
+            self._head = JournalHead(newest["n"], newest["hash"])
+            self._edits.take(entry for entry in found.entries if entry.get("boot_id") == self._boot_id)
+            self._edits.forget(self._newest_ns - KEPT_NS)
+
+    def _described(self, description: Description) -> list[Told]:
+        ended: list[Told] = []
+        if self._boot_id not in (None, description.boot_id):
+            ended = self.end()
+            self.cycles.clear()
+            self._cutter.restart()
+            self._edits = JournalEdits(self.robot)
+            self._first_ns, self._newest_ns = None, 0
+        if self._boot_id != description.boot_id:
+            self._head = None
+        self._boot_id = description.boot_id
+        self._joints = tuple(part.name for part in description.components if part.kind == JOINT)
+        self._cutter.enabled = {
+            channel.name: frozenset(float(number) for number, word in channel.enum.items() if word == ENABLED)
+            for channel in description.channels
+            if channel.enum and channel.quantity == STATE
+        }
+        return ended
+
+    def _ours(self) -> list[Edit]:
+        return [
+            edit for edit in self._edits.all if edit.state is not State.ASKED or edit.in_force_ns is not None
+        ]
+
+    def _open(self) -> Iterator[Edit]:
+        first_ns = self._first_ns
+        for edit in self._ours():
+            followed = first_ns is not None and edit.began_ns >= first_ns
+            if followed and edit.state is not State.FAILED and edit.id not in self._over:
+                yield edit
+
+    def _look(self, edit: Edit) -> Told | None:
+        until_ns = due_ns(edit)
+        is_final = until_ns is not None and self._newest_ns > until_ns + LATE_NS
+        if self._seen.get(edit.id) == (self._cut, edit) and not is_final:
+            return None
+        self._seen[edit.id] = self._cut, edit
+        if is_final:
+            self._over.add(edit.id)
+        return self._told(edit, is_final=is_final)
+
+
+def _load(buses: tuple[BusInfo, ...] | None) -> float | None:
+    """The busiest bus's."""
+    return max((bus.load_percent for bus in buses or () if bus.load_percent is not None), default=None)

@@ -1,0 +1,154 @@
+"""Edits: what each change of a parameter did to the walk, in words and as strides before and after."""
+
+from typing import Final
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QListWidget, QListWidgetItem, QVBoxLayout, QWidget
+
+from gateway.amounts import counted
+from server_gui.core.desk.desk import Desk
+from server_gui.core.evidence.comparison import Measured, Word
+from server_gui.core.evidence.cycles import DRAWN
+from server_gui.core.evidence.file import Told
+from server_gui.core.evidence.wording import changes, number, share
+from server_gui.views.theme import Theme
+from server_gui.views.widgets.card import set_text, set_tone
+from server_gui.views.widgets.plain import PlainLabel
+from server_gui.views.widgets.stride_curves import StrideCurves
+
+LIST: Final = 280  # wide, at text of 100 %
+MOST: Final = 8  # metrics that are told one by one
+UNIT: Final = {"position": "rad", "following_error": "rad", "current": "A", "torque": "N·m"}
+TONES: Final = {Word.BETTER: "good", Word.WORSE: "bad", Word.MIXED: "bad"}
+NONE: Final = (
+    "No edit is known yet. Change a parameter while somebody walks: what that does to tracking, current, "
+    "torque and gait is judged here, stride by stride, before and after."
+)
+COLOURS: Final = "grey before, in colour after; the bands are one standard deviation of the strides"
+
+
+class Edits(QWidget):
+    """Every edit of the robot that is looked at, newest first, and what the chosen one did."""
+
+    def __init__(self, desk: Desk, theme: Theme) -> None:
+        super().__init__()
+        self._desk = desk
+        self._theme = theme
+        self._shown: list[Told] = []
+        self._drawn: Told | None = None
+        self.setAccessibleName("Edits")
+        self.list = QListWidget()
+        self.list.setObjectName("framed")
+        self.list.setAccessibleName("Edits, newest first")
+        self.list.setWordWrap(True)
+        self.list.currentRowChanged.connect(lambda _row: self._choose())
+        self.verdict, self.words, self._legend = PlainLabel(), PlainLabel(NONE), PlainLabel(COLOURS)
+        self.verdict.setObjectName("title")
+        self._legend.setObjectName("dim")
+        for label in (self.verdict, self.words, self._legend):
+            label.setWordWrap(True)
+        self.words.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self.curves: dict[str, StrideCurves] = {}
+        self._grid = QGridLayout()
+        right = QVBoxLayout()
+        right.addWidget(self.verdict)
+        right.addWidget(self.words)
+        right.addLayout(self._grid, 1)
+        right.addWidget(self._legend)
+        right.addStretch()
+        row = QHBoxLayout(self)
+        row.addWidget(self.list)
+        row.addLayout(right, 1)
+        self._scale()
+        theme.scaled.connect(self._scale)
+
+    def refresh(self) -> None:
+        """Show what is known now."""
+        station = self._desk.selected
+        known = [] if station is None else sorted(station.judged.values(), key=lambda one: -one.edit.utc_ns)
+        if known == self._shown:
+            return
+        chosen = self._chosen
+        self._shown = known
+        self.list.blockSignals(True)
+        self.list.clear()
+        for told in known:
+            self.list.addItem(QListWidgetItem(_line(told)))
+        places = [place for place, told in enumerate(known) if chosen and told.edit.id == chosen.edit.id]
+        # Who looks at the newest one wants to see the next one, too.
+        was_newest = self._drawn is None or not places
+        self.list.setCurrentRow(0 if was_newest and known else places[0] if places else -1)
+        self.list.blockSignals(False)
+        self._choose()
+
+    @property
+    def _chosen(self) -> Told | None:
+        row = self.list.currentRow()
+        return self._shown[row] if 0 <= row < len(self._shown) else None
+
+    def _choose(self) -> None:
+        told = self._drawn = self._chosen
+        self._legend.setVisible(bool(told and told.curves))
+        self.verdict.setVisible(told is not None)
+        if told is None:
+            set_text(self.words, NONE)
+        else:
+            set_text(self.verdict, _verdict(told))
+            set_tone(self.verdict, TONES.get(told.evidence.word, ""))
+            set_text(self.words, "\n".join(_said(told)))
+        self._draw(told)
+
+    def _draw(self, told: Told | None) -> None:
+        found = {} if told is None else {one.channel: one for one in told.curves}
+        joints = list(dict.fromkeys(channel.rpartition(".")[0] for channel in found))
+        for channel in self.curves.keys() - found.keys():
+            gone = self.curves.pop(channel)
+            self._grid.removeWidget(gone)
+            gone.deleteLater()
+        for channel, one in found.items():
+            joint, _, quantity = channel.rpartition(".")
+            if channel not in self.curves:
+                self.curves[channel] = StrideCurves(self._theme)
+            widget = self.curves[channel]
+            self._grid.addWidget(widget, joints.index(joint), DRAWN.index(quantity))
+            widget.show_curves(one, self._desk.shown.units.unit(quantity, UNIT[quantity]))
+
+    def _scale(self) -> None:
+        self.list.setFixedWidth(self._theme.px(LIST))
+
+
+def _line(told: Told) -> str:
+    word = told.evidence.word if told.is_final else f"{told.evidence.word} so far"
+    return f"{told.edit.utc[11:19]}  {changes(told.edit)}\n{told.edit.state} · {word}"
+
+
+def _verdict(told: Told) -> str:
+    evidence = told.evidence
+    strides = f"{counted(evidence.cycles_before, 'gait cycle')} before, {evidence.cycles_after} after"
+    so_far = "" if told.is_final else " so far"
+    return f"{changes(told.edit)}: {evidence.word}{so_far} ({strides})"
+
+
+def _said(told: Told) -> list[str]:
+    evidence = told.evidence
+    differing = [one for one in evidence.metrics if one.word in (Word.BETTER, Word.WORSE, Word.CHANGED)]
+    strong = sorted(differing, key=lambda one: -abs(one.size or 0.0))
+    lines = [_metric(one) for one in strong[:MOST]]
+    if len(strong) > MOST:
+        lines.append(f"and {len(strong) - MOST} more: gwrms edits show {told.edit.id}")
+    same = sum(one.word is Word.SAME for one in evidence.metrics)
+    if same:
+        lines.append(f"No difference seen in {counted(same, 'metric')}.")
+    few = sum(one.word is Word.FEW for one in evidence.metrics)
+    if few:
+        lines.append(f"Not enough cycles for {counted(few, 'metric')}.")
+    lines += [f"{note[0].upper()}{note[1:]}." for note in evidence.notes]
+    lines += [f"Left out: {counted(count, 'cycle')}, {why}." for why, count in evidence.left_out.items()]
+    return lines
+
+
+def _metric(one: Measured) -> str:
+    name = one.title.replace("_", " ")
+    interval = f"{number(one.low)} to {number(one.high)} {one.unit}".rstrip()
+    means = f"{number(one.before)} → {number(one.after)}"
+    return f"{name} {one.word}: {share(one)} (95 % interval {interval}); means {means}"

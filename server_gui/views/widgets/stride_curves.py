@@ -1,0 +1,97 @@
+"""The mean stride before and after an edit laid over each other, each in a band of one standard deviation."""
+
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt
+from PySide6.QtGui import QPainter, QPaintEvent, QPen, QPolygonF
+from PySide6.QtWidgets import QSizePolicy, QWidget
+
+from gateway.units import Unit
+from server_gui.core.evidence.curves import Curves, Side
+from server_gui.views.theme import Theme
+
+Floats = npt.NDArray[np.float64]
+
+BAND: Final = 60  # of 255: how dense one is
+MARGIN: Final = 4
+
+
+class StrideCurves(QWidget):
+    """One channel over the stride: grey before, in the accent's colour after."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self._curves: Curves | None = None
+        self._unit = Unit("", "")
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+        self.setMinimumSize(120, 80)
+        theme.changed.connect(self.update)
+
+    def sizeHint(self) -> QSize:
+        return QSize(180, 110)
+
+    @property
+    def title(self) -> str:
+        """What it is of, and in which unit."""
+        name = "" if self._curves is None else self._curves.channel.replace("_", " ").replace(".", " ")
+        return f"{name} ({self._unit.symbol})" if self._unit.symbol else name
+
+    def show_curves(self, curves: Curves, unit: Unit) -> None:
+        """Draw this."""
+        self._curves, self._unit = curves, unit
+        low, high = self._range(curves)
+        counts = (0 if side is None else side.cycles for side in (curves.before, curves.after))
+        self.setAccessibleName(self.title)
+        before, after = counts
+        self.setAccessibleDescription(
+            f"{before} strides before and {after} after, from {unit.text(low)} to {unit.text(high)}"
+        )
+        self.update()
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setFont(self._theme.text_font(0.85))
+        line = painter.fontMetrics().height()
+        area = QRectF(self.rect()).adjusted(MARGIN, line + MARGIN, -MARGIN, -MARGIN)
+        painter.setPen(self._theme.colour("border"))
+        painter.drawRect(area)
+        if self._curves is not None:
+            low, high = self._range(self._curves)
+            for side, colour in ((self._curves.before, "dim"), (self._curves.after, "accent")):
+                if side is not None:
+                    self._draw(painter, area, side, colour, low, high)
+            painter.setPen(self._theme.colour("text"))
+            painter.drawText(QRectF(MARGIN, 0, self.width(), line), Qt.AlignmentFlag.AlignLeft, self.title)
+            painter.setPen(self._theme.colour("dim"))
+            painter.drawText(area, Qt.AlignmentFlag.AlignTop, self._unit.text(high))
+            painter.drawText(area, Qt.AlignmentFlag.AlignBottom, self._unit.text(low))
+        painter.end()
+
+    def _draw(self, painter: QPainter, area: QRectF, side: Side, name: str, low: float, high: float) -> None:
+        mean, deviation = np.array(side.mean), np.array(side.deviation)
+
+        def line(values: Floats) -> list[QPointF]:
+            across = np.linspace(area.left(), area.right(), len(values))
+            up = area.bottom() - (values - low) / ((high - low) or 1.0) * area.height()
+            return [QPointF(x, y) for x, y in zip(across.tolist(), up.tolist(), strict=True)]
+
+        colour = self._theme.colour(name)
+        band = self._theme.colour(name)
+        band.setAlpha(BAND)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(band)
+        painter.drawPolygon(QPolygonF([*line(mean + deviation), *reversed(line(mean - deviation))]))
+        painter.setBrush(Qt.BrushStyle.NoBrush)
+        painter.setPen(QPen(colour, 1.5))
+        painter.drawPolyline(QPolygonF(line(mean)))
+
+    def _range(self, curves: Curves) -> tuple[float, float]:
+        sides = [side for side in (curves.before, curves.after) if side is not None]
+        ends = [
+            np.array(side.mean) + sign * np.array(side.deviation) for side in sides for sign in (-1.0, 1.0)
+        ]
+        return (float(np.min(ends)), float(np.max(ends))) if ends else (0.0, 1.0)

@@ -1,0 +1,69 @@
+"""The page of edits, and a trial's bar: what an edit did, while it counts down and afterwards."""
+
+import time
+
+import pytest
+from msgspec.structs import replace
+
+from server_gui.core.evidence.comparison import Word, compare
+from server_gui.core.evidence.curves import Curves, Side
+from server_gui.core.evidence.file import Told
+from server_gui.core.tuning.writing import Trial
+from server_gui.views.main_window import MainWindow
+from tests.gui.fakes import Bench
+from tests.unit.evidence.synthetic import cycles, spell
+from tests.unit.evidence.test_comparison import ERROR, times
+from tests.unit.evidence.test_file import told
+
+
+def worse(write: int = 1, *, is_final: bool = True) -> Told:
+    """An edit after which a knee tracks by a fifth worse."""
+    before, after = Side((0.1,) * 101, (0.01,) * 101, 40), Side((0.2,) * 101, (0.01,) * 101, 41)
+    curves = tuple(Curves(f"left_knee.{name}", before, after) for name in ("position", "following_error"))
+    evidence = compare(cycles(times(ERROR, 1.2)), spell(), ["left_knee"], ["left_knee"])
+    return replace(told(write), evidence=evidence, curves=curves, is_final=is_final)
+
+
+def test_the_newest_edit_is_shown_with_its_word_and_its_strides(bench: Bench, window: MainWindow) -> None:
+    window.tabs.setCurrentIndex(window._views.index(window.edits))
+    window.refresh()
+    assert "No edit is known yet" in window.edits.words.text()
+    bench.station.take_evidence(worse())
+    window.edits.refresh()
+    assert window.edits.list.count() == 1
+    assert "worse (" in window.edits.verdict.text()
+    assert "left knee tracking error RMS worse: +19.2 %" in window.edits.words.text()
+    assert set(window.edits.curves) == {"left_knee.position", "left_knee.following_error"}
+    described = window.edits.curves["left_knee.position"].accessibleDescription()
+    assert described.startswith("40 strides before and 41 after, from ")
+
+
+def test_who_looks_at_an_older_edit_keeps_looking_at_it(bench: Bench, window: MainWindow) -> None:
+    for write in (1, 2):
+        bench.station.take_evidence(worse(write))
+    window.edits.refresh()
+    assert window.edits.list.currentRow() == 0
+    window.edits.list.setCurrentRow(1)
+    bench.station.take_evidence(told(3))
+    window.edits.refresh()
+    assert window.edits.list.currentRow() == 2
+    assert window.edits.list.count() == 3
+
+
+@pytest.mark.parametrize("word", [Word.FEW, Word.WORSE, None])
+def test_a_trial_that_counts_down_says_what_it_does_so_far(
+    bench: Bench, window: MainWindow, word: Word | None
+) -> None:
+    said = {
+        Word.FEW: "not enough to judge it",
+        Word.WORSE: "so far worse (left knee tracking",
+        None: "once somebody",
+    }
+    bench.station.writing.trial = Trial(
+        1, {"gait.step_length": 0.4}, {"gait.step_length": 0.3}, time.monotonic_ns() + 10**10
+    )
+    if word is not None:
+        known = worse(is_final=False)
+        bench.station.take_evidence(replace(known, evidence=replace(known.evidence, word=word)))
+    window.trial.refresh()
+    assert said[word] in window.trial.words.text()

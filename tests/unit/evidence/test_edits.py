@@ -1,0 +1,134 @@
+"""Edits as a journal tells them, and which stretches of a walk are before and after them."""
+
+from pathlib import Path
+from typing import Any
+
+from server_gui.core.evidence.edits import (
+    AFTER_NS,
+    BACK_NS,
+    BEFORE_NS,
+    SETTLE_NS,
+    Change,
+    JournalEdits,
+    State,
+    due_ns,
+    spell,
+)
+from tests.support.journals import RobotsJournal
+from tests.unit.evidence.walks import entry
+
+SECOND = 1_000_000_000
+NAME = "left_knee.max_torque"
+
+
+def journal(*told: tuple[int, str, int]) -> JournalEdits:
+    """Return what entries of (second, what, write) make."""
+    edits = JournalEdits("exo-01")
+    edits.take(_entries(*told))
+    return edits
+
+
+def _entries(*told: tuple[int, str, int]) -> list[dict[str, Any]]:
+    return [
+        entry(n, at_s * SECOND, what, write, {NAME: 60.0}, {NAME: 80.0}, 20.0 if "trial" in what else None)
+        for n, (at_s, what, write) in enumerate(told, 1)
+    ]
+
+
+def test_an_edit_has_who_what_and_when() -> None:
+    (edit,) = journal((200, "write", 7), (201, "write done", 7)).all
+    assert edit.changes == (Change(NAME, 80.0, 60.0),)
+    assert (edit.who, edit.state, edit.robot, edit.write) == ("anna", State.KEPT, "exo-01", 7)
+    assert (edit.began_ns, edit.in_force_ns, edit.ended_ns) == (200 * SECOND, 201 * SECOND, None)
+    assert edit.utc == "1970-01-01T00:03:20Z"
+    assert edit.id == _entries((200, "write", 7))[0]["hash"][:10]
+
+
+def test_a_trial_is_kept_or_goes_back() -> None:
+    on = journal((200, "write", 1), (201, "trial begun", 1))
+    assert on.all[0].state is State.ON_TRIAL
+    assert due_ns(on.all[0]) is None
+    kept = journal((200, "write", 1), (201, "trial begun", 1), (220, "trial confirmed", 1)).all[0]
+    assert kept.state is State.KEPT
+    assert kept.in_force_ns == 201 * SECOND
+    assert due_ns(kept) == 201 * SECOND + AFTER_NS
+    back = journal((200, "write", 1), (201, "trial begun", 1), (220, "taken back", 1)).all[0]
+    assert (back.state, back.ended_ns) == (State.REVERTED, 220 * SECOND)
+    assert due_ns(back) == 220 * SECOND + BACK_NS
+
+
+def test_what_was_refused_or_failed_is_no_edit_in_force() -> None:
+    assert journal((200, "write refused", 1)).all == []
+    failed = journal((200, "write", 1), (201, "write taken back", 1)).all[0]
+    assert failed.state is State.FAILED
+    assert spell(failed, [failed])[0].after == ()
+
+
+def test_a_trial_that_could_not_be_taken_back_yet_goes_on() -> None:
+    told = ((200, "write", 1), (201, "trial begun", 1), (220, "NOT TAKEN BACK yet", 1))
+    assert journal(*told).all[0].state is State.ON_TRIAL
+
+
+def test_what_follows_the_write_at_once_is_on_neither_side() -> None:
+    edits = journal((200, "write", 1), (201, "write done", 1)).all
+    windows, notes = spell(edits[0], edits)
+    assert windows.before == [(200 * SECOND - BEFORE_NS, 200 * SECOND)]
+    assert windows.after == [(201 * SECOND + SETTLE_NS, 201 * SECOND + AFTER_NS)]
+    assert notes == ()
+
+
+def test_a_walk_with_the_old_values_again_counts_as_before() -> None:
+    edits = journal((200, "write", 1), (201, "trial begun", 1), (231, "taken back", 1)).all
+    windows, _ = spell(edits[0], edits)
+    assert windows.after == [(202 * SECOND, 231 * SECOND)]
+    assert windows.before[1] == (232 * SECOND, 231 * SECOND + BACK_NS)
+
+
+def test_two_edits_that_overlap_say_so_and_share_nothing() -> None:
+    edits = journal(
+        (200, "write", 1),
+        (201, "trial begun", 1),
+        (220, "write", 2),
+        (221, "write done", 2),
+        (231, "taken back", 1),
+    ).all
+    first, notes = spell(edits[0], edits)
+    assert first.after == [(202 * SECOND, 221 * SECOND)]
+    assert len(first.before) == 1  # what came back is not what was before
+    assert notes == (
+        f"another edit at {edits[1].utc} ({edits[1].id}, {NAME}) cuts short what is known of after",
+    )
+    second, notes = spell(edits[1], edits)
+    assert second.before == [(202 * SECOND, 220 * SECOND)]
+    assert second.after == [(222 * SECOND, 231 * SECOND)]
+    assert "of before" in notes[0]
+
+
+def test_a_replayed_tail_changes_nothing() -> None:
+    """The same write number of another journal's entry is another edit."""
+    told = ((200, "write", 1), (201, "write done", 1), (300, "write", 1), (301, "write done", 1))
+    assert [edit.in_force_ns for edit in journal(*told).all] == [201 * SECOND, 301 * SECOND]
+
+
+def test_edits_that_are_over_are_forgotten_and_no_trial_is() -> None:
+    edits = journal((100, "write", 1), (101, "write done", 1), (200, "write", 2), (201, "trial begun", 2))
+    edits.forget(900 * SECOND)
+    assert [edit.write for edit in edits.all] == [2]
+
+
+def test_the_robots_own_journal_is_understood(tmp_path: Path) -> None:
+    journal = RobotsJournal(tmp_path)
+    kept = journal.written({NAME: 80.0}, {NAME: 60.0})
+    trial = journal.written({NAME: 60.0}, {NAME: 50.0}, "trial begun")
+    journal.say("taken back", write=trial, outcome={NAME: "taken back"}, reason="its time is over")
+    edits = JournalEdits("exo-01")
+    edits.take(journal.told().journal.entries)
+    journal.close()
+    assert [(edit.write, edit.state, edit.trial_s) for edit in edits.all] == [
+        (kept, State.KEPT, None),
+        (trial, State.REVERTED, 20.0),
+    ]
+    assert [edit.boot_id for edit in edits.all] == ["boot-1", "boot-1"]
+    assert edits.all[1].ended_ns is not None
+    assert edits.all[1].in_force_ns is not None
+    assert edits.all[0].began_ns < edits.all[1].began_ns < edits.all[1].in_force_ns < edits.all[1].ended_ns

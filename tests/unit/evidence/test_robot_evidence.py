@@ -1,0 +1,141 @@
+"""A simulated walk in which a gain is made worse, followed as a desk follows a robot."""
+
+import dataclasses
+from collections.abc import Callable, Iterable, Sequence
+
+import pytest
+from msgspec.structs import replace
+
+from gateway.wire.control import JournalEntries
+from server_gui.core.evidence.comparison import Word
+from server_gui.core.evidence.edits import State
+from server_gui.core.evidence.file import Told
+from server_gui.core.evidence.robot_evidence import RobotEvidence
+from server_gui.core.follow.events import Described, Event, Journalled, Telemetry, replaced
+from tests.support.desk import described
+from tests.unit.evidence.walks import GAIN, Edit, entry, walk
+
+WORSE = Edit(22.0, f"left_knee.{GAIN}", 2200.0)
+DIFFER = (Word.BETTER, Word.WORSE, Word.CHANGED)
+SECOND = 1_000_000_000
+
+
+@pytest.fixture(scope="module")
+def events() -> list[Event]:
+    """What the robot's feed tells: 44 s of walking, left to themselves but for one edit."""
+    return list(walk(44.0, seed=7, person=2, edits=[WORSE]))
+
+
+def followed(events: Iterable[Event], robot: RobotEvidence | None = None) -> dict[int, Told]:
+    """Return what is known in the end, by write."""
+    robot = robot or RobotEvidence("exo-01")
+    told = [one for event in events for one in robot.take(event)]
+    return {one.edit.write: one for one in (*told, *robot.end())}
+
+
+def words(told: Told) -> dict[str, Word]:
+    return {one.series: one.word for one in told.evidence.metrics}
+
+
+def changed(events: Sequence[Event], change: Callable[[Telemetry], Event | None]) -> list[Event]:
+    """The same, with other telemetry; None: it never came."""
+    made = [change(event) if isinstance(event, Telemetry) else event for event in events]
+    return [event for event in made if event is not None]
+
+
+def test_a_worse_gain_is_seen_at_its_joint_and_at_no_other(events: list[Event]) -> None:
+    worse = followed(events)[WORSE.write]
+    assert words(worse)["left_knee.error_rms"] is Word.WORSE
+    assert [one for one, word in words(worse).items() if word in DIFFER and "left_knee" not in one] == []
+    assert worse.evidence.strongest.startswith("left_knee.")
+    assert worse.edit.state is State.KEPT
+    assert worse.evidence.notes == ()
+
+
+def test_evidence_grows_while_a_trial_counts_down(events: list[Event]) -> None:
+    robot, seen = RobotEvidence("exo-01"), []
+    for number, event in enumerate(events):
+        robot.take(event)
+        seen += robot.look() if number % 20 == 0 else []
+    of_gain = [told for told in seen if told.edit.write == WORSE.write]
+    assert of_gain[0].evidence.word is Word.FEW
+    assert of_gain[-1].evidence.word is Word.WORSE
+    assert not any(told.is_final for told in of_gain)
+    counts = [told.evidence.cycles_after for told in of_gain]
+    assert counts == sorted(counts)
+    assert robot.look() == []  # nothing new has come
+
+
+def test_a_link_that_is_lost_in_the_middle_costs_the_cycles_it_has_cut(events: list[Event]) -> None:
+    whole = followed(events)[WORSE.write].evidence
+    lost = changed(events, lambda one: one if not 30e9 < one.batch.stamps_ns[0] < 32e9 else None)
+    cut = followed(lost)[WORSE.write].evidence
+    assert whole.cycles_after - 12 <= cut.cycles_after < whole.cycles_after
+    assert cut.word is Word.WORSE
+
+
+def test_a_drive_that_is_not_enabled_is_left_out_and_counted(events: list[Event]) -> None:
+    def disabled(one: Telemetry) -> Telemetry:
+        columns = one.batch.columns | {"left_knee.state": [6.0] * len(one.batch.stamps_ns)}
+        return replaced(one, one.batch.stamps_ns, columns)
+
+    evidence = followed(changed(events, disabled))[WORSE.write].evidence
+    found = {one.series: one for one in evidence.metrics}
+    assert found["left_knee.error_rms"].word is Word.NO_DATA
+    assert found["right_knee.error_rms"].word is Word.SAME
+    assert evidence.left_out["left_knee: its drive was not enabled"] > 15
+
+
+def test_stale_values_are_no_values(events: list[Event]) -> None:
+    """A gap in one channel costs the cycles that it lies in, not a wrong number."""
+
+    def stale(one: Telemetry) -> Telemetry:
+        if one.batch.stamps_ns[0] % (6 * SECOND) > SECOND // 2:
+            return one
+        empty: list[float | None] = [None] * len(one.batch.stamps_ns)
+        return replaced(one, one.batch.stamps_ns, one.batch.columns | {"left_knee.following_error": empty})
+
+    found = {one.series: one for one in followed(changed(events, stale))[WORSE.write].evidence.metrics}
+    error, torque = found["left_knee.error_rms"], found["left_knee.torque_rms"]
+    assert error.cycles_before < torque.cycles_before
+    assert error.word in (Word.WORSE, Word.FEW)
+
+
+def test_a_robot_that_starts_again_ends_what_was_followed(events: list[Event]) -> None:
+    robot = RobotEvidence("exo-01")
+    for event in events:
+        robot.take(event)
+    again = dataclasses.replace(described(), description=replace(described().description, boot_id="boot-2"))
+    ended = robot.take(again)
+    assert {told.edit.write for told in ended} == {WORSE.write}
+    assert all(told.is_final for told in ended)
+    assert robot.take(described()) == []
+    assert robot.end() == []
+
+
+def test_edits_of_before_it_was_followed_are_not_judged(events: list[Event]) -> None:
+    first = next(event for event in events if isinstance(event, Telemetry)).batch.stamps_ns[0]
+    early = Journalled(
+        JournalEntries(
+            [entry(1, first - SECOND, "write", 1, {"a.b": 1.0}), entry(2, first - 1, "write done", 1)]
+        )
+    )
+    head = [event for event in events[:200] if isinstance(event, Described | Telemetry)]
+    assert followed([*head, early]) == {}
+
+
+def test_the_whole_tail_again_makes_no_edit_twice(events: list[Event]) -> None:
+    journals = [event for event in events if isinstance(event, Journalled)]
+    assert len(followed([*events, *journals, *journals])) == 1
+
+
+def test_what_models_say_now_and_then_cuts_no_walk_in_pieces(events: list[Event]) -> None:
+    """Most of a stride counts; what is said of it otherwise for a moment does not."""
+    robot = RobotEvidence("exo-01")
+    for number, event in enumerate(events):
+        robot.take(event)
+        if isinstance(event, Telemetry):
+            robot.label(event.batch.stamps_ns[-1], "unknown" if number % 5 == 0 else "walk")
+    (told,) = robot.end()
+    assert told.evidence.word is Word.WORSE
+    assert "the activity changed" not in told.evidence.left_out
