@@ -61,6 +61,7 @@ from server_gui.views.status_bar import StatusBar
 from server_gui.views.theme import Look, Theme
 from server_gui.views.widgets.scrolled import Scrolled
 
+OF_A_ROBOT: Final = ("&Overview", "&Signals", "&Resources", "&Bus", "Ob&jects", "&Audit", "&Edits")
 SCALES: Final = (80, 90, 100, 125, 150, 175, 200)
 SLOW: Final = 6  # frames between two looks at what people read
 CHOICES: Final = (
@@ -161,21 +162,10 @@ class MainWindow(QMainWindow):
         self.empty.recordings.connect(self._look_at_recordings)
         self.tabs = QTabWidget()
         self.tabs.setAccessibleName("Views")
-        self._views: tuple[View, ...] = (
-            self.overview,
-            self.signals,
-            self.resources,
-            self.buses,
-            self.objects,
-            self.audit,
-            self.edits,
-        )
-        for title, view in zip(
-            ("&Overview", "&Signals", "&Resources", "&Bus", "Ob&jects", "&Audit", "&Edits"),
-            self._views,
-            strict=True,
-        ):
+        live = (self.overview, self.signals, self.resources, self.buses, self.objects, self.audit, self.edits)
+        for title, view in zip(OF_A_ROBOT, live, strict=True):
             self.tabs.addTab(Scrolled(view), title)
+        self._views: tuple[View, ...] = live
         self._live = len(self._views)  # tabs that show the robot that is looked at
         if archive is not None:
             self.recordings = Recordings(archive, desk.recording, theme)

@@ -1,16 +1,13 @@
 """While a joint moves, whatever is typed is a STOP, and so is that nobody can type any more."""
 
-import json
 import os
 import pty
 from collections.abc import Iterator
 
 import pytest
 
-from gateway.cli import commission_faces
-from gateway.cli.commission_faces import JsonFace, Terminal
+from gateway.cli.commission_faces import Terminal
 from gateway.cli.typed import Typed
-from gateway.commission.dialogue import Ask
 
 
 @pytest.fixture
@@ -57,23 +54,6 @@ def test_a_terminal_that_is_closed_is_a_stop() -> None:
     os.close(master)
     assert "nobody can press STOP any more" in typed.waits(1.0)
     os.close(slave)
-
-
-def test_other_faces_are_told_when_a_motion_begins_and_is_over(
-    pipe: tuple[Typed, int], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(commission_faces, "LOOK_S", 0.0)
-    face, write = JsonFace(), pipe[1]
-    face.typed = pipe[0]
-    assert [face.moving("it moves"), face.moving("it moves on")] == ["", ""]
-    os.write(write, b"stop\n")
-    assert face.moving("it moves on") == "STOP was pressed"
-    face.say("stopped")
-    os.write(write, b"0\n")
-    assert face.ask(Ask("At which angle?")) == "0\n", "the STOP was no answer to it"
-    said = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
-    assert said[:3] == [{"moving": "it moves"}, {"moving": None}, {"say": "stopped"}]
-    os.close(write)
 
 
 def test_a_terminal_says_that_it_moves_and_looks_at_the_keys(
