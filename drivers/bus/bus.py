@@ -225,15 +225,15 @@ class CanBus:
     def _serve(self, transport: Transport) -> None:
         """Hand out frames until told to stop; raises what ended it, `Unavailable` when the interface goes."""
         problem = "it was closed"
-        with self._lock:
-            self._transport, self.problem = transport, None
-            self.health.opened()
-            self.traffic.opened()
-            self.opened += 1
-            users = self._users
         FastSwitching.begin()
         try:
-            self._sender.start(transport)
+            self._sender.start(transport)  # whoever sees it open may send
+            with self._lock:
+                self._transport, self.problem = transport, None
+                self.health.opened()
+                self.traffic.opened()
+                self.opened += 1
+                users = self._users
             if self.role is Role.MASTER:
                 self._cycles.start()
             for user in users:

@@ -12,8 +12,9 @@ import pytest
 from can.interfaces.virtual import VirtualBus
 
 from drivers.bus.bus import BusUser, CanBus
-from drivers.bus.frames import ERROR, EXTENDED, wire_id
+from drivers.bus.frames import ERROR, EXTENDED, Transport, wire_id
 from drivers.bus.interfaces.controller_state import BusState, bus_state
+from drivers.bus.sender import Sender
 from drivers.bus.settings import CanSettings
 from drivers.errors import Unavailable
 from tests.support.waiting import WAIT_S, until
@@ -239,10 +240,30 @@ def test_a_bus_nobody_holds_is_closed_and_threads_take_turns_as_before() -> None
         bus.send(0x601, bytes(8))
 
 
+def test_whoever_sees_a_bus_open_may_send(
+    monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
+) -> None:
+    seen: list[bool] = []
+    start = Sender.start
+    opening = CanBus("main", CanSettings(interface="virtual", channel=request.node.name))
+
+    def noted(sender: Sender, transport: Transport) -> None:
+        seen.append(opening.is_open or opening.opened > 0)
+        start(sender, transport)
+
+    monkeypatch.setattr(Sender, "start", noted)
+    opening.start()
+    until(lambda: opening.opened)
+    opening.stop()
+    assert seen == [False]
+
+
 def test_an_interface_of_python_can_that_may_block_sends_in_the_buss_own_thread(
     peer: can.BusABC, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
 ) -> None:
     monkeypatch.setattr("drivers.bus.interfaces.python_can._NEVER_BLOCKS", ())
+    for name in ("SEND_TIMEOUT_S", "URGENT_S"):
+        monkeypatch.setattr(f"drivers.bus.sender.{name}", WAIT_S)
     senders: list[str] = []
     send = VirtualBus.send
 

@@ -247,10 +247,14 @@ def test_a_heartbeat_that_stays_away_is_told_while_sdo_works(
         fake.heartbeat()
         until(lambda: gait.node.life.heartbeats)
         until(lambda: state(gait) is State.LOST)
-        assert "its heartbeat is missing for" in problem(gait)
+        until(lambda: "its heartbeat is missing for" in problem(gait))
         assert gait.node.upload(0x1000, 0).result(WAIT_S)
-        fake.heartbeat()
-        until(lambda: state(gait) is State.OK)
+
+        def is_back() -> bool:
+            fake.heartbeat()
+            return state(gait) is State.OK
+
+        until(is_back)
         gait.stop()
 
 
