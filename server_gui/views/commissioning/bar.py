@@ -10,6 +10,7 @@ from server_gui.core.commissioning.commissioning import Commissioning
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.mark import MarkIcon
+from server_gui.views.widgets.plain import set_tip
 from server_gui.views.widgets.stop_button import StopButton
 from server_gui.views.widgets.whole import WholeLabel
 
@@ -37,11 +38,11 @@ class Bar(QWidget):
         self._icon = MarkIcon(theme, 14)
         self.stage, self.words = WholeLabel("title"), WholeLabel()
         self.interrupt = QPushButton("Interrupt")
-        self.interrupt.setToolTip("End the command; what was found is kept, and gone on with")
+        set_tip(self.interrupt, "End the command; what was found is kept, and gone on with")
         self.interrupt.clicked.connect(self.interrupted)
         self.stop = StopButton()
         self.stop.setAccessibleName("STOP the drives that are commissioned")
-        self.stop.setToolTip(STOP_TIP)
+        set_tip(self.stop, STOP_TIP)
         self.stop.setAccessibleDescription(STOP_TIP)
         self.stop.stopped.connect(self.stopped)
         theme.changed.connect(self._restyle)
