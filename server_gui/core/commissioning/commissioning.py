@@ -196,7 +196,7 @@ class Commissioning:
             self._talker.end()
 
     def close(self, within_s: float) -> bool:
-        """End all of it, and wait; whether it has ended. A STOP that is owed is begun, and goes on to its end."""
+        """End all of it, and wait; whether it has ended. A STOP that is owed goes on to its end."""
         until = self._clock() + within_s
         talker, ended = self._talker, True
         if talker is not None:
