@@ -57,8 +57,8 @@ def alone(file: Path) -> Iterator[None]:
 class Draft:
     """Values by table and key, as `("joint.left_knee", "node_id")`; any that is there is not asked again."""
 
-    def __init__(self, file: Path) -> None:
-        """Of the robot's file `file`, from where it was left.
+    def __init__(self, file: Path, *, go_on: bool = True) -> None:
+        """Of the robot's file `file`, from where it was left; without `go_on` from nothing.
 
         Raises:
             SettingsError: what was left cannot be read.
@@ -67,7 +67,7 @@ class Draft:
         self.file = file
         self.path = file.with_name(file.name + SUFFIX)
         self.tables: dict[str, dict[str, Found]] = {}
-        if self.path.exists():
+        if go_on and self.path.exists():
             try:
                 self.tables = msgspec.json.decode(self.path.read_bytes(), type=dict[str, dict[str, Found]])
                 for key, found in (pair for keys in self.tables.values() for pair in keys.items()):
