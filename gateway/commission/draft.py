@@ -1,6 +1,7 @@
 """What has been found out until now, and how: kept beside the file it becomes, after every finding."""
 
 import fcntl
+import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -46,7 +47,9 @@ def alone(file: Path) -> Iterator[None]:
     with lock:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
+            if not os.path.samestat(os.fstat(lock.fileno()), path.stat()):
+                raise FileNotFoundError  # who had it has just removed it: somebody may hold another one
+        except (BlockingIOError, FileNotFoundError) as error:
             raise SettingsError(f"{file}: another gwrms commission is at it; end that first") from error
         try:
             yield

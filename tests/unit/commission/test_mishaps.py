@@ -1,8 +1,10 @@
 """What goes wrong while a robot is commissioned is noticed, and spoils nothing that was found."""
 
+import fcntl
 import math
 from collections.abc import Callable
 from pathlib import Path
+from typing import BinaryIO
 
 import can
 import pytest
@@ -182,6 +184,20 @@ def test_two_do_not_commission_one_file_at_once(tmp_path: Path) -> None:
     with alone(file):
         pass
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_lock_that_was_removed_as_it_was_taken_is_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    taken = fcntl.flock
+
+    def late(lock: BinaryIO, how: int) -> None:
+        (tmp_path / "exo-01.toml.commission.lock").unlink()  # by who had it until now
+        taken(lock, how)
+
+    monkeypatch.setattr(fcntl, "flock", late)
+    with pytest.raises(SettingsError, match="another gwrms commission"), alone(tmp_path / "exo-01.toml"):
+        pass
 
 
 def test_a_folder_that_cannot_be_written_is_told_before_anything_is_asked(
