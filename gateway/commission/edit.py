@@ -15,7 +15,7 @@ class NotEdited(ValueError):
 
 
 def with_value(text: str, table: str, key: str, found: Found) -> str:
-    """The text with this value, its ends of lines kept; every other one is the same, by what TOML makes of it.
+    """The text with this value, its ends of lines kept; all else is the same, by what TOML makes of both.
 
     Raises:
         NotEdited: the table, or the value, is not on lines of its own.
