@@ -31,6 +31,7 @@ from eds import Description
 
 T = TypeVar("T")
 
+_REMAPPED = "its PDOs are being mapped otherwise: nothing is made of them until that has rested"
 _NOT_ASKED = "it has not come up, so nobody knows what it is: nothing is written to it"
 EMCY = 0x080
 PDO_PARAMETERS = range(0x1400, 0x1C00)  # communication and mapping, of both directions (CiA 301 §7.5.2)
@@ -222,7 +223,7 @@ class Node(BusUser):
     def problem(self, now_ns: int) -> str | None:
         """What is wrong with the node now, in words with what to check; `None` when nothing is."""
         if not self.ready:
-            return self.bus.trouble or self._booting.step
+            return self.bus.trouble or (_REMAPPED if now_ns < self._settled_ns else self._booting.step)
         return self.life.problem(now_ns) or self._asking.guard_problem or self.bus.trouble
 
     def counters(self) -> dict[str, int]:
@@ -298,9 +299,11 @@ class Node(BusUser):
         with self._lock:
             self._booting.begin_anew()
             self._stranger = _NOT_ASKED
-            users = self._users
         self.channel.forget_written()
-        for user, _ in users:
+        self._forget()
+
+    def _forget(self) -> None:
+        for user, _ in self._users:
             user.forget()
 
     def _come_up(self, sdo: SdoChannel) -> None:
@@ -316,6 +319,9 @@ class Node(BusUser):
         self._follow_emcy(sdo)
         for user, _ in self._users:
             user.boot(sdo)
+        if not self._booting.is_current():  # overtaken after its last answer: nobody goes by what was read
+            self._forget()
+            return
         self.bus.start_node(self.node_id)
 
     def _explain(self, error: DriverError) -> str:

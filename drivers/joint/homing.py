@@ -160,13 +160,19 @@ def set_up(axis: Axis, setup: Setup) -> None:
 
 
 def mode_of(axis: Axis) -> bytes:
-    """Its mode of operation now (6061h)."""
-    return axis.read(MODE_DISPLAY, 1)
+    """The mode of operation that was asked of it (6060h): 6061h may show another while it has no power."""
+    try:
+        return axis.read(MODE, 1)
+    except DeviceAbort:
+        return axis.read(MODE_DISPLAY, 1)
 
 
 def leave(axis: Axis, mode: bytes) -> None:
-    """Give it its mode of operation back; raises `DriverError`."""
+    """Give it its mode of operation back; raises `DriverError` where it does not hold it."""
     axis.write(MODE, mode)
+    with suppress(DeviceAbort):
+        if (held := axis.read(MODE, 1)) != mode:
+            raise Mismatch(f"{axis.sdo.label}: {MODE + axis.offset:04X}h is {held.hex()}, not {mode.hex()}")
 
 
 def look(axis: Axis) -> Seen:

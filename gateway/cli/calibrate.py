@@ -51,11 +51,11 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("joint", metavar="ROBOT.toml:NAME", help="the joint of a robot's file")
     parser.add_argument(
-        "--angle", type=float, metavar="DEGREES", help="at which it is held (flexion positive)"
+        "--angle", type=_degrees(-180, 360), metavar="DEGREES", help="at which it is held (flexion positive)"
     )
     parser.add_argument(
         "--max-change",
-        type=float,
+        type=_degrees(0, 540),
         default=PLAUSIBLE,
         metavar="DEGREES",
         help="a larger change is refused (default: %(default)g)",
@@ -66,6 +66,15 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
+def _degrees(low: float, high: float) -> Callable[[str], float]:
+    def degrees(typed: str) -> float:
+        if not low <= (found := float(typed)) <= high:
+            raise argparse.ArgumentTypeError(f"{typed} is no number of {low:g} to {high:g}")
+        return found
+
+    return degrees
+
+
 def _named(where: str) -> tuple[Path, str]:
     file, colon, joint = where.rpartition(":")
     if not (colon and file.endswith(".toml")):
@@ -74,7 +83,7 @@ def _named(where: str) -> tuple[Path, str]:
 
 
 def _lead(config: RobotConfig, joint: str, options: argparse.Namespace) -> int:
-    settings, text = config.joint[joint], config.path.read_text(encoding="utf-8")
+    settings, text = config.joint[joint], _text(config.path)
     face, bench = Terminal(), CanBench(settings.bus, config.can[settings.bus])
     degrees = options.angle if options.angle is not None else posture(comment_of(text, f"joint.{joint}", KEY))
     try:
@@ -94,6 +103,11 @@ def _lead(config: RobotConfig, joint: str, options: argparse.Namespace) -> int:
         bench.close()
 
 
+def _text(file: Path) -> str:
+    """With its own ends of lines."""
+    return file.read_bytes().decode()
+
+
 def _alone_on(bus: CanSettings, settings: JointTable) -> None:
     """Two who ask one node by SDO take each other's answers. Raises `DriverError`."""
     if settings.sdo_cob_ids is not None:
@@ -110,6 +124,8 @@ def _write(
 ) -> int:
     table = f"joint.{joint}"
     made = with_value(text, table, KEY, Found(zero.offset, zero.how))
+    if _text(config.path) != text:
+        raise NotEdited(f"{config.path} was changed meanwhile: begin again")
     found = put(config.path, made)
     if found.config is None:
         say(f"{config.path} is written and cannot be used: {'; '.join(one.words for one in found.findings)}")

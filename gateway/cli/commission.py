@@ -52,12 +52,12 @@ def main(argv: list[str]) -> int:
     """Run `gwrms commission`."""
     parser = _parser()
     options = parser.parse_args(argv)
+    name, settings = _the_bus(options.bus, options.bitrate)
+    if options.stop:
+        return _stop(_known_to(options.file), CanBench(name, settings), as_json=options.json)
     missing = [str(folder) for folder in options.eds if not folder.is_dir()]
     if missing:
         parser.error(f"--eds {', '.join(missing)}: there is no such folder")
-    name, settings = _the_bus(options.bus, options.bitrate)
-    if options.stop:
-        return _stop(Draft(options.file), CanBench(name, settings), as_json=options.json)
     with alone(options.file), _ending(), ExitStack() as ends:
         draft = Draft(options.file)
         bench = CanBench(name, settings)
@@ -102,6 +102,15 @@ def _lead(
     return 0 if not draft.path.exists() else 1
 
 
+def _known_to(file: Path) -> Draft:
+    """What was found; where that cannot be read nothing is known, and a stop asks all."""
+    try:
+        return Draft(file)
+    except SettingsError as error:
+        warn("commission", str(error))
+        return Draft(file, go_on=False)
+
+
 def _not_stopped(draft: Draft, bench: CanBench, why: str, lines: Lines | None) -> int:
     """A drive that was under power has not confirmed that it is off: it is asked once more."""
     warn("commission", f"NOT STOPPED: {why}")
@@ -141,7 +150,10 @@ class Ended(KeyboardInterrupt):
 
 @contextmanager
 def _ending() -> Iterator[None]:
-    """While inside, `ENDS` raise `Ended` in whatever the dialogue does."""
+    """While inside, the first of `ENDS` raises `Ended` in whatever the dialogue does.
+
+    The others change nothing: what ends and confirms a motion is not itself interrupted, and has its time.
+    """
     before = {number: signal.signal(number, _end) for number in ENDS}
     try:
         yield
@@ -151,6 +163,8 @@ def _ending() -> Iterator[None]:
 
 
 def _end(number: int, _frame: FrameType | None) -> None:
+    for one in ENDS:
+        signal.signal(one, signal.SIG_IGN)
     raise Ended(number)
 
 

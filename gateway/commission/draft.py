@@ -1,6 +1,7 @@
 """What has been found out until now, and how: kept beside the file it becomes, after every finding."""
 
 import fcntl
+import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -46,7 +47,9 @@ def alone(file: Path) -> Iterator[None]:
     with lock:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
+            if not os.path.samestat(os.fstat(lock.fileno()), path.stat()):
+                raise FileNotFoundError  # who had it has just removed it: somebody may hold another one
+        except (BlockingIOError, FileNotFoundError) as error:
             raise SettingsError(f"{file}: another gwrms commission is at it; end that first") from error
         try:
             yield
@@ -57,8 +60,8 @@ def alone(file: Path) -> Iterator[None]:
 class Draft:
     """Values by table and key, as `("joint.left_knee", "node_id")`; any that is there is not asked again."""
 
-    def __init__(self, file: Path) -> None:
-        """Of the robot's file `file`, from where it was left.
+    def __init__(self, file: Path, *, go_on: bool = True) -> None:
+        """Of the robot's file `file`, from where it was left; without `go_on` from nothing.
 
         Raises:
             SettingsError: what was left cannot be read.
@@ -67,7 +70,7 @@ class Draft:
         self.file = file
         self.path = file.with_name(file.name + SUFFIX)
         self.tables: dict[str, dict[str, Found]] = {}
-        if self.path.exists():
+        if go_on and self.path.exists():
             try:
                 self.tables = msgspec.json.decode(self.path.read_bytes(), type=dict[str, dict[str, Found]])
                 for key, found in (pair for keys in self.tables.values() for pair in keys.items()):

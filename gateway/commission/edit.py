@@ -15,15 +15,16 @@ class NotEdited(ValueError):
 
 
 def with_value(text: str, table: str, key: str, found: Found) -> str:
-    """The text with this value; every other one is the same, by what TOML makes of both.
+    """The text with this value, its ends of lines kept; all else is the same, by what TOML makes of both.
 
     Raises:
         NotEdited: the table, or the value, is not on lines of its own.
 
     """
-    lines = text.splitlines()
+    lines = text.split("\n")
     heads = [number for number, one in enumerate(lines) if _head(one) == table]
-    new = line(key, found).split("\n")
+    end = "\r" if lines[0].endswith("\r") else ""
+    new = [one + end for one in line(key, found).split("\n")]
     if len(heads) == 1:
         first = heads[0] + 1
         last = next((at for at in range(first, len(lines)) if _head(lines[at]) is not None), len(lines))
@@ -31,9 +32,9 @@ def with_value(text: str, table: str, key: str, found: Found) -> str:
         at = found_at[0] if found_at else first
         begin = at - 1 if found_at and lines[at - 1].startswith(OURS) else at
         lines[begin : at + bool(found_at)] = new
-    made = "\n".join(lines) + "\n"
+    made = "\n".join(lines)
     if not _differ_only_in(text, made, table, key, found.value):
-        raise NotEdited(f"[{table}] is not on lines of its own: write {' '.join(new)} there yourself")
+        raise NotEdited(f"[{table}] is not on lines of its own: write {line(key, found)} there yourself")
     return made
 
 

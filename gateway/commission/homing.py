@@ -19,6 +19,7 @@ from gateway.commission.bench import Bench
 from gateway.commission.dialogue import Ask, Moving, Say, Talk, choose, press
 from gateway.commission.draft import Draft, Found
 from gateway.commission.homing_plan import (
+    STILL,
     TOLD,
     Known,
     armed,
@@ -129,6 +130,10 @@ def _agreed(bench: Bench, known: Known, method: int, plan: Plan) -> Talk[bool]:
 def _run(draft: Draft, bench: Bench, known: Known, plan: Plan) -> Talk[Outcome | None]:
     try:
         with bench.power(_settings(draft, known), known.description) as power:
+            why = yield Moving(f"The {words(known.joint)} gets power now. STOP: Enter.")
+            if why:  # pressed while it listened
+                yield Say(f"Nothing got power: {why}.")
+                return None
             run = HomingRun(power, plan)
             outcome = yield from _followed(run, known)
     except DriverError as error:
@@ -178,8 +183,9 @@ def _settings(draft: Draft, known: Known) -> JointSettings:
 
 def _new_zero(draft: Draft, bench: Bench, known: Known, method: int, outcome: Outcome) -> Talk[Scale]:
     """Of the joint where the drive counts 0: as it stood, or by a known angle where it may have moved."""
-    joint, scale, still = known.joint, known.scale, not METHODS[method].moves
-    if still and outcome.problem is None and outcome.before is not None and outcome.after is not None:
+    joint, scale = known.joint, known.scale
+    offset = yield from answered(lambda: option(bench, known.axis, HOME_OFFSET, 4))
+    if _is_there(known, method, outcome, offset) and outcome.before is not None and outcome.after is not None:
         angle = scales.angle(scale, nearest(outcome.before, known.position))
         position, how = outcome.after, "where it stood"
     else:
@@ -188,9 +194,17 @@ def _new_zero(draft: Draft, bench: Bench, known: Known, method: int, outcome: Ou
     new = scales.with_zero(scale, angle, position)
     text = f"rad; {math.degrees(angle):.2f}° {how} after homing by method {method}"
     if outcome.problem is None:
-        offset = yield from answered(lambda: option(bench, known.axis, HOME_OFFSET, 4))
         text += f", 607Ch {offset}; {LASTING}"
         draft.put(told(joint), "homing", method, f"homed by its drive, method {method}, 607Ch {offset}")
     draft.put(table(joint), "zero_offset", round(new.zero_offset, 5), text)
     yield Say(f"{words(joint)}: the zero is {new.zero_offset:.4f} rad. {LASTING[0].upper()}{LASTING[1:]}.")
     return new
+
+
+def _is_there(known: Known, method: int, outcome: Outcome, offset: int | None) -> bool:
+    """Whether nothing has moved, and the drive counts as homing makes it count: its 607Ch is where it is."""
+    if METHODS[method].moves or outcome.problem is not None or outcome.after is None:
+        return False
+    return (
+        abs(nearest(outcome.after, offset or 0) - (offset or 0)) <= STILL * known.counts_per_turn / math.tau
+    )

@@ -35,6 +35,8 @@ REST_S = 3.0  # for the axis to come to rest when home is known
 SPEED_S = 0.2  # over which a speed is measured
 TOO_FAST = 2.0  # times the speed that it was given
 STOP_S = 3.0  # for a stop to be answered
+OUT_OF_REACH = "nobody has STOP in reach any more"
+OLD_ZERO = (Progress.UNDER_WAY, Progress.NOT_STARTED)  # what a position counts from beside these
 OFF = LIMP_STATES  # what confirms that the axis has no power
 
 
@@ -84,6 +86,7 @@ class HomingRun:
         self._kept = time.monotonic()
         self._before: int | None = None
         self._after: int | None = None
+        self._progress: Progress | None = None  # at the last look
         self._way: deque[tuple[float, int]] = deque()
         self._outcome = Outcome("it was not begun", off=True, state="not asked for anything")
         self._thread = threading.Thread(target=self._run, name="homing", daemon=False)
@@ -93,12 +96,15 @@ class HomingRun:
         return not self._thread.is_alive()
 
     def start(self) -> None:
-        self.keep()
+        self._kept = time.monotonic()
         self._thread.start()
 
     def keep(self) -> None:
-        """Somebody has STOP in reach, now."""
-        self._kept = time.monotonic()
+        """Somebody has STOP in reach, now. One gap that was too long ends it: nobody saw what came in it."""
+        now = time.monotonic()
+        if now - self._kept > KEEP_S:
+            self.stop(OUT_OF_REACH)
+        self._kept = now
 
     def stop(self, why: str) -> None:
         """End it now; the first reason counts."""
@@ -163,7 +169,8 @@ class HomingRun:
             now = time.monotonic()
             self._judge(seen, now - begun)
             if seen.progress is Progress.COMPLETE and now - begun > SETTLED_S:
-                self._after = seen.position
+                # Once more: that position was read before it said so, and may count from the old zero.
+                self._after = self._wait(self._power.drive.ask(homing.look)).position
                 return
             if seen.progress is Progress.ATTAINED:
                 attained = attained or now
@@ -182,16 +189,18 @@ class HomingRun:
             raise Ended("the drive does not begin to home, or has interrupted it")
         if since_s > plan.time_s:
             raise Ended(f"home was not found within {plan.time_s:.0f} s")
-        if progress is not Progress.UNDER_WAY:
-            self._way.clear()
-            return
-        near = nearest(seen.position, self._before or 0)
-        if not plan.low <= near <= plan.high:
-            raise Ended("the joint has left the way that was told")
         if seen.lag is not None and abs(seen.lag) > plan.lag:
             raise Ended(f"the joint is {abs(seen.lag)} counts behind what the drive wants (60F4h)")
-        self._judge_speed(near)
-        self.said, self.moved = "it looks for home", near - (self._before or 0)
+        near = nearest(seen.position, self._before or 0)
+        if progress in OLD_ZERO:
+            if not plan.low <= near <= plan.high:
+                raise Ended("the joint has left the way that was told")
+            self.said, self.moved = "it looks for home", near - (self._before or 0)
+        if progress is self._progress:
+            self._judge_speed(near)
+        else:  # its position may count from another zero now, from the next look on
+            self._progress = progress
+            self._way.clear()
 
     def _judge_speed(self, position: int) -> None:
         """Units that were misread show here."""
@@ -257,7 +266,7 @@ class HomingRun:
         if self._why is not None:
             return self._why
         if time.monotonic() - self._kept > KEEP_S:
-            return "nobody has STOP in reach any more"
+            return OUT_OF_REACH
         return self._power.objection
 
     def _wanted(self) -> bool:

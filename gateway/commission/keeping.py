@@ -1,5 +1,6 @@
 """A robot's file is written: the one before is kept beside it, and what was found goes into the journal."""
 
+import os
 import shutil
 from pathlib import Path
 from typing import Any
@@ -13,10 +14,13 @@ BEFORE = ".before"
 
 
 def put(file: Path, made: str) -> Examined:
-    """Write it, and say what it is worth; raises `OSError`."""
-    if file.exists():
-        shutil.copyfile(file, file.with_name(file.name + BEFORE))
-    durable.write(file, made.encode())
+    """Write it where `file` leads, as whose it was, and say what it is worth; raises `OSError`."""
+    there, like = file.resolve(), None
+    if there.exists():
+        shutil.copyfile(there, there.with_name(there.name + BEFORE))
+        seen = there.stat()
+        like = seen if os.geteuid() in (0, seen.st_uid) else None  # another's is ours from now on
+    durable.write(there, made.encode(), like)
     return examine(file)
 
 

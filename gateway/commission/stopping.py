@@ -68,7 +68,7 @@ def axes_of(draft: Draft) -> Iterator[Axis]:
     """Every drive that was found until now: the first axis of each node, and each joint's."""
     for table in draft.tables:
         kind, _, name = table.partition(".")
-        if kind == "node" and draft.has(table, "identity"):
+        if kind == "node" and name.isdecimal() and draft.has(table, "identity"):
             yield Axis(int(name))
         elif kind == "joint" and draft.has(table, "node_id"):
             yield Axis(draft.value(table, "node_id"), draft.value(table, "axis", 0))

@@ -29,6 +29,7 @@ from PySide6.QtWidgets import (
 from gateway.units import UNITS, Units
 from server_gui.core.archive.archive import Archive
 from server_gui.core.commissioning.commissioning import Commissioning
+from server_gui.core.commissioning.stages import Stage
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.views.alarms import AlarmStrip
@@ -196,8 +197,10 @@ class MainWindow(QMainWindow):
         """Draw a frame: what moves each time, what is read now and then, and only what is visible."""
         self._frame += 1
         if self._is_closing and self._commissioning is not None and not self._commissioning.runs:
-            self.close()
-            return
+            self._is_closing = False
+            if self._commissioning.stage is not Stage.NOT_CONFIRMED:  # that somebody has to see
+                self.close()
+                return
         self._bar.frame()
         due = self._is_due()
         if due:

@@ -239,6 +239,23 @@ def test_closing_the_window_asks_first_and_ends_the_command(full_window: MainWin
     assert not full_window.isVisible()
 
 
+def test_a_window_stays_where_a_drive_has_not_confirmed_that_it_is_stopped(
+    full_window: MainWindow, played: Played
+) -> None:
+    playing.moving(played)
+    full_window.close()
+    question = full_window.findChild(Question)
+    assert question is not None
+    question.act.click()
+    played.end(-9)
+    played.hear(playing.stopped(confirmed=False))
+    played.end(1)
+    full_window.refresh()
+    assert full_window.isVisible()
+    full_window.close()
+    assert not full_window.isVisible()
+
+
 def test_a_window_that_is_ended_asks_nobody(full_window: MainWindow, played: Played) -> None:
     playing.hand(played)
     full_window.end()

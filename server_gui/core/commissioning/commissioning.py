@@ -21,6 +21,8 @@ MOST_LINES: Final = 2000  # of what was said
 MOST_NEWS: Final = 16  # and since the last answer
 GUARD_S: Final = 0.4  # a click within it was meant for the question before
 STOP_S: Final = 2.5  # for the command to have stopped the drives; then another one does it
+KILL_S: Final = 2.5  # for one that was killed to be gone; then the other one begins all the same
+STOPPER_S: Final = 30.0  # for that one to say what the drives confirm, also on another computer
 OLD_S: Final = 2.0  # live values beyond it are not live
 SILENT_S: Final = 60.0  # that long no step takes
 MOVING_SILENT_S: Final = 2.0  # and while a joint is under power that is told again and again
@@ -96,6 +98,7 @@ class Commissioning:
         self._talker: Talker | None = None
         self._stopper: Talker | None = None  # another command, that stops the drives where the first does not
         self._ending = False
+        self._powered = False  # a joint was under power, and nobody has said since that it no longer is
         self._stop_s: float | None = None  # when STOP was asked for
         self._stopped: Stopped | None = None
         self._error = ""
@@ -157,7 +160,7 @@ class Commissioning:
         self.wish = wish
         self.question, self.steps, self.proposed, self.written = None, (), None, None
         self.problem, self._error, self._stopped, self._stop_s, self._ending = "", "", None, None, False
-        self._live = ()
+        self._live, self._powered = (), False
         self.news.clear()
         self._note(Kind.NOTED, wish.typed)
         self._heard_s = self._clock()
@@ -181,7 +184,7 @@ class Commissioning:
     def stop(self) -> None:
         """STOP: the command ends what it does, and quick-stops every drive that is known. From any thread."""
         if self._stop_s is None or not self.runs:
-            self._stop_s = self._clock()
+            self._stop_s, self._stopped = self._clock(), None  # what was confirmed before is of before
         talker = self._talker
         if talker is not None:
             talker.send(spoken.STOP)
@@ -193,13 +196,16 @@ class Commissioning:
             self._talker.end()
 
     def close(self, within_s: float) -> bool:
-        """End all of it, and wait; whether it has ended."""
-        talkers = [one for one in (self._talker, self._stopper) if one is not None]
-        for one in talkers:
-            one.end()
+        """End all of it, and wait; whether it has ended. A STOP that is owed goes on to its end."""
         until = self._clock() + within_s
-        ended = [one.join(max(0.0, until - self._clock())) for one in talkers]
-        return all(ended)
+        talker, ended = self._talker, True
+        if talker is not None:
+            talker.end()
+            ended = talker.join(within_s)
+        owed = self._powered or (self._stop_s is not None and self._stopped is None)
+        if owed and self._stopper is None and self.wish is not None:
+            self._stopper = self._talk(self.wish.stopping, self.wish.computer)
+        return ended and (self._stopper is None or self._stopper.join(max(0.0, until - self._clock())))
 
     def look(self) -> None:
         """Take what has come, and see how it is."""
@@ -233,6 +239,7 @@ class Commissioning:
         elif line.stopped is not None:
             self._stopped = line.stopped
             self._stop_s = self._clock() if self._stop_s is None else self._stop_s  # by itself, too
+            self._powered = self._powered and not line.stopped.confirmed
             self._note(Kind.NOTED, line.stopped.words)
         elif line.error is not None:
             self._error = line.error.message
@@ -242,10 +249,12 @@ class Commissioning:
     def _moves(self, words: str) -> None:
         if self.stage is not Stage.MOVING:
             self._note(Kind.NOTED, words)
+        self._powered = True
         if self.runs:
             self.stage, self.problem, self.question, self._live = Stage.MOVING, words, None, ()
 
     def _rests(self) -> None:
+        self._powered = False
         if self.stage is Stage.MOVING:
             self.stage, self.problem = Stage.WORKING, ""
 
@@ -281,16 +290,17 @@ class Commissioning:
             self._end_stop(Stage.STOPPED if self._stopped.confirmed else Stage.NOT_CONFIRMED)
             return
         self.stage, self.question, self._live = Stage.STOPPING, None, ()
-        talker, stopper = self._talker, self._stopper
+        talker, stopper, since_s = self._talker, self._stopper, self._clock() - self._stop_s
         if stopper is not None:
+            if stopper.ended is None and since_s > STOPPER_S:
+                stopper.kill()
             if stopper.ended is not None:
                 self.problem = stopper.ended.last_words or "the command that stops the drives has ended"
                 self._end_stop(Stage.NOT_CONFIRMED)
             return
-        late = self._clock() - self._stop_s > STOP_S
-        if talker is not None and talker.ended is None and late:
+        if talker is not None and talker.ended is None and since_s > STOP_S:
             talker.kill()
-        if talker is None or talker.ended is not None:
+        if talker is None or talker.ended is not None or since_s > STOP_S + KILL_S:
             self._note(Kind.NOTED, "STOP: the command did not do it, another one asks the drives")
             self._stopper = self._talk(self.wish.stopping, self.wish.computer)
 
@@ -303,12 +313,11 @@ class Commissioning:
     def _see_to_end(self) -> None:
         if self._talker is None or self._stop_s is not None or (ended := self._talker.ended) is None:
             return
-        was_moving = self.stage is Stage.MOVING
         self._talker, self.question, self._live = None, None, ()
         self.stage, self.problem = self._end_of(ended)
         if self.problem:
             self._note(Kind.NOTED, self.problem)
-        if was_moving:  # what it has put under power nobody else would stop
+        if self._powered:  # what it has put under power nobody else would stop
             self.stop()
             self._see_to_stop()
 

@@ -2,6 +2,7 @@
 
 import json
 import math
+import stat
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
@@ -173,6 +174,50 @@ def test_the_command_writes_the_zero_and_the_journal(
     journal = (load(robot).records / "journal.jsonl").read_text(encoding="utf-8")
     (one,) = [entry for entry in map(json.loads, journal.splitlines()) if entry["what"] == "calibrate"]
     assert (one["who"], one["joint"], one["before"]) == ("Ada", "left_knee", 0.5)
+
+
+def answered(robot: Path, channel: str, *options: str) -> int:
+    with HomingDrive(channel, 5) as drive:
+        drive.objects[0x6064, 0] = encoded(0x6064, round(0.01 / math.tau * TURN))
+        return calibrate.main(["joint", f"{robot}:left_knee", *options])
+
+
+def test_what_was_changed_by_hand_meanwhile_is_not_written_over(
+    robot: Path, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def changing() -> str:
+        robot.write_text(robot.read_text(encoding="utf-8").replace("100", "121"), encoding="utf-8")
+        return "y"
+
+    faced(monkeypatch, ("at 30° ", lambda: ""), ("Write it", changing))
+    assert answered(robot, request.node.nodeid) == 1
+    text = robot.read_text(encoding="utf-8")
+    assert "gear_ratio = 121" in text
+    assert "zero_offset = 0.5\n" in text
+
+
+def test_ends_of_lines_a_link_and_its_mode_stay(
+    robot: Path, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real = robot.with_name("real.toml")
+    real.write_bytes(robot.read_bytes().replace(b"\n", b"\r\n"))
+    real.chmod(0o600)
+    robot.unlink()
+    robot.symlink_to(real)
+    faced(monkeypatch, ("at 30° ", lambda: ""), ("Write it", lambda: "y"))
+    assert answered(robot, request.node.nodeid) == 0
+    made = real.read_bytes()
+    assert b"zero_offset = 0.5136 " in made
+    assert made.count(b"\n") == made.count(b"\r\n")
+    assert robot.is_symlink()
+    assert stat.S_IMODE(real.stat().st_mode) == 0o600
+
+
+@pytest.mark.parametrize("option", ["--angle=nan", "--angle=inf", "--angle=3000", "--max-change=nan"])
+def test_no_angle_is_no_number(robot: Path, capsys: pytest.CaptureFixture[str], option: str) -> None:
+    with pytest.raises(SystemExit):
+        calibrate.main(["joint", f"{robot}:left_knee", option])
+    assert "is no number of" in capsys.readouterr().err
 
 
 def test_nobody_who_is_asked_by_another_at_once_is_read(

@@ -1,6 +1,7 @@
 """Homing in the dialogue: offered, told, begun on the one phrase only, and the zero is true afterwards."""
 
 import math
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -16,7 +17,7 @@ from gateway.commission.draft import Draft
 from gateway.commission.homing import NotStopped, homing
 from gateway.commission.scale import Scale
 from tests.unit.commission.fake_bench import Hands
-from tests.unit.commission.homing_drive import FAILED, UNDER_WAY, HomingDrive, encoded
+from tests.unit.commission.homing_drive import COMPLETE, FAILED, UNDER_WAY, HomingDrive, encoded
 from tests.unit.joint.standard import S
 
 KNEE, NODE, AXIS = "left_knee", 5, Axis(5)
@@ -148,6 +149,30 @@ def test_who_presses_stop_shows_the_zero_again_because_it_may_be_another(
         assert drive.state is S.SWITCH_ON_DISABLED
     assert hands.heard("Not homed: STOP was pressed; the drive is stopped and disabled")
     assert draft.value(f"told.{KNEE}", "homing") is None
+
+
+def test_a_stop_while_it_listens_begins_nothing(draft: Draft, bench: CanBench, channel: str) -> None:
+    class Hasty(Keeper):
+        def moving(self, text: str) -> str:
+            threading.Event().wait(0.3)  # long enough for a drive to be led up
+            return "STOP was pressed"
+
+    with HomingDrive(channel, NODE) as drive:
+        hands = Hasty(*beginning(37), ("find its own zero", saying("no")))
+        run(homing(draft, bench, KNEE, AXIS, SCALE), hands)
+        assert drive.words == []
+    assert hands.heard("Nothing got power: STOP was pressed")
+    assert zero(draft) == 0.0
+
+
+def test_a_drive_that_says_that_it_is_home_and_counts_as_before_is_shown_by_hand(
+    draft: Draft, bench: CanBench, channel: str
+) -> None:
+    with HomingDrive(channel, NODE, homing=COMPLETE, begins=False) as drive:
+        drive.objects[0x6064, 0] = encoded(0x6064, TURN // 8)
+        does = beginning(37, ("one known angle, without power", saying("45")))
+        run(homing(draft, bench, KNEE, AXIS, SCALE), hands := Keeper(*does))
+    assert hands.heard("one known angle, without power")
 
 
 def test_until_it_is_shown_again_there_is_no_zero_to_go_on_with(

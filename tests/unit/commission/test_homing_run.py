@@ -159,6 +159,50 @@ def test_units_that_were_misread_show_in_the_speed(channel: str) -> None:
     assert outcome.off
 
 
+@pytest.mark.parametrize("says", [ATTAINED, NOT_STARTED])
+def test_a_joint_that_goes_on_whatever_the_drive_says_is_stopped(channel: str, says: int) -> None:
+    def runs_away(drive: HomingDrive) -> None:
+        if drive.words[-1:] == [0x1F]:
+            drive.homing = says
+            position = int.from_bytes(drive.objects[0x6064, 0], "little", signed=True)
+            drive.objects[0x6064, 0] = (position + 9000).to_bytes(4, "little", signed=True)
+
+    plan = Plan(WAY.setup, -1000, 30_000, fastest=1000.0, lag=5000, time_s=20.0)
+    with HomingDrive(channel, NODE, home=None, step=0, on_look=runs_away), begun(channel, plan) as run:
+        outcome = finished(run)
+    assert any(words in str(outcome.problem) for words in ("counts/s, not 1000", "left the way"))
+    assert outcome.off
+
+
+def test_home_is_where_it_is_after_the_drive_has_said_that_it_was_found(channel: str) -> None:
+    looks: list[int] = []
+
+    def finds_home(drive: HomingDrive) -> None:
+        """Between the answers of its position and of its statusword."""
+        looks.append(drive.words[-1:] == [0x1F])
+        if sum(looks) == 10:
+            drive.homing, drive.objects[0x6064, 0] = COMPLETE, bytes(4)
+
+    objects = {(0x6064, 0): (700).to_bytes(4, "little")}
+    with HomingDrive(channel, NODE, home=None, step=0, on_look=finds_home) as drive:
+        drive.objects |= objects
+        with begun(channel) as run:
+            outcome = finished(run)
+    assert (outcome.problem, outcome.before, outcome.after) == (None, 700, 0)
+
+
+def test_the_mode_that_was_asked_for_is_given_back_whatever_6061h_shows_without_power(channel: str) -> None:
+    class Shy(HomingDrive):
+        def _initiate_upload(self, index: int, subindex: int) -> bytes:
+            answer = super()._initiate_upload(index, subindex)
+            off = self.state is S.SWITCH_ON_DISABLED and index == 0x6061
+            return answer[:4] + bytes(4) if off else answer
+
+    with Shy(channel, NODE) as drive, begun(channel, Plan(Setup(37), -100, 100, 1e9, 5000, 20.0)) as run:
+        assert finished(run).problem is None
+        assert drive.mode == 8
+
+
 def test_home_that_is_not_found_in_time_ends_it(channel: str) -> None:
     plan = Plan(WAY.setup, -1000, 2**30, fastest=1e9, lag=5000, time_s=0.1)
     with HomingDrive(channel, NODE, home=None, step=0), begun(channel, plan) as run:
@@ -183,6 +227,17 @@ def test_who_does_not_say_that_stop_is_in_reach_any_more_has_let_go(
         until(lambda: run.done)
         assert run.end().problem == "nobody has STOP in reach any more"
         assert drive.state is S.SWITCH_ON_DISABLED
+
+
+def test_a_gap_in_which_nobody_had_stop_in_reach_is_not_made_up_for(
+    channel: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with HomingDrive(channel, NODE, home=None, step=0) as drive, begun(channel) as run:
+        until_it_homes(run, drive)
+        with monkeypatch.context() as context:
+            context.setattr(homing_run, "KEEP_S", 0.0)  # as after the whole program was suspended
+            run.keep()
+        assert finished(run).problem == "nobody has STOP in reach any more"
 
 
 def test_one_that_was_not_begun_has_nothing_to_confirm(channel: str) -> None:

@@ -2,13 +2,14 @@
 
 import json
 import os
+import signal
 import threading
 from collections.abc import Callable, Iterator
 
 import pytest
 
 from drivers.errors import DeviceTimeout
-from gateway.cli.commission import Ended, _ending
+from gateway.cli.commission import ENDS, Ended, _ending
 from gateway.cli.commission_lines import JsonFace, Lines
 from gateway.commission.dialogue import Ask, Reading, number, run
 from tests.support.waiting import WAIT_S, until
@@ -103,6 +104,15 @@ def test_a_stop_ends_whatever_is_done_and_once(pipe: Pipe, busy: Callable[[Lines
         with pytest.raises(Ended):
             stopped_in(pipe, lines, busy)
         assert lines.stop_asked
+
+
+def test_a_second_signal_does_not_end_what_the_first_one_ends() -> None:
+    with _ending():
+        with pytest.raises(Ended):
+            signal.raise_signal(signal.SIGINT)
+        for number in ENDS:
+            signal.raise_signal(number)
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 def test_a_line_without_end_is_not_waited_for(pipe: Pipe, monkeypatch: pytest.MonkeyPatch) -> None:

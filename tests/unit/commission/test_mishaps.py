@@ -1,9 +1,12 @@
 """What goes wrong while a robot is commissioned is noticed, and spoils nothing that was found."""
 
+import fcntl
 import math
 from collections.abc import Callable
 from pathlib import Path
+from typing import BinaryIO
 
+import can
 import pytest
 
 from drivers.errors import SettingsError
@@ -183,6 +186,20 @@ def test_two_do_not_commission_one_file_at_once(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_lock_that_was_removed_as_it_was_taken_is_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    taken = fcntl.flock
+
+    def late(lock: BinaryIO, how: int) -> None:
+        (tmp_path / "exo-01.toml.commission.lock").unlink()  # by who had it until now
+        taken(lock, how)
+
+    monkeypatch.setattr(fcntl, "flock", late)
+    with pytest.raises(SettingsError, match="another gwrms commission"), alone(tmp_path / "exo-01.toml"):
+        pass
+
+
 def test_a_folder_that_cannot_be_written_is_told_before_anything_is_asked(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -222,6 +239,28 @@ def test_a_damaged_draft_is_named_and_not_gone_on_with(tmp_path: Path, left: byt
     (tmp_path / "exo-01.toml.commission").write_bytes(left)
     with pytest.raises(SettingsError, match=r"exo-01\.toml\.commission: cannot be gone on with"):
         Draft(tmp_path / "exo-01.toml")
+
+
+@pytest.mark.parametrize(
+    "left",
+    [
+        b"{",
+        b'{"robot": 7}',
+        b'{"node.x": {"identity": {"value": 1}}, "joint.y": {"node_id": {"value": null}}}',
+    ],
+)
+def test_a_stop_asks_all_where_the_draft_is_damaged_or_a_folder_is_gone(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, left: bytes
+) -> None:
+    monkeypatch.setattr("gateway.cli.commission.signal.signal", lambda *_: None)
+    file = tmp_path / "exo-01.toml"
+    file.with_name("exo-01.toml.commission").write_bytes(left)
+    with can.Bus(interface="virtual", channel="damaged") as other:
+        options = ["--stop", f"--eds={tmp_path / 'gone'}", str(file), "virtual:damaged"]
+        assert main(options) == 1
+        sent = {frame.arbitration_id for frame in iter(lambda: other.recv(0.5), None)}
+    assert {0x600 + node for node in range(1, 128)} <= sent
+    assert "all 127 node ids were asked to stop" in capsys.readouterr().out
 
 
 def test_the_rated_torque_that_is_shown_is_in_the_unit_of_its_maker(

@@ -3,12 +3,16 @@
 import math
 import struct
 from collections.abc import Callable
+from typing import Any
 
 import can
 import pytest
 
+from drivers.bus import node
 from drivers.joint.drive import JointDrive
-from tests.support.waiting import until
+from drivers.joint.quick_stop import StopOutcome
+from drivers.joint.stop_rpdo import find_stop_rpdo
+from tests.support.waiting import WAIT_S, until
 from tests.unit.bus.fake_node import FakeNode
 from tests.unit.joint.conftest import drive_objects, tpdo
 from tests.unit.joint.test_drive import quality, read
@@ -100,4 +104,50 @@ def test_a_stray_frame_of_another_length_is_left_out_and_no_more(joint: Make, ch
         assert knee.short_frames == 2
         assert read(knee, "position") == pytest.approx(math.pi)
         assert knee.node.boots_begun == 1
+        knee.stop()
+
+
+def test_what_is_mapped_otherwise_as_the_last_of_it_is_read_is_not_followed_as_it_was(
+    joint: Make, channel: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    objects = drive_objects() | tpdo(1, 0x182, POSITION, VELOCITY)
+    monkeypatch.setattr(node, "REMAPPED_S", 600.0)
+    with FakeNode(channel, 2, dict(objects)) as fake:
+        knee = joint(objects, poll_hz=0, slow_poll_hz=0)
+        found, remapped = find_stop_rpdo, list[bool]()
+
+        def just_then(*asked: Any) -> Any:
+            rpdo = found(*asked)
+            knee.node.remapped()
+            remapped.append(True)
+            return rpdo
+
+        monkeypatch.setattr("drivers.joint.drive.find_stop_rpdo", just_then)
+        knee.start()
+        until(lambda: remapped and not knee.node.ready)
+        knee.node.run(lambda _sdo: None).result(WAIT_S)  # what was under way has ended
+        fake.send(0x182, struct.pack("<ii", 7, 500))
+        fake.heartbeat()
+        until(lambda: knee.node.life.heartbeats)
+        assert (knee.frames, read(knee, "position")) == (0, None)
+        knee.stop()
+
+
+def test_a_stop_is_confirmed_while_a_mapping_changes_again_and_again(joint: Make, channel: str) -> None:
+    objects = drive_objects() | tpdo(1, 0x182, POSITION, VELOCITY)
+    objects[0x6041, 0] = b"\x40\x02"
+    with FakeNode(channel, 2, dict(objects)) as fake, can.Bus(channel, interface="virtual") as master:
+        knee = joint(objects, poll_hz=0, slow_poll_hz=0)
+        knee.start()
+        until(lambda: knee.node.ready)
+        write = struct.pack("<BHBI", 0x23, 0x1A00, 2, POSITION)
+        again = can.Message(arbitration_id=0x602, data=write, is_extended_id=False)
+        storm = master.send_periodic(again, 0.05)
+        until(lambda: not knee.node.ready)
+        assert knee.quick_stop().result(WAIT_S) is StopOutcome.CONFIRMED
+        fake.send(0x182, struct.pack("<ii", 250, 7))
+        assert read(knee, "position") is None
+        assert "mapped otherwise" in str(quality(knee)[1])
+        storm.stop()
+        until(lambda: knee.node.ready)
         knee.stop()

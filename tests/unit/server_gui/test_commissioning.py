@@ -4,7 +4,14 @@ from collections.abc import Callable
 
 import pytest
 
-from server_gui.core.commissioning.commissioning import GUARD_S, OLD_S, SILENT_S, STOP_S
+from server_gui.core.commissioning.commissioning import (
+    GUARD_S,
+    KILL_S,
+    OLD_S,
+    SILENT_S,
+    STOP_S,
+    STOPPER_S,
+)
 from server_gui.core.commissioning.spoken import understood
 from server_gui.core.commissioning.stages import LOOKS, Stage
 from server_gui.core.commissioning.wish import Wish
@@ -258,3 +265,65 @@ def test_the_command_is_told_all_of_the_wish() -> None:
         *("--", "exo.toml", "can0"),
     ]
     assert wish.typed.startswith("gwrms commission --bitrate=500000 '--eds=a b'")
+
+
+def test_one_that_is_killed_while_it_lets_go_of_a_joint_under_power_is_followed_by_a_stop(
+    played: Played,
+) -> None:
+    playing.moving(played)
+    played.model.interrupt()
+    played.model.look()
+    played.end(-9)
+    assert stage(played) is Stage.STOPPING
+    assert "--stop" in played.talker.arguments
+
+
+def test_what_was_confirmed_before_confirms_no_later_stop(played: Played) -> None:
+    playing.stopping(played)
+    played.hear(stopped())
+    assert stage(played) is Stage.STOPPED
+    hangs = played.talker
+    played.model.stop()
+    played.model.look()
+    assert stage(played) is Stage.STOPPING
+    played.now_s += STOP_S + 0.1
+    played.model.look()
+    hangs.ends(-9)
+    played.model.look()
+    assert "--stop" in played.talker.arguments
+
+
+def test_a_command_that_cannot_be_killed_keeps_no_stop_waiting(played: Played) -> None:
+    playing.stopping(played)
+    played.now_s += STOP_S + KILL_S + 0.1
+    played.model.look()
+    assert "--stop" in played.talker.arguments
+
+
+def test_a_stop_that_says_nothing_for_long_is_not_confirmed(played: Played) -> None:
+    playing.died_moving(played)
+    played.now_s += STOPPER_S + 0.1
+    played.model.look()
+    assert played.talker.killed
+    played.end(-9)
+    assert stage(played) is Stage.NOT_CONFIRMED
+
+
+@pytest.mark.parametrize("state", [playing.stopping, playing.moving])
+def test_a_window_that_is_closed_leaves_the_stop_that_it_owes(
+    played: Played, state: Callable[[Played], None]
+) -> None:
+    state(played)
+    first = played.talker
+    assert not played.model.close(1.0)
+    assert first.asked_to_end
+    assert "--stop" in played.talker.arguments
+    assert not played.talker.asked_to_end, "before it has begun that would end it"
+    assert not played.model.close(1.0)
+    assert len(played.talkers) == 2
+
+
+def test_a_window_that_is_closed_owes_no_stop_where_nothing_moved(played: Played) -> None:
+    playing.hand(played)
+    played.model.close(1.0)
+    assert len(played.talkers) == 1
