@@ -98,6 +98,8 @@ def activity(station: Station) -> Line:
     why = station.predictions.problem or "the model says nothing now"
     if stopped := not_judged(station):
         return unjudged(stopped)
+    if gait.walking is None:
+        return Line(Mark("ring", "old", "not known"), "Activity not known", "too few steps seen yet", "", why)
     if not gait.walking:
         return Line(Mark("ring", "dim", "not walking"), "Not walking", "by the steps seen", "by steps", why)
     return Line(Mark("diamond", "accent", "walking"), "Walking", "by the steps seen", "by steps", why)
