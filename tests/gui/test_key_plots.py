@@ -18,6 +18,7 @@ from server_gui.views.key_plot import SECONDS, KeyPlot
 from server_gui.views.main_window import MainWindow
 from server_gui.views.overview import Overview
 from server_gui.views.theme import Theme
+from server_gui.views.widgets.value_axis import ValueAxis
 from tests.gui.fakes import Bench, destroy
 from tests.gui.running import wait
 from tests.support.desk import described, looked, telemetry, walking
@@ -195,3 +196,14 @@ def test_a_plot_without_data_says_so_and_has_no_numbers(theme: Theme, bench: Ben
 def test_times_have_their_unit(overview: Overview) -> None:
     axis = overview._plots[0].plot.getPlotItem().getAxis("bottom")
     assert axis.tickStrings([-10.0, -2.5, 0.0], 1.0, 2.0) == ["−10 s", "−2.5 s", "now"]
+
+
+@pytest.mark.parametrize("height", [30.0, 60.0, 200.0])
+def test_numbers_beside_a_plot_never_stand_on_each_other(qt: QApplication, height: float) -> None:
+    axis = ValueAxis()
+    axis.set_label_room(20)
+    for low, high in ((-47.0, 33.0), (0.0, 5.0), (-0.012, 0.009), (20.0, 100.0)):
+        ((step, _),) = axis.tickSpacing(low, high, height)
+        assert step / (high - low) * height >= 19.9
+    assert axis.tickSpacing(1.0, 1.0, height) == []
+    assert axis.tickStrings([-20.0, 0.0], 1.0, 20.0) == ["−20", "0"]

@@ -18,6 +18,7 @@ from server_gui.views.widgets import raster
 from server_gui.views.widgets.cursors import Cursors, Shown
 from server_gui.views.widgets.plain import set_tip
 from server_gui.views.widgets.time_axis import LAST, NOW, PAUSED, TimeAxis
+from server_gui.views.widgets.value_axis import ValueAxis
 
 Floats = npt.NDArray[np.float64]
 SHRINK_FRAMES: Final = 60  # a range that has become too wide is narrowed only now and then
@@ -107,7 +108,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
     def __init__(
         self, theme: Theme, seconds: float, least: float = 1.0, mouse: Mouse = Mouse.NOTHING
     ) -> None:
-        super().__init__(enableMenu=False, axisItems={"bottom": TimeAxis()})
+        super().__init__(enableMenu=False, axisItems={"bottom": TimeAxis(), "left": ValueAxis()})
         self._mouse = mouse
         self._theme = theme
         self._least = least
@@ -374,11 +375,11 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
             axis.setTextPen(theme.colour("dim"))
             axis.setTickFont(theme.text_font(0.85))
             axis.setStyle(tickLength=-4)
-            axis.setTickDensity(0.6)
+            metrics = QFontMetrics(theme.text_font(0.85))
             if width is not None:
                 axis.setWidth(theme.px(width))
+                axis.set_label_room(metrics.height() + theme.px(4))
             else:
-                metrics = QFontMetrics(theme.text_font(0.85))
                 axis.set_label_room(metrics.horizontalAdvance("−000 s") + theme.px(6))
         self._lines.set_behind(theme.colour("card"))
         self._inks = raster.Inks(
