@@ -7,7 +7,7 @@ import msgspec
 import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, QPointF, Qt
-from PySide6.QtGui import QWheelEvent
+from PySide6.QtGui import QFontMetrics, QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
@@ -18,6 +18,7 @@ from server_gui.views.key_plot import SECONDS, KeyPlot
 from server_gui.views.main_window import MainWindow
 from server_gui.views.overview import Overview
 from server_gui.views.theme import Theme
+from server_gui.views.widgets.time_axis import PAUSED
 from server_gui.views.widgets.value_axis import ValueAxis
 from tests.gui.fakes import Bench, destroy
 from tests.gui.running import wait
@@ -206,4 +207,16 @@ def test_numbers_beside_a_plot_never_stand_on_each_other(qt: QApplication, heigh
         ((step, _),) = axis.tickSpacing(low, high, height)
         assert step / (high - low) * height >= 19.9
     assert axis.tickSpacing(1.0, 1.0, height) == []
-    assert axis.tickStrings([-20.0, 0.0], 1.0, 20.0) == ["−20", "0"]
+    assert axis.tickStrings([-2.5, 1e-17, 2.5], 1.0, 2.5) == ["−2.5", "0", "2.5"]
+
+
+@pytest.mark.parametrize("scale", [1.0, 1.5, 2.0])
+def test_the_word_at_the_end_of_the_time_axis_is_whole(
+    overview: Overview, theme: Theme, scale: float
+) -> None:
+    theme.set(scale=scale)
+    QApplication.processEvents()
+    plot = overview._plots[0].plot
+    axis = plot.getPlotItem().getAxis("bottom")
+    width = QFontMetrics(theme.text_font(0.85)).horizontalAdvance(PAUSED)
+    assert axis.mapRectToScene(axis.rect()).right() + width / 2 <= plot.width()

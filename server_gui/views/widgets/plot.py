@@ -367,7 +367,8 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
     def _restyle(self) -> None:
         theme = self._theme
         self.setBackground(theme.colour("card"))
-        room = theme.px(16)  # for what stands beside the ends of the axes
+        metrics = QFontMetrics(theme.text_font(0.85))
+        room = metrics.horizontalAdvance(PAUSED) // 2 + 2  # the widest that stands beside the end of an axis
         self.getPlotItem().layout.setContentsMargins(0, theme.px(6), room, 0)
         for name, width in (("left", 44), ("bottom", None)):
             axis = self.getPlotItem().getAxis(name)
@@ -375,10 +376,9 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
             axis.setTextPen(theme.colour("dim"))
             axis.setTickFont(theme.text_font(0.85))
             axis.setStyle(tickLength=-4)
-            metrics = QFontMetrics(theme.text_font(0.85))
             if width is not None:
                 axis.setWidth(theme.px(width))
-                axis.set_label_room(metrics.height() + theme.px(4))
+                axis.set_label_room(metrics.ascent())
             else:
                 axis.set_label_room(metrics.horizontalAdvance("−000 s") + theme.px(6))
         self._lines.set_behind(theme.colour("card"))

@@ -6,7 +6,7 @@ from typing import Final
 
 import pyqtgraph as pg
 
-STEPS: Final = (1.0, 2.0, 5.0, 10.0)
+STEPS: Final = (1.0, 2.0, 2.5, 5.0, 10.0)
 
 
 class ValueAxis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph has no types
@@ -23,7 +23,7 @@ class ValueAxis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph has no types
         self.update()
 
     def tickSpacing(self, low: float, high: float, size: float) -> list[tuple[float, float]]:
-        """Return how far places are apart: 1, 2 or 5 of a decade, as near as there is room for numbers."""
+        """Return how far places are apart: 1, 2, 2.5 or 5 of a decade, as near as there is room for."""
         least = abs(high - low) * self._label_px / max(size, 1.0)
         if not 0.0 < least < math.inf:
             return []
@@ -32,4 +32,5 @@ class ValueAxis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph has no types
 
     def tickStrings(self, values: Sequence[float], scale: float, spacing: float) -> list[str]:
         """Return what stands at these places."""
-        return [text.replace("-", "−") for text in super().tickStrings(values, scale, spacing)]
+        near = [0.0 if abs(value) < spacing / 1000 else value * scale for value in values]
+        return [f"{value:.6g}".replace("-", "−") for value in near]
