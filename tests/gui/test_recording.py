@@ -213,7 +213,7 @@ def test_a_robot_that_the_other_program_does_not_follow_is_said_not_to_be_record
 def test_nobody_who_answers_is_bad_and_nobody_at_all_is_said() -> None:
     recording, _ = looked(FakeKeeper(ConnectionError("gone")), By.OTHER, "the folder cannot be used")
     said = recording.said(ADDRESS)
-    assert (said.tone, said.detail) == (Tone.BAD, f"{SOON}: the folder cannot be used")
+    assert (said.tone, said.detail) == (Tone.BAD, f"the folder cannot be used; {SOON}")
     nobody = Recording(By.NOBODY, None, lambda call: call(), News(), "to show only")
     assert (nobody.said(None).tone, nobody.said(None).text) == (Tone.OFF, "Not recording")
 
