@@ -18,6 +18,7 @@ from server_gui.views.key_plot import SECONDS, KeyPlot
 from server_gui.views.main_window import MainWindow
 from server_gui.views.overview import Overview
 from server_gui.views.theme import Theme
+from server_gui.views.widgets.cursors import told
 from server_gui.views.widgets.time_axis import PAUSED
 from server_gui.views.widgets.value_axis import ValueAxis
 from tests.gui.fakes import Bench, destroy
@@ -220,3 +221,8 @@ def test_the_word_at_the_end_of_the_time_axis_is_whole(
     axis = plot.getPlotItem().getAxis("bottom")
     width = QFontMetrics(theme.text_font(0.85)).horizontalAdvance(PAUSED)
     assert axis.mapRectToScene(axis.rect()).right() + width / 2 <= plot.width()
+
+
+def test_a_fault_is_not_hidden_by_the_stop_that_it_brings() -> None:
+    flags = [(0.50, FlagKind.FAULT), (0.51, FlagKind.STOP), (0.90, FlagKind.STOP), (0.905, FlagKind.WRITE)]
+    assert told(flags, 0.05) == [(0.50, FlagKind.FAULT), (0.90, FlagKind.STOP)]
