@@ -10,6 +10,7 @@ from server_gui.core.commissioning.commissioning import Commissioning
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.mark import MarkIcon
+from server_gui.views.widgets.plain import set_tip
 from server_gui.views.widgets.stop_button import StopButton
 from server_gui.views.widgets.whole import WholeLabel
 
@@ -41,7 +42,7 @@ class Bar(QWidget):
         self.interrupt.clicked.connect(self.interrupted)
         self.stop = StopButton()
         self.stop.setAccessibleName("STOP the drives that are commissioned")
-        self.stop.setToolTip(STOP_TIP)
+        set_tip(self.stop, STOP_TIP)
         self.stop.setAccessibleDescription(STOP_TIP)
         self.stop.stopped.connect(self.stopped)
         theme.changed.connect(self._restyle)

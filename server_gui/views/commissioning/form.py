@@ -13,7 +13,7 @@ from server_gui.core.commissioning.wish import Wish
 from server_gui.processes.surroundings import can_interfaces, serial_ports
 from server_gui.views.widgets.card import Card
 from server_gui.views.widgets.files import ask_folder, ask_open
-from server_gui.views.widgets.plain import PlainLabel
+from server_gui.views.widgets.plain import PlainLabel, set_tip
 from server_gui.views.widgets.whole import WholeLabel
 
 ABOUT: Final = (
@@ -54,7 +54,7 @@ class Form(Card):
         }
         for field, (hint, tip) in hints.items():
             field.setPlaceholderText(hint)
-            field.setToolTip(tip)
+            set_tip(field, tip)
             field.returnPressed.connect(self.begin)
             field.setAccessibleName(f"Commission: {tip}")
         self.start = QPushButton("Start")
@@ -136,7 +136,7 @@ class Form(Card):
     def _browse(self, name: str, do: Callable[[], None]) -> QPushButton:
         button = QPushButton("All" if name.startswith("All") else "…")
         button.setAccessibleName(name)
-        button.setToolTip(name)
+        set_tip(button, name)
         button.clicked.connect(do)
         return button
 
