@@ -42,7 +42,7 @@ from server_gui.views.first_run.opening import Opening
 from server_gui.views.kept import kept_units
 from server_gui.views.main_window import SLOW, MainWindow
 from server_gui.views.stop_keys import StopKeys
-from server_gui.views.theme import Look
+from server_gui.views.theme import Look, Theme
 from server_gui.views.x11_keys import NoX, X11Keys
 
 FRAME_MS: Final = 33
@@ -96,7 +96,7 @@ class App:
     """Everything from the robots of the server's file to the window that shows them.
 
     Without `record` it only shows, and so it does as long as another program records into the same spool.
-    `opening` is of a simulated robot that has been started already.
+    `opening` is of a simulated robot that has been started already. Without a `theme` it is the one kept.
     """
 
     def __init__(
@@ -108,6 +108,7 @@ class App:
         record: Record | None = None,
         file: Path | None = None,
         opening: Opening | None = None,
+        theme: Theme | None = None,
     ) -> None:
         self.desk = Desk()
         self._qt = qt
@@ -132,7 +133,7 @@ class App:
         self._own = OwnRobot() if opening is None else opening.own
         self.demo: DemoBar | None = None  # once a simulated robot of ours is followed
         self.desk.shown.units = kept_units(kept)
-        self.theme = kept_theme(qt, kept)
+        self.theme = theme or kept_theme(qt, kept)
         operator = "" if record is None else record.operator
         self._archive = Archive(settings, self.desk, self._poster.deliver, operator, file)
         self.commissioning = Commissioning(talk)
@@ -319,8 +320,9 @@ def run(
     """
     sys.setswitchinterval(SWITCH_S)
     qt = application()
-    with App(qt, settings, kept_settings(), FOLLOWING, record, file, opening) as app:
-        app.theme.set(look, scale)
+    kept = kept_settings()
+    theme = kept_theme(qt, kept, look, scale)
+    with App(qt, settings, kept, FOLLOWING, record, file, opening, theme) as app:
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, lambda *_: app.quit())
         if signals:

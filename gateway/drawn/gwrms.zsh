@@ -88,6 +88,13 @@ _shtab_gwrms_cloud_commands() {
   _describe 'gwrms cloud commands' _commands
 }
 
+_shtab_gwrms_edits_commands() {
+  local _commands=(
+    show:'Everything that is known of one edit.'
+  )
+  _describe 'gwrms edits commands' _commands
+}
+
 _shtab_gwrms_journal_commands() {
   local _commands=(
     tail:'The newest entries: who did what, when, and what came of it. WHO is known by their key or account'
@@ -496,6 +503,16 @@ _shtab_gwrms_edits_options=(
 
 # guard to ensure default positional specs are added only once per session
 _shtab_gwrms_edits_defaults_added=0
+
+_shtab_gwrms_edits_show_options=(
+  "(- : *)"{-h,--help}"[show this help message and exit]"
+  "--config[the server\'s file, which names the store]:FILE:_files"
+  "--json[for machines]"
+  ":of gwrms edits\; may be cut off where it is unique:"
+)
+
+# guard to ensure default positional specs are added only once per session
+_shtab_gwrms_edits_show_defaults_added=0
 
 _shtab_gwrms_eds_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
@@ -1282,7 +1299,7 @@ _shtab_gwrms() {
         describe) _arguments -C -s $_shtab_gwrms_describe_options ;;
         docs) _arguments -C -s $_shtab_gwrms_docs_options ;;
         doctor) _arguments -C -s $_shtab_gwrms_doctor_options ;;
-        edits) _arguments -C -s $_shtab_gwrms_edits_options ;;
+        edits) _shtab_gwrms_edits ;;
         eds) _arguments -C -s $_shtab_gwrms_eds_options ;;
         enable) _arguments -C -s $_shtab_gwrms_enable_options ;;
         evaluate) _arguments -C -s $_shtab_gwrms_evaluate_options ;;
@@ -1375,6 +1392,29 @@ _shtab_gwrms_cloud() {
         vacuum) _arguments -C -s $_shtab_gwrms_cloud_vacuum_options ;;
         verify) _arguments -C -s $_shtab_gwrms_cloud_verify_options ;;
         witnesses) _arguments -C -s $_shtab_gwrms_cloud_witnesses_options ;;
+      esac
+  esac
+}
+
+_shtab_gwrms_edits() {
+  local context state line curcontext="$curcontext" one_or_more='(*)' remainder='(-)*:' default='*::: :->edits'
+
+  # Add default positional/remainder specs only if none exist, and only once per session
+  if (( ! _shtab_gwrms_edits_defaults_added )); then
+    if (( ${_shtab_gwrms_edits_options[(I)${(q)one_or_more}*]} +          ${_shtab_gwrms_edits_options[(I)${(q)remainder}*]} +          ${_shtab_gwrms_edits_options[(I)${(q)default}]} == 0 )); then
+      _shtab_gwrms_edits_options+=(': :_shtab_gwrms_edits_commands' '*::: :->edits')
+    fi
+    _shtab_gwrms_edits_defaults_added=1
+  fi
+  _arguments -C -s $_shtab_gwrms_edits_options
+
+  case $state in
+    edits)
+      words=($line[1] "${words[@]}")
+      (( CURRENT += 1 ))
+      curcontext="${curcontext%:*:*}:_shtab_gwrms_edits-$line[1]:"
+      case $line[1] in
+        show) _arguments -C -s $_shtab_gwrms_edits_show_options ;;
       esac
   esac
 }

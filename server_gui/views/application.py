@@ -6,7 +6,7 @@ from PySide6.QtCore import QSettings
 from PySide6.QtWidgets import QApplication
 
 from server_gui.views.kept import kept_look, kept_scale
-from server_gui.views.theme import Theme
+from server_gui.views.theme import Look, Theme
 
 
 def application() -> QApplication:
@@ -24,6 +24,8 @@ def kept_settings() -> QSettings:
     return QSettings("gwrms", "gui")
 
 
-def kept_theme(qt: QApplication, kept: QSettings) -> Theme:
-    """Return the look and the size of text that were chosen last."""
-    return Theme(qt, kept_look(kept), kept_scale(kept))
+def kept_theme(
+    qt: QApplication, kept: QSettings, look: Look | None = None, scale: float | None = None
+) -> Theme:
+    """Return the look and the size of text that are asked for, or else were chosen last."""
+    return Theme(qt, look or kept_look(kept), kept_scale(kept) if scale is None else scale)

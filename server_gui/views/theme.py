@@ -226,6 +226,8 @@ class Theme(QObject):
         self.colours = PALETTES[self.look]
         font = QFont(self._family)
         font.setPointSizeF(BASE_POINTS * self.scale)
+        for widget in self._application.allWidgets():
+            widget.ensurePolished()  # Qt takes the style off what it has polished, and off nothing else
         with self.styled_at_the_end():
             self._application.setFont(font)
             self._application.setPalette(self._palette())

@@ -14,7 +14,7 @@ from tests.support.waiting import until
 from tests.unit.gateway.harness import Client, serving
 
 OFFER = '[joint.left_knee]\nparameters = "eds"\nrelease = ["position_control_*", "profile_*"]\n'
-GAIN = "left_knee.position_control_parameters_proportional_gain"
+GAIN = "left_knee.position_gain"
 TORQUE = "left_knee.max_torque"
 
 

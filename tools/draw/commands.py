@@ -35,9 +35,10 @@ WORDS: Final[Mapping[str, tuple[str, ...]]] = {
         "witnesses",
     ),
     "models": ("ls", "show", "promote", "rollback", "history", "export"),
+    "edits": ("show",),
     "sim": ("run",),
 }
-ALONE: Final = frozenset({"sensor", "sim"})  # which are commands without such a word too
+ALONE: Final = frozenset({"edits", "sensor", "sim"})  # which are commands without such a word too
 _HEAD: Final = """# Commands
 
 `gwrms COMMAND --help` says what stands here. Those that ask a robot take `--robot HOST:PORT`

@@ -15,7 +15,6 @@ from typing import Final
 
 import numpy as np
 import numpy.typing as npt
-from scipy.special import stdtr, stdtrit
 
 Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
@@ -39,6 +38,8 @@ class Effects:
     @property
     def half_width(self) -> Floats:
         """Half of the confidence interval."""
+        from scipy.special import stdtrit  # who only shows evidence has no scipy
+
         return np.asarray(stdtrit(self.degrees, 0.5 + CONFIDENCE / 2.0) * self.error)
 
     @property
@@ -46,6 +47,8 @@ class Effects:
         """How often a difference at least so large comes by chance."""
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio = np.nan_to_num(np.abs(self.difference) / self.error, posinf=np.inf)
+        from scipy.special import stdtr  # as above
+
         return np.asarray(2.0 * stdtr(self.degrees, -ratio))
 
     @property

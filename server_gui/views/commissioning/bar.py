@@ -38,7 +38,7 @@ class Bar(QWidget):
         self._icon = MarkIcon(theme, 14)
         self.stage, self.words = WholeLabel("title"), WholeLabel()
         self.interrupt = QPushButton("Interrupt")
-        self.interrupt.setToolTip("End the command; what was found is kept, and gone on with")
+        set_tip(self.interrupt, "End the command; what was found is kept, and gone on with")
         self.interrupt.clicked.connect(self.interrupted)
         self.stop = StopButton()
         self.stop.setAccessibleName("STOP the drives that are commissioned")

@@ -9,6 +9,7 @@ from server_gui.core.commissioning.commissioning import Commissioning
 from server_gui.core.commissioning.spoken import Written
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_text
+from server_gui.views.widgets.plain import set_tip
 from server_gui.views.widgets.whole import WholeLabel
 
 LINES: Final = 14  # high
@@ -35,7 +36,7 @@ class Result(Card):
         self.text.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.connect_button, self.copy = QPushButton(CONNECT), QPushButton("Copy the file's text")
         self.connect_button.setObjectName("primary")
-        self.connect_button.setToolTip("A gateway on this computer, which ends with this window")
+        set_tip(self.connect_button, "A gateway on this computer, which ends with this window")
         self.connect_button.clicked.connect(self._connect)
         self.copy.clicked.connect(lambda: QApplication.clipboard().setText(self.text.toPlainText()))
         row = QHBoxLayout()

@@ -57,7 +57,7 @@ class FactsCard(Card):
         self.body.addWidget(self.text)
         self.body.addLayout(self._grid)
         self.arrange(len(self.buttons))
-        theme.scaled.connect(self._restyle)
+        theme.changed.connect(self._restyle)
         self._restyle()
 
     def arrange(self, columns: int) -> None:

@@ -62,7 +62,7 @@ def test_a_robot_that_is_not_there_is_said_and_no_success(
     config = tmp_path / "server.toml"
     config.write_text(f'[store]\nurl = "{folder_url}"\n[robots]\nexo-01 = "{robot.address}"\n')
     robot.refuse()
-    argv = ["--config", str(config), "--robot", "exo-01", "--seconds", "0.3"]
+    argv = ["--config", str(config), "--robot", "exo-01", "--seconds", "1.5"]  # to be refused, however busy
     assert predict.main(argv) == 1
     assert predict.main([*argv, "--json"]) == 1
     said = capsys.readouterr()
