@@ -7,6 +7,7 @@ from typing import Final
 import pyqtgraph as pg
 
 STEPS: Final = (1.0, 2.0, 2.5, 5.0, 10.0)
+MOST: Final = 6  # numbers, about, however high the plot is
 
 
 class ValueAxis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph has no types
@@ -24,7 +25,7 @@ class ValueAxis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph has no types
 
     def tickSpacing(self, low: float, high: float, size: float) -> list[tuple[float, float]]:
         """Return how far places are apart: 1, 2, 2.5 or 5 of a decade, as near as there is room for."""
-        least = abs(high - low) * self._label_px / max(size, 1.0)
+        least = abs(high - low) * max(self._label_px / max(size, 1.0), 1.0 / MOST)
         if not 0.0 < least < math.inf:
             return []
         decade = 10.0 ** math.floor(math.log10(least))
