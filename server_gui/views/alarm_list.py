@@ -3,7 +3,7 @@
 from typing import Final, Protocol
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QPushButton, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QBoxLayout, QFrame, QHBoxLayout, QPushButton, QSizePolicy, QVBoxLayout, QWidget
 
 from server_gui.core.alarms.texts import Kind
 from server_gui.views.alarm_words import Key, Told, details, headline, key_of, now_s
@@ -15,6 +15,7 @@ from server_gui.views.widgets.sheet import Sheet
 from server_gui.views.widgets.whole import WholeLabel
 
 WIDEST: Final = 900  # at text of 100 %
+AROUND_BUTTONS: Final = 24  # pixels, of a row
 OVER: Final = Mark("ring", "dim", "over")
 
 
@@ -105,11 +106,18 @@ class AlarmButtons(QWidget):
         self.show_signal = QPushButton("Show the signal ± 5 s")
         self.acknowledge = QPushButton("Acknowledge")
         self.acknowledge.setToolTip("It is read: it gives way to others until it is over")
-        row = QHBoxLayout(self)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(6)
-        for button in (self.clear, self.show_signal, self.acknowledge):
-            row.addWidget(button)
+        self._row = QBoxLayout(QBoxLayout.Direction.LeftToRight, self)
+        self._row.setContentsMargins(0, 0, 0, 0)
+        self._row.setSpacing(6)
+        self._all = (self.clear, self.show_signal, self.acknowledge)
+        for button in self._all:
+            self._row.addWidget(button)
+
+    def fit(self, room: int) -> None:
+        """Stand below each other where there is less room (pixels) than they need beside each other."""
+        needed = sum(one.sizeHint().width() + self._row.spacing() for one in self._all if not one.isHidden())
+        direction = QBoxLayout.Direction
+        self._row.setDirection(direction.TopToBottom if needed > room else direction.LeftToRight)
 
     def offer(self, told: Told | None, *, all_of_them: bool = True) -> None:
         """Offer what there is for this one; what is not offered at once stands in the list."""
@@ -155,6 +163,7 @@ class AlarmList(Sheet):
             self._add_row()
         for row, (key, told) in zip(self.rows, self._shown.items(), strict=False):
             row.say(told, named=self._strip.named, is_over=key not in now)
+            row.buttons.fit(self.room - AROUND_BUTTONS)
         for place, row in enumerate(self.rows):
             row.setVisible(place < len(self._shown))
         self._none.setVisible(not self._shown)

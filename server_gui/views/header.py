@@ -194,6 +194,8 @@ def _status(station: Station) -> Words:
         return Words(line.mark, line.text, tuple(filter(None, parts)), f"{line.text}\n{line.detail}")
     gait, problem = station.processing.derived().gait, station.predictions.problem
     parts = ("by steps", f"not predicted: {problem}" if problem else "not predicted")
+    if gait.walking is None:
+        return Words(Mark("ring", "old"), "Activity not known", parts)
     if not gait.walking:
         return Words(Mark("ring", "dim"), "Not walking", parts)
     cadence = "–" if gait.cadence_spm is None else f"{gait.cadence_spm:.0f}"

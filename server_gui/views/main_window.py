@@ -92,6 +92,11 @@ class View(Protocol):
         ...
 
 
+def opening_size(room: QSize, scale: float) -> QSize:
+    """Return how large a window is that nobody has resized yet: larger text needs more of the screen."""
+    return (USUAL * max(scale, 1.0)).boundedTo(room)
+
+
 class MainWindow(QMainWindow):
     """`stopped` and `stop_all` ask for a STOP, `added`, `removed` bring a robot, `simulator` asks for one."""
 
@@ -119,7 +124,7 @@ class MainWindow(QMainWindow):
         self._known: tuple[object, ...] | None = None  # of the robot of header and panels, when last read
         self._is_arranged = False  # the panels, which may wait for the window to be shown
         self.setWindowTitle("GWRMS")
-        self.resize(USUAL.boundedTo(self.screen().availableSize()))
+        self.resize(opening_size(self.screen().availableSize(), theme.scale))
         with theme.styled_at_the_end():
             self._make(desk, theme, archive, commissioning)
         self._restore()

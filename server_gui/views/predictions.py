@@ -6,7 +6,7 @@ from typing import Final
 
 from ml.robot.task import ABNORMAL, UNKNOWN
 from ml.serving.trust import Level
-from server_gui.core.desk.belief import belief, not_judged
+from server_gui.core.desk.belief import belief, blind, not_judged
 from server_gui.core.desk.leg_phase import LegPhase, apart, leg_phase, phase_at
 from server_gui.core.desk.station import Station
 from server_gui.core.models.names import model_name, told_name
@@ -45,10 +45,11 @@ class Line:
         return tuple(dict.fromkeys(" · ".join(filter(None, (self.text, one))) for one in details))
 
 
-def said(shown: Told, *, stopped: str = "") -> Line:
+def said(shown: Told, *, stopped: str = "", unseen: str = "") -> Line:
     """Return what a model says now: the label and how probable, or that it does not know.
 
-    Of a robot that does not drive its wearer, by what `stopped` says, nothing is called unlike what is known.
+    Of a robot that does not drive its wearer, by what `stopped` says, nothing is called unlike what is known,
+    nor is it where the model does not see all, by what `unseen` says.
     """
     prediction = shown.prediction
     if shown.is_stale():
@@ -58,6 +59,8 @@ def said(shown: Told, *, stopped: str = "") -> Line:
         return unjudged(stopped)
     word, worth = label_text(prediction.label), belief(shown)
     details = (" · ".join(filter(None, (worth.wordings[0], _runner_up(shown)))), worth.wordings[-1])
+    if prediction.label == ABNORMAL and unseen:
+        return Line(Mark("ring", "old", "not judged"), "Not judged", unseen, unseen, _tip(shown))
     if prediction.label == ABNORMAL:
         novelty = f"novelty {prediction.novelty:.1f}"
         return Line(
@@ -80,12 +83,12 @@ def status(station: Station) -> Line | None:
     shown = station.predictions.told
     falling, stopped = shown.get(FALLING), not_judged(station)
     if falling is not None and not falling.is_stale():
-        line = said(falling, stopped=stopped)
+        line = said(falling, stopped=stopped, unseen=blind(station))
         if line.mark.colour == "bad":
             return _as_predicted(line)
     if stopped:
         return unjudged(stopped)
-    return _as_predicted(said(shown[ACTIVITY])) if ACTIVITY in shown else None
+    return _as_predicted(said(shown[ACTIVITY], unseen=blind(station))) if ACTIVITY in shown else None
 
 
 def activity(station: Station) -> Line:
@@ -94,10 +97,12 @@ def activity(station: Station) -> Line:
     if not station.is_live:
         return Line(Mark("ring", "old", "not known"), "Activity not known", "no live data")
     if shown is not None and not shown.is_stale():
-        return said(shown, stopped=not_judged(station))
+        return said(shown, stopped=not_judged(station), unseen=blind(station))
     why = station.predictions.problem or "the model says nothing now"
     if stopped := not_judged(station):
         return unjudged(stopped)
+    if gait.walking is None:
+        return Line(Mark("ring", "old", "not known"), "Activity not known", "too few steps seen yet", "", why)
     if not gait.walking:
         return Line(Mark("ring", "dim", "not walking"), "Not walking", "by the steps seen", "by steps", why)
     return Line(Mark("diamond", "accent", "walking"), "Walking", "by the steps seen", "by steps", why)
@@ -109,7 +114,7 @@ def lines(station: Station) -> Iterator[Line]:
     for task, title in TITLES.items():
         shown = None if stopped and task == GAIT_PHASE else predictions.told.get(task)
         if shown is not None and not (task == GAIT_PHASE and shown.is_stale()):
-            line = said(shown, stopped=stopped)
+            line = said(shown, stopped=stopped, unseen=blind(station))
             if task == GAIT_PHASE and line.mark.colour == "accent":
                 line = _stride(station, line)
             yield replace(line, text=f"{title}: {line.text}")

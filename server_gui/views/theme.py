@@ -167,6 +167,10 @@ QAbstractSpinBox {{ padding-right: 16px; }}
 QAbstractSpinBox QLineEdit {{ border: none; padding: 0; background: transparent; }}
 QComboBox QAbstractItemView, QMenu {{ background: {card}; border: 1px solid {border};
     selection-background-color: {accent}; selection-color: {on_accent}; }}
+QComboBox::drop-down {{ border: none; width: 16px; }}
+QComboBox::down-arrow {{ width: 0; height: 0; border-left: 4px solid {field}; border-right: 4px solid {field};
+    border-top: 5px solid {text}; }}
+QComboBox::down-arrow:disabled {{ border-top-color: {old}; }}
 QMenu::item {{ padding: 5px 22px 5px 12px; }}
 QMenu::item:selected {{ background: {accent}; color: {on_accent}; }}
 QMenu::item:disabled {{ color: {old}; }}

@@ -141,6 +141,24 @@ def test_nothing_that_is_clicked_moves_while_alarms_come_and_go(
         assert stop_is_whole(window)
 
 
+def test_what_may_be_done_is_whole_in_the_list_beside_panels_and_with_large_text(
+    theme: Theme, window: MainWindow, bench: Bench
+) -> None:
+    theme.set(scale=1.5)
+    window.resize(1024, 700)
+    window.show()
+    fault(bench)
+    settle(window, bench)
+    window.panels_button.click()
+    settle(window, bench)
+    window.alarms.list.turn()
+    settle(window, bench)
+    row = window.alarms.list.rows[0]
+    for button in (row.clear, row.show_signal, row.acknowledge):
+        assert button.isVisible()
+        assert button.visibleRegion().boundingRect() == button.rect(), button.text()
+
+
 @pytest.mark.parametrize(("width", "height"), [(1024, 700), (1366, 768), (1920, 1080)])
 def test_the_joint_table_is_whole_beside_an_alarm(
     window: MainWindow, bench: Bench, width: int, height: int

@@ -56,6 +56,7 @@ def test_a_store_that_is_away_says_so_and_is_tried_again(
     record(settings)
     shown.open("Cloud")
     shown.until(lambda: "Connection refused" in shown.window.cloud.state.text(), "said so")
+    assert shown.window.cloud._facts["Holds"].text() == "not known"
     shown.open("Recordings")
     assert "it is tried again" in shown.window.recordings.list.said.text()
     away[0] = False

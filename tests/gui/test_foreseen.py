@@ -139,6 +139,15 @@ def test_a_robot_that_does_not_drive_its_wearer_is_not_judged(
     assert line.text == "Fall 97 %", "a fall is told of a stopped robot, too"
 
 
+def test_a_wearer_is_not_called_abnormal_where_a_part_is_lost(window: MainWindow, station: Station) -> None:
+    station.take([looked(state="lost", problem="its heartbeat is missing")])
+    station.take_prediction(predicted("abnormal", WALKS, novelty=3.1))
+    assert activity(station).wordings[0] == "Not judged · nothing comes from left knee"
+    shown(window, lambda: chip(window).startswith("Not judged"))
+    station.take_prediction(predicted("walk", WALKS))
+    assert activity(station).text == "Walk 94 %"
+
+
 def test_a_prediction_that_is_old_is_not_shown_as_one(window: MainWindow, station: Station) -> None:
     station.take_prediction(predicted("walk", WALKS))
     newest = station.predictions.by_task["activity"]

@@ -7,7 +7,7 @@ import msgspec
 import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, QPointF, Qt
-from PySide6.QtGui import QWheelEvent
+from PySide6.QtGui import QFontMetrics, QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
@@ -18,6 +18,9 @@ from server_gui.views.key_plot import SECONDS, KeyPlot
 from server_gui.views.main_window import MainWindow
 from server_gui.views.overview import Overview
 from server_gui.views.theme import Theme
+from server_gui.views.widgets.cursors import told
+from server_gui.views.widgets.time_axis import PAUSED
+from server_gui.views.widgets.value_axis import ValueAxis
 from tests.gui.fakes import Bench, destroy
 from tests.gui.running import wait
 from tests.support.desk import described, looked, telemetry, walking
@@ -195,3 +198,31 @@ def test_a_plot_without_data_says_so_and_has_no_numbers(theme: Theme, bench: Ben
 def test_times_have_their_unit(overview: Overview) -> None:
     axis = overview._plots[0].plot.getPlotItem().getAxis("bottom")
     assert axis.tickStrings([-10.0, -2.5, 0.0], 1.0, 2.0) == ["−10 s", "−2.5 s", "now"]
+
+
+@pytest.mark.parametrize("height", [30.0, 60.0, 200.0])
+def test_numbers_beside_a_plot_never_stand_on_each_other(qt: QApplication, height: float) -> None:
+    axis = ValueAxis()
+    axis.set_label_room(20)
+    for low, high in ((-47.0, 33.0), (0.0, 5.0), (-0.012, 0.009), (20.0, 100.0)):
+        ((step, _),) = axis.tickSpacing(low, high, height)
+        assert step / (high - low) * height >= 19.9
+    assert axis.tickSpacing(1.0, 1.0, height) == []
+    assert axis.tickStrings([-2.5, 1e-17, 2.5], 1.0, 2.5) == ["−2.5", "0", "2.5"]
+
+
+@pytest.mark.parametrize("scale", [1.0, 1.5, 2.0])
+def test_the_word_at_the_end_of_the_time_axis_is_whole(
+    overview: Overview, theme: Theme, scale: float
+) -> None:
+    theme.set(scale=scale)
+    QApplication.processEvents()
+    plot = overview._plots[0].plot
+    axis = plot.getPlotItem().getAxis("bottom")
+    width = QFontMetrics(theme.text_font(0.85)).horizontalAdvance(PAUSED)
+    assert axis.mapRectToScene(axis.rect()).right() + width / 2 <= plot.width()
+
+
+def test_a_fault_is_not_hidden_by_the_stop_that_it_brings() -> None:
+    flags = [(0.50, FlagKind.FAULT), (0.51, FlagKind.STOP), (0.90, FlagKind.STOP), (0.905, FlagKind.WRITE)]
+    assert told(flags, 0.05) == [(0.50, FlagKind.FAULT), (0.90, FlagKind.STOP)]

@@ -19,7 +19,7 @@ from server_gui.core.desk.soles import cells_of, sole
 from server_gui.core.follow import robot
 from server_gui.core.follow.events import LinkChanged
 from server_gui.core.follow.robot import STALE_NS
-from server_gui.core.processing.gait_events import Leg
+from server_gui.core.processing.gait_events import EventKind, Leg
 from server_gui.core.tuning.stop import Proof
 from server_gui.core.tuning.writing import Trial
 from server_gui.views.joint_table import ERROR, STOP, TORQUE, JointModel
@@ -62,6 +62,15 @@ def test_a_walk_is_seen_as_a_walk(overview: Overview, bench: Bench) -> None:
         assert phase is not None
         assert 0.0 <= phase.percent <= 100.0
     assert len(colours(overview.grab().toImage())) > 200
+
+
+def test_a_leg_far_beyond_its_stride_is_nowhere(bench: Bench) -> None:
+    bench.station.take([walking(600)])
+    derived = bench.station.processing.derived()
+    strike_ns = max(one.stamp_ns for one in derived.events if one.kind is EventKind.HEEL_STRIKE)
+    stride_s = derived.gait.legs[Leg.LEFT].stride_s
+    assert stride_s is not None
+    assert leg_phase(derived, Leg.LEFT, strike_ns + round(2.1e9 * stride_s)) is None
 
 
 @pytest.mark.parametrize(

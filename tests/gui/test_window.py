@@ -5,14 +5,14 @@ import re
 import time
 
 import pytest
-from PySide6.QtCore import QSettings, Qt
+from PySide6.QtCore import QSettings, QSize, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QLineEdit, QWidget
 
 from gateway.client import ConnectionState, NotConnected
 from server_gui.core.desk.desk import Desk
 from server_gui.core.follow.events import LinkChanged
-from server_gui.views.main_window import USUAL, MainWindow
+from server_gui.views.main_window import USUAL, MainWindow, opening_size
 from server_gui.views.parameters.tree import DEFAULT, RANGE
 from server_gui.views.robots_panel import RobotsPanel
 from server_gui.views.theme import PALETTES, Look, Theme
@@ -270,3 +270,10 @@ def test_range_and_default_of_parameters_are_seen_on_a_laptop(window: MainWindow
     bench.draw(window)
     tree = window.parameters.tree
     assert not any(tree.isColumnHidden(column) for column in (RANGE, DEFAULT))
+
+
+def test_a_window_with_large_text_opens_as_large_as_its_screen() -> None:
+    assert opening_size(QSize(1920, 1080), 1.5) == QSize(1920, 1080)
+    assert opening_size(QSize(3840, 2160), 1.5) == USUAL * 1.5
+    assert opening_size(QSize(3840, 2160), 0.8) == USUAL
+    assert opening_size(QSize(1024, 700), 1.0) == QSize(1024, 700)

@@ -15,6 +15,7 @@ from server_gui.core.prediction.state import Quality
 
 QUICK_STOP: Final = "quick stop active"
 IN_FAULT: Final = ("fault", "fault reaction active")
+NOT_SEEN: Final = ("lost", "stale")
 SOURCES: Final = {
     Source.SIMULATED: "learned in the simulator",
     Source.RECORDED: "learned from recordings",
@@ -66,6 +67,12 @@ def not_judged(station: Station) -> str:
     if any(word in IN_FAULT for word in words):
         return "a drive is in fault"
     return "no drive is enabled" if words and all(words) and ENABLED not in words else ""
+
+
+def blind(station: Station) -> str:
+    """Return which components a model does not see now: without them nothing is like what it has learned."""
+    missing = [part.name.replace("_", " ") for part in station.robot.not_ok() if part.state in NOT_SEEN]
+    return f"nothing comes from {', '.join(missing)}" if missing else ""
 
 
 def _checked(quality: Quality) -> tuple[str, ...]:

@@ -17,6 +17,7 @@ PHASES: Final[tuple[tuple[str, float], ...]] = (
     ("mid-swing", 87.0),
     ("terminal swing", 100.0),
 )
+LONGEST_PERCENT: Final = 150.0  # of the mean stride, that one may last
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,12 +29,18 @@ class LegPhase:
 
 
 def leg_phase(derived: Derived, leg: Leg, now_ns: int) -> LegPhase | None:
-    """Return where a leg is at `now_ns` on the robot's clock; None without a walk or a whole stride."""
+    """Return where a leg is at `now_ns` on the robot's clock; None without a walk or a whole stride.
+
+    None too for a leg that is far beyond its stride's end: it stands, or its next strike was not seen.
+    """
     stride_s = derived.gait.legs[leg].stride_s
     strike = _newest_strike(derived.events, leg)
     if not derived.gait.walking or stride_s is None or strike is None:
         return None
-    percent = min(max((now_ns - strike.stamp_ns) / 1e9 / stride_s * 100.0, 0.0), 100.0)
+    percent = max((now_ns - strike.stamp_ns) / 1e9 / stride_s * 100.0, 0.0)
+    if percent > LONGEST_PERCENT:
+        return None
+    percent = min(percent, 100.0)
     return LegPhase(percent, phase_at(percent))
 
 

@@ -125,7 +125,9 @@ def reason(bus: BusInfo) -> tuple[str, ...] | None:
     short = {
         "no answer": any("no SDO" in one.words for node in bus.nodes for one in node.findings),
         "PDOs missing": any(_misses(node) for node in bus.nodes),
-        "errors": bool(bus.findings),
+        "findings": bool(bus.findings),
+        "not read in time": any("stood still" in one.words for one in bus.findings),
+        "errors": any("error" in one.words for one in bus.findings),
         "busy": load >= BUSY_PERCENT,
         "full": load >= FULL_PERCENT,
         bus.state: bus.state != ACTIVE,

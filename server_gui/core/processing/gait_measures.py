@@ -50,11 +50,13 @@ class LegGait:
 class Gait:
     """The walk as it is now; where nobody walks, everything is None.
 
+    Whether somebody walks is None while too little was seen to say so: no whole stride, and no pause either.
+
     `cadence_spm` is in steps a minute. `symmetry` is left against right, 0 where both are alike
     (`symmetry_index`), of step time, stance and swing.
     """
 
-    walking: bool = False
+    walking: bool | None = None
     cadence_spm: float | None = None
     double_support: float | None = None
     legs: Mapping[Leg, LegGait] = field(default_factory=lambda: {leg: LegGait() for leg in Leg})
@@ -77,6 +79,12 @@ class GaitMeasures:
 
     def __init__(self) -> None:
         self._legs = {leg: _Leg() for leg in Leg}
+        self._began_ns: int | None = None
+
+    def begin(self, stamp_ns: int) -> None:
+        """Take the first instant that was seen, where it was not yet: from then on nobody may walk."""
+        if self._began_ns is None:
+            self._began_ns = stamp_ns
 
     def take(self, event: GaitEvent, ranges: Mapping[str, float] | None = None) -> Stride | None:
         """Take one event; the stride that it ends, where it does and nothing of it was missed.
@@ -100,8 +108,11 @@ class GaitMeasures:
     def now(self, now_ns: int) -> Gait:
         """Return the walk at `now_ns` on the robot's clock."""
         strikes = [leg.strike_ns for leg in self._legs.values() if leg.strike_ns is not None]
-        if not strikes or now_ns - max(strikes) > WALKING_NS:
+        newest_ns = max(strikes, default=self._began_ns)
+        if newest_ns is None:
             return Gait()
+        if now_ns - newest_ns > WALKING_NS:
+            return Gait(walking=False)
         return summary({leg: found.strides for leg, found in self._legs.items()})
 
 
@@ -113,7 +124,7 @@ def summary(strides: Mapping[Leg, Iterable[Stride]]) -> Gait:
     step_s = _mean(stride.step_s for stride in both)
     sides = {name: [getattr(legs[leg], name) for leg in Leg] for name in SYMMETRIES}
     return Gait(
-        walking=bool(both),
+        walking=True if both else None,
         cadence_spm=None if step_s is None else 60.0 / step_s,
         double_support=_mean(stride.double_support for stride in both),
         legs=legs,

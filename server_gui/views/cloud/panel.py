@@ -167,12 +167,19 @@ class Cloud(QWidget):
         mark, text = self._reached()
         self._icon.show_mark(mark)
         set_text(self.state, text)
-        stored = sum(session.uploaded for session in found.sessions)
-        set_text(self._facts["Holds"], f"{size(found.size_bytes)}; recordings: {stored}")
+        set_text(self._facts["Holds"], self._holds())
         self.hint.setVisible(found.is_empty)
         there = bool(found.usage)
         self.verify.setEnabled(there)
         self.download.setEnabled(there)
+
+    def _holds(self) -> str:
+        """What nobody could look at holds not nothing."""
+        library = self._archive.library
+        if library.looked_s is None or library.found.problem is not None:
+            return "not known"
+        stored = sum(session.uploaded for session in library.found.sessions)
+        return f"{size(library.found.size_bytes)}; recordings: {stored}"
 
     def _reached(self) -> tuple[Mark, str]:
         library = self._archive.library

@@ -1,5 +1,6 @@
 """What is drawn above a plot's curves: limits, flags of what happened, hover line, cursors, a box."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final
 
@@ -20,6 +21,7 @@ FLAGS: Final = {
     FlagKind.TRIAL: Mark("half", "accent", "trial"),
     FlagKind.MARK: Mark("diamond", "text", "mark"),
 }
+FIRST: Final = (FlagKind.FAULT, FlagKind.STOP, FlagKind.MARK, FlagKind.TRIAL, FlagKind.WRITE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +41,15 @@ class Shown:
         """Whether there is nothing to draw."""
         several = self.at or self.flags or self.limits or self.words
         return not several and self.box is None and self.hover is None
+
+
+def told(flags: Iterable[tuple[float, FlagKind]], apart: float) -> list[tuple[float, FlagKind]]:
+    """Return which flags have room for their mark, `apart` from each other: a fault before the stop by it."""
+    found: list[tuple[float, FlagKind]] = []
+    for share, kind in sorted(flags, key=lambda flag: FIRST.index(flag[1])):
+        if all(abs(share - other) >= apart for other, _ in found):
+            found.append((share, kind))
+    return found
 
 
 class Cursors(QWidget):
@@ -104,9 +115,10 @@ class Cursors(QWidget):
             painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
             painter.setPen(QPen(colour, 1))
             painter.drawLine(QPointF(x, side), QPointF(x, self.height()))
-            painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-            left = min(max(x - side / 2, 0.0), self.width() - side)
-            draw(painter, mark, colour, QRectF(left, 0, side, side))
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        for share, kind in told(self._shown.flags, side / max(self.width(), 1)):
+            left = min(max(share * self.width() - side / 2, 0.0), self.width() - side)
+            draw(painter, FLAGS[kind], self._theme.colour(FLAGS[kind].colour), QRectF(left, 0, side, side))
         painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
 
     def _draw_cursors(self, painter: QPainter) -> None:

@@ -18,6 +18,7 @@ from server_gui.views.widgets import raster
 from server_gui.views.widgets.cursors import Cursors, Shown
 from server_gui.views.widgets.plain import set_tip
 from server_gui.views.widgets.time_axis import LAST, NOW, PAUSED, TimeAxis
+from server_gui.views.widgets.value_axis import ValueAxis
 
 Floats = npt.NDArray[np.float64]
 SHRINK_FRAMES: Final = 60  # a range that has become too wide is narrowed only now and then
@@ -107,7 +108,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
     def __init__(
         self, theme: Theme, seconds: float, least: float = 1.0, mouse: Mouse = Mouse.NOTHING
     ) -> None:
-        super().__init__(enableMenu=False, axisItems={"bottom": TimeAxis()})
+        super().__init__(enableMenu=False, axisItems={"bottom": TimeAxis(), "left": ValueAxis()})
         self._mouse = mouse
         self._theme = theme
         self._least = least
@@ -366,7 +367,8 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
     def _restyle(self) -> None:
         theme = self._theme
         self.setBackground(theme.colour("card"))
-        room = theme.px(16)  # for what stands beside the ends of the axes
+        metrics = QFontMetrics(theme.text_font(0.85))
+        room = metrics.horizontalAdvance(PAUSED) // 2 + 2  # the widest that stands beside the end of an axis
         self.getPlotItem().layout.setContentsMargins(0, theme.px(6), room, 0)
         for name, width in (("left", 44), ("bottom", None)):
             axis = self.getPlotItem().getAxis(name)
@@ -374,11 +376,10 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
             axis.setTextPen(theme.colour("dim"))
             axis.setTickFont(theme.text_font(0.85))
             axis.setStyle(tickLength=-4)
-            axis.setTickDensity(0.6)
             if width is not None:
                 axis.setWidth(theme.px(width))
+                axis.set_label_room(metrics.ascent())
             else:
-                metrics = QFontMetrics(theme.text_font(0.85))
                 axis.set_label_room(metrics.horizontalAdvance("−000 s") + theme.px(6))
         self._lines.set_behind(theme.colour("card"))
         self._inks = raster.Inks(

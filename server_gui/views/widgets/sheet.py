@@ -20,7 +20,7 @@ class Sheet(QFrame):
         self.setObjectName("card")
         self.setAccessibleName(name)
         words.setObjectName("page")
-        scrolled = QScrollArea()
+        scrolled = self._scrolled = QScrollArea()
         scrolled.setWidgetResizable(True)
         scrolled.setWidget(words)
         scrolled.setAccessibleName(name)
@@ -34,6 +34,11 @@ class Sheet(QFrame):
         below.installEventFilter(self)
         theme.scaled.connect(self._fit)
         self.hide()
+
+    @property
+    def room(self) -> int:
+        """How wide the words may be (pixels) without being scrolled aside."""
+        return self._scrolled.viewport().width()
 
     def turn(self) -> None:
         """Show it, or put it away."""

@@ -29,7 +29,7 @@ def tuning(bench: Bench) -> None:
     hand.keep("refused")
     stage(hand, "step length", NEW_STEP)
     hand.click("Review 1 …")
-    hand.sees("Try it for")
+    until(lambda: hand.can_see("Try it for"), "could be tried")
     hand.keep("review")
     hand.insist("Try it for", lambda: hand.reads("On trial"))
     hand.key("F9")
@@ -72,6 +72,7 @@ def two_channels(hand: Hand) -> None:
     hand.click("Filter channels")
     hand.type("knee.position")
     hand.click("Cursors")
+    hand.sees("Δt")
 
 
 def a_locked_object(hand: Hand) -> None:
@@ -159,7 +160,9 @@ def learning(bench: Bench) -> None:
     hand.reach("Start training")
     hand.keep("train")
     hand.click("Start training")
-    hand.sees("Better:", within_s=AGAIN_S)
+    hand.sees(
+        "etter: F1", within_s=AGAIN_S
+    )  # or not better: the session of this bench may be among the judges
     hand.keep("trained")
     hand.click("Train a model")
     hand.click("Promote…")
@@ -177,8 +180,9 @@ def store_gone(bench: Bench) -> None:
     hand.click("Upload now")
     hand.sees("Not reached", within_s=AGAIN_S)
     hand.keep("store-gone")
-    for title, key in (("models", "alt+m"), ("recordings", "alt+c")):
+    for title, key, words in (("models", "alt+m", "Train a model"), ("recordings", "alt+c", "tried again")):
         hand.key(key)
+        hand.sees(words)
         hand.keep(f"store-gone-{title}")
     bench.store.unlink()
     away.rename(bench.store)

@@ -36,7 +36,9 @@ Place = tuple[str, QRect]  # what stands there, on the screen
 
 
 def visible() -> Iterator[QWidget]:
-    for top in reversed(QApplication.topLevelWidgets()):
+    """Menus first: what is open above all else is what a hand means."""
+    tops = reversed(QApplication.topLevelWidgets())
+    for top in sorted(tops, key=lambda top: not isinstance(top, QMenu)):
         if top.isVisible():
             yield top
             yield from rules.seen(top)

@@ -17,6 +17,7 @@ TALKS = [TalkInfo("TPDO", 2, 900.0), TalkInfo("SYNC", None, 100.0), TalkInfo("he
 BUS = BusInfo("main", "error active", 1_000_000, 41.2, 1010.0, 0, 0, 1, 0, [NODE], None, [], TALKS)
 BUSY = FindingInfo(1, "85 % of its time is taken", "send fewer PDOs")
 LOST = FindingInfo(1, "it answers no SDO", "check its cable")
+STOOD = "this computer stood still 2 times, for up to 0.5 s"
 
 
 def robot(*buses: BusInfo, at_ns: int | None = None) -> Robot:
@@ -83,6 +84,7 @@ def test_the_worst_bus_is_said_with_its_load_its_errors_and_who_talks_most() -> 
     [
         (replace(BUS, load_percent=24.0, state="error passive"), "error passive"),
         (replace(BUS, load_percent=85.0), "busy"),
+        (replace(BUS, load_percent=24.0, findings=[replace(BUSY, words=STOOD)]), "not read in time"),
         (replace(BUS, load_percent=24.0, nodes=[replace(NODE, pdos_missing_percent=3.0)]), "PDOs missing"),
         (replace(BUS, load_percent=24.0, nodes=[replace(NODE, findings=[LOST])]), "no answer"),
     ],

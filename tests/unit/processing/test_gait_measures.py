@@ -93,6 +93,16 @@ def test_who_has_stopped_has_no_cadence() -> None:
     assert stopped.legs[Leg.LEFT].stride_s is None
 
 
+def test_whoever_is_seen_too_briefly_is_not_said_to_stand() -> None:
+    measures = GaitMeasures()
+    assert measures.now(0).walking is None
+    measures.begin(round(1.0e9))
+    assert measures.now(round(3.0e9)).walking is None
+    assert measures.now(round(4.0e9)).walking is False
+    measures.take(event(Leg.LEFT, EventKind.HEEL_STRIKE, 4.5))
+    assert measures.now(round(5.0e9)).walking is None, "one step is no whole stride yet"
+
+
 def test_another_walk_begins_anew() -> None:
     measures, _ = taken(walk(6))
     for one in walk(3, stride_s=2.0, right_after=1.0):

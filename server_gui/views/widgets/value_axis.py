@@ -1,0 +1,37 @@
+"""The axis of values beside a plot: its places are as far apart as what stands there is high."""
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+import pyqtgraph as pg
+
+STEPS: Final = (1.0, 2.0, 2.5, 5.0, 10.0)
+MOST: Final = 6  # numbers, about, however high the plot is
+
+
+class ValueAxis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph has no types
+    """Its numbers stand never on each other, however low the plot is."""
+
+    def __init__(self) -> None:
+        self._label_px = 20
+        super().__init__("left")
+
+    def set_label_room(self, pixels: int) -> None:
+        """Set how high a place is, with the space around it."""
+        self._label_px = pixels
+        self.picture = None
+        self.update()
+
+    def tickSpacing(self, low: float, high: float, size: float) -> list[tuple[float, float]]:
+        """Return how far places are apart: 1, 2, 2.5 or 5 of a decade, as near as there is room for."""
+        least = abs(high - low) * max(self._label_px / max(size, 1.0), 1.0 / MOST)
+        if not 0.0 < least < math.inf:
+            return []
+        decade = 10.0 ** math.floor(math.log10(least))
+        return [(next(step * decade for step in STEPS if step * decade >= least * (1 - 1e-9)), 0.0)]
+
+    def tickStrings(self, values: Sequence[float], scale: float, spacing: float) -> list[str]:
+        """Return what stands at these places."""
+        near = [0.0 if abs(value) < spacing / 1000 else value * scale for value in values]
+        return [f"{value:.6g}".replace("-", "−") for value in near]
