@@ -68,6 +68,20 @@ class Edits(QWidget):
         known = [] if station is None else sorted(station.judged.values(), key=lambda one: -one.edit.utc_ns)
         if known == self._shown:
             return
+        if [told.edit.id for told in known] == [told.edit.id for told in self._shown]:
+            self._grow(known)
+        else:
+            self._list(known)
+        self._choose()
+
+    def _grow(self, known: list[Told]) -> None:
+        """More is known of some: hundreds of others are not laid out again each second."""
+        for row, (told, shown) in enumerate(zip(known, self._shown, strict=True)):
+            if told != shown:
+                self.list.item(row).setText(_line(told))
+        self._shown = known
+
+    def _list(self, known: list[Told]) -> None:
         chosen = self._chosen
         self._shown = known
         self.list.blockSignals(True)
@@ -79,7 +93,6 @@ class Edits(QWidget):
         was_newest = self._drawn is None or not places
         self.list.setCurrentRow(0 if was_newest and known else places[0] if places else -1)
         self.list.blockSignals(False)
-        self._choose()
 
     @property
     def _chosen(self) -> Told | None:
@@ -142,6 +155,9 @@ def _said(told: Told) -> list[str]:
     few = sum(one.word is Word.FEW for one in evidence.metrics)
     if few:
         lines.append(f"Not enough cycles for {counted(few, 'metric')}.")
+    silent = sum(one.word is Word.NO_DATA for one in evidence.metrics)
+    if silent:
+        lines.append(f"No data for {counted(silent, 'metric')}.")
     lines += [f"{note[0].upper()}{note[1:]}." for note in evidence.notes]
     lines += [f"Left out: {counted(count, 'cycle')}, {why}." for why, count in evidence.left_out.items()]
     return lines

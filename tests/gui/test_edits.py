@@ -33,6 +33,7 @@ def test_the_newest_edit_is_shown_with_its_word_and_its_strides(bench: Bench, wi
     assert window.edits.list.count() == 1
     assert "worse (" in window.edits.verdict.text()
     assert "left knee tracking error RMS worse: +19.2 %" in window.edits.words.text()
+    assert "No data for " in window.edits.words.text()
     assert set(window.edits.curves) == {"left_knee.position", "left_knee.following_error"}
     described = window.edits.curves["left_knee.position"].accessibleDescription()
     assert described.startswith("40 strides before and 41 after, from ")
@@ -67,3 +68,15 @@ def test_a_trial_that_counts_down_says_what_it_does_so_far(
         bench.station.take_evidence(replace(known, evidence=replace(known.evidence, word=word)))
     window.trial.refresh()
     assert said[word] in window.trial.words.text()
+
+
+def test_evidence_that_grows_lays_no_other_edit_out_again(bench: Bench, window: MainWindow) -> None:
+    for write in (1, 2):
+        bench.station.take_evidence(worse(write, is_final=False))
+    window.edits.refresh()
+    items = [window.edits.list.item(row) for row in (0, 1)]
+    bench.station.take_evidence(worse(2))
+    window.edits.refresh()
+    assert [window.edits.list.item(row) for row in (0, 1)] == items
+    assert ["so far" in item.text() for item in items] == [False, True]
+    assert "so far" not in window.edits.verdict.text()

@@ -86,8 +86,10 @@ def drives_mark(robot: Robot) -> Mark:
 def enabled_text(robot: Robot, *, live: bool) -> str:
     """Return how many drives are enabled, as far as that is known."""
     joints = robot.names("joint")
-    enabled = sum(robot.word(f"{joint}.state") == ENABLED for joint in joints)
-    return f"{enabled if live else '–'} of {len(joints)} enabled"
+    known = [word for joint in joints if live and (word := robot.word(f"{joint}.state")) is not None]
+    enabled = known.count(ENABLED) if known or not joints else "–"
+    unknown = f", {len(joints) - len(known)} not known" if known and len(known) < len(joints) else ""
+    return f"{enabled} of {len(joints)} enabled{unknown}"
 
 
 def age_text(age_s: float | None) -> str:

@@ -165,8 +165,9 @@ def compare(
     measured = _worded([own, [one for one in found if one not in own], robot])
     told = [sum(counts) for counts in zip(*(leg.counts for leg in legs.values()), strict=True)]
     strongest = max(_differing(measured), key=lambda one: abs(one.size or 0.0), default=None)
+    judged = {one.series for one in own or found}
     return Evidence(
-        word=_verdict(measured),
+        word=_verdict(measured, [one for one in measured if one.series in judged]),
         strongest="" if strongest is None else strongest.series,
         metrics=tuple(measured),
         cycles_before=told[0],
@@ -174,6 +175,13 @@ def compare(
         left_out=left_out,
         notes=tuple(_notes(most)),
     )
+
+
+def drawn(cycles: Iterable[Cycle], spell: Spell) -> list[Cycle]:
+    """Return the cycles that are compared; of a leg that has too few on a side yet, all that may be."""
+    taken, _ = _sorted_out(cycles, spell)
+    legs = [[cycle for cycle in taken if cycle.leg is leg] for leg in Leg]
+    return [cycle for leg in legs for cycle in (_sided(leg, spell).cycles or leg)]
 
 
 def _sorted_out(cycles: Iterable[Cycle], spell: Spell) -> tuple[list[Cycle], dict[str, int]]:
@@ -316,21 +324,24 @@ def _measured(one: _Found, p: float | None) -> Measured:
 def _word(metric: Metric, before: float, difference: float, p: float) -> Word:
     if p >= ALPHA or abs(difference) < metric.smallest(before):
         return Word.SAME
-    if metric.better is Better.NEITHER:
+    gain = -difference if metric.better is Better.LESS else abs(before) - abs(before + difference)
+    if metric.better is Better.NEITHER or abs(gain) < metric.smallest(before):
         return Word.CHANGED
-    return Word.BETTER if difference < 0.0 else Word.WORSE
+    return Word.BETTER if gain > 0.0 else Word.WORSE
 
 
 def _differing(measured: Iterable[Measured]) -> Iterator[Measured]:
     return (one for one in measured if one.word in (Word.BETTER, Word.WORSE, Word.CHANGED))
 
 
-def _verdict(measured: Sequence[Measured]) -> Word:
+def _verdict(measured: Sequence[Measured], judged: Sequence[Measured]) -> Word:
+    """The word for all; where nothing differs, that of what was edited: no cadence speaks for a knee."""
     words = {one.word for one in measured}
     if {Word.BETTER, Word.WORSE} <= words:
         return Word.MIXED
-    order = (Word.WORSE, Word.BETTER, Word.CHANGED, Word.SAME, Word.FEW)
-    return next((word for word in order if word in words), Word.NO_DATA)
+    differs = next((word for word in (Word.WORSE, Word.BETTER, Word.CHANGED) if word in words), None)
+    own = {one.word for one in judged}
+    return differs or next((word for word in (Word.SAME, Word.FEW) if word in own), Word.NO_DATA)
 
 
 def _notes(sided: _Sided) -> Iterator[str]:

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 from msgspec import Struct
 
-from server_gui.core.evidence.comparison import Evidence, Spell
+from server_gui.core.evidence.comparison import Evidence, Spell, drawn
 from server_gui.core.evidence.cycles import DRAWN, Cycle
 
 MOST = 3  # joints: those that were edited, and those that changed most
@@ -30,7 +30,7 @@ class Curves(Struct, frozen=True):
 
 def curves(cycles: Iterable[Cycle], spell: Spell, joints: Iterable[str]) -> tuple[Curves, ...]:
     """Return the strides of these joints on both sides."""
-    sides = [(cycle, spell.side(cycle)) for cycle in cycles if cycle.activity is not None]
+    sides = [(cycle, spell.side(cycle)) for cycle in drawn(cycles, spell)]
     found = []
     for channel in [f"{joint}.{quantity}" for joint in joints for quantity in DRAWN]:
         before, after = (

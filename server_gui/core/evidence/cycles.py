@@ -21,6 +21,7 @@ WAIT_NS: Final = 200_000_000  # for what other components tell of the end of a s
 KEPT_NS: Final = LONGEST_STRIDE_NS + 2 * WAIT_NS + MAX_GAP_NS
 COMPUTER_NS: Final = 6_000_000_000  # what was told of computer and bus longer ago is not known any more
 MOSTLY: Final = 2 / 3  # of what models say within a stride
+MOST: Final = 1e9  # in SI no joint and no foot has more: whatever sends it is broken
 LABELS: Final = 1000  # more than they say of two strides
 DRAWN: Final = ("position", "following_error", "current", "torque")  # curves that are kept, of 101 points
 
@@ -191,6 +192,7 @@ class _Ring:
         if not self._names:
             return
         values = np.array([columns[name] for name in self._names], dtype=np.float64)  # None becomes NaN
+        values[~(np.abs(values) < MOST)] = np.nan
         self._parts.append((np.asarray(stamps_ns, dtype=np.int64), values))
         while abs(stamps_ns[-1] - self._parts[0][0][-1]) > KEPT_NS:
             self._parts.popleft()

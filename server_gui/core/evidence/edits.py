@@ -1,6 +1,8 @@
 """Edits of a robot's parameters, as its journal tells them: who, what from and to, when it was in force."""
 
 import datetime
+import logging
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from enum import StrEnum
 from typing import Any, Final
@@ -8,7 +10,10 @@ from typing import Any, Final
 from msgspec import Struct
 from msgspec.structs import replace
 
+from gateway.amounts import NONE
 from server_gui.core.evidence.comparison import Spell
+
+log = logging.getLogger(__name__)
 
 Entry = Mapping[str, Any]
 
@@ -16,6 +21,7 @@ SETTLE_NS: Final = 1_000_000_000  # after a write: what the robot does until the
 BEFORE_NS: Final = 120_000_000_000  # of walking before an edit
 AFTER_NS: Final = 120_000_000_000  # with the new values
 BACK_NS: Final = 60_000_000_000  # after they were taken back
+TRIAL_NS: Final = 300_000_000_000  # the longest trial that a robot takes
 ID: Final = 10  # digits of the hash of the journal's entry
 
 
@@ -61,9 +67,11 @@ class Edit(Struct, frozen=True):
     @property
     def utc(self) -> str:
         """When, as ISO 8601, UTC."""
-        return datetime.datetime.fromtimestamp(self.utc_ns // 10**9, datetime.UTC).strftime(
-            "%Y-%m-%dT%H:%M:%SZ"
-        )
+        try:
+            at = datetime.datetime.fromtimestamp(self.utc_ns // 10**9, datetime.UTC)
+        except (OverflowError, ValueError, OSError):  # nobody's calendar has it
+            return NONE
+        return at.strftime("%Y-%m-%dT%H:%M:%SZ")
 
     @property
     def components(self) -> frozenset[str]:
@@ -86,15 +94,20 @@ class JournalEdits:
     def take(self, entries: Iterable[Entry]) -> None:
         """Take new entries, oldest first."""
         for entry in entries:
-            self._take(entry, str(entry.get("what")))
+            try:
+                self._take(entry, str(entry.get("what")))
+            except (KeyError, TypeError, ValueError, OverflowError) as error:
+                log.warning("%s: entry %s of its journal is no edit: %r", self._robot, entry.get("n"), error)
 
     def forget(self, before_ns: int) -> None:
-        """Forget edits that were over long ago."""
-        self.all = [edit for edit in self.all if (until_ns := due_ns(edit)) is None or until_ns >= before_ns]
+        """Forget edits that were over long ago, or of which nothing was heard since."""
+        self.all = [edit for edit in self.all if _last_ns(edit, before_ns) >= before_ns]
 
     def _take(self, entry: Entry, what: str) -> None:
         if what == "write":
-            self.all.append(_begun(self._robot, entry))
+            begun = _begun(self._robot, entry)
+            if all((edit.id, edit.began_ns) != (begun.id, begun.began_ns) for edit in self.all):
+                self.all.append(begun)
             return
         outcome = _OUTCOMES.get(what)
         places = [place for place, edit in enumerate(self.all) if edit.write == entry.get("write")]
@@ -138,7 +151,15 @@ def _begun(robot: str, entry: Entry) -> Edit:
 
 def _numbers(found: object) -> dict[str, float]:
     known = found.items() if isinstance(found, Mapping) else ()
-    return {str(name): float(value) for name, value in known if isinstance(value, int | float)}
+    numbers = {str(name): float(value) for name, value in known if isinstance(value, int | float)}
+    return {name: value for name, value in numbers.items() if math.isfinite(value)}
+
+
+def _last_ns(edit: Edit, now_ns: int) -> int:
+    if edit.state is State.ASKED:
+        return edit.began_ns
+    until_ns = due_ns(edit)
+    return now_ns if until_ns is None else until_ns
 
 
 def due_ns(edit: Edit) -> int | None:

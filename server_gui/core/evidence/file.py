@@ -92,7 +92,7 @@ class EvidenceFile:
                 log.warning("%s, line %d: another format; a newer gwrms can read it", self.path, number)
                 return None
             return msgspec.json.decode(line, type=Told)
-        except msgspec.DecodeError as error:
+        except (msgspec.DecodeError, RecursionError) as error:
             log.warning("%s, line %d is damaged and left out: %s", self.path, number, error)
             return None
 
@@ -125,7 +125,7 @@ def _whose(line: bytes) -> tuple[str, str] | None:
     """The robot and the recording of a line of any format; None where nobody can tell."""
     try:
         found = msgspec.json.decode(line, type=_Whose)
-    except msgspec.DecodeError:
+    except (msgspec.DecodeError, RecursionError):
         return None
     return found.edit.robot, found.session
 

@@ -10,6 +10,7 @@ import numpy.typing as npt
 Floats = npt.NDArray[np.float64]
 
 POINTS: Final = 201  # 0, 0.5 … 100 % of the stride
+MOVES_RAD: Final = 0.02  # over the stride: a target that moves less is a posture that is held
 SMOOTHED: Final = 7  # points on each side that jerk is fitted to
 CURVES: Final = ("position", "velocity", "torque", "current", "temperature", "following_error")
 
@@ -21,7 +22,8 @@ _SECOND: Final = 2.0 * np.linalg.pinv(np.vander(_AROUND, 4, increasing=True).ast
 def of_joint(curves: Mapping[str, Floats], seconds: float) -> dict[str, float]:
     """Return what these curves tell, by the keys of `metrics.OF_JOINTS`; the rest is missing.
 
-    Each curve has `POINTS` values, evenly over the `seconds` of the stride, in SI units.
+    Each curve has `POINTS` values, evenly over the `seconds` of the stride, in SI units. What holds still has
+    neither lag nor overshoot: of noise, they would be anything.
     """
     found: dict[str, float] = {}
     position, error = curves.get("position"), curves.get("following_error")
@@ -30,7 +32,8 @@ def of_joint(curves: Mapping[str, Floats], seconds: float) -> dict[str, float]:
         found |= {"error_rms": rms(error), "error_peak": _peak(error)}
     if position is not None and error is not None:
         target = position + error
-        found |= {"lag": lag(target, position, seconds), "overshoot": overshoot(target, position)}
+        if float(np.ptp(target)) >= MOVES_RAD:
+            found |= {"lag": lag(target, position, seconds), "overshoot": overshoot(target, position)}
     if current is not None:
         found |= {"current_rms": rms(current), "current_peak": _peak(current)}
     if (temperature := curves.get("temperature")) is not None:

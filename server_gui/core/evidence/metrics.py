@@ -9,6 +9,7 @@ class Better(Enum):
     """Which way of a metric is the better one; of some nobody can say without the wearer."""
 
     LESS = "less"
+    NEARER = "nearer to zero"  # of what may be on either side of it
     NEITHER = "neither"
 
 
@@ -35,12 +36,12 @@ class Metric:
         return max(self.share * abs(before), self.floor)
 
 
-LESS, NEITHER = Better.LESS, Better.NEITHER
+LESS, NEARER, NEITHER = Better.LESS, Better.NEARER, Better.NEITHER
 
 OF_JOINTS: Final = (
     Metric("error_rms", "tracking error RMS", "rad", LESS, 0.05, 2e-4),
     Metric("error_peak", "tracking error peak", "rad", LESS, 0.10, 5e-4),
-    Metric("lag", "lag behind the target", "s", LESS, 0.10, 1e-3),
+    Metric("lag", "lag behind the target", "s", NEARER, 0.10, 1e-3),
     Metric("overshoot", "overshoot", "rad", LESS, 0.10, 1e-3),
     Metric("current_rms", "current RMS", "A", LESS, 0.05, 0.02),
     Metric("current_peak", "current peak", "A", LESS, 0.10, 0.1),

@@ -8,13 +8,14 @@ from msgspec.structs import replace
 
 from gateway.wire.bus import BusInfo
 from gateway.wire.robot import Description
-from server_gui.core.evidence.comparison import compare
+from server_gui.core.evidence.comparison import Spell, compare
 from server_gui.core.evidence.curves import curves, told_joints
 from server_gui.core.evidence.cycles import ENABLED, STATE, Cycle, CycleCutter
 from server_gui.core.evidence.edits import (
     AFTER_NS,
     BACK_NS,
     BEFORE_NS,
+    TRIAL_NS,
     Edit,
     JournalEdits,
     State,
@@ -34,8 +35,9 @@ from server_gui.core.follow.events import (
 from server_gui.core.recording.journal_tail import news
 from server_gui.core.recording.rows import JournalHead
 
-KEPT_NS: Final = BEFORE_NS + AFTER_NS + BACK_NS  # of cycles
 LATE_NS: Final = 10_000_000_000  # after which the journal has told everything of an instant
+LONGEST_NS: Final = max(AFTER_NS, TRIAL_NS + BACK_NS)  # from an edit until nothing more comes of it
+KEPT_NS: Final = BEFORE_NS + LONGEST_NS + 2 * LATE_NS  # of cycles
 JOINT: Final = "joint"  # the kind of component
 
 
@@ -50,12 +52,13 @@ class RobotEvidence:
         self.cycles: collections.deque[Cycle] = collections.deque()
         self._cutter = CycleCutter()
         self._edits = JournalEdits(robot)
+        self._description: Description | None = None
         self._boot_id: str | None = None
         self._joints: tuple[str, ...] = ()
         self._head: JournalHead | None = None
         self._first_ns: int | None = None  # the first row of this boot
         self._newest_ns = 0
-        self._seen: dict[str, tuple[int, Edit]] = {}  # edits: at how many cycles they were looked at, and how
+        self._seen: dict[str, tuple[Edit, Spell, int | None]] = {}  # how, and at how many cycles at most
         self._cut = 0
         self._over: set[str] = set()
 
@@ -91,11 +94,18 @@ class RobotEvidence:
         self._over |= {one.edit.id for one in told}
         return told
 
+    def anew(self) -> "RobotEvidence":
+        """Return one that has seen nothing, but knows what the robot has said of itself once."""
+        other = RobotEvidence(self.robot)
+        if self._description is not None:
+            other.take(Described(self._description))
+        return other
+
     # --- inside
 
     def _told(self, edit: Edit, *, is_final: bool) -> Told:
         """What an edit has done, as far as the cycles until now tell."""
-        windows, notes = spell(edit, self._ours())
+        windows, notes = spell(edit, self._edits.all)
         edited = [joint for joint in self._joints if joint in edit.components]
         found = compare(self.cycles, windows, self._joints, edited)
         drawn = curves(self.cycles, windows, told_joints(found, edited))
@@ -123,6 +133,7 @@ class RobotEvidence:
 
     def _described(self, description: Description) -> list[Told]:
         ended: list[Told] = []
+        self._description = description
         if self._boot_id not in (None, description.boot_id):
             ended = self.end()
             self.cycles.clear()
@@ -155,11 +166,16 @@ class RobotEvidence:
     def _look(self, edit: Edit) -> Told | None:
         until_ns = due_ns(edit)
         is_final = until_ns is not None and self._newest_ns > until_ns + LATE_NS
-        if self._seen.get(edit.id) == (self._cut, edit) and not is_final:
+        windows, _ = spell(edit, self._edits.all)
+        last_ns = max(until for _, until in (*windows.before, *windows.after))
+        grows = self._newest_ns <= last_ns + LATE_NS
+        looked = (edit, windows, self._cut if grows else None)
+        if self._seen.get(edit.id) == looked and not is_final:
             return None
-        self._seen[edit.id] = self._cut, edit
+        self._seen[edit.id] = looked
         if is_final:
             self._over.add(edit.id)
+            del self._seen[edit.id]
         return self._told(edit, is_final=is_final)
 
 

@@ -32,7 +32,8 @@ class EvidenceService:
     """Follows edits from entering to leaving; use it as a context manager, which joins its thread.
 
     `take` gets everything that the robots' feeds tell, `predicted` what models say of them. What is final is
-    kept in `folder`, and what is not when this ends: of robots that are recorded now, as `session` tells.
+    kept in `folder`, and what is not when this ends: of robots that were recorded when the edit was made, as
+    `session` tells. It belongs to that recording: by the time it is final, somebody else may wear the robot.
     `tell` is told of each change, and first of what was kept of a robot before.
     """
 
@@ -43,6 +44,7 @@ class EvidenceService:
         self._inbox = Inbox()
         self._robots: dict[str, RobotEvidence] = {}
         self._said: collections.deque[tuple[str, Prediction]] = collections.deque(maxlen=MOST_SAID)
+        self._sessions: dict[str, str] = {}  # by edit: what was recorded when it was made
         self._looked_s = 0.0
         self.worker = Worker("evidence", self._run, STILL_S)
 
@@ -94,19 +96,23 @@ class EvidenceService:
                 self._told(robot, told)
         except Exception:
             log.exception("%s sent what no evidence can be found in; begun anew", robot)
-            del self._robots[robot]
+            self._robots[robot] = known.anew()
 
     def _tell_kept(self, robot: str) -> None:
         if self._tell is None:
             return
         try:
             for told in EvidenceFile(self._folder, robot).read().values():
-                self._tell(robot, told)
+                if told.edit.robot == robot:  # names that differ in signs share a file
+                    self._tell(robot, told)
         except OSError as error:
             log.error("the edits of %s that were kept cannot be read: %s", robot, error)
 
     def _told(self, robot: str, told: Told) -> None:
-        if told.is_final and (session := self._session(robot)):
+        session = self._sessions.setdefault(told.edit.id, self._session(robot))
+        if told.is_final:
+            del self._sessions[told.edit.id]
+        if told.is_final and session:
             try:
                 EvidenceFile(self._folder, robot).add(replace(told, session=session))
             except OSError as error:

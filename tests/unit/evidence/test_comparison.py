@@ -3,9 +3,11 @@
 import dataclasses
 from collections.abc import Callable
 
+import numpy as np
 import pytest
 
 from server_gui.core.evidence.comparison import Evidence, Measured, Spell, Word, compare
+from server_gui.core.evidence.curves import curves
 from tests.unit.evidence.synthetic import AT_S, SECOND, cycles, spell
 
 ERROR, TORQUE, TEMPERATURE = "left_knee.error_rms", "left_knee.torque_rms", "left_knee.temperature"
@@ -147,6 +149,20 @@ def test_only_the_same_activity_is_compared() -> None:
     assert evidence.left_out["the activity changed"] >= 3
 
 
+def test_strides_of_another_activity_are_not_drawn_either() -> None:
+    """Stairs laid over a walk would look like what the edit did."""
+    taken = [
+        dataclasses.replace(
+            cycle, curves={"left_knee.position": np.full(101, float(cycle.activity == "stairs"))}
+        )
+        for cycle in cycles(activity=lambda at_s: "stairs" if at_s >= AT_S + 30.0 else "walk")
+    ]
+    (found,) = curves(taken, spell(), ["left_knee"])
+    assert found.before is not None
+    assert found.after is not None
+    assert found.after.mean == found.before.mean
+
+
 def test_cycles_are_left_out_with_their_reason() -> None:
     taken = [
         dataclasses.replace(cycle, values={"cadence": 100.0}, left_out={"left_knee": "values are missing"})
@@ -157,3 +173,33 @@ def test_cycles_are_left_out_with_their_reason() -> None:
     evidence = compare(taken, spell(), JOINTS)
     assert metric(evidence, ERROR).word is Word.FEW
     assert evidence.left_out["left_knee: values are missing"] > 40
+
+
+@pytest.mark.parametrize(("known", "word"), [("cadence", Word.NO_DATA), (ERROR, Word.FEW)])
+def test_what_is_not_known_of_the_edited_joint_is_not_no_difference(known: str, word: Word) -> None:
+    """The cadence is as it was; of the knee that was edited nothing is known, or of a few strides only."""
+
+    def lost(at_s: float, values: dict[str, float]) -> None:
+        for series in list(values):
+            if series.startswith("left_knee") and (series != known or at_s >= AT_S + 5.0):
+                del values[series]
+
+    evidence = compare(cycles(lost), spell(), JOINTS, ["left_knee"])
+    assert metric(evidence, "cadence").word is Word.SAME
+    assert evidence.word is word
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "word"),
+    [
+        (-0.02, -0.01, Word.BETTER),
+        (-0.01, -0.02, Word.WORSE),
+        (0.01, -0.02, Word.WORSE),
+        (0.02, -0.02, Word.CHANGED),
+    ],
+)
+def test_a_lead_is_no_better_than_a_lag(before: float, after: float, word: Word) -> None:
+    def change(at_s: float, values: dict[str, float]) -> None:
+        values["left_knee.lag"] = (after if at_s >= AT_S else before) + 1e-4 * (at_s % 1.0)
+
+    assert metric(compare(cycles(change), spell(), JOINTS), "left_knee.lag").word is word

@@ -3,6 +3,8 @@
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from server_gui.core.evidence.edits import (
     AFTER_NS,
     BACK_NS,
@@ -132,3 +134,37 @@ def test_the_robots_own_journal_is_understood(tmp_path: Path) -> None:
     assert edits.all[1].ended_ns is not None
     assert edits.all[1].in_force_ns is not None
     assert edits.all[0].began_ns < edits.all[1].began_ns < edits.all[1].in_force_ns < edits.all[1].ended_ns
+
+
+def test_the_whole_journal_again_makes_no_edit_twice() -> None:
+    edits = JournalEdits("exo-01")
+    told = _entries((200, "write", 1), (201, "trial begun", 1), (220, "taken back", 1))
+    edits.take(told)
+    once = list(edits.all)
+    edits.take(told)
+    assert edits.all == once
+
+
+@pytest.mark.parametrize(
+    "nonsense",
+    [{"monotonic_ns": "soon"}, {"monotonic_ns": None}, {"write": [1]}, {"after": {NAME: 10**400}}],
+)
+def test_an_entry_that_is_nonsense_costs_no_other(nonsense: dict[str, Any]) -> None:
+    edits = JournalEdits("exo-01")
+    good = _entries((200, "write", 1), (201, "write done", 1))
+    edits.take([entry(9, 1, "write", 9, {NAME: 1.0}) | nonsense, *good])
+    assert [(edit.write, edit.state) for edit in edits.all] == [(1, State.KEPT)]
+
+
+def test_a_value_that_is_no_number_and_a_time_of_no_calendar_can_be_shown() -> None:
+    edits = JournalEdits("exo-01")
+    edits.take([entry(1, 1, "write", 1, {NAME: float("nan"), "a.b": 2.0}) | {"utc_ns": 10**30}])
+    (edit,) = edits.all
+    assert [change.name for change in edit.changes] == ["a.b"]
+    assert edit.utc == "–"
+
+
+def test_edits_of_which_nothing_was_heard_are_forgotten() -> None:
+    edits = journal((100, "write", 1), (200, "write", 2), (201, "trial begun", 2))
+    edits.forget(900 * SECOND)
+    assert [edit.write for edit in edits.all] == [2]

@@ -10,13 +10,13 @@ AFTER = np.arange(CYCLES) >= CYCLES // 2
 TREND = np.column_stack([np.ones(CYCLES), np.linspace(-1.0, 1.0, CYCLES)])
 
 
-def noise(correlation: float, seed: int = 1) -> Floats:
+def noise(correlation: float, seed: int = 1, cycles: int = CYCLES, columns: int = COLUMNS) -> Floats:
     """Columns in which each cycle keeps so much of the one before."""
     source = np.random.default_rng(seed)
-    fresh = source.normal(size=(CYCLES, COLUMNS)) * np.sqrt(1.0 - correlation**2)
+    fresh = source.normal(size=(cycles, columns)) * np.sqrt(1.0 - correlation**2)
     values = np.empty_like(fresh)
-    values[0] = source.normal(size=COLUMNS)
-    for place in range(1, CYCLES):
+    values[0] = source.normal(size=columns)
+    for place in range(1, cycles):
         values[place] = correlation * values[place - 1] + fresh[place]
     return np.asarray(values)
 
@@ -71,3 +71,21 @@ def test_many_looks_cost_each_its_share() -> None:
     assert holm(np.array([0.01, 0.04, 0.03])) == pytest.approx([0.03, 0.06, 0.06])
     assert holm(np.array([0.9, 0.6])) == pytest.approx([1.0, 1.0])
     assert len(holm(np.array([]))) == 0
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "correlation"),
+    [(20, 20, 0.7), (9, 90, 0.4), (90, 9, 0.4)],
+)
+def test_few_or_long_alike_cycles_do_not_look_surer_than_they_are(
+    before: int, after: int, correlation: float
+) -> None:
+    """At what one of sixty metrics must keep, so that together they err in few of hundred edits."""
+    wrong = 0
+    for seed in range(20):
+        values = noise(correlation, seed, before + after, 60)
+        behind = np.arange(before + after) >= before
+        trend = np.column_stack([np.ones(before + after), np.linspace(-1.0, 1.0, before + after)])
+        found = effects(values, behind.astype(float), trend, behind)
+        wrong += int(np.sum(found.p < 0.01 / 60))
+    assert wrong <= 2

@@ -76,3 +76,14 @@ def test_what_is_known_of_somebody_who_is_forgotten_goes(tmp_path: Path) -> None
     assert b"torn" not in file.path.read_bytes()
     assert b'"format": 2' in file.path.read_bytes()
     assert stat.S_IMODE(file.path.stat().st_mode) == 0o600
+
+
+@pytest.mark.parametrize("line", [b'{"format":1,"x":' + b"[" * 100_000 + b"]" * 100_000 + b"}", b"\xff\xfe"])
+def test_a_line_that_is_nonsense_costs_no_other(tmp_path: Path, line: bytes) -> None:
+    file = EvidenceFile(tmp_path, "exo-01")
+    file.add(told())
+    with file.path.open("ab") as lines:
+        lines.write(line + b"\n")
+    file.add(told(2))
+    assert [one.edit.write for one in file.read().values()] == [1, 2]
+    assert forget(tmp_path, {("exo-01", "another")}) == []

@@ -58,3 +58,9 @@ def test_each_metric_has_its_own_curves() -> None:
 def test_what_a_joint_does_not_tell_is_missing() -> None:
     assert of_joint({}, STRIDE_S) == {}
     assert set(of_joint({"torque": SWING, "position": SWING}, STRIDE_S)) == {"torque_rms"}
+
+
+def test_a_posture_that_is_held_has_neither_lag_nor_overshoot() -> None:
+    noise = 1e-4 * np.random.default_rng(1).normal(size=(2, POINTS))
+    found = of_joint({"position": 0.3 + noise[0], "following_error": noise[1]}, STRIDE_S)
+    assert set(found) == {"error_rms", "error_peak"}

@@ -13,7 +13,8 @@ from server_gui.core.evidence.file import Told
 from server_gui.core.evidence.robot_evidence import RobotEvidence
 from server_gui.core.follow.events import Described, Event, Journalled, Telemetry, replaced
 from tests.support.desk import described
-from tests.unit.evidence.walks import GAIN, Edit, entry, walk
+from tests.unit.evidence.synthetic import cycles
+from tests.unit.evidence.walks import GAIN, Edit, entry, telemetry, walk
 
 WORSE = Edit(22.0, f"left_knee.{GAIN}", 2200.0)
 DIFFER = (Word.BETTER, Word.WORSE, Word.CHANGED)
@@ -139,3 +140,64 @@ def test_what_models_say_now_and_then_cuts_no_walk_in_pieces(events: list[Event]
     (told,) = robot.end()
     assert told.evidence.word is Word.WORSE
     assert "the activity changed" not in told.evidence.left_out
+
+
+def test_values_that_no_joint_can_have_are_no_values(events: list[Event]) -> None:
+    """Infinite currents after the edit say nothing of it; least of all that they became worse."""
+
+    def broken(one: Telemetry) -> Telemetry:
+        late = one.batch.stamps_ns[0] > WORSE.at_s * SECOND
+        current: list[float | None] = [float("inf") if late else 1.0] * len(one.batch.stamps_ns)
+        huge: list[float | None] = [1e200 if late else 1.0] * len(one.batch.stamps_ns)
+        columns = one.batch.columns | {"right_hip.current": current, "right_hip.torque": huge}
+        return replaced(one, one.batch.stamps_ns, columns)
+
+    found = words(followed(changed(events, broken))[WORSE.write])
+    assert found["right_hip.current_rms"] is Word.FEW
+    assert found["right_hip.torque_rms"] is Word.FEW
+    assert found["left_knee.error_rms"] is Word.WORSE
+
+
+def test_an_edit_that_nobody_heard_the_end_of_cuts_the_walk_short(events: list[Event]) -> None:
+    """Whether its values are in force is not known: the strides after it say nothing of the one before."""
+    (told,) = (one for one in events if isinstance(one, Journalled))
+    asked = entry(3, 32 * SECOND, "write", 32, {"left_knee.max_torque": 40.0})
+    both = Journalled(JournalEntries([*told.journal.entries, asked]))
+    evidence = followed([*events, both])[WORSE.write].evidence
+    assert evidence.cycles_after < followed(events)[WORSE.write].evidence.cycles_after // 2 + 2
+    assert "another edit" in evidence.notes[0]
+
+
+def test_a_long_trial_is_judged_by_what_was_before_it() -> None:
+    robot = RobotEvidence("exo-01")
+    robot.take(described())
+    for second in range(0, 480, 10):  # nobody walks any more: the cycles are there already
+        robot.take(telemetry(["left_hip.position"], [(second * SECOND, [0.0])]))
+        if second == 0:
+            robot.cycles.extend(cycles())
+    assert robot.cycles[0].began_ns == 0
+
+
+def test_what_went_wrong_once_does_not_end_the_evidence(events: list[Event]) -> None:
+    robot = RobotEvidence("exo-01")
+    for event in events[:20]:
+        robot.take(event)
+    again = [event for event in events if not isinstance(event, Described)]
+    assert words(followed(again, robot.anew())[WORSE.write])["left_knee.error_rms"] is Word.WORSE
+
+
+def test_an_edit_that_another_has_ended_costs_no_more_looks(events: list[Event]) -> None:
+    robot = RobotEvidence("exo-01")
+    (told,) = (one for one in events if isinstance(one, Journalled))
+    after = [entry(3, 30 * SECOND, "write", 30, {"a.b": 1.0}), entry(4, 30 * SECOND, "write done", 30)]
+    counted = dict.fromkeys((WORSE.write, 30), 0)
+    for number, event in enumerate(events):
+        robot.take(event)
+        if not isinstance(event, Telemetry):
+            continue
+        if event.batch.stamps_ns[0] // SECOND == 30:
+            robot.take(Journalled(JournalEntries([*told.journal.entries, *after])))
+        for one in robot.look() if number % 10 == 0 else ():
+            counted[one.edit.write] += event.batch.stamps_ns[0] > 41 * SECOND
+    assert counted[WORSE.write] <= 1
+    assert counted[30] >= 2

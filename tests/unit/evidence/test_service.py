@@ -69,3 +69,18 @@ def test_a_folder_that_cannot_be_written_is_said(
             service.take("exo-01", event)
         until(lambda: bool(heard))
     assert "is not kept" in caplog.text
+
+
+def test_it_belongs_to_the_recording_in_which_the_edit_was_made(tmp_path: Path, events: list[Event]) -> None:
+    """What is kept of a wearer goes with that wearer, and not with who came next."""
+    heard: list[Told] = []
+    session = ["anna"]
+    with EvidenceService(
+        tmp_path, lambda _robot: session[0], lambda _robot, told: heard.append(told)
+    ) as service:
+        for event in events:
+            service.take("exo-01", event)
+        until(lambda: bool(heard))
+        session[0] = "bert"
+    (told,) = read_all(tmp_path)
+    assert told.session == "anna"
