@@ -144,7 +144,7 @@ def test_the_simulator_that_is_offered_at_first_walks_in_the_window(qt: QApplica
         wait(lambda: app.desk.selected is not None, "started it")
         station = app.desk.stations[0]
         wait(lambda: station.title == "simulated-exo" and not station.robot.is_stale(), "was live")
-        wait(lambda: station.processing.derived().gait.walking, "walked")
+        wait(lambda: station.processing.derived().gait.walking is True, "walked")
         assert app.demo is not None
         demo = app.demo
         app.stop("test")
