@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Final
 
 from PySide6.QtCore import QByteArray, QEvent, QObject, QRect, Qt
-from PySide6.QtWidgets import QDockWidget, QMainWindow, QScrollArea, QTabWidget, QWidget
+from PySide6.QtWidgets import QDockWidget, QMainWindow, QScrollArea, QTabBar, QTabWidget, QWidget
 
 from server_gui.views.theme import Theme
 
@@ -58,6 +58,9 @@ class Docks(QObject):
 
     def restore(self, state: QByteArray) -> None:
         """Arrange them as it was kept; as they were at first where Qt cannot."""
+        # Qt makes new bars of tabs, and draws the old ones over the pages until it deletes them later.
+        for bar in self._window.findChildren(QTabBar, options=Qt.FindChildOption.FindDirectChildrenOnly):
+            bar.hide()
         if not self._window.restoreState(state, LAYOUT):
             self._window.restoreState(self._usual, LAYOUT)
 

@@ -7,7 +7,7 @@ import time
 import pytest
 from PySide6.QtCore import QSettings, QSize, Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QAbstractButton, QLineEdit, QWidget
+from PySide6.QtWidgets import QAbstractButton, QLineEdit, QTabBar, QWidget
 
 from gateway.client import ConnectionState, NotConnected
 from server_gui.core.desk.desk import Desk
@@ -180,6 +180,8 @@ def test_a_window_without_room_has_its_panels_behind_each_other_and_gives_them_b
     bench.draw(window)
     assert [dock.geometry() for dock in window.docks] == before
     assert not window.panels_button.isVisible()
+    bars = window.findChildren(QTabBar, options=Qt.FindChildOption.FindDirectChildrenOnly)
+    assert not any(bar.isVisible() for bar in bars), "names of panels are left over the pages"
 
 
 def test_a_tight_window_begins_with_the_robot_and_has_its_panels_a_click_away(
