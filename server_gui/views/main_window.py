@@ -125,8 +125,7 @@ class MainWindow(QMainWindow):
         self._is_arranged = False  # the panels, which may wait for the window to be shown
         self.setWindowTitle("GWRMS")
         self.resize(opening_size(self.screen().availableSize(), theme.scale))
-        with theme.styled_at_the_end():
-            self._make(desk, theme, archive, commissioning)
+        self._make(desk, theme, archive, commissioning)
         self._restore()
         self._opened_as = self.size()
         theme.scaled.connect(self._scaled)

@@ -1,14 +1,12 @@
 """Colours, dark and light, and the style that everything is drawn in. Left is blue, right is orange."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import Enum
 from typing import Final
 
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtGui import QColor, QFont, QFontDatabase, QPalette
-from PySide6.QtWidgets import QApplication, QWidget
+from PySide6.QtWidgets import QApplication
 
 SMALLEST_SCALE, LARGEST_SCALE = 0.8, 2.0
 BASE_POINTS: Final = 9.0
@@ -211,9 +209,6 @@ class Theme(QObject):
         super().__init__(application)
         self._application = application
         self._family = QFontDatabase.systemFont(QFontDatabase.SystemFont.GeneralFont).family()
-        # Without any sheet Qt 6.11 forgets to hear of the end of what it has measured, and crashes later.
-        self._never_shown = QWidget()
-        self._never_shown.setStyleSheet("QWidget#none { color: black; }")
         self.look, self.scale = look, scale
         self.colours = PALETTES[look]
         self.set(look, scale)
@@ -226,23 +221,13 @@ class Theme(QObject):
         self.colours = PALETTES[self.look]
         font = QFont(self._family)
         font.setPointSizeF(BASE_POINTS * self.scale)
-        for widget in self._application.allWidgets():
-            widget.ensurePolished()  # Qt takes the style off what it has polished, and off nothing else
-        with self.styled_at_the_end():
-            self._application.setFont(font)
-            self._application.setPalette(self._palette())
+        self._application.setFont(font)
+        self._application.setPalette(self._palette())
+        # Never without a sheet in between: Qt 6.11 then keeps widgets that are gone, and crashes later.
+        self._application.setStyleSheet(self._style())
         self.changed.emit()
         if self.scale != before:
             self.scaled.emit()
-
-    @contextmanager
-    def styled_at_the_end(self) -> Iterator[None]:
-        """Style at once what is put together meanwhile: else Qt styles it again with each parent it gets."""
-        self._application.setStyleSheet("")
-        try:
-            yield
-        finally:
-            self._application.setStyleSheet(self._style())
 
     def colour(self, name: str) -> QColor:
         """Return a colour of the palette by its name."""

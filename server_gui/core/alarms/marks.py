@@ -87,7 +87,7 @@ def enabled_text(robot: Robot, *, live: bool) -> str:
     """Return how many drives are enabled, as far as that is known."""
     joints = robot.names("joint")
     known = [word for joint in joints if live and (word := robot.word(f"{joint}.state")) is not None]
-    enabled = known.count(ENABLED) if known or not joints else "–"
+    enabled = known.count(ENABLED) if known or (live and not joints) else "–"
     unknown = f", {len(joints) - len(known)} not known" if known and len(known) < len(joints) else ""
     return f"{enabled} of {len(joints)} enabled{unknown}"
 
