@@ -103,6 +103,7 @@ class Feed:
                 self._ended(following)
                 await asyncio.sleep(self._backoff.next_s())
         finally:
+            self._subscribers = ()  # another feed may go by this robot's name already
             await self._client.close()
 
     def _ended(self, following: "asyncio.Task[None]") -> None:

@@ -1,5 +1,6 @@
 """The server's core without a screen: events in, state out."""
 
+import asyncio
 import math
 import threading
 from collections.abc import Callable, Iterator
@@ -190,6 +191,20 @@ def fake() -> Iterator[FakeRobot]:
 def network() -> Iterator[Network]:
     with Network() as network:
         yield network
+
+
+def test_a_feed_that_is_left_says_nothing_more(fake: FakeRobot, network: Network) -> None:
+    """Another may follow the same robot by then: that the old link is closed is not said of the new one."""
+    watcher = Watcher(fake, network)
+    watcher.until(lambda: watcher.robot.link.state is ConnectionState.CONNECTED)
+    watcher.following.cancel()
+    network.run(_ended(watcher.feed)).result(waiting.WAIT_S)
+    assert not [one for one in watcher._mailbox.drain() if isinstance(one, LinkChanged)]
+
+
+async def _ended(feed: Feed) -> None:
+    while feed._client.link.state is not ConnectionState.CLOSED:
+        await asyncio.sleep(0.001)
 
 
 def test_feed_tells_what_the_robot_is_and_does(fake: FakeRobot, network: Network) -> None:
