@@ -63,7 +63,8 @@ def commissioned(file: Path, folder: Path) -> int:
         for said in map(json.loads, process.stdout):
             if "say" in said:
                 person.say(said["say"])
-                continue
+            if "ask" not in said:
+                continue  # its progress, and what drives tell
             question = Ask(said["ask"], tuple(said["choices"]), said["default"], said["unit"])
             process.stdin.write(person.ask(question) + "\n")
             process.stdin.flush()
