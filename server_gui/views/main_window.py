@@ -65,16 +65,8 @@ from server_gui.views.widgets.scrolled import Scrolled
 OF_A_ROBOT: Final = ("&Overview", "&Signals", "&Resources", "&Bus", "Ob&jects", "&Audit", "&Edits")
 SCALES: Final = (80, 90, 100, 125, 150, 175, 200)
 SLOW: Final = 6  # frames between two looks at what people read
-CHOICES: Final = (
-    "rad",
-    "rad/s",
-    "m",
-    "Pa",
-    "m/s²",
-    "s",
-    "A",
-)  # quantities with more than one unit worth choosing
-
+# Quantities with more than one unit worth choosing.
+CHOICES: Final = ("rad", "rad/s", "m", "Pa", "m/s²", "s", "A")
 CLOSING: Final = (
     "A robot is being commissioned. Closing the window ends the command; what was found is kept beside the "
     "robot's file, and gone on with at the next start."
