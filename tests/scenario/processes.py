@@ -56,7 +56,11 @@ class Bench:
         return f"127.0.0.1:{self.port}"
 
     def kill(self, child: Child) -> None:
-        """kill -9, and wait until it is dead."""
+        """kill -9, and wait until it is dead. Its terminals may be another robot's : no link leads there."""
+        if child is self.simulator:
+            for one in self.folder.iterdir():
+                if one.is_symlink():
+                    one.unlink()
         os.kill(child.pid, signal.SIGKILL)
         until(lambda: is_dead(child))
 
