@@ -1,7 +1,6 @@
 """`gwrms calibrate`: sensors, by the drivers' own command, and a joint's zero, in the robot's file."""
 
 import argparse
-import getpass
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -20,6 +19,7 @@ from gateway.commission.keeping import journal, put
 from gateway.commission.zero import PLAUSIBLE, NotRepeated, Zero, posture, repeated
 from gateway.config.reading import load
 from gateway.config.robot import JointTable, RobotConfig
+from gateway.user_name import user_name
 
 LISTEN_S = 1.0
 KEY = "zero_offset"
@@ -61,7 +61,7 @@ def _parser() -> argparse.ArgumentParser:
         help="a larger change is refused (default: %(default)g)",
     )
     parser.add_argument(
-        "--who", default=getpass.getuser(), help="who does it, for the record (default: your user name)"
+        "--who", default=user_name(), help="who does it, for the record (default: your user name)"
     )
     return parser
 

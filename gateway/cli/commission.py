@@ -2,7 +2,6 @@
 
 import argparse
 import datetime
-import getpass
 import signal
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
@@ -28,6 +27,7 @@ from gateway.commission.serial_bench import SerialPorts
 from gateway.commission.steps import commission
 from gateway.commission.stopping import Stopped, stop
 from gateway.commission.writing import Written, text, unfinished
+from gateway.user_name import user_name
 
 _EPILOG = """\
 example
@@ -188,7 +188,7 @@ def _parser() -> argparse.ArgumentParser:
         "--serial", action="append", default=[], metavar="PORT", help="an insole's or IMU's port"
     )
     parser.add_argument(
-        "--who", default=getpass.getuser(), help="who does it, for the record (default: your user name)"
+        "--who", default=user_name(), help="who does it, for the record (default: your user name)"
     )
     parser.add_argument(
         "--json", action="store_true", help="questions and answers as JSON lines, for other faces"

@@ -1,6 +1,5 @@
 """The desk's side of pairing: proves a robot's code, and pins its key in the server's file."""
 
-import getpass
 import itertools
 import re
 import socket
@@ -21,6 +20,7 @@ from gateway.client.keys import CERTIFICATE, KEY, keys_folder, server_file
 from gateway.key_making import alone_in, make, write_file
 from gateway.private import check_private
 from gateway.tables.entries import with_entry
+from gateway.user_name import user_name
 from gateway.wire.pairing import (
     DESK,
     LINE_BYTES,
@@ -158,11 +158,8 @@ def own_certificate() -> bytes:
 
 def own_name() -> str:
     """What a robot may call this desk: its user and computer."""
-    try:
-        user = getpass.getuser()
-    except (KeyError, OSError):
-        user = "desk"
-    return re.sub(r"[^A-Za-z0-9_.-]", "-", f"{user}-{socket.gethostname()}").lstrip("_.-")[:64] or "desk"
+    name = f"{user_name()}-{socket.gethostname()}"
+    return re.sub(r"[^A-Za-z0-9_.-]", "-", name).lstrip("_.-")[:64] or "desk"
 
 
 def pin(robot: str, address: Address, file: Path | None = None) -> str:

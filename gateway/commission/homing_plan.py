@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from drivers.bus.arming import ABORT_CONNECTION, ACTING, CONSUMER
-from drivers.errors import DriverError
+from drivers.errors import DriverError, Unavailable
 from drivers.joint.cia402 import ABORT_CONNECTION_OPTIONS, QUICK_STOP_OPTIONS, option_text
 from drivers.joint.homing import ACCELERATION, METHODS, SPEEDS, Setup
 from drivers.joint.scaling import drive_speed
@@ -64,6 +64,8 @@ def refusal(draft: Draft, bench: Bench, joint: str, axis: Axis) -> str | None:
             return f"its {key.replace('_', ' ')} is not known ({index:04X}h, or typed)"
     if not any(number(bench, axis, index) for index in (MAX_CURRENT, MAX_TORQUE)):
         return "its drive tells no limit of current or torque (6073h, 6072h)"
+    if counts(bench, axis) is None:
+        return "its drive tells no position (6064h)"
     return None
 
 
@@ -102,7 +104,7 @@ def option(bench: Bench, axis: Axis, index: int, size: int = 2) -> int | None:
 def known_now(
     draft: Draft, bench: Bench, joint: str, axis: Axis, scale: Scale, description: Description
 ) -> Talk[Known]:
-    position = yield from answered(lambda: counts(bench, axis) or 0)
+    position = yield from answered(lambda: _position(bench, axis))
     position = nearest(position, scales.counts_at_zero(scale))
     ends = draft.value(told(joint), ENDS)
     return Known(
@@ -114,6 +116,12 @@ def known_now(
         scales.angle(scale, position),
         position,
     )
+
+
+def _position(bench: Bench, axis: Axis) -> int:
+    if (position := counts(bench, axis)) is None:
+        raise Unavailable(f"{axis} tells no position (6064h)")
+    return position
 
 
 def planned(bench: Bench, known: Known, method: int) -> Talk[Plan | None]:

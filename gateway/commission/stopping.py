@@ -4,7 +4,12 @@ Like every stop it can enable nothing (`drivers.joint.commands`). It is software
 """
 
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
 
 from drivers.bus.sdo.protocol import expedited
 from drivers.errors import DriverError
@@ -19,6 +24,15 @@ from gateway.commission.draft import Draft
 WITHIN_S = 1.5  # for a drive to confirm it
 MOST_AXES = 8  # of a node (CiA 402-2)
 EVERY_NODE = range(1, 128)
+
+
+class _Joint(msgspec.Struct):
+    node_id: Annotated[int, msgspec.Meta(ge=1, le=127)]
+    axis: Annotated[int, msgspec.Meta(ge=0, lt=MOST_AXES)] = 0
+
+
+class _File(msgspec.Struct):
+    joint: dict[str, _Joint] = {}
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,12 +65,14 @@ class Stopped:
 def stop(bench: CanBench, draft: Draft) -> Stopped:
     """Ask all at once, then look until each has confirmed; where no drive is known all node ids are asked.
 
+    Known are those that were found until now; once the robot's file is written, its joints.
+
     Raises:
         DriverError: the bus does not open.
 
     """
-    known = sorted(set(axes_of(draft)), key=lambda axis: (axis.node, axis.number))
-    for axis in known or map(Axis, EVERY_NODE):
+    known = set(axes_of(draft)) or set(_axes_in(draft.file))
+    for axis in sorted(known, key=_place) or map(Axis, EVERY_NODE):
         bench.send_urgent(axis.node, _request(axis))
     found = _confirmed(bench, known)
     further = [axis for axis in _further(bench, found) if axis not in found]
@@ -72,6 +88,13 @@ def axes_of(draft: Draft) -> Iterator[Axis]:
             yield Axis(int(name))
         elif kind == "joint" and draft.has(table, "node_id"):
             yield Axis(draft.value(table, "node_id"), draft.value(table, "axis", 0))
+
+
+def _axes_in(file: Path) -> Iterator[Axis]:
+    """The joints of a robot's file; of one that is not there, or says nothing of use, none."""
+    with suppress(OSError, ValueError, msgspec.MsgspecError):
+        joints = msgspec.toml.decode(file.read_bytes(), type=_File).joint
+        yield from (Axis(one.node_id, one.axis) for one in joints.values())
 
 
 def _request(axis: Axis) -> bytes:
@@ -94,7 +117,11 @@ def _confirmed(bench: CanBench, axes: Iterable[Axis]) -> dict[Axis, StopOutcome]
             if outcome is not None:
                 found[axis] = outcome
                 del left[axis]
-    return {axis: found[axis] for axis in sorted(found, key=lambda axis: (axis.node, axis.number))}
+    return {axis: found[axis] for axis in sorted(found, key=_place)}
+
+
+def _place(axis: Axis) -> tuple[int, int]:
+    return axis.node, axis.number
 
 
 def _further(bench: CanBench, found: Mapping[Axis, StopOutcome]) -> Iterator[Axis]:

@@ -3,7 +3,6 @@
 What is begun, and what came of it, is written down beside the robot's journal.
 """
 
-import getpass
 import json
 import os
 import time
@@ -17,6 +16,7 @@ from gateway.client import CallTimeout, ClientError, LinkLost, ProtocolError, Re
 from gateway.config.robot import RobotConfig
 from gateway.doctor.file_edit import NotMended, change
 from gateway.doctor.verdicts import Edit, Finding, Fix, Together, Write
+from gateway.user_name import user_name
 from gateway.wire.parameter import PARAMETER_WRITE, ParameterInfo
 
 RECORD = "doctor.jsonl"
@@ -156,7 +156,7 @@ class Mender:
         folder = self._config.records
         row = {
             "utc_s": round(time.time(), 3),
-            "who": _who(),
+            "who": user_name(),
             "rule": finding.rule,
             "about": finding.about,
             "evidence": list(finding.evidence),
@@ -172,13 +172,6 @@ class Mender:
         except OSError as error:
             done = came.get("done") or came.get("refused") or "nothing was changed"
             raise NotMended(f"it cannot be written down in {folder}: {error}; {done}") from error
-
-
-def _who() -> str:
-    try:
-        return getpass.getuser()
-    except (KeyError, OSError):  # a user without a name, as in containers
-        return str(os.getuid())
 
 
 def _touched(fix: Fix) -> set[str]:

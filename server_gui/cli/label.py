@@ -1,7 +1,6 @@
 """`gwrms label`: what robot and wearer did in a recorded session, for people and for models to learn from."""
 
 import argparse
-import getpass
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
@@ -10,6 +9,7 @@ import msgspec
 
 from gateway.amounts import NONE, counted
 from gateway.cli.text import say, say_json, table, warn
+from gateway.user_name import user_name
 from ml.store import Store
 from ml.store.labels import ACTIVITIES, INSTANTS, REGRESSION, WEARER, Label, utc_ns, wearer
 from ml.store.private import private_files
@@ -146,7 +146,7 @@ def _parser() -> argparse.ArgumentParser:
     made.add_argument("--from", dest="begin", type=instant_or_seconds, metavar="TIME", help="since when")
     made.add_argument("--to", dest="end", type=instant_or_seconds, metavar="TIME", help="until when")
     made.add_argument(
-        "--author", default=getpass.getuser(), metavar="WHO", help="who says so (default: %(default)s)"
+        "--author", default=user_name(), metavar="WHO", help="who says so (default: %(default)s)"
     )
     others = made.add_mutually_exclusive_group()
     others.add_argument("--file", type=Path, metavar="FILE.csv", help="many labels: from,to,label")

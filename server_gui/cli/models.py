@@ -1,7 +1,6 @@
 """`gwrms models`: which models there are, which one serves, and what served before."""
 
 import argparse
-import getpass
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
@@ -11,6 +10,7 @@ import msgspec
 from gateway.amounts import NONE
 from gateway.cli.connect import choose
 from gateway.cli.text import did_you_mean, say, say_json, table, warn
+from gateway.user_name import user_name
 from ml.errors import UnusableModel
 from ml.registry.card import Card, age_days
 from ml.registry.pointers import Pointer
@@ -232,9 +232,7 @@ def _parser(command: str, what: str, epilog: str = "") -> argparse.ArgumentParse
 
 def _add_who(made: argparse.ArgumentParser, whose: str) -> None:
     made.add_argument("--robot", default="", metavar="NAME", help=f"{whose} (default: that for every robot)")
-    made.add_argument(
-        "--who", default=getpass.getuser(), metavar="WHO", help="who says so (default: %(default)s)"
-    )
+    made.add_argument("--who", default=user_name(), metavar="WHO", help="who says so (default: %(default)s)")
     made.add_argument("--why", default="", metavar="TEXT", help="kept in the history")
 
 

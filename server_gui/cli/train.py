@@ -1,12 +1,12 @@
 """`gwrms train`: a model from recorded sessions and their labels, judged before it may serve."""
 
 import argparse
-import getpass
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, Final
 
 from gateway.amounts import NONE
 from gateway.cli.text import say, say_json, table, warn
+from gateway.user_name import user_name
 from ml.errors import Overtaken
 from ml.progress import Tell, untold
 from ml.registry.card import Metrics
@@ -107,7 +107,7 @@ def _promoted(
     """Whether it serves now; why not, where it was better but something else serves since it was judged."""
     if not (arguments.promote and trained.decision.better):
         return False, ""
-    who, why = getpass.getuser(), "; ".join(trained.decision.why)
+    who, why = user_name(), "; ".join(trained.decision.why)
     try:
         registry.promote(model, arguments.robot, who=who, why=why, over=trained.over)
     except Overtaken as error:

@@ -1,12 +1,12 @@
 """The models of the store, as the window works with them: looked at in a thread, trained in a process."""
 
-import getpass
 import time
 from collections.abc import Callable, Mapping, Set
 from enum import Enum
 from types import MappingProxyType
 from typing import Final
 
+from gateway.user_name import user_name
 from server_gui.core.cloud.jobs import Job, Jobs, JobState, Work
 from server_gui.core.models.catalogue import Catalogue, Looking
 from server_gui.core.models.changes import Change, carry_out, promotion, way_back
@@ -52,7 +52,7 @@ class Models:
         self.trained: dict[str, Trained] = {}  # what this window has trained, by model
         self.robots = robots
         self.jobs = Jobs(lambda job: deliver(lambda: self._over(job)), "training")
-        self._who = who or getpass.getuser()
+        self._who = who or user_name()
         self._deliver = deliver
         self._thread = Background("list of models")
         self._looking = Looking(url, promoters)

@@ -1,6 +1,5 @@
 """What is to be commissioned, typed or chosen: file, bus, EDS files, serial ports, on which computer."""
 
-import getpass
 import shlex
 from collections.abc import Callable
 from pathlib import Path
@@ -9,6 +8,7 @@ from typing import Final
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QComboBox, QGridLayout, QHBoxLayout, QLineEdit, QPushButton, QWidget
 
+from gateway.user_name import user_name
 from server_gui.core.commissioning.wish import Wish
 from server_gui.processes.surroundings import can_interfaces, serial_ports
 from server_gui.views.widgets.card import Card
@@ -35,7 +35,7 @@ class Form(Card):
     def __init__(self) -> None:
         super().__init__("What is to be commissioned")
         self.file, self.bitrate, self.eds = QLineEdit(), QLineEdit(), QLineEdit()
-        self.serial, self.who, self.computer = QLineEdit(), QLineEdit(_user()), QLineEdit()
+        self.serial, self.who, self.computer = QLineEdit(), QLineEdit(user_name()), QLineEdit()
         self.bus = QComboBox()
         self.bus.setEditable(True)
         self.bus.addItems(can_interfaces())
@@ -174,10 +174,3 @@ def _name(field: QLineEdit) -> str:
 
 def _more(field: QLineEdit, path: Path) -> str:
     return shlex.join([*_words(field.text()), str(path)])
-
-
-def _user() -> str:
-    try:
-        return getpass.getuser()
-    except (KeyError, OSError):  # an account without a name
-        return ""

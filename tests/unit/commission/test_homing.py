@@ -234,6 +234,15 @@ def test_what_is_not_known_gets_no_power(
     assert hands.heard(words)
 
 
+def test_a_joint_whose_position_is_not_told_gets_no_power(
+    draft: Draft, bench: CanBench, channel: str
+) -> None:
+    with HomingDrive(channel, NODE, aborts={(0x6064, 0): 0x0602_0000}) as drive:
+        run(homing(draft, bench, KNEE, AXIS, SCALE), hands := Keeper(*beginning(37)))
+        assert drive.words == []
+    assert hands.heard("its drive tells no position (6064h)")
+
+
 def test_without_ends_by_hand_only_what_moves_nothing_is_offered(
     draft: Draft, bench: CanBench, channel: str
 ) -> None:

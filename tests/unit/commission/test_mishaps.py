@@ -263,6 +263,19 @@ def test_a_stop_asks_all_where_the_draft_is_damaged_or_a_folder_is_gone(
     assert "all 127 node ids were asked to stop" in capsys.readouterr().out
 
 
+def test_a_stop_after_the_file_is_written_asks_its_joints(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("gateway.cli.commission.signal.signal", lambda *_: None)
+    file = tmp_path / "exo-01.toml"
+    file.write_text("[joint.left_knee]\nnode_id = 2\n[joint.right_knee]\nnode_id = 5\naxis = 1\n")
+    with can.Bus(interface="virtual", channel="written") as other:
+        assert main(["--stop", str(file), "virtual:written"]) == 1
+        sent = {frame.arbitration_id for frame in iter(lambda: other.recv(0.5), None)}
+    assert sent == {0x602, 0x605}
+    assert capsys.readouterr().out.startswith("NOT CONFIRMED: node 2 is unreachable, node 5, axis 1 is")
+
+
 def test_the_rated_torque_that_is_shown_is_in_the_unit_of_its_maker(
     draft: Draft, bench: FakeBench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
