@@ -40,9 +40,7 @@ from server_gui.core.recording.rows import JournalHead
 LATE_NS: Final = 10_000_000_000  # after which the journal has told everything of an instant
 LONGEST_NS: Final = max(AFTER_NS, TRIAL_NS + BACK_NS)  # from an edit until nothing more comes of it
 NEVER_NS: Final = 2**63
-OUTSIDE: Final = (
-    "a recording began or ended within its time: what was outside, perhaps with another wearer, does not count"
-)
+OUTSIDE: Final = "a recording began or ended within its time: what was outside, perhaps with another wearer, does not count"
 KEPT_NS: Final = BEFORE_NS + LONGEST_NS + 2 * LATE_NS  # of cycles
 JOINT: Final = "joint"  # the kind of component
 
@@ -69,7 +67,9 @@ class RobotEvidence:
         self._boot_id: str | None = None
         self._joints: tuple[str, ...] = ()
         self._head: JournalHead | None = None
-        self._recordings: list[tuple[int, str]] = [(-NEVER_NS, "")]  # since when (robot's clock), and their names
+        self._recordings: list[tuple[int, str]] = [
+            (-NEVER_NS, "")
+        ]  # since when (robot's clock), and their names
         self._first_ns: int | None = None  # the first row of this boot
         self._newest_ns = 0
         self._seen: dict[str, tuple[Edit, Spell, int | None]] = {}  # how, and at how many cycles at most

@@ -4,6 +4,7 @@ import hashlib
 import importlib.metadata
 
 import msgspec
+from msgspec import UNSET
 from msgspec.structs import replace
 
 from gateway.wire.framing import PROTOCOL
@@ -39,7 +40,10 @@ def configuration_hash(description: Description) -> str:
     """SHA-256 of what the robot's file says, as far as the robot tells it, without what changes by itself."""
     parts = [
         description.role,
-        [replace(known, state="", problem=None) for known in description.components],
+        [
+            replace(known, state="", problem=None, findings=UNSET, emcy=UNSET)
+            for known in description.components
+        ],
         [replace(known, problem=None) for known in description.parameters],
         [
             replace(rule, state="", since_ns=None, reason=None, trips=0, problems=[])
