@@ -1,7 +1,7 @@
 """One parameter of several joints: the same value for all, or what mirrors one side on the other.
 
-Angles of joints count the same way on both sides (flexion is positive), but a drive's own counts may not: they
-fall on one side where they rise on the other. So what a parameter is decides how it is carried over:
+Angles of joints count the same way on both sides (flexion is positive), but a drive's own counts may not:
+they fall on one side where they rise on the other. So what a parameter is decides how it is carried over:
 
 - What has no sign (a gain, a largest torque, a speed) is copied.
 - Limits of position, which a drive has in its counts, are carried over as the joint's angle. Where counts run
@@ -186,7 +186,7 @@ class _Spreading:
             raise _Refused(f"{joint}.{quantity} cannot be changed: {self._read_only[f'{joint}.{quantity}']}")
         if named is not None:
             raise _Refused(
-                f"{named.name} is another object there, {named.object} and not {source.object}, without a unit"
+                f"{named.name} is another object there ({named.object}, not {source.object}), without a unit"
             )
         why = self._parts[joint].problem
         raise _Refused(f"it has no {quantity} (object {source.object})" + (f": {why}" if why else ""))
@@ -269,7 +269,7 @@ class Outcome(StrEnum):
     UNASKED = "not asked"  # the link was lost before
 
 
-def refused_or_unknown(kind: str) -> Outcome:
+def refused_or_unknown(kind: str | None) -> Outcome:
     """Return what a robot's refusal of this kind says of a device's flash."""
     return Outcome.UNKNOWN if kind in UNSURE else Outcome.REFUSED
 

@@ -21,10 +21,10 @@ is said.
 With --trial they are taken back by the robot itself after that time, and at once when this command ends in
 any way, its terminal, computer or network included. Enter keeps them.
 
---mirror carries each value over to the same joint of the other side, --all-joints to every joint, in the same
-transaction; without =VALUE it is what that joint holds now. Limits of position are carried over as the joint's
-angle, whichever way its drive counts. A joint that cannot take the value is named, and nothing is written:
---leave-out says that it is to stay as it is.
+--mirror carries each value over to the same joint of the other side, --all-joints to every joint, in the
+same transaction; without =VALUE it is what that joint holds now. Limits of position are carried over as the
+joint's angle, whichever way its drive counts. A joint that cannot take the value is named, and nothing is
+written: --leave-out says that it is to stay as it is.
 
 examples:
   gwrms set gait.step_length=0.42 left_knee.max_torque=40

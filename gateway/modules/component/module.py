@@ -21,8 +21,8 @@ from gateway.process.futures import done, then
 from gateway.streaming.sources import Selection, Source, channel_info, check_globs, narrow, whole
 from gateway.wire.bus import BUS_SNAPSHOT, Buses, BusInfo
 from gateway.wire.component import (
-    AngleInfo,
     COMPONENT_SNAPSHOT,
+    AngleInfo,
     ChannelInfo,
     ComponentInfo,
     LayoutInfo,

@@ -52,8 +52,8 @@ from server_gui.core.tuning.edits import Change, Edits
 from server_gui.core.tuning.flash import Flash
 from server_gui.core.tuning.lease import LeaseState
 from server_gui.core.tuning.link import LEASE_S
-from server_gui.core.tuning.storing import Storing
 from server_gui.core.tuning.stop import StopProgress, StopState
+from server_gui.core.tuning.storing import Storing
 from server_gui.core.tuning.taken_back import OVERDUE_S, TakenBack
 from server_gui.core.tuning.writing import WriteProgress, WriteState
 

@@ -2,8 +2,8 @@
 
 A line is `{"format": 1, "edit": {…}, "evidence": {…}, …}`; of an edit the newest line counts.
 `docs/reference/store.md` says what is in them. Lines are only ever added; what a newer program has written in
-another format is left alone. Whoever writes has the folder to itself: a recorder that adds a line, and a command
-that forgets a wearer, may come at the same instant.
+another format is left alone. Whoever writes has the folder to itself: a recorder that adds a line, and a
+command that forgets a wearer, may come at the same instant.
 """
 
 import contextlib

@@ -12,7 +12,10 @@ MOST_NS: Final = 10_000_000_000  # of rows that may wait, robot by robot
 
 
 class Inbox(Generic[Thing]):
-    """Of events, and of what else belongs between them. `put` from any thread; where nobody takes, a robot's oldest rows go, and are counted in `lost`."""
+    """Of events, and of what belongs between them.
+
+    `put` from any thread; where nobody takes, a robot's oldest rows go, and are counted in `lost`.
+    """
 
     def __init__(self) -> None:
         self.lost = 0

@@ -8,8 +8,8 @@ from gateway.client import NotConnected, RemoteError
 from gateway.several import Outcome, refused_or_unknown, storing
 from gateway.wire.parameter import Stored
 from gateway.wire.robot import Description
-from server_gui.core.follow.robot import Robot
 from server_gui.core.follow.news import NewsKind
+from server_gui.core.follow.robot import Robot
 from server_gui.core.threads.answers import Deliver, when_done
 from server_gui.core.tuning.commands import Commands
 from server_gui.core.tuning.lease import LeaseState

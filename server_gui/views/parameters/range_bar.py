@@ -90,7 +90,7 @@ class RangeBar(QWidget):
         painter.setOpacity(0.45)
         painter.drawRect(QRectF(at(reach[0]), top, max(at(reach[1]) - at(reach[0]), 1.0), HIGH))
         painter.setOpacity(1.0)
-        for value, colour in ((held, "text"), (staged, "staged")):
+        for value, colour in ((held, "text"), (staged, "yellow")):
             if value is not None:
                 painter.setBrush(self._theme.colour(colour))
                 painter.drawRect(QRectF(at(value) - 1.5, top - 3.0, 3.0, HIGH + 6.0))
