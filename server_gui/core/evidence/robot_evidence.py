@@ -40,9 +40,7 @@ from server_gui.core.recording.rows import JournalHead
 LATE_NS: Final = 10_000_000_000  # after which the journal has told everything of an instant
 LONGEST_NS: Final = max(AFTER_NS, TRIAL_NS + BACK_NS)  # from an edit until nothing more comes of it
 NEVER_NS: Final = 2**63
-OUTSIDE: Final = (
-    "a recording began or ended within its time: what is outside, of whoever wore it, does not count"
-)
+OUTSIDE: Final = "a recording began or ended within its time: what is outside, of anybody, does not count"
 KEPT_NS: Final = BEFORE_NS + LONGEST_NS + 2 * LATE_NS  # of cycles
 JOINT: Final = "joint"  # the kind of component
 
