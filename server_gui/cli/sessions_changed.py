@@ -9,7 +9,7 @@ from gateway.cli.text import say, say_json, table
 from ml.store.sessions import Session
 from server_gui.cli.cloud_options import add_url, parser, progress, recordings
 from server_gui.cli.edits import COLUMNS, metric_row
-from server_gui.core.cloud.changed import Changes, Difference, Told, changes
+from server_gui.core.cloud.changed import Changes, Difference, Told, changes, not_known
 from server_gui.core.cloud.moved import moved, walk
 from server_gui.core.evidence.comparison import Evidence, Word
 
@@ -67,8 +67,7 @@ def _told(sides: Sequence[Session], found: Changes, evidence: Evidence | None) -
         yield "nothing that both tell was otherwise"
     yield f"{counted(found.same, 'thing', 'things')} that both tell, and alike"
     if found.unrecorded:
-        yield ""
-        yield table(("NOT KNOWN", "", "BEFORE", "AFTER"), map(_row, found.unrecorded)).rstrip()
+        yield from not_known(found)
     if evidence is not None:
         yield ""
         yield from _moved(evidence)

@@ -46,7 +46,8 @@ def test_what_changed_is_listed_and_what_is_not_recorded_is_said(
         ["parameter", "left_knee.gain", "2", "3"],
         ["operator", "operator", "Ada", "Bert"],
     ]
-    assert "left_knee firmware (1.2 before, not recorded after)" in page.unknown.text()
+    assert "left_knee firmware (1.2 before)" in page.unknown.text()
+    assert "not recorded in either: wearer, calibration" in page.unknown.text()
     assert NOT_THE_CAUSE in page.verdict.text()
     assert "gait cycle" in page.verdict.text()
     page.left.emit()

@@ -153,17 +153,13 @@ def _compared(kind: Kind, title: str, before: Facts, after: Facts, are_told: boo
     whole = are_told and kind in (Kind.COMPONENT, Kind.GUARD, Kind.LIMITS)
     if not before and not after and not whole:
         if kind is not Kind.OPERATOR:
-            yield Difference(kind, _title(title, "").strip(), NOT_RECORDED, NOT_RECORDED)
+            yield Difference(kind, str(kind), NOT_RECORDED, NOT_RECORDED)
         return
     missing = NOT_THERE if whole else NOT_RECORDED
     for name in dict.fromkeys([*before, *after]):
         old, new = before.get(name), after.get(name)
         said = [missing if value is None else _said(value) for value in (old, new)]
-        yield Difference(kind, _title(title, name), said[0], said[1], _size(old, new))
-
-
-def _title(title: str, name: str) -> str:
-    return title.format(name)
+        yield Difference(kind, title.format(name), said[0], said[1], _size(old, new))
 
 
 def _said(value: object) -> str:
@@ -184,10 +180,21 @@ def _gathered(found: Iterable[Difference]) -> Iterator[Difference]:
         sides = (one.before == NOT_RECORDED, one.after == NOT_RECORDED)
         by_kind.setdefault((one.kind, *sides), []).append(one)
     for (kind, is_old, is_new), rows in by_kind.items():
-        if len(rows) == 1:
+        if len(rows) == 1 or (is_old and is_new):
             yield rows[0]
             continue
         count = f"recorded of {len(rows)}"
         yield Difference(
             kind, str(kind), NOT_RECORDED if is_old else count, NOT_RECORDED if is_new else count
         )
+
+
+def not_known(found: Changes) -> list[str]:
+    """Return in words what at least one of the two does not tell: first what neither does."""
+    neither = [one.what for one in found.unrecorded if one.before == one.after]
+    said = [f"not recorded in either: {', '.join(neither)}"] if neither else []
+    for side, told in (("before", "after"), ("after", "before")):
+        rows = [one for one in found.unrecorded if getattr(one, side) == NOT_RECORDED]
+        known = [f"{one.what} ({getattr(one, told)} {told})" for one in rows if one.before != one.after]
+        said += [f"not recorded {side}: {', '.join(known)}"] if known else []
+    return said

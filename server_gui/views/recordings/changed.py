@@ -18,7 +18,7 @@ from PySide6.QtWidgets import (
 from gateway.amounts import NONE, counted
 from gateway.plain import plain
 from server_gui.core.archive.archive import Archive
-from server_gui.core.cloud.changed import Changes
+from server_gui.core.cloud.changed import Changes, not_known
 from server_gui.core.evidence.comparison import Evidence, Measured, Word
 from server_gui.core.evidence.wording import number, share
 from server_gui.views.theme import Theme
@@ -86,9 +86,8 @@ class ChangedPage(QWidget):
             set_text(self.unknown, f"It cannot be told: {problem}" if problem else "looking …")
             return
         alike = f"{counted(found.same, 'thing', 'things')} that both tell, and alike."
-        unknown = [f"{one.what} ({one.before} before, {one.after} after)" for one in found.unrecorded]
-        said = f"Not known: {', '.join(unknown)}. " if unknown else ""
-        set_text(self.unknown, said + ("" if cells else "Nothing that both tell was otherwise. ") + alike)
+        said = ["" if cells else "Nothing that both tell was otherwise.", alike, *not_known(found)]
+        set_text(self.unknown, "\n".join(filter(None, said)))
 
     def _show_moved(self, found: Evidence | None, problem: str) -> None:
         measured = [] if found is None else [one for one in found.metrics if one.word in DIFFERENT]
