@@ -153,7 +153,9 @@ def _compared(kind: Kind, title: str, before: Facts, after: Facts, are_told: boo
     whole = are_told and kind in (Kind.COMPONENT, Kind.GUARD, Kind.LIMITS)
     if not before and not after and not whole:
         if kind is not Kind.OPERATOR:
-            yield Difference(kind, str(kind), NOT_RECORDED, NOT_RECORDED)
+            of_devices = kind in (Kind.FIRMWARE, Kind.DEVICE)
+            what = title.removeprefix("{} ") if of_devices else str(kind)
+            yield Difference(kind, what, NOT_RECORDED, NOT_RECORDED)
         return
     missing = NOT_THERE if whole else NOT_RECORDED
     for name in dict.fromkeys([*before, *after]):
@@ -181,7 +183,7 @@ def _gathered(found: Iterable[Difference]) -> Iterator[Difference]:
         by_kind.setdefault((one.kind, *sides), []).append(one)
     for (kind, is_old, is_new), rows in by_kind.items():
         if len(rows) == 1 or (is_old and is_new):
-            yield rows[0]
+            yield from dict.fromkeys(rows)
             continue
         count = f"recorded of {len(rows)}"
         yield Difference(
