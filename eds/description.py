@@ -42,6 +42,7 @@ class Description:
     vendor_id: int | None
     product_code: int | None
     findings: tuple[Finding, ...]
+    digest: str = ""  # SHA-256 of the file's text
 
     def has(self, index: int, subindex: int = 0) -> bool:
         """Whether the file describes this object."""

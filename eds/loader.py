@@ -5,6 +5,7 @@ The drives of a robot have one file, and all that does not depend on the node is
 
 import configparser
 import functools
+import hashlib
 import io
 import pickle
 from dataclasses import dataclass
@@ -50,7 +51,8 @@ def load_file(path: Path, node_id: int) -> Description:
     """See `eds.load`."""
     if not 1 <= node_id <= 127:
         raise EdsError(f"{path}: node id {node_id} is outside 1–127")
-    ini, sections, file_node_id = pickle.loads(_repaired(read_text(path)))
+    text = read_text(path)
+    ini, sections, file_node_id = pickle.loads(_repaired(text))
     if not any(len(name) == 4 for name in sections):
         raise EdsError(f"{path}: there is no object section like [1000]; this is no EDS or DCF file")
     owner = _Owner(file_node_id, node_id)
@@ -72,6 +74,7 @@ def load_file(path: Path, node_id: int) -> Description:
         vendor_id=_identity(dictionary, 1, information.vendor_number),
         product_code=_identity(dictionary, 2, information.product_number),
         findings=tuple(ini.findings),
+        digest=hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest(),
     )
 
 

@@ -40,7 +40,7 @@ def drive_speed(rad_s: float, counts_per_turn: float, gear_ratio: float, unit: i
 
 def scalings(settings: JointSettings, readings: Readings) -> dict[str, Linear | None]:
     """How each scaled quantity becomes SI; `None` where nobody says how, so that it has no value."""
-    rad_per_count = settings.direction * math.tau / (settings.counts_per_revolution * settings.gear_ratio)
+    rad_per_count = settings.rad_per_count
     rad_per_rpm = settings.direction * math.tau / 60 / settings.gear_ratio
     factor = _RPM.get(settings.velocity_unit)
     return {

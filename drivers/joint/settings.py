@@ -1,5 +1,6 @@
 """What an integrator says about a joint: the table `[joint.NAME]` of the robot's file."""
 
+import math
 from typing import Annotated, Literal
 
 import msgspec
@@ -34,3 +35,8 @@ class JointSettings(NodeTimes, frozen=True, forbid_unknown_fields=True, kw_only=
     stop_timeout_s: Seconds = 1.0  # how long a quick stop may take to be confirmed
     stale_after_s: LongSeconds = 0.5
     lost_after_s: LongSeconds = 2.0
+
+    @property
+    def rad_per_count(self) -> float:
+        """Of the joint; negative where counts fall when it bends."""
+        return self.direction * math.tau / (self.counts_per_revolution * self.gear_ratio)

@@ -6,9 +6,11 @@ from dataclasses import dataclass
 from typing import Final
 
 from gateway.cli.connect import check_names, connect, parameter_names, parser
+from gateway.cli.text import warn
 from gateway.cli.writing import add_trial, write
-from gateway.client import ClientError
+from gateway.client import ClientError, Robot
 from gateway.coding import Number
+from gateway.several import all_joints, mirrored, spread
 from gateway.units import unit_named
 from gateway.wire.robot import Description
 
@@ -19,29 +21,40 @@ is said.
 With --trial they are taken back by the robot itself after that time, and at once when this command ends in
 any way, its terminal, computer or network included. Enter keeps them.
 
+--mirror carries each value over to the same joint of the other side, --all-joints to every joint, in the
+same transaction; without =VALUE it is what that joint holds now. Limits of position are carried over as the
+joint's angle, whichever way its drive counts. A joint that cannot take the value is named, and nothing is
+written: --leave-out says that it is to stay as it is.
+
 examples:
   gwrms set gait.step_length=0.42 left_knee.max_torque=40
   gwrms set gait.trunk_angle=3deg gait.step_length=420mm
-  gwrms set --trial 30 gait.cycle_time=1.1"""
+  gwrms set --trial 30 gait.cycle_time=1.1
+  gwrms set --mirror left_knee.max_torque=40
+  gwrms set --all-joints left_knee.profile_velocity --leave-out right_ankle"""
 
 
 OBJECTS: Final = range(-(2**63), 2**64)  # what a device's object can hold
 LONGEST: Final = 20  # of such a number, with its sign
 
 
+class NotForAll(ClientError):
+    """A joint cannot take a value that it was to have; says why, and that nothing was written."""
+
+
 class UnknownUnit(ClientError):
     """A value is no number that there can be, or in a unit that its parameter cannot be in."""
 
 
-_CHANGE: Final = re.compile(r"([^=]+)=([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?) ?([^\d\s.,].*)?")
+_CHANGE: Final = re.compile(r"([^=]+)(?:=([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?) ?([^\d\s.,].*)?)?")
 
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """What was typed: a number as it stands, and its unit, where one was given."""
+    """What was typed: a number as it stands, and its unit, where one was given; without it, what is held."""
 
     name: str
-    number: str
+    number: str | None
     unit: str | None
 
 
@@ -50,20 +63,82 @@ def main(argv: list[str]) -> int:
     made = parser("set", "Change parameters: all or none, limit-checked, read back.", EPILOG)
     made.add_argument(
         "changes",
-        metavar="NAME=VALUE[UNIT]",
+        metavar="NAME[=VALUE[UNIT]]",
         nargs="+",
         type=change_of,
         help="in the parameter's own unit, or in another: 3deg, 420mm, 30rpm",
     )
+    whom = made.add_mutually_exclusive_group()
+    whom.add_argument("--mirror", action="store_true", help="the same joint of the other side takes it, too")
+    whom.add_argument("--all-joints", action="store_true", help="every joint takes it")
+    made.add_argument(
+        "--leave-out",
+        action="append",
+        default=[],
+        metavar="JOINT",
+        help="with these: a joint that stays as it is (again: more)",
+    )
     add_trial(made)
     arguments = made.parse_args(argv)
+    is_spread = arguments.mirror or arguments.all_joints
+    if arguments.leave_out and not is_spread:
+        made.error("--leave-out goes with --mirror or --all-joints")
+    bare = [change.name for change in arguments.changes if change.number is None]
+    if bare and not is_spread:
+        made.error(f"{bare[0]} has no value: write {bare[0]}=VALUE, or say --mirror or --all-joints")
     if len({change.name for change in arguments.changes}) != len(arguments.changes):
         made.error("a parameter is named twice")
     with connect(arguments, "set") as robot:
         description = robot.describe()
         check_names("parameter", [each.name for each in arguments.changes], parameter_names(description))
-        changes = {each.name: value_of(each, description) for each in arguments.changes}
+        if is_spread:
+            changes = _spread(robot, arguments, description)
+        else:
+            changes = {each.name: value_of(each, description) for each in arguments.changes}
         return write(robot, changes, description, arguments)
+
+
+def _spread(robot: Robot, arguments: argparse.Namespace, description: Description) -> dict[str, Number]:
+    """What each joint takes; raises `NotForAll` where one cannot and is not left out by word."""
+    held = robot.read().values
+    changes: dict[str, Number] = {}
+    check_names("joint", arguments.leave_out, all_joints(description))
+    for each in arguments.changes:
+        name = _named(each, description)
+        joints = (
+            mirrored(name.partition(".")[0], description) if arguments.mirror else all_joints(description)
+        )
+        value = held[name].value if each.number is None and name in held else None
+        if each.number is not None:
+            value = value_of(each, description)
+        if value is None:
+            raise NotForAll(f"nothing was written: what {name} holds is not known")
+        if len(joints) < 2 or name.partition(".")[0] not in joints:
+            raise NotForAll(f"nothing was written: {name} is of no joint that has others like it")
+        found = spread(name, value, joints, description, held).without(arguments.leave_out)
+        if found.problem:
+            raise NotForAll(
+                f"nothing was written. {found.problem} (--leave-out JOINT lets one stay as it is)"
+            )
+        if changes.keys() & found.changes.keys():
+            raise NotForAll(
+                f"nothing was written: {min(changes.keys() & found.changes.keys())} is meant twice"
+            )
+        changes |= found.changes
+    if not changes:
+        raise NotForAll("nothing was written: every joint is left out")
+    for joint in arguments.leave_out:
+        warn("set", f"{joint} is left out, and stays as it is")
+    return changes
+
+
+def _named(change: Change, description: Description) -> str:
+    """The parameter's name, also where its address was typed."""
+    return next(
+        info.name
+        for info in description.parameters
+        if change.name in (info.name, f"{info.component}.{info.object}")
+    )
 
 
 def change_of(text: str) -> Change:
@@ -78,6 +153,8 @@ def change_of(text: str) -> Change:
 
 def value_of(change: Change, description: Description) -> Number:
     """The value in the parameter's own unit; a whole number as such, so that none of its digits is lost."""
+    if change.number is None:
+        raise UnknownUnit(f"{change.name} has no value")
     if change.unit is None and change.number.lstrip("+-").isdecimal() and len(change.number) <= LONGEST:
         whole = int(change.number)
         if whole in OBJECTS:

@@ -10,8 +10,15 @@ from gateway.wire.parameter import Stored
 def device_parser(command: str, what: str, epilog: str) -> argparse.ArgumentParser:
     """Make the parser of a command for one device."""
     made = parser(command, what, epilog)
-    made.add_argument("component", metavar="COMPONENT", help="a joint or device, such as left_knee")
+    add_component(made)
     return made
+
+
+def add_component(made: argparse.ArgumentParser, nargs: str | None = None) -> None:
+    """Add the argument that names the device."""
+    made.add_argument(
+        "component", metavar="COMPONENT", nargs=nargs, help="a joint or device, such as left_knee"
+    )
 
 
 def say_stored(stored: Stored, *, json: bool) -> None:

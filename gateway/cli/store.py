@@ -1,21 +1,77 @@
-"""`gwrms store`: a device keeps its parameters over a reset."""
+"""`gwrms store`: a device keeps its parameters over a reset; or every device does, one after another."""
 
-from gateway.cli.connect import connect
-from gateway.cli.storage import device_parser, say_stored
+import argparse
+
+from msgspec import Struct
+
+from gateway.cli.connect import connect, parser
+from gateway.cli.storage import add_component, say_stored
+from gateway.cli.text import say, say_json, table
+from gateway.client import CallTimeout, LinkLost, NotConnected, RemoteError, Robot
+from gateway.several import Outcome, refused_or_unknown, storing
 
 EPILOG = """Refused while one of its drives is enabled or in a state that is not known, while something
 is on trial, and where the device does not say that it can (1010h). All of its parameters are stored, whoever
 has changed them, and compared before and after. A write never stores by itself.
 
-example:
-  gwrms store left_knee"""
+With --all every device that can store is asked, one after another, and what came of each is said: stored,
+refused, or not confirmed, after which nobody knows what its flash holds. Where the link drops, the devices
+after it are not asked. Exit status 1 unless all have stored.
+
+examples:
+  gwrms store left_knee
+  gwrms store --all"""
+
+
+class Result(Struct, frozen=True):
+    """What came of one device; `said` is its own words, or why not."""
+
+    components: tuple[str, ...]
+    outcome: Outcome
+    said: str
 
 
 def main(argv: list[str]) -> int:
     """Run `gwrms store`."""
-    made = device_parser("store", "Make a device keep its parameters as they are now (1010h).", EPILOG)
+    made = parser("store", "Make a device keep its parameters as they are now (1010h).", EPILOG)
+    add_component(made, "?")
+    made.add_argument("--all", action="store_true", help="every device that can, one after another")
     arguments = made.parse_args(argv)
+    if arguments.all == (arguments.component is not None):
+        made.error("name one COMPONENT, or say --all")
     with connect(arguments, "store") as robot:
+        if arguments.all:
+            return _all(robot, arguments)
         stored = robot.store(arguments.component)
     say_stored(stored, json=arguments.json)
     return 0
+
+
+def _all(robot: Robot, arguments: argparse.Namespace) -> int:
+    results: list[Result] = []
+    lost = ""
+    for components in storing(robot.describe()):
+        try:
+            outcome, said = (Outcome.UNASKED, lost) if lost else _one(robot, components)
+        except NotConnected as error:
+            outcome, said = Outcome.UNASKED, str(error)
+            lost = said
+        except (LinkLost, CallTimeout) as error:
+            outcome, said = Outcome.UNKNOWN, str(error)
+            lost = said
+        results.append(Result(components, outcome, said))
+    if arguments.json:
+        say_json(results)
+    elif results:
+        rows = [(" + ".join(one.components), one.outcome, one.said) for one in results]
+        say(table(("DEVICE", "", ""), rows))
+    else:
+        say("no device of this robot says that it can store (1010h)\n")
+    return 0 if results and all(one.outcome is Outcome.STORED for one in results) else 1
+
+
+def _one(robot: Robot, components: tuple[str, ...]) -> tuple[Outcome, str]:
+    try:
+        return Outcome.STORED, robot.store(components[0]).result
+    except RemoteError as error:
+        return refused_or_unknown(error.kind), str(error)

@@ -51,7 +51,7 @@ function _shtab_gwrms_using
 end
 
 set -g _shtab_gwrms_commands gateway install-service keys 'keys pair' 'keys list' 'keys push' 'keys add' 'keys revoke' pair check doctor describe snapshot cost bench blame watch top plot get set params 'params save' 'params compare' 'params apply' od store restore journal 'journal tail' 'journal verify' stop reset enable completion docs eds scan lss trace commission sensor 'sensor record' 'sensor replay' 'sensor decode' calibrate 'calibrate insole' 'calibrate imu' 'calibrate joint' collect sessions 'sessions ls' 'sessions show' 'sessions gait' 'sessions resources' 'sessions compare' 'sessions export' edits 'edits show' label train cloud 'cloud ls' 'cloud du' 'cloud verify' 'cloud mend' 'cloud upload' 'cloud download' 'cloud compact' 'cloud retain' 'cloud vacuum' 'cloud forget' 'cloud witnesses' query models 'models ls' 'models show' 'models promote' 'models rollback' 'models history' 'models export' predict gui evaluate demo sim 'sim run' sim-record sim-fault
-set -g _shtab_gwrms_opts_with_value --activity --adapt-from --angle --author --axes --baud --benchmark --bitrate --bus --certificate --channels --clear --cluster --component --computer --config --consent --controller --count --data --days --dir --drive --eds --falling --falls --file --foot --for --format --from --grace --hand --held-out --host --imu --include --insole --instead-of --interface --junit --key --kind --layout --lean --limit --link --look --mark --max-change --minutes --mistake --model --mount --mounting --name --new-bitrate --node --node-id --notes --object --on --onnx --operator --out --path --picture --port --pseudo-labels --rate --reason --remote --report --requests --robot --role --run-as --saturation --scale --scenario --schema --script --seconds --seed --serial --session --set --sort --speed --stamp --subject --subjects --table --task --timeout --to --trial --truth --unconfigured --url --wearer --who --why --without --witness --write -n
+set -g _shtab_gwrms_opts_with_value --activity --adapt-from --angle --author --axes --baud --benchmark --bitrate --bus --certificate --channels --clear --cluster --component --computer --config --consent --controller --count --data --days --dir --drive --eds --falling --falls --file --foot --for --format --from --grace --hand --held-out --host --imu --include --insole --instead-of --interface --junit --key --kind --layout --lean --leave-out --limit --link --look --mark --max-change --minutes --mistake --model --mount --mounting --name --new-bitrate --node --node-id --notes --object --on --onnx --operator --out --path --picture --port --pseudo-labels --rate --reason --remote --report --requests --robot --role --run-as --saturation --scale --scenario --schema --script --seconds --seed --serial --session --set --sort --speed --stamp --subject --subjects --table --task --timeout --to --trial --truth --unconfigured --url --wearer --who --why --without --witness --write -n
 
 complete -c gwrms -e
 complete -c gwrms -f
@@ -178,6 +178,9 @@ complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a 
 complete -c gwrms -n '_shtab_gwrms_using set' -s h -l help -d 'show this help message and exit'
 complete -c gwrms -n '_shtab_gwrms_using set' -l robot -x -d 'the gateway to ask (default 127.0.0.1:7420)'
 complete -c gwrms -n '_shtab_gwrms_using set' -l json -d 'one JSON object a line, for machines'
+complete -c gwrms -n '_shtab_gwrms_using set' -l mirror -d 'the same joint of the other side takes it, too'
+complete -c gwrms -n '_shtab_gwrms_using set' -l all-joints -d 'every joint takes it'
+complete -c gwrms -n '_shtab_gwrms_using set' -l leave-out -x -d 'with these: a joint that stays as it is (again: more)'
 complete -c gwrms -n '_shtab_gwrms_using set' -l trial -x -d 'try it for S seconds (at most 300); exit status 0 if kept'
 complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a params -d 'parameters as files: save, compare, apply'
 complete -c gwrms -n '_shtab_gwrms_using params' -s h -l help -d 'show this help message and exit'
@@ -220,6 +223,7 @@ complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a 
 complete -c gwrms -n '_shtab_gwrms_using store' -s h -l help -d 'show this help message and exit'
 complete -c gwrms -n '_shtab_gwrms_using store' -l robot -x -d 'the gateway to ask (default 127.0.0.1:7420)'
 complete -c gwrms -n '_shtab_gwrms_using store' -l json -d 'one JSON object a line, for machines'
+complete -c gwrms -n '_shtab_gwrms_using store' -l all -d 'every device that can, one after another'
 complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a restore -d 'Give a device its defaults back (1011h).'
 complete -c gwrms -n '_shtab_gwrms_using restore' -s h -l help -d 'show this help message and exit'
 complete -c gwrms -n '_shtab_gwrms_using restore' -l robot -x -d 'the gateway to ask (default 127.0.0.1:7420)'

@@ -1095,6 +1095,9 @@ _shtab_gwrms_set_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
   "--json[one JSON object a line, for machines]"
+  "--mirror[the same joint of the other side takes it, too]"
+  "--all-joints[every joint takes it]"
+  "*--leave-out[with these\: a joint that stays as it is (again\: more)]:JOINT:"
   "--trial[try it for S seconds (at most 300)\; exit status 0 if kept]:S:"
   "(*):in the parameter\'s own unit, or in another\: 3deg, 420mm, 30rpm:"
 )
@@ -1199,6 +1202,7 @@ _shtab_gwrms_store_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
   "--json[one JSON object a line, for machines]"
+  "--all[every device that can, one after another]"
   ":a joint or device, such as left_knee:"
 )
 

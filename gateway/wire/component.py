@@ -28,6 +28,16 @@ class EmcyInfo(Struct, frozen=True):
     active: bool  # not taken back
 
 
+class AngleInfo(Struct, frozen=True):
+    """How a joint's counts become its angle (rad): `rad_per_count` · counts + `zero_offset`.
+
+    `rad_per_count` is negative where counts fall when the joint bends.
+    """
+
+    rad_per_count: float
+    zero_offset: float
+
+
 class ComponentInfo(Struct, frozen=True):
     """One component of `robot.describe`; `problem` says in words what is wrong."""
 
@@ -39,6 +49,7 @@ class ComponentInfo(Struct, frozen=True):
     layout: LayoutInfo | UnsetType = UNSET  # of an insole
     findings: list[FindingInfo] | UnsetType = UNSET  # of what `problem` says, that which has a beginning
     emcy: EmcyInfo | UnsetType = UNSET
+    angle: AngleInfo | UnsetType = UNSET  # of a joint
 
 
 class ChannelInfo(Struct, frozen=True):

@@ -34,9 +34,22 @@ def hold(descriptor: int) -> None:
 def of_folder(folder: Path, *, shared: bool = False) -> Iterator[None]:
     """Lock a folder within the block; shared waits, else `BlockingIOError` where somebody has locked it."""
     fcntl = check()
+    with _locked(folder, fcntl.LOCK_SH if shared else fcntl.LOCK_EX | fcntl.LOCK_NB):
+        yield
+
+
+@contextlib.contextmanager
+def turn(folder: Path) -> Iterator[None]:
+    """Lock a folder within the block, for one writer after another: waits, so what is done there is short."""
+    with _locked(folder, check().LOCK_EX):
+        yield
+
+
+@contextlib.contextmanager
+def _locked(folder: Path, how: int) -> Iterator[None]:
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
-        fcntl.flock(descriptor, fcntl.LOCK_SH if shared else fcntl.LOCK_EX | fcntl.LOCK_NB)
+        check().flock(descriptor, how)
         yield
     finally:
         os.close(descriptor)

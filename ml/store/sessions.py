@@ -56,7 +56,8 @@ class Session(msgspec.Struct, frozen=True):
     """What is known of a session. `ended` is None while it goes on, and where its server died.
 
     Its telemetry is from `first` to before `last`, None where it has none. `parameters` are the values at
-    its start, `units` each channel's unit as the robot described it, `versions` software by name.
+    its start, `units` each channel's unit as the robot described it, `versions` software by name. `setup` is
+    what else was so then, by section and name (`firmware/left_knee`); empty where that was not recorded.
     """
 
     robot: str
@@ -76,6 +77,7 @@ class Session(msgspec.Struct, frozen=True):
     parameters: dict[str, Any] = {}
     units: dict[str, Any] = {}
     versions: dict[str, Any] = {}
+    setup: dict[str, Any] = {}
 
     @property
     def length(self) -> timedelta:
@@ -163,7 +165,8 @@ def made(fields: Mapping[str, Any], extent: Extent, uploaded: bool = True) -> Se
     """Return a session from its row in the table, and its telemetry's extent."""
     known = {name: value for name, value in fields.items() if value is not None}
     tables = {
-        name: msgspec.json.decode(known.pop(name, "{}")) for name in ("parameters", "units", "versions")
+        name: msgspec.json.decode(known.pop(name, "{}"))
+        for name in ("parameters", "units", "versions", "setup")
     }
     found = {
         "first": extent.first,

@@ -126,6 +126,7 @@ SESSIONS: Final = Table(
             *_ORIGIN,
             field("wearer", pa.string()),
             field("consent", pa.string()),
+            field("setup", pa.string()),  # JSON
         ]
     ),
     indexed=5,

@@ -124,7 +124,7 @@ def _told(told: Told) -> Iterator[str]:
     yield ""
     judged = [one for one in evidence.metrics if one.p is not None]
     if judged:
-        yield table(COLUMNS, map(_line, sorted(judged, key=_order)), right=(2, 3, 4, 6)).rstrip()
+        yield table(COLUMNS, map(metric_row, sorted(judged, key=_order)), right=(2, 3, 4, 6)).rstrip()
     few = collections.Counter(one.why for one in evidence.metrics if one.word is Word.FEW)
     yield from (f"not enough cycles for {counted(count, 'metric')}: {why}" for why, count in few.items())
     silent = [one for one in evidence.metrics if one.word is Word.NO_DATA]
@@ -137,7 +137,8 @@ def _order(one: Measured) -> float:
     return -abs(one.size or 0.0) if one.word not in (Word.SAME, Word.FEW) else 1.0
 
 
-def _line(one: Measured) -> tuple[str, ...]:
+def metric_row(one: Measured) -> tuple[str, ...]:
+    """Return a row of `COLUMNS`."""
     interval = NONE if one.low is None else f"{number(one.low)} … {number(one.high)}"
     return (
         one.title,

@@ -27,6 +27,7 @@ from server_gui.cli.cloud_options import (
     recordings,
     when,
 )
+from server_gui.cli.sessions_changed import changed
 from server_gui.cli.sessions_gait import gait
 from server_gui.cli.sessions_resources import compare, resources
 from server_gui.core.cloud import exports
@@ -45,6 +46,7 @@ USAGE: Final = """usage: gwrms sessions COMMAND …
   export SESSION --out FILE
                          as CSV, Parquet or MCAP, whole or a part
   resources SESSION      what each program on the robot's computer used; memory leaks
+  changed BEFORE AFTER   what changed from one to the other, and what of the walk moved with it
   compare BEFORE[,…] AFTER[,…]
                          which programs take more than in earlier ones
 
@@ -56,7 +58,9 @@ def main(argv: list[str]) -> int:
     """Run `gwrms sessions`."""
     private_files()
     commands = {"ls": ls, "show": show, "export": export, "gait": gait}
-    return choose_command(argv, commands | {"resources": resources, "compare": compare}, USAGE)
+    return choose_command(
+        argv, commands | {"resources": resources, "compare": compare, "changed": changed}, USAGE
+    )
 
 
 # --- ls

@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import msgspec
 import pytest
 from PySide6.QtCore import QSettings
 from PySide6.QtWidgets import QApplication, QTabWidget
@@ -28,17 +29,18 @@ from tests.gui.running import wait
 from tests.support.commissioning import Played
 from tests.support.desk import walking
 
+ADA = Facts(operator="Ada", notes="new insoles")
 SECONDS = 12
 RATE_HZ = 50
 
 
-def record(settings: ServerSettings, *, sent: bool = True) -> str:
+def record(settings: ServerSettings, *, sent: bool = True, facts: Facts = ADA) -> str:
     """Somebody who walks for `SECONDS`, of whom a model says so for half of it; and a marker."""
     walk = walking(SECONDS * RATE_HZ, rate_hz=RATE_HZ).batch
     with Spool(settings.recorder.spool, reserve_bytes=0) as spool:
         with Recorder(spool) as recorder:
             units = {name: "rad" if name.endswith("position") else "" for name in walk.columns}
-            session = recorder.begin("exo-01", Facts(units=units, operator="Ada", notes="new insoles"))
+            session = recorder.begin("exo-01", msgspec.structs.replace(facts, units=units))
             recorder.record("exo-01", 1, walk, 0)
             recorder.add(
                 *(foretold(session, at_ns) for at_ns in walk.stamps_ns[: len(walk.stamps_ns) // 2 : 5])

@@ -15,7 +15,7 @@ from server_gui.views.parameters.review import NUMBERS, SETTLE_MS
 from server_gui.views.parameters.tree import NAME, NEW, ROBOT, SAID, TITLES
 from tests.gui.fakes import Bench
 from tests.gui.running import wait
-from tests.support.desk import HELD, described, looked
+from tests.support.desk import HELD, JOINTS, described, looked
 
 
 def row(panel: ParametersPanel, name: str) -> list[str]:
@@ -89,7 +89,7 @@ def test_a_value_that_changed_elsewhere_is_flagged_before_it_is_overwritten(
 
 
 def test_what_the_robot_would_refuse_cannot_be_written(panel: ParametersPanel) -> None:
-    panel.stage_text("gait.step_length", "700")
+    panel.stage("gait.step_length", 0.7)  # as a file's
     panel.begin_review()
     QTest.qWait(SETTLE_MS + 100)
     assert not panel.review.write_it.isEnabled()
@@ -103,7 +103,7 @@ def test_a_review_says_how_far_each_change_goes_and_writes_the_rest_of_what_is_r
     panel: ParametersPanel, bench: Bench
 ) -> None:
     panel.stage_text("gait.step_length", "430")
-    panel.stage_text("left_knee.max_torque", "200")
+    panel.stage("left_knee.max_torque", 200.0)  # as a file's
     panel.begin_review()
     panel.resize(700, 900)
     QApplication.processEvents()
@@ -270,3 +270,55 @@ def test_control_shows_who_has_it_and_how_long(panel: ParametersPanel, bench: Be
     bench.first.fail(RemoteError(-32003, "ada at 10.0.0.3 has control", {"kind": "lease_held"}))
     panel.refresh()
     assert panel.control.words.text() == "ada at 10.0.0.3 has control"
+
+
+def test_what_is_outside_is_refused_before_it_is_staged(panel: ParametersPanel, bench: Bench) -> None:
+    panel.stage_text("gait.step_length", "900")
+    panel.refresh()
+    assert bench.station.edits.staged == {}
+    assert panel.banner.text() == (
+        "gait.step_length: 900 mm is not staged, it is above the largest allowed, 600 mm"
+    )
+    panel.stage_text("gait.step_length", "520")
+    panel.refresh()
+    assert "one write may go, 100 mm" in panel.banner.text()
+
+
+def test_the_range_stands_beside_the_editor(panel: ParametersPanel) -> None:
+    row(panel, "gait.step_length")
+    panel.stage_text("gait.step_length", "430")
+    panel.refresh()
+    assert panel.detail.range.figures == ("200", "600 mm")
+    assert panel.detail.range.isVisible()
+
+
+def test_several_joints_are_edited_at_once(panel: ParametersPanel, bench: Bench) -> None:
+    torques = {f"{joint}.max_torque": 80.0 for joint in JOINTS}
+    bench.station.take([described(parameters=torques), looked(torques)])
+    row(panel, "left_knee.max_torque")
+    panel.stage_text("left_knee.max_torque", "60")
+    panel.detail.several.aboutToShow.emit()
+    titles = [action.text() for action in panel.detail.several.actions()]
+    assert titles == ["60 N·m for right knee, too", "60 N·m for all joints"]
+    assert "right_knee.max_torque: 80" in panel.detail.several.actions()[0].toolTip()
+    panel.detail.several.actions()[1].trigger()
+    assert bench.station.edits.staged.keys() == torques.keys()
+    panel.begin_review()
+    settle(panel)
+    panel.review.write_it.click()
+    assert bench.first.named("write") == [(dict.fromkeys(torques, 60.0), None)]
+
+
+def test_where_one_joint_cannot_nothing_is_staged_and_it_is_named(
+    panel: ParametersPanel, bench: Bench
+) -> None:
+    torques = {f"{joint}.max_torque": 80.0 for joint in JOINTS[:-1]}
+    bench.station.take([described(parameters=torques), looked(torques)])
+    row(panel, "left_knee.max_torque")
+    panel.detail.several.aboutToShow.emit()
+    panel.stage("left_knee.max_torque", 60.0)
+    panel.detail.several.aboutToShow.emit()
+    panel.detail.several.actions()[1].trigger()
+    panel.refresh()
+    assert list(bench.station.edits.staged) == ["left_knee.max_torque"]
+    assert "right_ankle: it has no max_torque" in panel.banner.text()

@@ -36,6 +36,7 @@ NOT_TYPED: Final[Mapping[str, tuple[str, ...]]] = {
     "how-to/containers.md": ("Docker", "Docker", "Docker"),
     "how-to/first-robot.md": ("two computers, and root",),
     "how-to/judge-an-edit.md": ("a walk of minutes, before and after an edit",),
+    "how-to/what-changed.md": ("two recorded walks of minutes, some days apart",),
     "how-to/measure-the-cost.md": (
         "a control loop on the robot's computer, which the simulated robot has not",
     ),

@@ -120,6 +120,7 @@ def facts(config: RobotConfig, name: str, description: eds.Description) -> Mappi
     bus, bitrate = tables[name].bus, config.can[tables[name].bus].bitrate
     found: dict[str, str | int] = {
         "eds": description.path.name,
+        "eds_digest": description.digest,
         "vendor": description.vendor,
         "product": description.product,
         "bus": bus,

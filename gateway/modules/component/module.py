@@ -22,6 +22,7 @@ from gateway.streaming.sources import Selection, Source, channel_info, check_glo
 from gateway.wire.bus import BUS_SNAPSHOT, Buses, BusInfo
 from gateway.wire.component import (
     COMPONENT_SNAPSHOT,
+    AngleInfo,
     ChannelInfo,
     ComponentInfo,
     LayoutInfo,
@@ -166,11 +167,18 @@ class ComponentModule:
             _layout(component),
             finding_infos(quality.findings) or UNSET,
             emcy_info(component),
+            self._angle(name),
         )
 
     def _absent_info(self, name: str) -> ComponentInfo:
         kind, why = self.robot.absent[name]
-        return ComponentInfo(name, kind.value, State.LOST.value, why, self._device(name))
+        device, angle = self._device(name), self._angle(name)
+        return ComponentInfo(name, kind.value, State.LOST.value, why, device, angle=angle)
+
+    def _angle(self, name: str) -> AngleInfo | UnsetType:
+        """As the robot's file says it, whether the drive is there or not."""
+        settings = self._context.config.joint.get(name)
+        return UNSET if settings is None else AngleInfo(settings.rad_per_count, settings.zero_offset)
 
     def _device(self, name: str) -> dict[str, str | int] | UnsetType:
         description = self.robot.descriptions.get(name)

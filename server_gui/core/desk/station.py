@@ -13,7 +13,7 @@ from gateway.units import Units
 from gateway.wire.control import Lease
 from gateway.wire.cost import GatewayCost
 from gateway.wire.method import AnyMethod
-from gateway.wire.parameter import ParameterInfo, Stored, Written
+from gateway.wire.parameter import ParameterInfo, Written
 from gateway.wire.resource import ProcessUse, ResourceSnapshot
 from gateway.wire.robot import Description
 from gateway.wire.stop import Stopped
@@ -53,6 +53,7 @@ from server_gui.core.tuning.flash import Flash
 from server_gui.core.tuning.lease import LeaseState
 from server_gui.core.tuning.link import LEASE_S
 from server_gui.core.tuning.stop import StopProgress, StopState
+from server_gui.core.tuning.storing import Storing
 from server_gui.core.tuning.taken_back import OVERDUE_S, TakenBack
 from server_gui.core.tuning.writing import WriteProgress, WriteState
 
@@ -104,6 +105,7 @@ class Station:
         self._states = StateWatch()
         self._stalls = Stalls()
         self._back = TakenBack(self.robot, self.writing, self.tell)
+        self._storing = Storing(commands, deliver, self.writing, self.control, self.tell)
 
     @property
     def called(self) -> str:
@@ -449,24 +451,9 @@ class Station:
             )
             self.tell(NewsKind.WARNING, self.writing.text)
 
-    def store(self, component: str) -> None:
-        """Make a device keep its parameters over a reset."""
-        self.writing.storing(component)
-        when_done(
-            self._commands.store(component),
-            self._deliver,
-            self._stored,
-            self._store_failed,
-        )
-
-    def _stored(self, stored: Stored) -> None:
-        self.control.renewed(LEASE_S)
-        self.writing.say(WriteState.DONE, f"{stored.component}: {stored.result}")
-        self.tell(NewsKind.PARAMETER, self.writing.text)
-
-    def _store_failed(self, error: Exception) -> None:
-        self.writing.not_stored(error)
-        self.tell(NewsKind.PARAMETER, f"{self.writing.state.value}: {error}")
+    def store(self, *components: str) -> None:
+        """Make devices keep their parameters over a reset, one after another."""
+        self._storing.begin(components)
 
     def is_stored(self, name: str) -> bool:
         """Return whether the present value is in flash, as far as the journal shows it; else nobody knows."""

@@ -192,6 +192,15 @@ def spell(edit: Edit, edits: Sequence[Edit]) -> tuple[Spell, tuple[str, ...]]:
     return Spell(before, after), tuple(_disturbances(edit, others, since_ns, after[0][1]))
 
 
+def within(found: Spell, since_ns: int, until_ns: int) -> Spell:
+    """Return what of it lies in one recording: who wears the robot before or after that, nobody knows."""
+    sides = (
+        [(max(since, since_ns), min(until, until_ns)) for since, until in spans]
+        for spans in (found.before, found.after)
+    )
+    return Spell(*sides)
+
+
 def _instants(edit: Edit) -> Iterator[int]:
     """When it changed what the robot does."""
     yield edit.began_ns if edit.in_force_ns is None else edit.in_force_ns

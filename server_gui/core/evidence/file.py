@@ -2,7 +2,8 @@
 
 A line is `{"format": 1, "edit": {…}, "evidence": {…}, …}`; of an edit the newest line counts.
 `docs/reference/store.md` says what is in them. Lines are only ever added; what a newer program has written in
-another format is left alone.
+another format is left alone. Whoever writes has the folder to itself: a recorder that adds a line, and a
+command that forgets a wearer, may come at the same instant.
 """
 
 import contextlib
@@ -16,6 +17,7 @@ from typing import Final
 import msgspec
 from msgspec import Struct
 
+from ml.store.locks import turn
 from ml.store.private import opener, private_folder
 from server_gui.core.atomic_files import draft
 from server_gui.core.evidence.comparison import Evidence
@@ -67,7 +69,7 @@ class EvidenceFile:
     def add(self, told: Told) -> None:
         """Add a line, durably; raises `OSError`."""
         private_folder(self.path.parent)
-        with open(self.path, "ab", opener=opener) as file:
+        with turn(self.path.parent), open(self.path, "ab", opener=opener) as file:
             torn = file.tell() and not _ends_whole(self.path)
             file.write(b"\n" * bool(torn) + msgspec.json.encode(told) + b"\n")
             file.flush()
@@ -111,14 +113,19 @@ def forget(folder: Path, sessions: Collection[tuple[str, str]]) -> list[str]:
     left = []
     for path in sorted(folder.glob("*.jsonl")) if folder.is_dir() else []:
         try:
-            lines = path.read_bytes().splitlines(keepends=True)
-            kept = [line for line in lines if (whose := _whose(line)) is not None and whose not in sessions]
-            if len(kept) < len(lines):
-                with draft(path) as written:
-                    written.write_bytes(b"".join(kept))
+            with turn(folder):
+                _without(path, sessions)
         except OSError as error:
             left.append(f"{path} may have edits of theirs: {error}")
     return left
+
+
+def _without(path: Path, sessions: Collection[tuple[str, str]]) -> None:
+    lines = path.read_bytes().splitlines(keepends=True)
+    kept = [line for line in lines if (whose := _whose(line)) is not None and whose not in sessions]
+    if len(kept) < len(lines):
+        with draft(path) as written:
+            written.write_bytes(b"".join(kept))
 
 
 def _whose(line: bytes) -> tuple[str, str] | None:

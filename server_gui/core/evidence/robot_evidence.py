@@ -2,6 +2,7 @@
 
 import collections
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any, Final
 
 from msgspec.structs import replace
@@ -21,6 +22,7 @@ from server_gui.core.evidence.edits import (
     State,
     due_ns,
     spell,
+    within,
 )
 from server_gui.core.evidence.file import Told
 from server_gui.core.follow.events import (
@@ -37,8 +39,17 @@ from server_gui.core.recording.rows import JournalHead
 
 LATE_NS: Final = 10_000_000_000  # after which the journal has told everything of an instant
 LONGEST_NS: Final = max(AFTER_NS, TRIAL_NS + BACK_NS)  # from an edit until nothing more comes of it
+NEVER_NS: Final = 2**63
+OUTSIDE: Final = "a recording began or ended within its time: what is outside, of anybody, does not count"
 KEPT_NS: Final = BEFORE_NS + LONGEST_NS + 2 * LATE_NS  # of cycles
 JOINT: Final = "joint"  # the kind of component
+
+
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """What comes from now on is in the recording of this name; empty: in none."""
+
+    session: str
 
 
 class RobotEvidence:
@@ -56,15 +67,20 @@ class RobotEvidence:
         self._boot_id: str | None = None
         self._joints: tuple[str, ...] = ()
         self._head: JournalHead | None = None
+        self._recordings: list[tuple[int, str]] = [
+            (-NEVER_NS, "")
+        ]  # since when (robot's clock), and their names
         self._first_ns: int | None = None  # the first row of this boot
         self._newest_ns = 0
         self._seen: dict[str, tuple[Edit, Spell, int | None]] = {}  # how, and at how many cycles at most
         self._cut = 0
         self._over: set[str] = set()
 
-    def take(self, event: Event) -> list[Told]:
+    def take(self, event: Event | Recorded) -> list[Told]:
         """Take one fact; what can become no more where it ends something."""
         match event:
+            case Recorded():
+                self._recorded(event.session)
             case Telemetry(batch=batch):
                 self._rows(list(batch.stamps_ns), batch.columns)
             case Journalled():
@@ -79,6 +95,10 @@ class RobotEvidence:
             case Described():
                 return self._described(event.description)
         return []
+
+    def session_of(self, edit: Edit) -> str:
+        """Return what the recording was called in which the edit was made."""
+        return self._recordings[self._place(edit)][1]
 
     def label(self, stamp_ns: int, activity: str) -> None:
         """Take what a model says that the wearer does at an instant."""
@@ -99,17 +119,43 @@ class RobotEvidence:
         other = RobotEvidence(self.robot)
         if self._description is not None:
             other.take(Described(self._description))
+        other.take(Recorded(self._recordings[-1][1]))
         return other
 
     # --- inside
 
     def _told(self, edit: Edit, *, is_final: bool) -> Told:
         """What an edit has done, as far as the cycles until now tell."""
-        windows, notes = spell(edit, self._edits.all)
+        windows, notes = self._spell(edit)
         edited = [joint for joint in self._joints if joint in edit.components]
         found = compare(self.cycles, windows, self._joints, edited)
         drawn = curves(self.cycles, windows, told_joints(found, edited))
         return Told(edit, replace(found, notes=found.notes + notes), is_final, curves=drawn)
+
+    def _recorded(self, session: str) -> None:
+        """A recording is of one wearer: what is in another one is compared with no edit of this one."""
+        if session == self._recordings[-1][1]:
+            return
+        if self._first_ns is None:  # nothing was seen before it
+            self._recordings = [(-NEVER_NS, session)]
+            return
+        self._recordings.append((self._newest_ns, session))
+        while len(self._recordings) > 1 and self._recordings[1][0] < self._newest_ns - KEPT_NS:
+            del self._recordings[0]
+
+    def _place(self, edit: Edit) -> int:
+        """Which of the recordings the edit was made in."""
+        later = (place for place, (since, _) in enumerate(self._recordings) if since > edit.began_ns)
+        return max(next(later, len(self._recordings)) - 1, 0)
+
+    def _spell(self, edit: Edit) -> tuple[Spell, tuple[str, ...]]:
+        """When its old and new values were in force, in the recording that it was made in."""
+        windows, notes = spell(edit, self._edits.all)
+        place = self._place(edit)
+        since_ns = self._recordings[place][0]
+        until_ns = self._recordings[place + 1][0] if place + 1 < len(self._recordings) else NEVER_NS
+        inside = within(windows, since_ns, until_ns)
+        return inside, notes if inside == windows else (*notes, OUTSIDE)
 
     def _rows(self, stamps_ns: list[int], columns: Mapping[str, Any]) -> None:
         if not stamps_ns:
@@ -140,6 +186,7 @@ class RobotEvidence:
             self._cutter.restart()
             self._edits = JournalEdits(self.robot)
             self._first_ns, self._newest_ns = None, 0
+            self._recordings = [(-NEVER_NS, self._recordings[-1][1])]
         if self._boot_id != description.boot_id:
             self._head = None
         self._boot_id = description.boot_id
@@ -166,7 +213,7 @@ class RobotEvidence:
     def _look(self, edit: Edit) -> Told | None:
         until_ns = due_ns(edit)
         is_final = until_ns is not None and self._newest_ns > until_ns + LATE_NS
-        windows, _ = spell(edit, self._edits.all)
+        windows, _ = self._spell(edit)
         last_ns = max(until for _, until in (*windows.before, *windows.after))
         grows = self._newest_ns <= last_ns + LATE_NS
         looked = (edit, windows, self._cut if grows else None)

@@ -12,7 +12,7 @@ from msgspec.structs import replace
 
 from ml.serving.predictor import Prediction
 from server_gui.core.evidence.file import EvidenceFile, Told
-from server_gui.core.evidence.robot_evidence import RobotEvidence
+from server_gui.core.evidence.robot_evidence import Recorded, RobotEvidence
 from server_gui.core.follow.events import Event, without_processes
 from server_gui.core.prediction.inbox import Inbox
 from server_gui.core.prediction.news import Predicted, PredictionNews
@@ -41,10 +41,10 @@ class EvidenceService:
         self._folder = folder
         self._session = session
         self._tell = tell
-        self._inbox = Inbox()
+        self._inbox = Inbox[Event | Recorded]()
         self._robots: dict[str, RobotEvidence] = {}
         self._said: collections.deque[tuple[str, Prediction]] = collections.deque(maxlen=MOST_SAID)
-        self._sessions: dict[str, str] = {}  # by edit: what was recorded when it was made
+        self._recorded: dict[str, str] = {}  # by robot: what its recording is called, as was told last
         self._looked_s = 0.0
         self.worker = Worker("evidence", self._run, STILL_S)
 
@@ -58,6 +58,10 @@ class EvidenceService:
 
     def take(self, robot: str, event: Event) -> None:
         """Take what a robot's feed tells; from any thread, returns at once."""
+        session = self._session(robot)
+        if self._recorded.get(robot) != session:
+            self._recorded[robot] = session
+            self._inbox.put(robot, Recorded(session))
         self._inbox.put(robot, without_processes(event))
 
     def predicted(self, news: Iterable[PredictionNews]) -> None:
@@ -109,9 +113,7 @@ class EvidenceService:
             log.error("the edits of %s that were kept cannot be read: %s", robot, error)
 
     def _told(self, robot: str, told: Told) -> None:
-        session = self._sessions.setdefault(told.edit.id, self._session(robot))
-        if told.is_final:
-            del self._sessions[told.edit.id]
+        session = self._robots[robot].session_of(told.edit)
         if told.is_final and session:
             try:
                 EvidenceFile(self._folder, robot).add(replace(told, session=session))
@@ -121,5 +123,5 @@ class EvidenceService:
             self._tell(robot, told)
 
 
-def _taken(events: Iterable[Event], known: RobotEvidence) -> list[Told]:
+def _taken(events: Iterable[Event | Recorded], known: RobotEvidence) -> list[Told]:
     return [told for event in events for told in known.take(event)]

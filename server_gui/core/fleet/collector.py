@@ -104,7 +104,8 @@ class Collector:
         compacting = None if every_s is None else Compaction(store.url, self._spool.folder, every_s)
         self._uploader = Uploader(self._spool, lambda: connect(store), self._wanted, compacting)
         self._recorder = Recorder(self._spool, settings=RecorderSettings(batch_s=recorder.batch_s))
-        self._fleet = Fleet(following or whole(recorder), self._recorder, operator, notes, worn)
+        asked = msgspec.structs.replace(following or whole(recorder), identities=True)
+        self._fleet = Fleet(asked, self._recorder, operator, notes, worn)
         self._stop_links = StopLinks(self.network, settings.rules if stop is None else ())
         self._evidence = EvidenceService(folder_beside(recorder.spool), self._fleet.session, tell_evidence)
         self._prediction = (

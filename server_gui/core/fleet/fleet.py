@@ -40,15 +40,23 @@ class Member:
         self.keeping = keeping
         subscribers = [keeping.take, self.statistics.take, LinkLog(robot, address).take, *others]
         self._feed = functools.partial(Feed, address, subscribers, following)
+        self._live: Feed | None = None
 
     async def run(self) -> None:
         """Follow the robot until cancelled; a mistake of ours about it ends no other's recording."""
         while True:
+            self._live = self._feed()
             try:
-                await self._feed().run()
+                await self._live.run()
             except Exception:
                 log.exception("%s: internal error; it is followed anew in %g s", self._robot, AGAIN_S)
             await asyncio.sleep(AGAIN_S)
+
+    def go_on(self, notes: str) -> None:
+        """Record again, and ask once more what the devices are: they may be others by now."""
+        self.keeping.go_on(notes)
+        if self._live is not None:
+            self._live.identify()
 
     @property
     def session(self) -> str:
@@ -127,7 +135,7 @@ class Fleet:
         """Record all of them again, in sessions with this name; without one as they were called."""
         self._notes, self.is_paused = name or self._notes, False
         for member in self._members.values():
-            member.keeping.go_on(self._notes)
+            member.go_on(self._notes)
 
     def session(self, robot: str) -> str:
         """Return what a robot's recording that goes on is called."""

@@ -10,6 +10,7 @@ from server_gui.core.fleet import session_facts
 from server_gui.core.follow.events import (
     Described,
     Event,
+    Identified,
     Journalled,
     LinkChanged,
     Looked,
@@ -75,6 +76,8 @@ class RobotRecording:
                 self._recorder.journal(self._robot, event.journal.entries, event.head)
             case Described():
                 self._described(event.description)
+            case Identified() if not any(map(session_facts.is_identity, self._facts.setup)):
+                self._learn(setup=self._facts.setup | session_facts.identities(event.devices))
             case Looked() if event.parameters is not None and not self._facts.parameters:
                 values = event.parameters.values.items()
                 self._learn(parameters={name: known.value for name, known in values})

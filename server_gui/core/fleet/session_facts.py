@@ -2,14 +2,30 @@
 
 import hashlib
 import importlib.metadata
+from collections.abc import Mapping
+from typing import Final
 
 import msgspec
+from msgspec import UNSET
 from msgspec.structs import replace
 
+from gateway.amounts import NONE
 from gateway.wire.framing import PROTOCOL
+from gateway.wire.parameter import ParameterInfo
 from gateway.wire.resource import KernelFacts
 from gateway.wire.robot import Description
 from server_gui.core.recording.records import NOBODY, Facts, Worn
+
+ENABLED: Final = "operation enabled"  # the word of a drive's state in which it follows its target
+DIGITS: Final = 12  # of a digest: enough to tell two files of a robot apart
+IDENTITY: Final = {  # CiA 301
+    "0X1009:0": "hardware",
+    "0X100A:0": "firmware",
+    "0X1018:1": "vendor",
+    "0X1018:2": "product",
+    "0X1018:3": "revision",
+    "0X1018:4": "serial number",
+}
 
 
 def facts(description: Description, operator: str, notes: str, worn: Worn = NOBODY) -> Facts:
@@ -21,6 +37,7 @@ def facts(description: Description, operator: str, notes: str, worn: Worn = NOBO
         operator=operator,
         notes=notes,
         worn=worn,
+        setup=setup(description),
     )
 
 
@@ -35,11 +52,61 @@ def kernel(known: KernelFacts) -> dict[str, str]:
     return {"robot's kernel": " ".join((known.system, known.release, known.version))}
 
 
+def setup(description: Description) -> dict[str, str | float]:
+    """Return what the robot's file makes of it: EDS files, calibration of joints, limits, guard."""
+    found: dict[str, str | float] = {}
+    if description.file is not None:
+        found["robot.toml/digest"] = description.file[:DIGITS]
+    for part in description.components:
+        found[f"component/{part.name}"] = part.kind
+        if isinstance(part.device, dict):
+            digest = str(part.device.get("eds_digest", ""))[:DIGITS]
+            found[f"EDS/{part.name}"] = f"{part.device.get('eds', '')} {digest}".strip()
+        if part.angle is not UNSET:
+            found[f"zero/{part.name}"] = part.angle.zero_offset
+            found[f"scale/{part.name}"] = part.angle.rad_per_count
+    for known in description.parameters:
+        if known.read_only is None:
+            found[f"limits/{known.name}"] = _limits(known)
+    for rule in description.guard.rules:
+        found[f"guard/{rule.name}"] = f"{rule.watch} {rule.limit}: {', '.join(rule.actions)}"
+    for channel in description.channels:
+        if isinstance(channel.enum, dict):
+            numbers = [number for number, word in channel.enum.items() if word == ENABLED]
+            found[f"enabled/{channel.name}"] = ",".join(numbers)
+    return found
+
+
+def _limits(known: ParameterInfo) -> str:
+    ends = (NONE if one is None else f"{one:.10g}" for one in (known.min, known.max))
+    step = "" if known.max_step is None else f", steps of {known.max_step:.10g}"
+    return f"{' … '.join(ends)} {known.unit}".rstrip() + step
+
+
+def identities(devices: Mapping[str, Mapping[str, str]]) -> dict[str, str]:
+    """Return what the devices say that they are."""
+    return {
+        f"{section}/{component}": said
+        for component, told in devices.items()
+        for place, section in IDENTITY.items()
+        if place in told
+        for said in [told[place]]
+    }
+
+
+def is_identity(key: str) -> bool:
+    """Whether it is what a device says of itself."""
+    return key.partition("/")[0] in IDENTITY.values()
+
+
 def configuration_hash(description: Description) -> str:
     """SHA-256 of what the robot's file says, as far as the robot tells it, without what changes by itself."""
     parts = [
         description.role,
-        [replace(known, state="", problem=None) for known in description.components],
+        [
+            replace(known, state="", problem=None, findings=UNSET, emcy=UNSET)
+            for known in description.components
+        ],
         [replace(known, problem=None) for known in description.parameters],
         [
             replace(rule, state="", since_ns=None, reason=None, trips=0, problems=[])

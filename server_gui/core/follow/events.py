@@ -1,6 +1,7 @@
 """What a robot's feed tells: small frozen facts, handed from the network's thread to whoever shows them."""
 
 import dataclasses
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import msgspec
@@ -110,7 +111,25 @@ class Refused(Failed):
     """The robot sent what cannot be kept: it was told to nobody."""
 
 
-Event = LinkChanged | Described | Telemetry | Looked | Resources | Costs | BusesSeen | Journalled | Failed
+@dataclass(frozen=True, slots=True)
+class Identified:
+    """What each device says that it is, by component and by object's address."""
+
+    devices: Mapping[str, Mapping[str, str]]
+
+
+Event = (
+    LinkChanged
+    | Described
+    | Identified
+    | Telemetry
+    | Looked
+    | Resources
+    | Costs
+    | BusesSeen
+    | Journalled
+    | Failed
+)
 
 
 def replaced(event: Telemetry, stamps_ns: list[int], columns: dict[str, list[float | None]]) -> Telemetry:

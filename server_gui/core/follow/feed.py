@@ -4,7 +4,7 @@ import asyncio
 import fnmatch
 import math
 import time
-from collections.abc import Awaitable, Callable, Iterable, Sequence
+from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
 from typing import Any, Final
 
 from msgspec import Struct
@@ -33,6 +33,7 @@ from server_gui.core.follow.events import (
     Described,
     Event,
     Failed,
+    Identified,
     Journalled,
     LinkChanged,
     Looked,
@@ -50,6 +51,8 @@ AGAIN_S: Final = 5.0  # before a look that failed is tried again
 DEPTH: Final = 8192  # notifications; more than one read of the socket can bring
 WHOLE_JOURNAL: Final = 1000  # entries; as many as a gateway gives at once
 METHOD_NOT_FOUND: Final = -32601  # JSON-RPC 2.0 §5.1: a gateway of before
+IDENTITY: Final = "0x1008-0x1018"  # where CiA 301 has what a device is
+ASKED: Final = ("0X1009:0", "0X100A:0", "0X1018:1", "0X1018:2", "0X1018:3", "0X1018:4")
 COMPUTER: Final = "resource"  # the component whose channels are the robot's computer
 
 
@@ -68,6 +71,7 @@ class FollowSettings(Struct, frozen=True):
     resources_s: float = 1.0
     journal_s: float | None = None  # None: it is not asked for
     buses_s: float | None = None  # likewise
+    identities: bool = False  # whether each device is asked once what it is: firmware, serial number
 
 
 class Feed:
@@ -85,6 +89,7 @@ class Feed:
         self._backoff = Backoff()
         self._arriving = Validator()
         self._dropped = asyncio.Event()
+        self._identify = asyncio.Event()
         self._newest_entry: dict[str, Any] = {"n": 0}
 
     async def run(self) -> None:
@@ -105,6 +110,10 @@ class Feed:
         finally:
             self._subscribers = ()  # another feed may go by this robot's name already
             await self._client.close()
+
+    def identify(self) -> None:
+        """Ask each device once more what it is, where that is asked at all; for the network's thread."""
+        self._identify.set()
 
     def _ended(self, following: "asyncio.Task[None]") -> None:
         try:
@@ -147,6 +156,9 @@ class Feed:
             group.create_task(self._repeat(following.resources_s, self._resources))
             if following.journal_s is not None:
                 group.create_task(self._repeat(following.journal_s, self._journal))
+            if following.identities:
+                self._identify.set()
+                group.create_task(self._identities(description))
             if following.buses_s is not None:
                 group.create_task(self._repeat_buses(following.buses_s))
 
@@ -215,6 +227,31 @@ class Feed:
                 found = await self._client.journal(WHOLE_JOURNAL)
             self._admit(Journalled(found, head))
             self._newest_entry = found.entries[-1]
+
+    async def _identities(self, description: Description) -> None:
+        """Only what its EDS knows is asked of a device; one that cannot be asked costs no other."""
+        names = [part.name for part in description.components if isinstance(part.device, dict)]
+        while True:
+            await self._identify.wait()
+            self._identify.clear()
+            found: dict[str, Mapping[str, str]] = {}
+            for name in names:
+                try:
+                    found[name] = await self._identity(name)
+                except (RemoteError, CallTimeout, ProtocolError) as error:
+                    self._tell(Failed(f"what {name} is", str(error)))
+            try:
+                self._admit(Identified(found))
+            except Unfit as error:
+                self._tell(Refused("what its devices are is refused", str(error)))
+
+    async def _identity(self, component: str) -> Mapping[str, str]:
+        listed = await self._client.objects(component, IDENTITY)
+        wanted = [one.object for one in listed.objects if one.object.upper() in ASKED]
+        if not wanted:
+            return {}
+        told = await self._client.read_objects(component, *wanted)
+        return {place.upper(): one.words for place, one in told.values.items() if not one.problem}
 
     async def _signed_head(self) -> SignedHead | None:
         """Without it the journal is kept all the same."""

@@ -14,7 +14,15 @@ from gateway.client import Batch, ProtocolError
 from gateway.plain import LONGEST_NAME, NAME_SIGNS, ROBOT_SIGNS, is_name, is_robot_name
 from gateway.wire.control import SignedHead
 from gateway.wire.robot import Description
-from server_gui.core.follow.events import Described, Event, Journalled, Looked, Resources, Telemetry
+from server_gui.core.follow.events import (
+    Described,
+    Event,
+    Identified,
+    Journalled,
+    Looked,
+    Resources,
+    Telemetry,
+)
 
 MOST_ROWS: Final = 10_000  # of one notification: a gateway sends what came in milliseconds
 IN_ENTRIES: Final = range(-(2**63), 2**64)  # what a device's object can hold; kept as text
@@ -64,6 +72,8 @@ class Validator:
             case Looked():
                 _sound("its parameters", event.parameters, MOST_BYTES[Looked])
                 _sound("its components' quality", event.quality, MOST_BYTES[Looked])
+            case Identified():
+                _sound("what its devices are", event.devices, MOST_BYTES[Looked])
             case Journalled():
                 journal(event.journal.entries)
                 if event.head is not None:

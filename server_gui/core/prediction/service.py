@@ -49,7 +49,7 @@ class PredictionService:
         self._tracking = TrackRecordUpdates(
             settings.store.url, lambda: {robot for robot, _ in self._serving.models}
         )
-        self._inbox = Inbox()
+        self._inbox = Inbox[Event]()
         self._robots: dict[str, RobotPredictor] = {}
         self._broken: dict[str, str] = {}  # models, and why
         self._judged = 0

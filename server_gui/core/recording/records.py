@@ -29,7 +29,8 @@ NOBODY: Final = Worn()
 class Facts(msgspec.Struct, frozen=True):
     """What was so when a session began.
 
-    `parameters` are values by name, `units` each channel's unit, `versions` software by name.
+    `parameters` are values by name, `units` each channel's unit, `versions` software by name. `setup` is
+    what else was so, by section and name, as in `firmware/left_knee`; what is not in it was not told.
     """
 
     configuration_hash: str = ""
@@ -39,6 +40,7 @@ class Facts(msgspec.Struct, frozen=True):
     operator: str = ""
     notes: str = ""
     worn: Worn = NOBODY
+    setup: dict[str, str | float] = {}
 
 
 class Session(msgspec.Struct, frozen=True):
@@ -67,6 +69,7 @@ class Session(msgspec.Struct, frozen=True):
             "notes": facts.notes,
             "wearer": facts.worn.wearer,
             "consent": facts.worn.consent,
+            "setup": _json(facts.setup),
         }
         return Record("sessions", fields)
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from gateway.client import ClockOffset
+from gateway.several import devices
 from gateway.wire.component import QualityInfo
 from gateway.wire.method import Number
 from gateway.wire.robot import Description
@@ -25,16 +26,6 @@ class Claim:
     value: Number
     stamp_ns: int
     boot_id: str
-
-
-def devices(description: Description) -> dict[str, Device]:
-    """Return which device each component is, by bus and node: axes of one node store together."""
-    found: dict[str, Device] = {}
-    for part in description.components:
-        about = part.device if isinstance(part.device, dict) else {}
-        known = "bus" in about and "node_id" in about
-        found[part.name] = (about["bus"], about["node_id"]) if known else (None, part.name)
-    return found
 
 
 def claims(entries: Iterable[Entry], device_of: Mapping[str, Device]) -> dict[str, Claim]:

@@ -81,15 +81,13 @@ class WriteProgress:
 
     def failed(self, changes: tuple[Change, ...], error: Exception) -> None:
         """It was refused or rolled back, or nobody knows; what is known of a row stands on it."""
-        self._refused(WriteState.FAILED, error)
+        refused = isinstance(error, RemoteError) and error.kind not in UNSURE
+        nothing_done = refused or isinstance(error, NotConnected)
+        self._set(WriteState.FAILED if nothing_done else WriteState.UNKNOWN, str(error))
         said = error.data.get(OUTCOMES) if isinstance(error, RemoteError) else None
         for change in changes:
             told = said.get(change.name) if isinstance(said, Mapping) else None
             self.rows[change.name] = str(told) if told is not None else str(error)
-
-    def not_stored(self, error: Exception) -> None:
-        """A device was not asked to store, or has refused, or nobody knows."""
-        self._refused(WriteState.NOT_STORED, error)
 
     def kept(self) -> None:
         """What was on trial stays."""
@@ -109,11 +107,6 @@ class WriteProgress:
     def say(self, state: WriteState, text: str) -> None:
         """What else is to be told."""
         self._set(state, text)
-
-    def _refused(self, state: WriteState, error: Exception) -> None:
-        refused = isinstance(error, RemoteError) and error.kind not in UNSURE
-        nothing_done = refused or isinstance(error, NotConnected)
-        self._set(state if nothing_done else WriteState.UNKNOWN, str(error))
 
     def _end_trial(self, text: str) -> None:
         self.trial = None

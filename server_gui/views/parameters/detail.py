@@ -14,12 +14,16 @@ from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.tuning.edits import refusal, unit_of
 from server_gui.core.tuning.flash import RULE
+from server_gui.views.parameters.range_bar import RangeBar
+from server_gui.views.parameters.several import SeveralMenu
 from server_gui.views.parameters.tree import brief
+from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_text
 from server_gui.views.widgets.fitted import FittedLabel
 from server_gui.views.widgets.plain import PlainLabel, set_tip
 
 STEPS: Final = 200
+SEVERAL: Final = "The same for other joints: one change, reviewed, written and taken back as a whole"
 
 
 class CalmSlider(QSlider):
@@ -40,7 +44,7 @@ class Detail(Card):
     dropped = Signal(str)
     pinned = Signal(str)
 
-    def __init__(self, desk: Desk) -> None:
+    def __init__(self, desk: Desk, theme: Theme) -> None:
         super().__init__("No parameter chosen")
         self._desk = desk
         self._name: str | None = None
@@ -69,6 +73,15 @@ class Detail(Card):
         row.addWidget(self._unit)
         row.addWidget(self._drop)
         self.body.addLayout(row)
+        self.several = SeveralMenu(desk, self)
+        self._several = QPushButton("Several …")
+        set_tip(self._several, SEVERAL)
+        self._several.setMenu(self.several)
+        self.range = RangeBar(theme)
+        below = QHBoxLayout()
+        below.addWidget(self.range, 1)
+        below.addWidget(self._several)
+        self.body.addLayout(below)
         self._facts = PlainLabel("Choose a parameter above; F2 or typing edits it.")
         self._facts.setObjectName("dim")
         self._facts.setWordWrap(True)
@@ -81,13 +94,14 @@ class Detail(Card):
     def be_short(self, is_short: bool) -> None:
         """Take little room: seen when one is chosen; one line says the most of what is known, its tip all."""
         self._is_short = is_short
-        self._facts.setVisible(not is_short)
+        for part in (self._facts, self.range, self._several):
+            part.setVisible(not is_short)
         self._brief.setVisible(is_short)
         self.refresh()
 
     def choose(self, name: str | None) -> None:
         """Show this one."""
-        self._name = name
+        self._name = self.several.name = name
         self.refresh(anew=True)
 
     def refresh(self, *, anew: bool = False) -> None:
@@ -114,6 +128,8 @@ class Detail(Card):
             if self.field.text() != text:
                 self.field.setText(text)
         self._refresh_slider(info, current, value)
+        self.range.show_range(info, unit, current, None if staged is None else staged.value, self._range)
+        self._several.setEnabled(info.component in station.robot.names("joint"))
         facts = _facts(station, info, unit, current)
         known, _, problem = facts.partition("\n")
         parts = known.split(" · ")

@@ -21,7 +21,8 @@ from gateway.wire.parameter import PARAMETER_STORE, PARAMETER_WRITE
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.tuning.comparison import open_file, save_file, staged_as
-from server_gui.core.tuning.edits import Change, unit_of
+from server_gui.core.tuning.edits import Change, refusal, unit_of
+from server_gui.core.tuning.several import Offer
 from server_gui.core.tuning.writing import WriteState
 from server_gui.views.parameters.control_bar import ControlBar
 from server_gui.views.parameters.detail import Detail
@@ -49,7 +50,7 @@ class ParametersPanel(QWidget):
         self._problem = ""
         self.setObjectName("dock")
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
-        self.tree, self.detail, self.review = ParameterTree(desk, theme), Detail(desk), Review(theme)
+        self.tree, self.detail, self.review = ParameterTree(desk, theme), Detail(desk, theme), Review(theme)
         self.trial, self.control = TrialBar(desk), ControlBar(desk, theme)
         self.filters, self.file = FilterBar(desk, theme), FileBar(desk)
         self.storing = StorePage(desk, theme)
@@ -123,6 +124,11 @@ class ParametersPanel(QWidget):
         except ValueError as error:
             self._problem = f"{name}: {error}"
             return
+        held = station.robot.parameters.get(name)
+        why = refusal(value, None if held is None else held.value, station.known[name], unit)
+        if why is not None:
+            self._problem = f"{name}: {text.strip()} {unit.symbol}".rstrip() + f" is not staged, it is {why}"
+            return
         self.stage(name, value)
 
     def stage(self, name: str, value: float) -> None:
@@ -132,6 +138,13 @@ class ParametersPanel(QWidget):
             self._problem = ""
             station.edits.stage(name, value, station.robot.parameters.get(name))
             station.writing.rows.pop(name, None)
+
+    def stage_several(self, offer: Offer) -> None:
+        """Stage the same for several joints; where one cannot take it, none of it, and why is said."""
+        if offer.problem:
+            self._problem = offer.problem
+        for name, value in offer.changes.items():
+            self.stage(name, value)
 
     def begin_review(self) -> None:
         """Show exactly what would be written."""
@@ -228,6 +241,7 @@ class ParametersPanel(QWidget):
         for button, action in actions.items():
             action.setToolTip(button.toolTip())
             action.triggered.connect(button.click)
+        menu.addMenu(self.detail.several)
         menu.setToolTipsVisible(True)
         menu.aboutToShow.connect(lambda: _enable_alike(actions))
         self.more.setMenu(menu)
@@ -240,6 +254,7 @@ class ParametersPanel(QWidget):
         self.tree.chosen.connect(self.detail.choose)
         self.detail.typed.connect(self.stage_text)
         self.detail.slid.connect(self.stage)
+        self.detail.several.taken.connect(self.stage_several)
         self.detail.dropped.connect(lambda name: self._with(lambda station: station.edits.drop(name)))
         for part in (self.tree, self.detail):
             part.pinned.connect(self._pin)
@@ -299,9 +314,9 @@ class ParametersPanel(QWidget):
         self.storing.begin(None if chosen is None else chosen.component)
         self.pages.setCurrentIndex(STORE)
 
-    def _store(self, component: str) -> None:
+    def _store(self, components: tuple[str, ...]) -> None:
         self.pages.setCurrentIndex(EDIT)
-        self._with(lambda station: station.store(component))
+        self._with(lambda station: station.store(*components))
 
     def _undo_latest(self) -> None:
         self._with(Station.stage_undo)

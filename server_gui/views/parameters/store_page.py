@@ -34,9 +34,9 @@ EXPLAINED: Final = (
 
 
 class StorePage(QWidget):
-    """`store` brings the component whose device is to store, `back` leaves."""
+    """`store` brings a component of each device that is to store, `back` leaves."""
 
-    store = Signal(str)
+    store = Signal(tuple)
     back = Signal()
 
     def __init__(self, desk: Desk, theme: Theme) -> None:
@@ -83,6 +83,8 @@ class StorePage(QWidget):
         self.device.blockSignals(True)
         self.device.clear()
         self.device.addItems([device.title for device in self._devices])
+        if len(self._devices) > 1:
+            self.device.addItem(f"all {len(self._devices)} devices, one after another")
         places = [place for place, device in enumerate(self._devices) if component in device.components]
         self.device.setCurrentIndex(places[0] if places else 0)
         self.device.blockSignals(False)
@@ -90,42 +92,45 @@ class StorePage(QWidget):
 
     def refresh(self) -> None:
         """Show how it is now."""
-        station, device = self._desk.selected, self._chosen
-        rows = [] if station is None or device is None else _rows(self._desk, station, device)
+        station, chosen = self._desk.selected, self._chosen
+        rows = [] if station is None else [row for one in chosen for row in _rows(self._desk, station, one)]
         self.table.setRowCount(len(rows))
         for place, texts in enumerate(rows):
             self._fill(place, texts)
-        why, tone = self._state(station, device)
+        why, tone = self._state(station, chosen)
         set_text(self.said, why)
         if self.said.property("tone") != tone:
             self.said.setProperty("tone", tone)
             self.said.style().polish(self.said)
         self.store_it.setEnabled(tone != "bad" and not self._settled.isActive())
-        text = "Store" if device is None else f"Store {device.title}"
+        names = [one.title for one in chosen]
+        text = f"Store {names[0]}" if len(names) == 1 else f"Store all {len(names)}" if names else "Store"
         if self.store_it.text() != text:
             self.store_it.setText(text)
 
     @property
-    def _chosen(self) -> Storable | None:
+    def _chosen(self) -> list[Storable]:
         place = self.device.currentIndex()
-        return self._devices[place] if 0 <= place < len(self._devices) else None
+        return self._devices[place : place + 1] if place < len(self._devices) else self._devices
 
     def _settle(self) -> None:
         self._settled.start(SETTLE_MS)
         self.refresh()
 
     def _store(self) -> None:
-        if self._chosen is not None:
-            self.store.emit(self._chosen.components[0])
+        if self._chosen:
+            self.store.emit(tuple(one.components[0] for one in self._chosen))
 
-    def _state(self, station: Station | None, device: Storable | None) -> tuple[str, str]:
+    def _state(self, station: Station | None, chosen: list[Storable]) -> tuple[str, str]:
         """What is to be known before, and whether it can be done."""
-        if station is None or device is None:
+        if station is None or not chosen:
             return "No device of this robot says that it can store (1010h).", "bad"
-        why_not = objection(device, station.robot, station.writing.trial)
-        if not station.is_linked or why_not is not None:
+        trial = station.writing.trial
+        objections = dict.fromkeys(objection(one, station.robot, trial) or "" for one in chosen)
+        why_not = "\n".join(filter(None, objections))
+        if not station.is_linked or why_not:
             return why_not or "There is no link to the robot.", "bad"
-        staged = [name for name in station.edits.staged if name in device.parameters]
+        staged = [name for name in station.edits.staged if any(name in one.parameters for one in chosen)]
         if staged:
             return f"{', '.join(staged)}: staged and not written, so not stored. Write first.", "warn"
         return "Values are compared before and after; the journal tells who stored.", "good"

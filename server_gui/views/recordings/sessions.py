@@ -27,7 +27,7 @@ from server_gui.core.desk.recording import Recording
 from server_gui.views.recordings.timeline import SECOND_NS, clock_text
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_text
-from server_gui.views.widgets.plain import PlainLabel, tip
+from server_gui.views.widgets.plain import PlainLabel, set_tip, tip
 from server_gui.views.widgets.rows import SORT_ROLE, Filtered, Index, RowsModel, RowsTable
 
 TITLES: Final = ("Began", "Robot", "Length", "Rows", "Size", "State", "Operator", "Notes")
@@ -37,6 +37,8 @@ EMPTY: Final = (
     "add a robot at the left, and its session appears here within seconds."
 )
 EVENTS_TOLD: Final = 200
+MARK_TWO: Final = "Mark two recordings: a click on one, a click with Ctrl on the other"
+COMPARING: Final = "What was otherwise in the later one, and what of the walk moved with it"
 
 
 class SessionModel(RowsModel[Session]):
@@ -63,9 +65,10 @@ class SessionModel(RowsModel[Session]):
 
 
 class SessionsPage(QWidget):
-    """`played` when the chosen session is to be played."""
+    """`played` when the chosen session is to be played, `compared` when two that are marked are compared."""
 
     played = Signal()
+    compared = Signal()
 
     def __init__(self, archive: Archive, recording: Recording, theme: Theme) -> None:
         super().__init__()
@@ -87,6 +90,8 @@ class SessionsPage(QWidget):
         self.play = QPushButton("Play")
         self.play.setObjectName("primary")
         self.play.clicked.connect(self.played)
+        self.compare = QPushButton("What changed?")
+        self.compare.clicked.connect(self._compare)
         self.details = QPlainTextEdit(readOnly=True)
         self.details.setAccessibleName("What is known of the chosen recording")
         self._card = Card("Recording")
@@ -96,6 +101,7 @@ class SessionsPage(QWidget):
         self._list.body.addWidget(self.words)
         self._list.body.addWidget(self.said)
         self._list.body.addWidget(self.table, 1)
+        self._list.body.addWidget(self.compare)
         split = QSplitter()
         split.addWidget(self._list)
         split.addWidget(self._card)
@@ -122,13 +128,31 @@ class SessionsPage(QWidget):
         counted = "1 session" if count == 1 else f"{count} sessions"
         self._list.set_note(counted if library.revision else "looking …")
         self.mark.setEnabled(self._recording.can_ask)
+        self._refresh_compare()
         self._refresh_details()
 
     @property
     def chosen(self) -> Session | None:
         """The session that is chosen in the table."""
+        marked = self.marked
+        return marked[0] if marked else None
+
+    @property
+    def marked(self) -> list[Session]:
+        """The sessions that are marked in the table, in the order in which that was done."""
         rows = self.table.selectionModel().selectedRows()
-        return self.sessions.rows[self._filter.mapToSource(rows[0]).row()] if rows else None
+        return [self.sessions.rows[self._filter.mapToSource(row).row()] for row in rows]
+
+    def _refresh_compare(self) -> None:
+        marked = self.marked
+        self.compare.setEnabled(len(marked) == 2)
+        set_tip(self.compare, COMPARING if len(marked) == 2 else MARK_TWO)
+
+    def _compare(self) -> None:
+        marked = self.marked
+        if len(marked) == 2:
+            self._archive.compared.open(*marked)
+            self.compared.emit()
 
     def _state(self) -> str:
         library = self._archive.library
@@ -151,7 +175,7 @@ class SessionsPage(QWidget):
     def _table(self) -> RowsTable:
         self._filter = Filtered(self.sessions)
         table = RowsTable(self._filter, "Recordings", 0)
-        table.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
+        table.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
         table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         table.horizontalHeader().setStretchLastSection(True)
         table.selectionModel().selectionChanged.connect(lambda *_: self._archive.choose(self.chosen))

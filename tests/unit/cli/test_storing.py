@@ -45,3 +45,25 @@ def test_restore_with_yes_in_a_script(storing: Served, capsys: pytest.CaptureFix
 def test_a_refused_store_is_a_sentence(robot: Served, capsys: pytest.CaptureFixture[str]) -> None:
     assert robot.run("store", "left_insole") == 1
     assert "'left_insole' is no device that can store" in capsys.readouterr().err
+
+
+def test_all_devices_store_and_each_says_what_came_of_it(
+    storing: Served, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The right knee has the command and refuses; the exit status is no success then."""
+    right = storing.bench.right.node
+    right.objects |= {(0x1010, 1): b"\1\0\0\0"}
+    storing.run("store", "--all", "--json")
+    told = json.loads(capsys.readouterr().out)
+    outcomes = {one["components"][0]: one["outcome"] for one in told}
+    assert outcomes["left_knee"] == "stored"
+    assert set(outcomes.values()) <= {"stored", "refused", "NOT CONFIRMED"}
+    assert (0x1010, b"save") in sent(storing)
+
+
+def test_store_wants_one_device_or_all(robot: Served, capsys: pytest.CaptureFixture[str]) -> None:
+    for typed in (("store",), ("store", "left_knee", "--all")):
+        with pytest.raises(SystemExit) as ended:
+            robot.run(*typed)
+        assert ended.value.code == 2
+    assert "name one COMPONENT, or say --all" in capsys.readouterr().err

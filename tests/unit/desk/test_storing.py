@@ -95,3 +95,38 @@ def test_a_store_that_failed_and_one_that_nobody_knows_of_are_told_apart(
     bench.first.fail(error)
     assert bench.station.writing.state is state
     assert bench.station.writing.text == str(error)
+
+
+def test_all_devices_store_one_after_another(bench: Bench) -> None:
+    station = bench.station
+    station.store("left_hip", "left_knee")
+    assert bench.first.named("store") == [("left_hip",)], "the second waits for the first"
+    bench.first.answer(Stored("left_hip", "stored, and it still holds the same values"))
+    bench.first.answer(Stored("left_knee", "stored, and it still holds the same values"))
+    assert bench.first.named("store") == [("left_hip",), ("left_knee",)]
+    assert station.writing.state is WriteState.DONE
+    assert station.writing.text == "left_hip: stored\nleft_knee: stored"
+
+
+def test_each_device_is_said_to_be_stored_refused_or_not_confirmed(bench: Bench) -> None:
+    station = bench.station
+    station.store("left_hip", "left_knee", "right_hip")
+    bench.first.fail(RemoteError(-32010, "it is under power", {"kind": "drive_state"}))
+    bench.first.fail(RemoteError(-32011, "no answer", {"kind": "device_timeout"}))
+    bench.first.answer(Stored("right_hip", "stored"))
+    assert station.writing.state is WriteState.UNKNOWN
+    assert station.writing.text.splitlines() == [
+        "left_hip: refused, it is under power",
+        "left_knee: NOT CONFIRMED, no answer",
+        "right_hip: stored",
+    ]
+
+
+def test_after_the_link_was_lost_nothing_more_is_asked(bench: Bench) -> None:
+    station = bench.station
+    station.store("left_hip", "left_knee")
+    bench.first.fail(LinkLost("the link dropped"))
+    assert bench.first.named("store") == [("left_hip",)]
+    assert "left_knee: not asked, the link was lost" in station.writing.text
+    assert "left_hip: NOT CONFIRMED" in station.writing.text
+    assert station.writing.state is WriteState.UNKNOWN

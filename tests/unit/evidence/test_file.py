@@ -1,12 +1,17 @@
 """Evidence is found again: whole lines, the newest of each edit, whatever happened to the file."""
 
 import stat
+import threading
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import pytest
 from msgspec.structs import replace
 
+from server_gui.core.evidence import file as evidence_file
 from server_gui.core.evidence.comparison import compare
 from server_gui.core.evidence.edits import State
 from server_gui.core.evidence.file import EvidenceFile, Told, folder_beside, forget, read_all
@@ -87,3 +92,40 @@ def test_a_line_that_is_nonsense_costs_no_other(tmp_path: Path, line: bytes) -> 
     file.add(told(2))
     assert [one.edit.write for one in file.read().values()] == [1, 2]
     assert forget(tmp_path, {("exo-01", "another")}) == []
+
+
+@pytest.mark.parametrize("first", ["add", "forget"])
+def test_a_line_that_comes_while_somebody_is_forgotten_is_not_lost(
+    tmp_path: Path, first: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each order: whoever comes second waits until the first is done, and finds what that has left."""
+    file = EvidenceFile(tmp_path, "exo-01")
+    file.add(told())
+    begun, go_on = threading.Event(), threading.Event()
+
+    def held(real: Callable[..., Any]) -> Callable[..., Any]:
+        def call(*arguments: Any) -> Any:
+            found = real(*arguments)
+            begun.set()
+            assert go_on.wait(10.0)
+            return found
+
+        return call
+
+    acts: dict[str, Callable[[], object]] = {
+        "add": lambda: file.add(replace(told(2), session="20261122T0900")),
+        "forget": lambda: forget(tmp_path, {("exo-01", "20261121T1530")}),
+    }
+    inside = {"add": "_ends_whole", "forget": "draft"}[first]  # called when it has the folder
+    monkeypatch.setattr(evidence_file, inside, held(getattr(evidence_file, inside)))
+    second = next(act for name, act in acts.items() if name != first)
+    with ThreadPoolExecutor(2) as pool:
+        earlier = pool.submit(acts[first])
+        assert begun.wait(10.0)
+        later = pool.submit(second)
+        with pytest.raises(TimeoutError):
+            later.result(0.05)  # without the lock it is over by now
+        go_on.set()
+        earlier.result(10.0)
+        later.result(10.0)
+    assert [one.edit.write for one in file.read().values()] == [2]

@@ -10,7 +10,7 @@ from gateway.wire.control import JournalEntries
 from server_gui.core.evidence.comparison import Word
 from server_gui.core.evidence.edits import State
 from server_gui.core.evidence.file import Told
-from server_gui.core.evidence.robot_evidence import RobotEvidence
+from server_gui.core.evidence.robot_evidence import OUTSIDE, Recorded, RobotEvidence
 from server_gui.core.follow.events import Described, Event, Journalled, Telemetry, replaced
 from tests.support.desk import described
 from tests.unit.evidence.synthetic import cycles
@@ -27,7 +27,7 @@ def events() -> list[Event]:
     return list(walk(44.0, seed=7, person=2, edits=[WORSE]))
 
 
-def followed(events: Iterable[Event], robot: RobotEvidence | None = None) -> dict[int, Told]:
+def followed(events: Iterable[Event | Recorded], robot: RobotEvidence | None = None) -> dict[int, Told]:
     """Return what is known in the end, by write."""
     robot = robot or RobotEvidence("exo-01")
     told = [one for event in events for one in robot.take(event)]
@@ -201,3 +201,30 @@ def test_an_edit_that_another_has_ended_costs_no_more_looks(events: list[Event])
             counted[one.edit.write] += event.batch.stamps_ns[0] > 41 * SECOND
     assert counted[WORSE.write] <= 1
     assert counted[30] >= 2
+
+
+def split(events: Sequence[Event], at_s: float, *names: str) -> list[Event | Recorded]:
+    """The same walk in recordings of these names, the second from a time (s) on; a third at its end."""
+    first = next(
+        place
+        for place, event in enumerate(events)
+        if isinstance(event, Telemetry) and event.batch.stamps_ns[0] >= at_s * SECOND
+    )
+    return [Recorded(names[0]), *events[:first], Recorded(names[1]), *events[first:]]
+
+
+@pytest.mark.parametrize("at_s", [10.0, 30.0])
+def test_nobody_is_compared_with_who_wears_the_robot_next(events: list[Event], at_s: float) -> None:
+    whole = followed(events)[WORSE.write].evidence
+    robot = RobotEvidence("exo-01")
+    told = followed(split(events, at_s, "anna", "bert"), robot)[WORSE.write]
+    assert robot.session_of(told.edit) == ("bert" if at_s < WORSE.at_s else "anna")
+    assert OUTSIDE in told.evidence.notes
+    assert (whole.word, told.evidence.word) == (Word.WORSE, Word.FEW)
+
+
+def test_what_is_walked_in_no_recording_belongs_to_none(events: list[Event]) -> None:
+    """Recording was stopped, somebody else put the robot on, and it was started again."""
+    robot = RobotEvidence("exo-01")
+    told = followed(split(events, 23.0, "anna", ""), robot)[WORSE.write]
+    assert told.evidence.word is Word.FEW
