@@ -16,11 +16,12 @@ from server_gui.core.evidence.cycles import Cycle
 from server_gui.core.evidence.experiment import Period
 from server_gui.core.evidence.robot_evidence import RobotEvidence
 from server_gui.core.experiments.machine import Action, Event, State, after
-from server_gui.core.experiments.plan import Kind, Plan
+from server_gui.core.experiments.plan import BadPlan, Kind, Plan
 from server_gui.core.experiments.verdict import Held
 from server_gui.core.experiments.watch import Watch
 from server_gui.core.follow.events import Described, Looked, Telemetry
 from server_gui.core.follow.events import Event as Fact
+from server_gui.core.follow.robot import Robot
 from server_gui.core.processing.gait_events import Leg
 from server_gui.core.threads.answers import Deliver, when_done
 from server_gui.core.tuning.commands import Commands, ReadBack
@@ -34,6 +35,15 @@ STANDS_S: Final = 6.0  # without a gait cycle: nobody walks any more
 AGAIN_NS: Final = SECOND  # between looks at what is held
 LIMITS_S: Final = {State.LOOKING: 30.0, State.WRITING: 35.0, State.TAKING_BACK: 35.0, State.READING: 60.0}
 IN_THE_WAY: Final = frozenset({AlarmKind.GUARD, AlarmKind.STOPPED, AlarmKind.NOT_STOPPED})
+
+
+def begun(plan: Plan, before: "Run | None", robot: Robot, commands: Commands, deliver: Deliver) -> "Run":
+    """Return a new one; raises `BadPlan` where the one `before` goes on, or the robot is not reached."""
+    if before is not None and not before.is_over:
+        raise BadPlan(f"{before.plan.kind.value} of {before.plan.name} goes on: stop it, or wait for its end")
+    if robot.description is None or robot.is_stale():
+        raise BadPlan("the robot is not reached now, or its values are stale")
+    return Run(plan, robot.description.robot, commands, deliver, Described(robot.description))
 
 
 class Run:
