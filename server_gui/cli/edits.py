@@ -36,7 +36,7 @@ sure although many metrics were looked at, and one that is large enough to matte
 """
 EXPLAINED_AB: Final = """
 Before is A, after is B. The difference is that of the pairs, tested by all orders that might have been drawn:
-no drift, straight or bent, is taken for it. A word needs a difference that is sure and large enough to matter.
+no drift, straight or bent, is taken for it. A word needs a difference that is sure, and large enough.
 """
 
 

@@ -53,7 +53,7 @@ RATE_HZ: Final = 100.0
 NOT_CONFIRMED: Final = 3  # exit status
 RULES: Final = """
 Each value is a trial: the robot takes it back by itself when its time is over, when this command, its
-terminal or its computer dies, and when a rule of its guard says so. It ends at once, and the value from before
+terminal or its computer dies, and when a rule of its guard says so. It ends at once, and the first value
 comes back and is read to be so, with any new alarm, a STOP, a trial that is refused or reverted, a write of
 others, a lost link, values that are stale, when nobody walks any more, beyond --most-error or --most-current
 (twice what was usual before, where not given), and with Enter or Ctrl-C. Nothing is ever kept by it.

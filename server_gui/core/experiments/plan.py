@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from gateway.coding import coding_of
+from gateway.coding import CodingError, coding_of
 from gateway.units import Unit
 from gateway.wire.parameter import ParameterInfo
 from server_gui.core.tuning.edits import refusal
@@ -193,8 +193,12 @@ def _check(info: ParameterInfo, unit: Unit, ways: list[tuple[float, float]], dwe
 
 
 def _nearest(info: ParameterInfo, value: float) -> float:
+    """As the device would hold it."""
     coding = coding_of(info.type, info.scale)
-    return value if coding is None else float(coding.nearest(value))
+    try:
+        return value if coding is None else float(coding.decode(coding.encode(value)))
+    except CodingError:
+        return value  # the robot says why
 
 
 def _tidy(value: float) -> float:

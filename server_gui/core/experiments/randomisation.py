@@ -24,7 +24,7 @@ TINY: Final = 1e-9  # of what binary fractions leave of nothing
 
 
 @dataclass(frozen=True, slots=True)
-class Tested:
+class Randomised:
     """Of each metric: the second value's minus the first's, its interval, p for all metrics together."""
 
     difference: Floats
@@ -33,7 +33,7 @@ class Tested:
     p: Floats
 
 
-def tested(differences: Floats, chosen: npt.NDArray[np.int8], orders: npt.NDArray[np.int8]) -> Tested:
+def randomised(differences: Floats, chosen: npt.NDArray[np.int8], orders: npt.NDArray[np.int8]) -> Randomised:
     """Return what differs.
 
     `differences` has of each pair the later minus the earlier mean (pairs × metrics), `chosen` the order that
@@ -50,7 +50,7 @@ def tested(differences: Floats, chosen: npt.NDArray[np.int8], orders: npt.NDArra
     with np.errstate(divide="ignore", invalid="ignore"):
         ratios = np.nan_to_num(np.abs(effects) / np.sqrt(left / power))
     low, high = _interval(effects, drawn, (level / power) @ chosen)
-    return Tested(effects[drawn], low, high, _stepped_down(ratios, drawn))
+    return Randomised(effects[drawn], low, high, _stepped_down(ratios, drawn))
 
 
 def _interval(effects: Floats, drawn: int, alike: Floats) -> tuple[Floats, Floats]:

@@ -13,7 +13,7 @@ from server_gui.core.evidence.comparison import Evidence, Measured, Word, differ
 from server_gui.core.evidence.cycles import Cycle
 from server_gui.core.evidence.metrics import OF_JOINTS, OF_ROBOTS, Metric
 from server_gui.core.experiments.plan import FEWEST_PAIRS, orders
-from server_gui.core.experiments.randomisation import tested
+from server_gui.core.experiments.randomisation import randomised
 from server_gui.core.processing.gait_events import Leg
 from server_gui.core.processing.wiring import leg_of
 
@@ -159,7 +159,7 @@ def _family(
         whole = np.flatnonzero(np.frombuffer(mask, dtype=np.bool_))
         both = np.array([means[one.key].reshape(-1, 2)[whole] for one in members])
         later = (both[:, :, 1] - both[:, :, 0]).T
-        test = tested(later, order[whole], every[:, whole])
+        test = randomised(later, order[whole], every[:, whole])
         for place, one in enumerate(members):
             numbers = (test.difference, test.low, test.high, test.p)
             found[one.key] = _measured(found[one.key], one, sides, [float(each[place]) for each in numbers])
