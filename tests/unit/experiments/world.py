@@ -1,4 +1,4 @@
-"""A robot's gateway as far as an experiment meets it, and whatever may come between; nothing comes by itself."""
+"""A robot's gateway as far as an experiment meets it, and what may come between; nothing comes by itself."""
 
 import collections
 import contextlib
