@@ -38,11 +38,11 @@ IN_THE_WAY: Final = frozenset({AlarmKind.GUARD, AlarmKind.STOPPED, AlarmKind.NOT
 
 
 def begun(plan: Plan, before: "Run | None", robot: Robot, commands: Commands, deliver: Deliver) -> "Run":
-    """Return a new one; raises `BadPlan` where the one `before` goes on, or the robot is not reached."""
+    """Return a new one; raises `BadPlan` where the one `before` goes on, or the robot is not known."""
     if before is not None and not before.is_over:
         raise BadPlan(f"{before.plan.kind.value} of {before.plan.name} goes on: stop it, or wait for its end")
-    if robot.description is None or robot.is_stale():
-        raise BadPlan("the robot is not reached now, or its values are stale")
+    if robot.description is None:
+        raise BadPlan("the robot has not told yet what it is made of")
     return Run(plan, robot.description.robot, commands, deliver, Described(robot.description))
 
 
