@@ -194,7 +194,8 @@ def made_up(task: tuple[str, int]) -> tuple[str, bool, bool]:
     spell = Spell([(0, middle_ns)], [(middle_ns, 2**62)])
     once = compare(found[1], spell, JOINTS, JOINTS[:1])
     said_of = [{one.series for one in told.metrics if one.word in DIFFER} for told in (tried, once)]
-    return shape, *((edited in said if effect else bool(said)) for said in said_of)
+    by_ab, by_edit = ((edited in said if effect else bool(said)) for said in said_of)
+    return shape, by_ab, by_edit
 
 
 def of_made_up(count: int) -> int:

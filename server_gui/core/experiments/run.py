@@ -196,7 +196,7 @@ class Run:
         elif self._held is not None and self._held != self.plan.original:
             self.halt(f"{self.plan.name} is {self._held:g}, not {self.plan.original:g} any more: begin anew")
         elif self._held is not None and self._least() >= LOOKS_AT:
-            self.watch.begin(alarms)
+            self.watch.begin(alarms, self._walk.newest_ns)
             self._do(Event.READY)
 
     def _do(self, event: Event) -> None:
@@ -218,7 +218,7 @@ class Run:
 
     def _ask_to_write(self) -> None:
         value = self.plan.steps[self.place].value
-        self.watch.writes(value)
+        self.watch.writes()
         future = self._commands.write({self.plan.name: value}, self.plan.dwell.trial_s)
         when_done(future, self._deliver, self._written, self._not_written)
 

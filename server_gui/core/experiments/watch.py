@@ -1,6 +1,5 @@
 """The stop rules: what ends an experiment, each in words. Nothing here asks the robot anything."""
 
-import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
@@ -40,14 +39,14 @@ class Watch:
     _begun: bool = False
     _entry: int = 0  # of the journal: the newest that is known
     _boot_id: str | None = None
-    _ours: set[float] = field(default_factory=set)
+    _began_ns: int = 0  # the robot's clock: what its journal tells of before is no news
     _value: float | None = None  # that the device holds
     _since_ns: int = 0  # our clock
     _differs: int = 0
 
-    def begin(self, alarms: Iterable[Alarm]) -> Bounds:
-        """Begin to watch; the bounds, of which those that were not given are twice what is usual."""
-        self._begun = True
+    def begin(self, alarms: Iterable[Alarm], robot_ns: int) -> Bounds:
+        """Begin to watch, now on the robot's clock; the bounds: twice what is usual, where none was given."""
+        self._begun, self._began_ns = True, robot_ns
         self._alarms = frozenset(alarm.key for alarm in alarms)
         usual = {name: AS_USUAL * most for name, most in self.most.items() if most > 0.0}
         error = usual.get("following_error") if self.bounds.error is None else self.bounds.error
@@ -55,14 +54,12 @@ class Watch:
         self.bounds = Bounds(error, current)
         return self.bounds
 
-    def writes(self, value: float) -> None:
+    def writes(self) -> None:
         """A value is about to be written by us."""
-        self._ours.add(value)
         self._value = None
 
     def holds(self, value: float, now_ns: int) -> None:
         """The robot has written it and read this back; `now_ns` is our clock."""
-        self._ours.add(value)
         self._value, self._since_ns, self._differs = value, now_ns, 0
 
     def take(self, event: Event) -> None:
@@ -114,7 +111,9 @@ class Watch:
             if not isinstance(number, int) or number <= self._entry:
                 continue
             self._entry = number
-            yield from self._meant(entry, str(entry.get("what")))
+            at_ns = entry.get("monotonic_ns")
+            if not isinstance(at_ns, int) or at_ns > self._began_ns:
+                yield from self._meant(entry, str(entry.get("what")))
 
     def _meant(self, entry: Mapping[str, Any], what: str) -> Iterator[str]:
         if entry.get("who") == GUARD:
@@ -125,10 +124,9 @@ class Watch:
             yield f"{OF_OTHERS[what]} of another: {entry.get('who')}"
 
     def _is_ours(self, entry: Mapping[str, Any]) -> bool:
+        """We have the lease: a trial of just this parameter can be nobody else's."""
         after = entry.get("after")
-        if not isinstance(after, Mapping) or list(after) != [self.name] or entry.get("trial_s") is None:
-            return False
-        return any(math.isclose(float(after[self.name]), ours, rel_tol=1e-6) for ours in self._ours)
+        return isinstance(after, Mapping) and list(after) == [self.name] and entry.get("trial_s") is not None
 
     def _held(self, event: Looked) -> Iterator[str]:
         """Two looks in a row: one may have been under way when it was written."""

@@ -48,12 +48,12 @@ class ExperimentBar(QFrame):
             run = station.experiment
             if run is not None and run not in self._told:
                 self._go_on(station, run)
-        station = self._station = self._whose()
-        run = None if station is None else station.experiment
+        found = self._station = self._whose()
+        run = None if found is None else found.experiment
         self.setVisible(run is not None)
-        if station is None or run is None:
+        if found is None or run is None:
             return
-        whose = "" if station is self._desk.selected else f"{station.title}: "
+        whose = "" if found is self._desk.selected else f"{found.title}: "
         set_text(self.words, whose + progress(run))
         set_tone(self.words, "bad" if run.state is State.NOT_CONFIRMED else "")
         self._bar.setRange(0, len(run.plan.steps))

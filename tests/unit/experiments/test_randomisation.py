@@ -15,7 +15,7 @@ DRIFTS: dict[str, Drift] = {
     "none": lambda at, _phase: 0.0 * at,
     "straight": lambda at, _phase: 0.3 * at,
     "bent": lambda at, phase: 0.1 * np.sin(2.0 * np.pi * (at + phase)),
-    "a jump": lambda at, phase: 0.2 * (at > phase),
+    "a jump": lambda at, phase: np.where(at > phase, 0.2, 0.0),
 }
 
 

@@ -7,12 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from gateway.wire.control import JournalEntries
 from server_gui.core.experiments.machine import ENDS, TABLE, Action, State
 from server_gui.core.experiments.machine import Event as Step
+from server_gui.core.follow.events import Journalled
 from tests.unit.experiments.world import NAME, ORIGINAL, World
 
 HAPPENINGS: Final[Mapping[str, Callable[[World], Any]]] = {
-    "answer": World.answer,
+    "answer": World.carry_out,
     "a while": lambda world: world.sleep(1.0),
     "a long while": lambda world: world.sleep(36.0),
     "the link dies": World.drop,
@@ -68,7 +70,7 @@ def test_each_happening_in_each_state_ends_well(state: State, what: str) -> None
     if state in (State.TAKING_BACK, State.READING):
         world.run.halt("asked for")
     if state is State.READING:
-        world.answer()
+        world.carry_out()
     assert world.run.state is state
     HAPPENINGS[what](world)
     check(world)
@@ -151,3 +153,28 @@ def test_from_every_state_there_is_a_way_out_and_nothing_is_written_on_it() -> N
         for step in (Step.HALT, Step.LATE, Step.REFUSED, Step.UNSURE):
             if step in told:
                 assert told[step][1] is not Action.WRITE
+
+
+@pytest.mark.parametrize(
+    ("entry", "why"),
+    [
+        (
+            {"n": 7, "who": "guard", "what": "alarm", "about": "tilt", "reason": "too far"},
+            "the guard: alarm, too far",
+        ),
+        (
+            {"n": 7, "who": "anna", "what": "write", "after": {"gait.cycle_time": 1.1}},
+            "a write of another: anna",
+        ),
+        ({"n": 7, "who": "anna", "what": "write", "after": {NAME: 0.42}, "trial_s": 30.0}, ""),
+        ({"n": 7, "who": "anna", "what": "trial begun", "after": {NAME: 0.42}}, ""),
+        ({"n": 7, "who": "gateway", "what": "taken back"}, "taken the trial back"),
+        ({"n": 7, "who": "anna", "what": "stop", "monotonic_ns": 1}, ""),  # long ago
+    ],
+)
+def test_the_journal_ends_it_by_what_others_do_now(entry: dict[str, Any], why: str) -> None:
+    world = World()
+    world.until(State.HOLDING)
+    world.run.take(Journalled(JournalEntries([entry])))
+    assert why in (world.run.watch.why or "")
+    assert bool(world.run.watch.why) is bool(why)

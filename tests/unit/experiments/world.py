@@ -44,7 +44,8 @@ class World(FakeCommands):
     def __init__(self, plan: Plan | None = None) -> None:
         super().__init__()
         self.now_ns = 100 * SECOND
-        self.value, self.trial, self.ends_ns = ORIGINAL, None, 0
+        self.value, self.ends_ns = ORIGINAL, 0
+        self.trial: int | None = None
         self.is_linked = self.is_walking = self.is_told = self.is_watched = True
         self.is_taken = False  # the lease, by another desk
         self.foreign = False
@@ -107,7 +108,7 @@ class World(FakeCommands):
 
     # --- what happens
 
-    def answer(self) -> None:
+    def carry_out(self) -> None:
         """The oldest request is carried out and answered."""
         if self.waiting:
             _, do, future = self.waiting.pop(0)
@@ -187,7 +188,7 @@ class World(FakeCommands):
         for _ in range(400):
             if self.run.is_over and not self.waiting:
                 return
-            self.answer()
+            self.carry_out()
             self.sleep(0.5)
         raise AssertionError(f"it never ends: {self.run.state} {self.run.why}")
 
@@ -197,7 +198,7 @@ class World(FakeCommands):
             if self.run.state is state:
                 return
             if state is not State.WRITING or self.run.state is not State.WRITING:
-                self.answer()
+                self.carry_out()
             if self.run.state is not state:
                 self.sleep(0.5)
         raise AssertionError(f"{self.run.state}, not {state}: {self.run.why}")
