@@ -15,6 +15,7 @@ from server_gui.core.evidence.comparison import Measured, Word
 from server_gui.core.evidence.experiment import Experiment
 from server_gui.core.evidence.file import Told, folder_beside, read_all
 from server_gui.core.evidence.wording import number, share
+from server_gui.core.experiments.plan import Kind
 from server_gui.core.experiments.wording import chart, record, what, whole
 
 EPILOG: Final = """commands
@@ -133,7 +134,7 @@ def shown(told: Told) -> Iterator[str]:
         yield f"{evidence.word}: {counted(before, 'gait cycle')} before, {after} after"
     elif rows := list(chart(tried)):
         yield table(_columns(tried), rows, right=(0, 1, 4)).rstrip()
-    else:
+    elif tried.kind == Kind.AB:
         yield f"{evidence.word}: {counted(before, 'gait cycle')} with A, {after} with B"
     yield from (f"  {note}" for note in evidence.notes)
     yield from (

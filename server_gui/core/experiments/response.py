@@ -46,11 +46,11 @@ def respond(periods: Sequence[Held], joints: Sequence[str], edited: Sequence[str
     counts = [len(held.cycles) for held in periods]
     if judged is None or len(judged.points) < 2:
         why = "no tracking error is known at two values"
-        evidence = Evidence(Word.FEW if responses else Word.NO_DATA, "", (), 0, sum(counts), {}, (why,))
+        evidence = Evidence(Word.FEW if responses else Word.NO_DATA, "", (), 0, sum(counts))
         return Swept(evidence, tuple(responses), "", None, why)
     proposal, reason = _proposal(judged, original)
     word = Word.SAME if proposal is None else Word.CHANGED
-    evidence = Evidence(word, "", (), 0, sum(counts), {}, (reason,))
+    evidence = Evidence(word, "", (), 0, sum(counts))
     return Swept(evidence, tuple(responses), judged.series, proposal, reason)
 
 
