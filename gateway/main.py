@@ -53,6 +53,8 @@ COMMANDS: dict[str, tuple[str, str]] = {
         "recordings: list, look into, export as CSV, Parquet, MCAP",
     ),
     "edits": ("server_gui.cli.edits:main", "what each edit of a parameter did to the walk"),
+    "ab": ("server_gui.cli.experiments:ab_main", "two values of a parameter against each other, walking"),
+    "sweep": ("server_gui.cli.experiments:sweep_main", "values of a parameter upwards, while you watch"),
     "label": ("server_gui.cli.label:main", "what robot and wearer did in a recorded session"),
     "train": ("server_gui.cli.train:main", "a model from labelled sessions, judged before it serves"),
     "cloud": ("server_gui.cli.cloud:main", "the store: browse, upload, download, verify, tidy"),

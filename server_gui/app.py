@@ -128,6 +128,7 @@ class App:
             lambda robot, told: self._judged.append((robot, told)),
         )
         self.desk.recording = self.feeds.recording(self._poster.deliver, self.desk.news)
+        self.desk.keep_evidence = self._keep
         self._predicts = settings.prediction.enabled
         self._opening = opening
         self._own = OwnRobot() if opening is None else opening.own
@@ -221,6 +222,10 @@ class App:
             self.commissioning.stop()
         if (station := self.desk.selected) is not None:
             self._stop(station.name, reason)
+
+    def _keep(self, robot: str, told: Told) -> None:
+        report = self.desk.recording.link(self._stations[robot].address)
+        self.feeds.keep(robot, told, "" if report is None else report.session)
 
     def _stop(self, robot: str, reason: str) -> "concurrent.futures.Future[Stopped]":
         """STOP a robot, by a key or a rule; from any thread."""

@@ -50,8 +50,8 @@ function _shtab_gwrms_using
   test "$_shtab_gwrms_cmdpath" = "$argv"
 end
 
-set -g _shtab_gwrms_commands gateway install-service keys 'keys pair' 'keys list' 'keys push' 'keys add' 'keys revoke' pair check doctor describe snapshot cost bench blame watch top plot get set params 'params save' 'params compare' 'params apply' od store restore journal 'journal tail' 'journal verify' stop reset enable completion docs eds scan lss trace commission sensor 'sensor record' 'sensor replay' 'sensor decode' calibrate 'calibrate insole' 'calibrate imu' 'calibrate joint' collect sessions 'sessions ls' 'sessions show' 'sessions gait' 'sessions resources' 'sessions compare' 'sessions export' edits 'edits show' label train cloud 'cloud ls' 'cloud du' 'cloud verify' 'cloud mend' 'cloud upload' 'cloud download' 'cloud compact' 'cloud retain' 'cloud vacuum' 'cloud forget' 'cloud witnesses' query models 'models ls' 'models show' 'models promote' 'models rollback' 'models history' 'models export' predict gui evaluate demo sim 'sim run' sim-record sim-fault
-set -g _shtab_gwrms_opts_with_value --activity --adapt-from --angle --author --axes --baud --benchmark --bitrate --bus --certificate --channels --clear --cluster --component --computer --config --consent --controller --count --data --days --dir --drive --eds --falling --falls --file --foot --for --format --from --grace --hand --held-out --host --imu --include --insole --instead-of --interface --junit --key --kind --layout --lean --leave-out --limit --link --look --mark --max-change --minutes --mistake --model --mount --mounting --name --new-bitrate --node --node-id --notes --object --on --onnx --operator --out --path --picture --port --pseudo-labels --rate --reason --remote --report --requests --robot --role --run-as --saturation --scale --scenario --schema --script --seconds --seed --serial --session --set --sort --speed --stamp --subject --subjects --table --task --timeout --to --trial --truth --unconfigured --url --wearer --who --why --without --witness --write -n
+set -g _shtab_gwrms_commands gateway install-service keys 'keys pair' 'keys list' 'keys push' 'keys add' 'keys revoke' pair check doctor describe snapshot cost bench blame watch top plot get set params 'params save' 'params compare' 'params apply' od store restore journal 'journal tail' 'journal verify' stop reset enable completion docs eds scan lss trace commission sensor 'sensor record' 'sensor replay' 'sensor decode' calibrate 'calibrate insole' 'calibrate imu' 'calibrate joint' collect sessions 'sessions ls' 'sessions show' 'sessions gait' 'sessions resources' 'sessions compare' 'sessions export' edits 'edits show' ab sweep label train cloud 'cloud ls' 'cloud du' 'cloud verify' 'cloud mend' 'cloud upload' 'cloud download' 'cloud compact' 'cloud retain' 'cloud vacuum' 'cloud forget' 'cloud witnesses' query models 'models ls' 'models show' 'models promote' 'models rollback' 'models history' 'models export' predict gui evaluate demo sim 'sim run' sim-record sim-fault
+set -g _shtab_gwrms_opts_with_value --activity --adapt-from --angle --author --axes --baud --benchmark --bitrate --bus --certificate --channels --clear --cluster --component --computer --config --consent --controller --count --cycles --data --days --dir --drive --eds --falling --falls --file --foot --for --format --from --grace --hand --held-out --host --imu --include --insole --instead-of --interface --junit --key --kind --layout --lean --leave-out --limit --link --look --mark --max-change --minutes --mistake --model --most-current --most-error --mount --mounting --name --new-bitrate --node --node-id --notes --object --on --onnx --operator --out --pairs --path --picture --port --pseudo-labels --rate --reason --remote --report --requests --robot --role --run-as --saturation --scale --scenario --schema --script --seconds --seed --serial --session --set --sort --speed --stamp --subject --subjects --table --task --timeout --to --transient --trial --truth --unconfigured --url --wearer --who --why --without --witness --write -n
 
 complete -c gwrms -e
 complete -c gwrms -f
@@ -421,6 +421,28 @@ complete -c gwrms -n '_shtab_gwrms_using edits; and test $_shtab_gwrms_npos -eq 
 complete -c gwrms -n '_shtab_gwrms_using edits show' -s h -l help -d 'show this help message and exit'
 complete -c gwrms -n '_shtab_gwrms_using edits show' -l config -xka "(__fish_complete_path (commandline -ct))" -d 'the server'"'"'s file, which names the store'
 complete -c gwrms -n '_shtab_gwrms_using edits show' -l json -d 'for machines'
+complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a ab -d 'Try two values of a parameter against each other while somebody walks.'
+complete -c gwrms -n '_shtab_gwrms_using ab' -s h -l help -d 'show this help message and exit'
+complete -c gwrms -n '_shtab_gwrms_using ab' -l robot -x -d 'the gateway to ask (default 127.0.0.1:7420)'
+complete -c gwrms -n '_shtab_gwrms_using ab' -l json -d 'one JSON object a line, for machines'
+complete -c gwrms -n '_shtab_gwrms_using ab' -l pairs -x -d 'of A and B, 8 to 14 (default 10)'
+complete -c gwrms -n '_shtab_gwrms_using ab' -l seed -x -d 'of the order (default: another each time)'
+complete -c gwrms -n '_shtab_gwrms_using ab' -l cycles -x -d 'gait cycles that each value is held for (default 6)'
+complete -c gwrms -n '_shtab_gwrms_using ab' -l transient -x -d 'gait cycles left out after each change (default 2)'
+complete -c gwrms -n '_shtab_gwrms_using ab' -l seconds -x -d 'hold each value for so long instead'
+complete -c gwrms -n '_shtab_gwrms_using ab' -l most-error -x -d 'tracking error that ends it'
+complete -c gwrms -n '_shtab_gwrms_using ab' -l most-current -x -d 'current that ends it'
+complete -c gwrms -n '_shtab_gwrms_using ab' -l config -xka "(__fish_complete_path (commandline -ct))" -d 'the server'"'"'s file: where it is kept'
+complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a sweep -d 'Try values of a parameter upwards, in small steps, while you watch.'
+complete -c gwrms -n '_shtab_gwrms_using sweep' -s h -l help -d 'show this help message and exit'
+complete -c gwrms -n '_shtab_gwrms_using sweep' -l robot -x -d 'the gateway to ask (default 127.0.0.1:7420)'
+complete -c gwrms -n '_shtab_gwrms_using sweep' -l json -d 'one JSON object a line, for machines'
+complete -c gwrms -n '_shtab_gwrms_using sweep' -l cycles -x -d 'gait cycles that each value is held for (default 6)'
+complete -c gwrms -n '_shtab_gwrms_using sweep' -l transient -x -d 'gait cycles left out after each change (default 2)'
+complete -c gwrms -n '_shtab_gwrms_using sweep' -l seconds -x -d 'hold each value for so long instead'
+complete -c gwrms -n '_shtab_gwrms_using sweep' -l most-error -x -d 'tracking error that ends it'
+complete -c gwrms -n '_shtab_gwrms_using sweep' -l most-current -x -d 'current that ends it'
+complete -c gwrms -n '_shtab_gwrms_using sweep' -l config -xka "(__fish_complete_path (commandline -ct))" -d 'the server'"'"'s file: where it is kept'
 complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a label -d 'What robot and wearer did in a recorded session.'
 complete -c gwrms -n '_shtab_gwrms_using label' -s h -l help -d 'show this help message and exit'
 complete -c gwrms -n '_shtab_gwrms_using label' -l config -xka "(__fish_complete_path (commandline -ct))" -d 'the server'"'"'s file, which names the store'

@@ -10,6 +10,7 @@
 
 _shtab_gwrms_commands() {
   local _commands=(
+    ab:'Try two values of a parameter against each other while somebody walks.'
     bench:'Measure a robot'"'"'s gateway: latency, CPU and memory of what it does.'
     blame:'Watch the robot'"'"'s control loop, and name what made it late.'
     calibrate:'an insole'"'"'s pressure, an IMU'"'"'s or a joint'"'"'s zero'
@@ -54,6 +55,7 @@ _shtab_gwrms_commands() {
     snapshot:'One look at a robot: what it has now, asked once.'
     stop:'Quick stop on every drive, held until gwrms reset. Needs no lease.'
     store:'Make a device keep its parameters as they are now (1010h).'
+    sweep:'Try values of a parameter upwards, in small steps, while you watch.'
     top:'One robot in the terminal, live: its joints, feet, trunk, parameters and computer.'
     trace:'Shows the frames of CAN buses or of recordings, decoded by EDS. Only listens.'
     train:'A model from recorded sessions and their labels.'
@@ -169,6 +171,25 @@ _shtab_gwrms_options=(
 
 # guard to ensure default positional specs are added only once per session
 _shtab_gwrms_defaults_added=0
+
+_shtab_gwrms_ab_options=(
+  "(- : *)"{-h,--help}"[show this help message and exit]"
+  "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
+  "--json[one JSON object a line, for machines]"
+  "--pairs[of A and B, 8 to 14 (default 10)]:N:"
+  "--seed[of the order (default\: another each time)]:N:"
+  "--cycles[gait cycles that each value is held for (default 6)]:N:"
+  "--transient[gait cycles left out after each change (default 2)]:N:"
+  "--seconds[hold each value for so long instead]:S:"
+  "--most-error[tracking error that ends it]:RAD:"
+  "--most-current[current that ends it]:A:"
+  "--config[the server\'s file\: where it is kept]:FILE:_files"
+  ":the parameter, as in left_knee.position_gain:"
+  ":A and B, in its own unit or another\: 3deg:"
+)
+
+# guard to ensure default positional specs are added only once per session
+_shtab_gwrms_ab_defaults_added=0
 
 _shtab_gwrms_bench_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
@@ -1209,6 +1230,23 @@ _shtab_gwrms_store_options=(
 # guard to ensure default positional specs are added only once per session
 _shtab_gwrms_store_defaults_added=0
 
+_shtab_gwrms_sweep_options=(
+  "(- : *)"{-h,--help}"[show this help message and exit]"
+  "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
+  "--json[one JSON object a line, for machines]"
+  "--cycles[gait cycles that each value is held for (default 6)]:N:"
+  "--transient[gait cycles left out after each change (default 2)]:N:"
+  "--seconds[hold each value for so long instead]:S:"
+  "--most-error[tracking error that ends it]:RAD:"
+  "--most-current[current that ends it]:A:"
+  "--config[the server\'s file\: where it is kept]:FILE:_files"
+  ":the parameter, as in left_knee.position_gain:"
+  ":in its own unit or another\: 3deg:"
+)
+
+# guard to ensure default positional specs are added only once per session
+_shtab_gwrms_sweep_defaults_added=0
+
 _shtab_gwrms_top_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
@@ -1290,6 +1328,7 @@ _shtab_gwrms() {
       (( CURRENT += 1 ))
       curcontext="${curcontext%:*:*}:_shtab_gwrms-$line[1]:"
       case $line[1] in
+        ab) _arguments -C -s $_shtab_gwrms_ab_options ;;
         bench) _arguments -C -s $_shtab_gwrms_bench_options ;;
         blame) _arguments -C -s $_shtab_gwrms_blame_options ;;
         calibrate) _shtab_gwrms_calibrate ;;
@@ -1334,6 +1373,7 @@ _shtab_gwrms() {
         snapshot) _arguments -C -s $_shtab_gwrms_snapshot_options ;;
         stop) _arguments -C -s $_shtab_gwrms_stop_options ;;
         store) _arguments -C -s $_shtab_gwrms_store_options ;;
+        sweep) _arguments -C -s $_shtab_gwrms_sweep_options ;;
         top) _arguments -C -s $_shtab_gwrms_top_options ;;
         trace) _arguments -C -s $_shtab_gwrms_trace_options ;;
         train) _arguments -C -s $_shtab_gwrms_train_options ;;

@@ -12,11 +12,14 @@ from gateway.cli.text import say, say_json, table, warn
 from ml.store.private import private_files
 from server_gui.cli.cloud_options import parser, spool
 from server_gui.core.evidence.comparison import Measured, Word
+from server_gui.core.evidence.experiment import Experiment
 from server_gui.core.evidence.file import Told, folder_beside, read_all
-from server_gui.core.evidence.wording import changes, number, share
+from server_gui.core.evidence.wording import number, share
+from server_gui.core.experiments.plan import Kind
+from server_gui.core.experiments.wording import chart, record, what, whole
 
 EPILOG: Final = """commands
-  gwrms edits            every edit, oldest first: when, who, what from and to, what it did
+  gwrms edits            every edit, A/B trial and sweep, oldest first: when, who, what, what it did
   gwrms edits show ID    one of them: every metric before and after, with its interval
 
 Evidence is found by the desk that records the robot (the window, or gwrms collect) while somebody walks
@@ -31,6 +34,10 @@ EXPLAINED: Final = """
 The difference is the edit's: without a slow drift, and at equal speed; its interval holds in 95 of 100 edits.
 The size is the difference in standard deviations of single cycles. A word needs both: a difference that is
 sure although many metrics were looked at, and one that is large enough to matter.
+"""
+EXPLAINED_AB: Final = """
+Before is A, after is B. The difference is that of the pairs, tested by all orders that might have been drawn:
+no drift, straight or bent, is taken for it. A word needs a difference that is sure, and large enough.
 """
 
 
@@ -51,8 +58,9 @@ def ls(argv: list[str]) -> int:
     if found is None:
         return 1
     found = [told for told in found if told.edit.robot in (arguments.robot or (told.edit.robot,))]
+    found = whole(found)
     if arguments.json:
-        say_json([_fields(told) for told in found])
+        say_json([fields(told) for told in found])
     elif found:
         say(table(HEADER, map(_row, found)))
     else:
@@ -74,9 +82,9 @@ def show(argv: list[str]) -> int:
         warn("edits", f"{arguments.id}: {what}; gwrms edits lists them")
         return 1
     if arguments.json:
-        say_json(_fields(chosen[0]))
+        say_json(fields(chosen[0]))
     else:
-        say("\n".join(_told(chosen[0])) + "\n")
+        say("\n".join(shown(chosen[0])) + "\n")
     return 0
 
 
@@ -89,9 +97,10 @@ def _read(arguments: argparse.Namespace) -> list[Told] | None:
         return None
 
 
-def _fields(told: Told) -> dict[str, Any]:
-    fields: dict[str, Any] = msgspec.to_builtins(told)
-    return fields
+def fields(told: Told) -> dict[str, Any]:
+    """Return an edit for machines."""
+    found: dict[str, Any] = msgspec.to_builtins(told)
+    return found
 
 
 def _row(told: Told) -> tuple[str, ...]:
@@ -102,21 +111,31 @@ def _row(told: Told) -> tuple[str, ...]:
         edit.utc,
         edit.robot,
         edit.who,
-        changes(edit),
+        what(told),
         str(edit.state),
         str(evidence.word),
         NONE if strongest is None else f"{strongest.title} {share(strongest)}",
     )
 
 
-def _told(told: Told) -> Iterator[str]:
-    edit, evidence = told.edit, told.evidence
-    yield f"edit {edit.id} of {edit.robot}, {edit.utc}, by {edit.who}"
-    yield f"  {changes(edit)}"
-    yield f"  {edit.state}; entry {edit.n} of the robot's journal; recording {told.session or NONE}"
+def shown(told: Told) -> Iterator[str]:
+    """Yield everything that is known of one, in lines."""
+    edit, evidence, tried = told.edit, told.evidence, told.experiment
+    yield f"{tried.kind if tried else 'edit'} {edit.id} of {edit.robot}, {edit.utc}, by {edit.who or NONE}"
+    yield f"  {what(told)}"
+    if tried is None:
+        yield f"  {edit.state}; entry {edit.n} of the robot's journal; recording {told.session or NONE}"
+    else:
+        yield f"  recording {told.session or NONE}"
+        yield from (f"  {line}" for line in record(tried))
     yield ""
     before, after = evidence.cycles_before, evidence.cycles_after
-    yield f"{evidence.word}: {counted(before, 'gait cycle')} before, {after} after"
+    if tried is None:
+        yield f"{evidence.word}: {counted(before, 'gait cycle')} before, {after} after"
+    elif rows := list(chart(tried)):
+        yield table(_columns(tried), rows, right=(0, 1, 4)).rstrip()
+    elif tried.kind == Kind.AB:
+        yield f"{evidence.word}: {counted(before, 'gait cycle')} with A, {after} with B"
     yield from (f"  {note}" for note in evidence.notes)
     yield from (
         f"  left out: {counted(count, 'cycle')}, {why}" for why, count in sorted(evidence.left_out.items())
@@ -130,7 +149,14 @@ def _told(told: Told) -> Iterator[str]:
     silent = [one for one in evidence.metrics if one.word is Word.NO_DATA]
     if silent:
         yield "\nno data: " + ", ".join(one.title for one in silent)
-    yield EXPLAINED.rstrip()
+    if judged:
+        yield (EXPLAINED if tried is None else EXPLAINED_AB).rstrip()
+
+
+def _columns(tried: Experiment) -> tuple[str, ...]:
+    judged = next(each for each in tried.responses if each.series == tried.judged_by)
+    unit = f", {judged.unit}" if judged.unit else ""
+    return "VALUE", f"{judged.title}{unit}".upper(), "95 % INTERVAL", "", "CYCLES", ""
 
 
 def _order(one: Measured) -> float:

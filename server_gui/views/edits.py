@@ -3,7 +3,15 @@
 from typing import Final
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QListWidget, QListWidgetItem, QVBoxLayout, QWidget
+from PySide6.QtWidgets import (
+    QGridLayout,
+    QHBoxLayout,
+    QListWidget,
+    QListWidgetItem,
+    QPushButton,
+    QVBoxLayout,
+    QWidget,
+)
 
 from gateway.amounts import counted
 from server_gui.core.desk.desk import Desk
@@ -11,6 +19,10 @@ from server_gui.core.evidence.comparison import Measured, Word
 from server_gui.core.evidence.cycles import DRAWN
 from server_gui.core.evidence.file import Told
 from server_gui.core.evidence.wording import changes, number, share
+from server_gui.core.experiments.plan import Kind
+from server_gui.core.experiments.wording import record, what, whole
+from server_gui.views.experiments.form import ExperimentForm
+from server_gui.views.experiments.response_plot import ResponsePlot
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text, set_tone
 from server_gui.views.widgets.plain import PlainLabel
@@ -50,14 +62,17 @@ class Edits(QWidget):
         self.words.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.curves: dict[str, StrideCurves] = {}
         self._grid = QGridLayout()
+        self.response = ResponsePlot(theme)
+        self.response.hide()
         right = QVBoxLayout()
         right.addWidget(self.verdict)
         right.addWidget(self.words)
         right.addLayout(self._grid, 1)
+        right.addWidget(self.response, 1)
         right.addWidget(self._legend)
         right.addStretch()
         row = QHBoxLayout(self)
-        row.addWidget(self.list)
+        row.addLayout(self._left())
         row.addLayout(right, 1)
         self._scale()
         theme.scaled.connect(self._scale)
@@ -65,7 +80,10 @@ class Edits(QWidget):
     def refresh(self) -> None:
         """Show what is known now."""
         station = self._desk.selected
-        known = [] if station is None else sorted(station.judged.values(), key=lambda one: -one.edit.utc_ns)
+        self.ab.setEnabled(station is not None)
+        self.sweep.setEnabled(station is not None)
+        judged = [] if station is None else whole(tuple(station.judged.values()))
+        known = sorted(judged, key=lambda one: -one.edit.utc_ns)
         if known == self._shown:
             return
         if [told.edit.id for told in known] == [told.edit.id for told in self._shown]:
@@ -73,6 +91,25 @@ class Edits(QWidget):
         else:
             self._list(known)
         self._choose()
+
+    def _left(self) -> QVBoxLayout:
+        """The list, and what else may be tried."""
+        self.ab, self.sweep = QPushButton("A/B trial…"), QPushButton("Sweep…")
+        self.ab.setToolTip("Two values of a parameter against each other, several times in a drawn order")
+        self.sweep.setToolTip("Values of a parameter upwards in small steps, while you watch")
+        self.ab.clicked.connect(lambda: self._ask(Kind.AB))
+        self.sweep.clicked.connect(lambda: self._ask(Kind.SWEEP))
+        buttons, column = QHBoxLayout(), QVBoxLayout()
+        buttons.addWidget(self.ab)
+        buttons.addWidget(self.sweep)
+        column.addWidget(self.list, 1)
+        column.addLayout(buttons)
+        return column
+
+    def _ask(self, kind: Kind) -> None:
+        if self._desk.selected is not None:
+            self.form = ExperimentForm(self, self._desk, self._desk.selected, self._theme, kind)
+            self.form.show()
 
     def _grow(self, known: list[Told]) -> None:
         """More is known of some: hundreds of others are not laid out again each second."""
@@ -109,6 +146,8 @@ class Edits(QWidget):
             set_text(self.verdict, _verdict(told))
             set_tone(self.verdict, TONES.get(told.evidence.word, ""))
             set_text(self.words, "\n".join(_said(told)))
+        tried = None if told is None else told.experiment
+        self.response.setVisible(tried is not None and self.response.show_response(tried))
         self._draw(told)
 
     def _draw(self, told: Told | None) -> None:
@@ -132,21 +171,26 @@ class Edits(QWidget):
 
 def _line(told: Told) -> str:
     word = told.evidence.word if told.is_final else f"{told.evidence.word} so far"
-    return f"{told.edit.utc[11:19]}  {changes(told.edit)}\n{told.edit.state} · {word}"
+    ended = told.edit.state if told.experiment is None else told.experiment.kind
+    return f"{told.edit.utc[11:19]}  {what(told)}\n{ended} · {word}"
 
 
 def _verdict(told: Told) -> str:
-    evidence = told.evidence
+    evidence, tried = told.evidence, told.experiment
+    if tried is not None:
+        word = f"{counted(len(tried.periods), 'period')}" if tried.responses else str(evidence.word)
+        return f"{what(told)}: {word}{'' if tried.is_back else '; NOT CONFIRMED that it is back'}"
     strides = f"{counted(evidence.cycles_before, 'gait cycle')} before, {evidence.cycles_after} after"
     so_far = "" if told.is_final else " so far"
     return f"{changes(told.edit)}: {evidence.word}{so_far} ({strides})"
 
 
 def _said(told: Told) -> list[str]:
-    evidence = told.evidence
+    evidence, tried = told.evidence, told.experiment
+    done = [] if tried is None else list(record(tried))
     differing = [one for one in evidence.metrics if one.word in (Word.BETTER, Word.WORSE, Word.CHANGED)]
     strong = sorted(differing, key=lambda one: -abs(one.size or 0.0))
-    lines = [_metric(one) for one in strong[:MOST]]
+    lines = [*done, *(_metric(one) for one in strong[:MOST])]
     if len(strong) > MOST:
         lines.append(f"and {len(strong) - MOST} more: gwrms edits show {told.edit.id}")
     same = sum(one.word is Word.SAME for one in evidence.metrics)

@@ -42,6 +42,7 @@ from server_gui.views.docks import Area, Docks
 from server_gui.views.edits import Edits
 from server_gui.views.empty import EmptyView
 from server_gui.views.events_panel import EventsPanel
+from server_gui.views.experiments.bar import ExperimentBar
 from server_gui.views.header import Header
 from server_gui.views.help import Help
 from server_gui.views.kept import keep_bytes, kept_bytes
@@ -141,6 +142,7 @@ class MainWindow(QMainWindow):
         self.trial = TrialBar(desk, of_all=True)
         self.trial.keep.connect(lambda: self.trial.station.keep_trial() if self.trial.station else None)
         self.trial.take_back.connect(lambda: self.trial.station.end_trial() if self.trial.station else None)
+        self.experiment = ExperimentBar(desk)
         self.events = EventsPanel(desk, theme)
         self.events.shown.connect(self.show_around)
         self.overview, self.signals = Overview(desk, theme), Signals(desk, theme)
@@ -216,6 +218,7 @@ class MainWindow(QMainWindow):
         self.parameters.refresh()
         elsewhere = (self.parameters.trial, self.overview.now.trial)
         self.overview.now.offer(not _is_seen(self.parameters.trial))
+        self.experiment.refresh()
         self.trial.refresh(shown=not any(_is_seen(one) for one in elsewhere))
         self.events.refresh()
         self._bar.refresh()
@@ -331,6 +334,7 @@ class MainWindow(QMainWindow):
     def _build(self) -> None:
         column = _column(self._middle)
         column.addWidget(self._pages, 1)
+        column.addWidget(self.experiment)
         column.addWidget(self.trial)  # below: when it comes or goes, no tab moves
         self.keys = KeysSheet(self._theme, self._middle)
         self.setCentralWidget(self._middle)

@@ -37,6 +37,11 @@ NOT_TYPED: Final[Mapping[str, tuple[str, ...]]] = {
     "how-to/first-robot.md": ("two computers, and root",),
     "how-to/judge-an-edit.md": ("a walk of minutes, before and after an edit",),
     "how-to/what-changed.md": ("two recorded walks of minutes, some days apart",),
+    "how-to/try-two-values.md": (
+        "a walk of five minutes, with a value changed twenty times",
+        "what came of that walk",
+        "a walk of minutes, and somebody who watches",
+    ),
     "how-to/measure-the-cost.md": (
         "a control loop on the robot's computer, which the simulated robot has not",
     ),

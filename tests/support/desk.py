@@ -78,6 +78,9 @@ class FakeCommands:
     def revert(self, write: int) -> "Future[Any]":
         return self._ask("revert", write)
 
+    def read_back(self, name: str) -> "Future[Any]":
+        return self._ask("read_back", name)
+
     def store(self, component: str) -> "Future[Any]":
         return self._ask("store", component)
 

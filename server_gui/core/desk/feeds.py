@@ -6,6 +6,7 @@ the same spool, the window follows robots without; it takes over when that progr
 
 import concurrent.futures
 import functools
+import logging
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,7 +16,7 @@ from msgspec.structs import replace
 
 from gateway.client import Address
 from server_gui.core.desk.recording import By, Recording
-from server_gui.core.evidence.file import folder_beside
+from server_gui.core.evidence.file import EvidenceFile, Told, folder_beside
 from server_gui.core.evidence.service import EvidenceService
 from server_gui.core.evidence.service import Tell as TellEvidence
 from server_gui.core.fleet.collector import Collector, whole
@@ -34,6 +35,8 @@ from server_gui.core.recording.records import NOBODY, Worn
 from server_gui.core.settings.server_file import RecordingSettings, ServerSettings
 from server_gui.core.threads.answers import Deliver
 from server_gui.core.threads.supervision import ThreadWatch
+
+log = logging.getLogger(__name__)
 
 RESOURCES_S: Final = 2.0  # between looks at a robot's computer, at most
 GIVE_WAY_S: Final = 4.0  # before who has gone is replaced: a service that begins anew goes first
@@ -109,6 +112,18 @@ class Feeds:
                 part.__exit__(*exc)
         self._end_showing_only()
         self._ending.shutdown()
+
+    def keep(self, robot: str, told: Told, session: str) -> None:
+        """Keep what came of an experiment beside the evidence for edits; nobody waits for the disk."""
+
+        def add() -> None:
+            folder = folder_beside(self._settings.recorder.spool)
+            try:
+                EvidenceFile(folder, robot).add(replace(told, session=session))
+            except OSError as error:
+                log.error("what came of %s of %s is not kept: %s", told.edit.names, robot, error)
+
+        self._ending.submit(add)
 
     @property
     def hangs(self) -> bool:

@@ -28,6 +28,8 @@ from server_gui.core.audit.journal import Audit
 from server_gui.core.desk.flags import Flag, FlagKind, Flags, StateWatch, of_journal
 from server_gui.core.desk.rings import Rings
 from server_gui.core.evidence.file import Told
+from server_gui.core.experiments.plan import Plan
+from server_gui.core.experiments.run import Run, begun
 from server_gui.core.follow.events import (
     Costs,
     Described,
@@ -55,7 +57,7 @@ from server_gui.core.tuning.link import LEASE_S
 from server_gui.core.tuning.stop import StopProgress, StopState
 from server_gui.core.tuning.storing import Storing
 from server_gui.core.tuning.taken_back import OVERDUE_S, TakenBack
-from server_gui.core.tuning.writing import WriteProgress, WriteState
+from server_gui.core.tuning.writing import WriteProgress, WriteState, written_line
 
 WATCH_NS: Final = 200_000_000  # between looks for news
 JUDGED: Final = 500  # edits that are shown
@@ -87,6 +89,7 @@ class Station:
         self.most: tuple[ProcessUse, int] | None = None  # who used most CPU, and when that was seen
         self.cost: GatewayCost | None = None  # what monitoring costs the robot, as long as it is looked at
         self.predictions = StationPredictions()
+        self.experiment: Run | None = None  # an A/B trial or a sweep, the newest
         self.judged: dict[str, Told] = {}  # edits and what they did, by their ids
         self.stopping = StopProgress()
         self.control = LeaseState()
@@ -182,6 +185,8 @@ class Station:
     def take(self, events: Iterable[Event]) -> None:
         """Apply what has come, and look for what is new."""
         for event in events:
+            if self.experiment is not None:
+                self.experiment.take(event)
             if isinstance(event, Resources) and isinstance(event.snapshot.processes, list):
                 self._processes(event)
                 continue
@@ -280,6 +285,11 @@ class Station:
         trial = self.writing.trial
         mine = (told for told in reversed(self.judged.values()) if trial and told.edit.write == trial.write)
         return next((told for told in mine if not told.is_final), None)
+
+    def begin(self, plan: Plan) -> Run:
+        """Begin an experiment; raises `BadPlan` where one goes on, or something is on trial."""
+        self.experiment = begun(plan, self.experiment, self.robot, self._commands, self._deliver)
+        return self.experiment
 
     # --- STOP and reset
 
@@ -399,7 +409,7 @@ class Station:
         self.robot.hold(written.after)
         self._back.forget()
         self.edits.drop(*(change.name for change in changes))
-        self.tell(NewsKind.PARAMETER, ", ".join(_line(change, written) for change in changes))
+        self.tell(NewsKind.PARAMETER, ", ".join(written_line(change, written) for change in changes))
 
     def _write_failed(self, changes: tuple[Change, ...], error: Exception) -> None:
         self.writing.failed(changes, error)
@@ -470,11 +480,3 @@ class Station:
 
     def _ask(self, future: "Future[Result]", done: Callable[[Result], None], what: str) -> None:
         when_done(future, self._deliver, done, lambda error: self.tell(NewsKind.WARNING, f"{what}: {error}"))
-
-
-def _line(change: Change, written: Written) -> str:
-    before, after = written.before.get(change.name), written.after.get(change.name)
-    unit = change.unit
-    old = "?" if before is None else unit.editable(before)
-    new = "?" if after is None else unit.editable(after)
-    return f"{change.name} {old} → {new} {unit.symbol}".rstrip()

@@ -164,10 +164,10 @@ def compare(
     own = [one for one in found if one.component in edited]
     measured = _worded([own, [one for one in found if one not in own], robot])
     told = [sum(counts) for counts in zip(*(leg.counts for leg in legs.values()), strict=True)]
-    strongest = max(_differing(measured), key=lambda one: abs(one.size or 0.0), default=None)
+    strongest = max(differing(measured), key=lambda one: abs(one.size or 0.0), default=None)
     judged = {one.series for one in own or found}
     return Evidence(
-        word=_verdict(measured, [one for one in measured if one.series in judged]),
+        word=verdict(measured, [one for one in measured if one.series in judged]),
         strongest="" if strongest is None else strongest.series,
         metrics=tuple(measured),
         cycles_before=told[0],
@@ -309,7 +309,7 @@ def _measured(one: _Found, p: float | None) -> Measured:
     difference, half, size, _ = one.effect
     return Measured(
         *base,
-        _word(metric, one.before or 0.0, difference, p),
+        word_of(metric, one.before or 0.0, difference, p),
         *one.cycles,
         before=one.before,
         after=one.after,
@@ -321,8 +321,9 @@ def _measured(one: _Found, p: float | None) -> Measured:
     )
 
 
-def _word(metric: Metric, before: float, difference: float, p: float) -> Word:
-    if p >= ALPHA or abs(difference) < metric.smallest(before):
+def word_of(metric: Metric, before: float, difference: float, p: float, alpha: float = ALPHA) -> Word:
+    """Return what a difference is called: what is sure, and large enough to matter."""
+    if p >= alpha or abs(difference) < metric.smallest(before):
         return Word.SAME
     gain = -difference if metric.better is Better.LESS else abs(before) - abs(before + difference)
     if metric.better is Better.NEITHER or abs(gain) < metric.smallest(before):
@@ -330,11 +331,12 @@ def _word(metric: Metric, before: float, difference: float, p: float) -> Word:
     return Word.BETTER if gain > 0.0 else Word.WORSE
 
 
-def _differing(measured: Iterable[Measured]) -> Iterator[Measured]:
+def differing(measured: Iterable[Measured]) -> Iterator[Measured]:
+    """Yield those that are said to differ."""
     return (one for one in measured if one.word in (Word.BETTER, Word.WORSE, Word.CHANGED))
 
 
-def _verdict(measured: Sequence[Measured], judged: Sequence[Measured]) -> Word:
+def verdict(measured: Sequence[Measured], judged: Sequence[Measured]) -> Word:
     """The word for all; where nothing differs, that of what was edited: no cadence speaks for a knee."""
     words = {one.word for one in measured}
     if {Word.BETTER, Word.WORSE} <= words:

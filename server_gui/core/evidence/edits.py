@@ -32,6 +32,7 @@ class State(StrEnum):
     ON_TRIAL = "on trial"
     KEPT = "kept"
     REVERTED = "reverted"
+    TAKEN_OVER = "taken over by another trial"
     FAILED = "failed"  # it was never in force as a whole
 
 
@@ -118,7 +119,17 @@ class JournalEdits:
         if outcome in (State.ON_TRIAL, State.KEPT) and in_force_ns is None:
             in_force_ns = stamp_ns
         ended_ns = stamp_ns if outcome in (State.REVERTED, State.FAILED) else edit.ended_ns
+        if outcome is State.ON_TRIAL:
+            self._take_over(edit, stamp_ns)
         self.all[places[-1]] = replace(edit, state=outcome, in_force_ns=in_force_ns, ended_ns=ended_ns)
+
+    def _take_over(self, by: Edit, stamp_ns: int) -> None:
+        """Another trial of the same parameter is over with this one, of which no entry is written."""
+        names = {change.name for change in by.changes}
+        for place, edit in enumerate(self.all):
+            shares = names & {change.name for change in edit.changes}
+            if edit.write != by.write and edit.state is State.ON_TRIAL and shares:
+                self.all[place] = replace(edit, state=State.TAKEN_OVER, ended_ns=stamp_ns)
 
 
 _OUTCOMES: Final[Mapping[str, State]] = {

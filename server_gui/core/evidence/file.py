@@ -23,6 +23,7 @@ from server_gui.core.atomic_files import draft
 from server_gui.core.evidence.comparison import Evidence
 from server_gui.core.evidence.curves import Curves
 from server_gui.core.evidence.edits import Edit
+from server_gui.core.evidence.experiment import Experiment
 
 log = logging.getLogger(__name__)
 
@@ -37,6 +38,7 @@ class Told(Struct, frozen=True):
     is_final: bool
     session: str = ""
     curves: tuple[Curves, ...] = ()
+    experiment: Experiment | None = None  # several trials that were one: `edit` stands for all of them
     format: int = FORMAT
 
 

@@ -65,15 +65,15 @@ class RobotEvidence:
         self._edits = JournalEdits(robot)
         self._description: Description | None = None
         self._boot_id: str | None = None
-        self._joints: tuple[str, ...] = ()
+        self.joints: tuple[str, ...] = ()  # in the robot's order
         self._head: JournalHead | None = None
         self._recordings: list[tuple[int, str]] = [
             (-NEVER_NS, "")
         ]  # since when (robot's clock), and their names
         self._first_ns: int | None = None  # the first row of this boot
-        self._newest_ns = 0
+        self.newest_ns = 0  # the newest row, on the robot's clock
         self._seen: dict[str, tuple[Edit, Spell, int | None]] = {}  # how, and at how many cycles at most
-        self._cut = 0
+        self.cut = 0  # cycles, also those that were forgotten
         self._over: set[str] = set()
 
     def take(self, event: Event | Recorded) -> list[Told]:
@@ -127,8 +127,8 @@ class RobotEvidence:
     def _told(self, edit: Edit, *, is_final: bool) -> Told:
         """What an edit has done, as far as the cycles until now tell."""
         windows, notes = self._spell(edit)
-        edited = [joint for joint in self._joints if joint in edit.components]
-        found = compare(self.cycles, windows, self._joints, edited)
+        edited = [joint for joint in self.joints if joint in edit.components]
+        found = compare(self.cycles, windows, self.joints, edited)
         drawn = curves(self.cycles, windows, told_joints(found, edited))
         return Told(edit, replace(found, notes=found.notes + notes), is_final, curves=drawn)
 
@@ -139,8 +139,8 @@ class RobotEvidence:
         if self._first_ns is None:  # nothing was seen before it
             self._recordings = [(-NEVER_NS, session)]
             return
-        self._recordings.append((self._newest_ns, session))
-        while len(self._recordings) > 1 and self._recordings[1][0] < self._newest_ns - KEPT_NS:
+        self._recordings.append((self.newest_ns, session))
+        while len(self._recordings) > 1 and self._recordings[1][0] < self.newest_ns - KEPT_NS:
             del self._recordings[0]
 
     def _place(self, edit: Edit) -> int:
@@ -162,11 +162,11 @@ class RobotEvidence:
             return
         if self._first_ns is None:
             self._first_ns = stamps_ns[0]
-        self._newest_ns = stamps_ns[-1]
+        self.newest_ns = stamps_ns[-1]
         found = self._cutter.take(stamps_ns, columns)
-        self._cut += len(found)
+        self.cut += len(found)
         self.cycles.extend(found)
-        while self.cycles and self.cycles[0].ended_ns < self._newest_ns - KEPT_NS:
+        while self.cycles and self.cycles[0].ended_ns < self.newest_ns - KEPT_NS:
             self.cycles.popleft()
 
     def _journal(self, entries: list[dict[str, Any]]) -> None:
@@ -175,7 +175,7 @@ class RobotEvidence:
             newest = found.entries[-1]
             self._head = JournalHead(newest["n"], newest["hash"])
             self._edits.take(entry for entry in found.entries if entry.get("boot_id") == self._boot_id)
-            self._edits.forget(self._newest_ns - KEPT_NS)
+            self._edits.forget(self.newest_ns - KEPT_NS)
 
     def _described(self, description: Description) -> list[Told]:
         ended: list[Told] = []
@@ -185,12 +185,12 @@ class RobotEvidence:
             self.cycles.clear()
             self._cutter.restart()
             self._edits = JournalEdits(self.robot)
-            self._first_ns, self._newest_ns = None, 0
+            self._first_ns, self.newest_ns = None, 0
             self._recordings = [(-NEVER_NS, self._recordings[-1][1])]
         if self._boot_id != description.boot_id:
             self._head = None
         self._boot_id = description.boot_id
-        self._joints = tuple(part.name for part in description.components if part.kind == JOINT)
+        self.joints = tuple(part.name for part in description.components if part.kind == JOINT)
         self._cutter.enabled = {
             channel.name: frozenset(float(number) for number, word in channel.enum.items() if word == ENABLED)
             for channel in description.channels
@@ -212,11 +212,11 @@ class RobotEvidence:
 
     def _look(self, edit: Edit) -> Told | None:
         until_ns = due_ns(edit)
-        is_final = until_ns is not None and self._newest_ns > until_ns + LATE_NS
+        is_final = until_ns is not None and self.newest_ns > until_ns + LATE_NS
         windows, _ = self._spell(edit)
         last_ns = max(until for _, until in (*windows.before, *windows.after))
-        grows = self._newest_ns <= last_ns + LATE_NS
-        looked = (edit, windows, self._cut if grows else None)
+        grows = self.newest_ns <= last_ns + LATE_NS
+        looked = (edit, windows, self.cut if grows else None)
         if self._seen.get(edit.id) == looked and not is_final:
             return None
         self._seen[edit.id] = looked

@@ -2,12 +2,20 @@
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from gateway.wire.control import Lease
 from gateway.wire.dictionary import ObjectList, ObjectValues
 from gateway.wire.parameter import Confirmed, Reverted, Stored, Written
 from gateway.wire.stop import Reset, Stopped
+
+
+class ReadBack(NamedTuple):
+    """What a device holds of a parameter now, None where it cannot be read; and whether it is on trial."""
+
+    value: float | None
+    problem: str | None
+    on_trial: bool
 
 
 class Commands(Protocol):
@@ -35,6 +43,10 @@ class Commands(Protocol):
 
     def revert(self, write: int) -> "Future[Reverted]":
         """Take back what is on trial."""
+        ...
+
+    def read_back(self, name: str) -> "Future[ReadBack]":
+        """Read a parameter from its device, and whether a trial of it still stands."""
         ...
 
     def store(self, component: str) -> "Future[Stored]":

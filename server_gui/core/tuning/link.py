@@ -17,6 +17,7 @@ from server_gui.core.follow.events import Costs, Failed, Resources
 from server_gui.core.follow.feed import Tell
 from server_gui.core.follow.network import Network
 from server_gui.core.follow.validation import Validator
+from server_gui.core.tuning.commands import ReadBack
 
 LEASE_S: Final = 300.0  # the longest that a robot gives; every write begins it anew
 PROCESSES_S: Final = 1.0  # between looks at the process table, while it is shown
@@ -78,6 +79,9 @@ class Link:
     def revert(self, write: int) -> "Future[Reverted]":
         return self._network.run(self._client.revert(write))
 
+    def read_back(self, name: str) -> "Future[ReadBack]":
+        return self._network.run(self._read_back(name))
+
     def store(self, component: str) -> "Future[Stored]":
         return self._network.run(self._store(component))
 
@@ -98,6 +102,12 @@ class Link:
     async def _write(self, changes: Mapping[str, float], trial_s: float | None) -> Written:
         await self._client.acquire(LEASE_S)
         return await self._client.write(changes, trial_s)
+
+    async def _read_back(self, name: str) -> ReadBack:
+        trials = (await self._client.describe()).trials
+        held = (await self._client.read(name)).values[name]
+        value = None if held.value is None else float(held.value)
+        return ReadBack(value, held.problem, any(name in trial.before for trial in trials))
 
     async def _store(self, component: str) -> Stored:
         await self._client.acquire(LEASE_S)

@@ -119,3 +119,12 @@ class WriteProgress:
 
 def _count(number: int) -> str:
     return f"{number} parameter" if number == 1 else f"{number} parameters"
+
+
+def written_line(change: Change, written: Written) -> str:
+    """Return one change of a write as it was read back."""
+    before, after = written.before.get(change.name), written.after.get(change.name)
+    unit = change.unit
+    old = "?" if before is None else unit.editable(before)
+    new = "?" if after is None else unit.editable(after)
+    return f"{change.name} {old} → {new} {unit.symbol}".rstrip()

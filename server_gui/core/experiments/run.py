@@ -1,0 +1,308 @@
+"""One experiment on one robot, from the look at the walk until the original value was read back.
+
+Nothing here waits: facts of the robot's feed come by `take`, answers by futures, time by `tick`. What is done
+when is the table of `machine`; each value is a trial, which the robot takes back without us.
+"""
+
+import time
+from collections.abc import Callable, Iterable, Sequence
+from typing import Final
+
+from gateway.client import NotConnected, RemoteError
+from gateway.wire.parameter import Reverted, Written
+from server_gui.core.alarms.alarm import Alarm
+from server_gui.core.alarms.texts import Kind as AlarmKind
+from server_gui.core.evidence.cycles import Cycle
+from server_gui.core.evidence.experiment import Period
+from server_gui.core.evidence.robot_evidence import RobotEvidence
+from server_gui.core.experiments.machine import Action, Event, State, after
+from server_gui.core.experiments.plan import BadPlan, Kind, Plan
+from server_gui.core.experiments.verdict import Held
+from server_gui.core.experiments.watch import Watch
+from server_gui.core.follow.events import Described, Looked, Telemetry
+from server_gui.core.follow.events import Event as Fact
+from server_gui.core.follow.robot import Robot
+from server_gui.core.processing.gait_events import Leg
+from server_gui.core.threads.answers import Deliver, when_done
+from server_gui.core.tuning.commands import Commands, ReadBack
+from server_gui.core.tuning.writing import UNSURE
+
+SECOND: Final = 1_000_000_000
+LOOKS_AT: Final = 3  # cycles of a leg, before anything is written
+WATCHED_S: Final = 5.0  # without a sign of who watches a sweep
+STALE_S: Final = 2.0  # without telemetry
+STANDS_S: Final = 6.0  # without a gait cycle: nobody walks any more
+AGAIN_NS: Final = SECOND  # between looks at what is held
+LIMITS_S: Final = {State.LOOKING: 30.0, State.WRITING: 35.0, State.TAKING_BACK: 35.0, State.READING: 60.0}
+IN_THE_WAY: Final = frozenset({AlarmKind.GUARD, AlarmKind.STOPPED, AlarmKind.NOT_STOPPED})
+
+
+def begun(plan: Plan, before: "Run | None", robot: Robot, commands: Commands, deliver: Deliver) -> "Run":
+    """Return a new one; raises `BadPlan` where the one `before` goes on, or the robot is not known."""
+    if before is not None and not before.is_over:
+        raise BadPlan(f"{before.plan.kind.value} of {before.plan.name} goes on: stop it, or wait for its end")
+    if robot.description is None:
+        raise BadPlan("the robot has not told yet what it is made of")
+    return Run(plan, robot.description.robot, commands, deliver, Described(robot.description))
+
+
+class Run:
+    """Begins by itself once somebody walks. Answers come back by `deliver`, in the thread of `tick`."""
+
+    def __init__(
+        self,
+        plan: Plan,
+        robot: str,
+        commands: Commands,
+        deliver: Deliver,
+        described: Described,
+        clock: Callable[[], int] = time.monotonic_ns,
+    ) -> None:
+        self.plan = plan
+        self.robot = robot
+        self.state = State.LOOKING
+        self.why = ""  # it ended early
+        self.back = ""  # what is known of the original value
+        self.utc_ns = time.time_ns()
+        self.boot_id = described.description.boot_id
+        self.periods: list[tuple[Period, Held]] = []
+        self.transients = 0  # cycles that were left out
+        self._commands = commands
+        self._deliver = deliver
+        self._clock = clock
+        self._walk = RobotEvidence(robot)
+        self._walk.take(described)
+        self.joints = self._walk.joints
+        component = plan.name.partition(".")[0]
+        self.edited = tuple(joint for joint in self.joints if joint == component)
+        self.watch = Watch(plan.name, self.edited or self.joints, plan.bounds)
+        self.watch.take(described)
+        self.place = 0  # of the step
+        self._write: int | None = None  # that is on trial
+        self._since_ns = self._beat_ns = self._rows_ns = clock()
+        self._began_ns = 0  # of this step, on the robot's clock
+        self._cycles: dict[Leg, list[Cycle]] = {leg: [] for leg in Leg}  # that began with this value
+        self._legs: set[Leg] = set()  # that were seen to step
+        self._cut = 0  # cycles that were taken
+        self._walked_ns = 0  # the end of the newest cycle, or the beginning of this step
+        self._held: float | None = None  # what the device was seen to hold, before anything
+        self._read_ns: int | None = None  # when to read next; None: an answer is awaited
+
+    # --- what is told
+
+    @property
+    def is_over(self) -> bool:
+        """Whether it has ended, well or not."""
+        return self.state.is_end
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether every value was held as planned."""
+        return not self.why and self.state is State.OVER
+
+    @property
+    def cycles(self) -> int:
+        """Of this step, of the leg that has least, without those that are left out."""
+        return max(0, self._least() - self.plan.dwell.transient)
+
+    @property
+    def left_s(self) -> float:
+        """About how long it goes on, as the last stride lasted."""
+        stride_s = self._walk.cycles[-1].seconds if self._walk.cycles else 1.2
+        whole_s = self.plan.expected_s(stride_s)
+        held_s = (self._clock() - self._since_ns) / SECOND if self.state is State.HOLDING else 0.0
+        return max(0.0, whole_s * (1.0 - self.place / len(self.plan.steps)) - held_s)
+
+    @property
+    def trial_left_s(self) -> float:
+        """Until the robot takes this value back by itself, if nobody does anything."""
+        return max(0.0, self.plan.dwell.trial_s - (self._clock() - self._since_ns) / SECOND)
+
+    # --- what comes
+
+    def take(self, fact: Fact) -> None:
+        """Take what the robot's feed tells."""
+        self._walk.take(fact)
+        self.watch.take(fact)
+        match fact:
+            case Telemetry():
+                self._rows_ns = self._clock()
+                self._take_cycles()
+            case Looked() if fact.parameters is not None and self.plan.name in fact.parameters.values:
+                held = fact.parameters.values[self.plan.name].value
+                self._held = None if held is None else float(held)
+
+    def beat(self) -> None:
+        """Somebody watches."""
+        self._beat_ns = self._clock()
+
+    def halt(self, why: str) -> None:
+        """End it, and take back what is on trial; says why once."""
+        if not self.is_over and self.state in (State.LOOKING, State.WRITING, State.HOLDING):
+            self.why = self.why or why
+        self._do(Event.HALT)
+
+    def tick(self, alarms: Sequence[Alarm]) -> None:
+        """Look at the time, and at what was broken; call it some times a second."""
+        if self.is_over:
+            return
+        self.watch.see(alarms)
+        broken = self._broken()
+        if broken is not None and self.state in (State.LOOKING, State.WRITING, State.HOLDING):
+            self.halt(broken)
+        elif self.state is State.LOOKING:
+            self._look(alarms)
+        elif self.state is State.HOLDING and self._is_enough():
+            self._close_period()
+            self._do(Event.NEXT if self.place < len(self.plan.steps) else Event.LAST)
+        if self._is_late():
+            self.why = self.why or self._late()
+            self._do(Event.LATE)
+        elif self.state is State.READING and self._read_ns is not None and self._clock() >= self._read_ns:
+            self._ask_what_is_held()
+
+    # --- stop rules that need the time
+
+    def _broken(self) -> str | None:
+        now_ns = self._clock()
+        if self.watch.why is not None:
+            return self.watch.why
+        if now_ns - self._rows_ns > STALE_S * SECOND:
+            return f"no telemetry for {STALE_S:.0f} s: the link is lost, or its values are stale"
+        if self.plan.kind is Kind.SWEEP and now_ns - self._beat_ns > WATCHED_S * SECOND:
+            return "nobody watches it any more"
+        if self.state is State.HOLDING and self._walk.newest_ns - self._walked_ns > STANDS_S * SECOND:
+            return f"no gait cycle for {STANDS_S:.0f} s: the robot does not walk any more"
+        return None
+
+    def _is_late(self) -> bool:
+        limit_s = self.plan.dwell.limit_s if self.state is State.HOLDING else LIMITS_S.get(self.state)
+        return limit_s is not None and self._clock() - self._since_ns > limit_s * SECOND
+
+    def _late(self) -> str:
+        return {
+            State.LOOKING: "nobody walks: no three gait cycles were seen, or the parameter could not be read",
+            State.WRITING: "the robot has not answered a write in time",
+            State.HOLDING: "too few gait cycles came in the time that a value may be held",
+        }.get(self.state, "the robot has not answered in time")
+
+    # --- what is done
+
+    def _look(self, alarms: Iterable[Alarm]) -> None:
+        """Begin once it is seen that somebody walks, on a robot that nothing is wrong with."""
+        problem = next((alarm.brief for alarm in alarms if alarm.kind in IN_THE_WAY), None)
+        if problem is not None:
+            self.halt(f"it does not begin: {problem}")
+        elif self._held is not None and self._held != self.plan.original:
+            self.halt(f"{self.plan.name} is {self._held:g}, not {self.plan.original:g} any more: begin anew")
+        elif self._held is not None and self._least() >= LOOKS_AT:
+            self.watch.begin(alarms, self._walk.newest_ns)
+            self._do(Event.READY)
+
+    def _do(self, event: Event) -> None:
+        before = self.state
+        self.state, action = after(before, event)
+        if self.state is not before:
+            self._since_ns = self._clock()
+        match action:
+            case Action.WRITE:
+                self._ask_to_write()
+            case Action.REVERT if self._write is not None:
+                when_done(self._commands.revert(self._write), self._deliver, self._taken, self._not_taken)
+            case Action.REVERT | Action.RELEASE:
+                when_done(self._commands.release_control(), self._deliver, self._taken, self._not_taken)
+            case Action.READ:
+                self._read_ns = self._clock() + (AGAIN_NS if before is State.READING else 0)
+        if self.is_over and before is not self.state:
+            self._ended()
+
+    def _ask_to_write(self) -> None:
+        value = self.plan.steps[self.place].value
+        self.watch.writes()
+        future = self._commands.write({self.plan.name: value}, self.plan.dwell.trial_s)
+        when_done(future, self._deliver, self._written, self._not_written)
+
+    def _written(self, written: Written) -> None:
+        self._write = written.write
+        before = written.before.get(self.plan.name)
+        self.watch.holds(float(written.after.get(self.plan.name, 0.0)), self._clock())
+        self._began_ns = self._walked_ns = self._walk.newest_ns
+        self._cycles = {leg: [] for leg in Leg}
+        self._do(Event.WRITTEN)
+        if before != self.plan.original or len(written.before) != 1:
+            self.halt(f"the trial would go back to {before}, and not to {self.plan.original:g} alone")
+
+    def _not_written(self, error: Exception) -> None:
+        self.why = self.why or f"not written: {error}"
+        refused = isinstance(error, RemoteError) and error.kind not in UNSURE
+        self._do(Event.REFUSED if refused or isinstance(error, NotConnected) else Event.UNSURE)
+
+    def _taken(self, answer: Reverted | None) -> None:
+        if answer is not None:
+            self.back = ", ".join(answer.outcome.values())
+        self._do(Event.TAKEN)
+
+    def _not_taken(self, error: Exception) -> None:
+        self.back = str(error)
+        self._do(Event.NOT_TAKEN)
+
+    def _ask_what_is_held(self) -> None:
+        self._read_ns = None
+        when_done(self._commands.read_back(self.plan.name), self._deliver, self._read, self._not_read)
+
+    def _read(self, found: ReadBack) -> None:
+        self.back = f"{self.plan.name} = {'not known' if found.value is None else f'{found.value:g}'}"
+        if found.problem:
+            self.back += f", {found.problem}"
+        if found.on_trial:
+            self.back += ", still on trial"
+        is_back = found.value == self.plan.original and not found.on_trial
+        self._do(Event.ORIGINAL if is_back else Event.OTHER)
+
+    def _not_read(self, error: Exception) -> None:
+        self.back = str(error)
+        self._do(Event.UNREAD)
+
+    def _ended(self) -> None:
+        """Nobody needs the lease any more; that it is given back is nothing that the end waits for."""
+        if self.state is not State.NOTHING_DONE:
+            self._commands.release_control()
+
+    # --- gait cycles
+
+    def _take_cycles(self) -> None:
+        new = self._walk.cut - self._cut
+        if not new:
+            return
+        self._cut += new
+        for cycle in list(self._walk.cycles)[-new:]:
+            self._legs.add(cycle.leg)
+            self._walked_ns = max(self._walked_ns, cycle.ended_ns)
+            if cycle.began_ns >= self._began_ns:
+                self._cycles[cycle.leg].append(cycle)
+
+    def _least(self) -> int:
+        """Of the legs that have stepped at all since the beginning, of the one that has least."""
+        return min((len(self._cycles[leg]) for leg in self._legs), default=0)
+
+    def _is_enough(self) -> bool:
+        dwell = self.plan.dwell
+        if not self.plan.steps[self.place].is_measured:
+            return self._least() > dwell.transient
+        if dwell.seconds is None:
+            return self._least() >= dwell.transient + dwell.cycles
+        legs = [cycles[: dwell.transient] for cycles in self._cycles.values() if cycles]
+        if self._least() < dwell.transient:
+            return False
+        settled_ns = max((cycles[-1].ended_ns for cycles in legs if cycles), default=self._began_ns)
+        return self._walk.newest_ns - settled_ns >= dwell.seconds * SECOND
+
+    def _close_period(self) -> None:
+        step = self.plan.steps[self.place]
+        kept = [one for cycles in self._cycles.values() for one in cycles[self.plan.dwell.transient :]]
+        self.transients += sum(map(len, self._cycles.values())) - len(kept)
+        self.place += 1
+        if step.is_measured:
+            ended_ns = self._walk.newest_ns
+            period = Period(step.value, self._write or 0, self._began_ns, ended_ns, len(kept))
+            self.periods.append((period, Held(step.value, sorted(kept, key=lambda one: one.ended_ns))))

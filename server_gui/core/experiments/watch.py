@@ -1,0 +1,150 @@
+"""The stop rules: what ends an experiment, each in words. Nothing here asks the robot anything."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+from server_gui.core.alarms.alarm import Alarm
+from server_gui.core.experiments.plan import Bounds
+from server_gui.core.follow.events import Described, Event, Journalled, Looked, Telemetry
+
+AS_USUAL: Final = 2.0  # times the largest that was seen before: a bound where none was given
+SETTLES_NS: Final = 1_500_000_000  # after which what was read is what was written
+GUARD: Final = "guard"
+ENDING: Final = {
+    "stop": "somebody has sent a STOP",
+    "stop still held": "a stop is held",
+    "taken back": "the robot has taken the trial back",
+    "claimed by the stop": "a stop has taken the trial over",
+    "write taken back": "the robot has taken the write back",
+    "ROLL-BACK FAILED": "the robot could not take the write back",
+}
+OF_OTHERS: Final = {"write": "a write", "restore": "a restore", "store": "a store", "enable": "an enabling"}
+
+
+@dataclass(slots=True)
+class Watch:
+    """Takes what the robot tells; `why` is the first rule that was broken, None while none is.
+
+    `name` is the parameter, `joints` those whose tracking error and current count. Before `begin` it only
+    learns what is usual.
+    """
+
+    name: str
+    joints: tuple[str, ...]
+    bounds: Bounds
+    why: str | None = None
+    most: dict[str, float] = field(default_factory=dict)  # by quantity, before the beginning
+    _alarms: frozenset[object] = frozenset()
+    _begun: bool = False
+    _entry: int = 0  # of the journal: the newest that is known
+    _boot_id: str | None = None
+    _began_ns: int = 0  # the robot's clock: what its journal tells of before is no news
+    _value: float | None = None  # that the device holds
+    _since_ns: int = 0  # our clock
+    _differs: int = 0
+
+    def begin(self, alarms: Iterable[Alarm], robot_ns: int) -> Bounds:
+        """Begin to watch, now on the robot's clock; the bounds: twice what is usual, where none was given."""
+        self._begun, self._began_ns = True, robot_ns
+        self._alarms = frozenset(alarm.key for alarm in alarms)
+        usual = {name: AS_USUAL * most for name, most in self.most.items() if most > 0.0}
+        error = usual.get("following_error") if self.bounds.error is None else self.bounds.error
+        current = usual.get("current") if self.bounds.current is None else self.bounds.current
+        self.bounds = Bounds(error, current)
+        return self.bounds
+
+    def writes(self) -> None:
+        """A value is about to be written by us."""
+        self._value = None
+
+    def holds(self, value: float, now_ns: int) -> None:
+        """The robot has written it and read this back; `now_ns` is our clock."""
+        self._value, self._since_ns, self._differs = value, now_ns, 0
+
+    def take(self, event: Event) -> None:
+        """Take one fact."""
+        for why in self._broken(event):
+            self._ends(why)
+
+    def see(self, alarms: Iterable[Alarm]) -> None:
+        """Look at the alarms of now: whatever was not there at the beginning ends it."""
+        if self._begun:
+            for alarm in alarms:
+                if alarm.key not in self._alarms:
+                    self._ends(alarm.brief)
+
+    def _ends(self, why: str) -> None:
+        if self._begun and self.why is None:
+            self.why = why
+
+    def _broken(self, event: Event) -> Iterator[str]:
+        match event:
+            case Telemetry():
+                yield from self._beyond(event)
+            case Journalled():
+                yield from self._told(event.journal.entries)
+            case Looked():
+                yield from self._held(event)
+            case Described():
+                known, self._boot_id = self._boot_id, event.description.boot_id
+                if known not in (None, self._boot_id):
+                    yield "the robot's computer has started anew"
+                if event.description.stop.held:
+                    yield "a stop is held"
+
+    def _beyond(self, event: Telemetry) -> Iterator[str]:
+        columns = event.batch.columns
+        limits = {"following_error": self.bounds.error, "current": self.bounds.current}
+        for quantity, limit in limits.items():
+            for joint in self.joints:
+                found = max(_sizes(columns.get(f"{joint}.{quantity}", ())), default=0.0)
+                if not self._begun:
+                    self.most[quantity] = max(found, self.most.get(quantity, 0.0))
+                elif limit is not None and found > limit:
+                    what = "tracking error" if quantity == "following_error" else quantity
+                    yield f"{joint}: {what} {found:.3g}, beyond the bound of {limit:.3g}"
+
+    def _told(self, entries: Iterable[Mapping[str, Any]]) -> Iterator[str]:
+        for entry in entries:
+            number = entry.get("n")
+            if not isinstance(number, int) or number <= self._entry:
+                continue
+            self._entry = number
+            at_ns = entry.get("monotonic_ns")
+            if not isinstance(at_ns, int) or at_ns > self._began_ns:
+                yield from self._meant(entry, str(entry.get("what")))
+
+    def _meant(self, entry: Mapping[str, Any], what: str) -> Iterator[str]:
+        if entry.get("who") == GUARD:
+            yield f"the guard: {what}, {entry.get('reason') or entry.get('about') or ''}"
+        elif what in ENDING:
+            yield f"{ENDING[what]} ({entry.get('who')})"
+        elif what in OF_OTHERS and not self._is_ours(entry):
+            yield f"{OF_OTHERS[what]} of another: {entry.get('who')}"
+
+    def _is_ours(self, entry: Mapping[str, Any]) -> bool:
+        """We have the lease: a trial of just this parameter can be nobody else's."""
+        after = entry.get("after")
+        return isinstance(after, Mapping) and list(after) == [self.name] and entry.get("trial_s") is not None
+
+    def _held(self, event: Looked) -> Iterator[str]:
+        """Two looks in a row: one may have been under way when it was written."""
+        known = None if event.parameters is None else event.parameters.values.get(self.name)
+        if self._value is None or known is None or event.at_ns < self._since_ns + SETTLES_NS:
+            return
+        if known.value is None:
+            self._differs += 1
+            found = f"{self.name} cannot be read: {known.problem}"
+        elif known.value == self._value:
+            self._differs = 0
+            return
+        else:
+            self._differs += 1
+            found = f"{self.name} is {known.value:g} and not {self._value:g}: somebody else has written it"
+        if self._differs > 1:
+            yield found
+
+
+def _sizes(values: Iterable[float | None]) -> Iterator[float]:
+    return (abs(value) for value in values if value is not None)

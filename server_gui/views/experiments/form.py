@@ -1,0 +1,200 @@
+"""What is to be tried: a parameter, its values, how long each is held; said whole before it begins."""
+
+from typing import Final
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import (
+    QComboBox,
+    QDialog,
+    QGridLayout,
+    QLineEdit,
+    QPushButton,
+    QSpinBox,
+    QVBoxLayout,
+    QWidget,
+)
+
+from gateway.units import Unit
+from gateway.wire.parameter import PARAMETER_WRITE, ParameterInfo
+from server_gui.core.desk.desk import Desk
+from server_gui.core.desk.station import Station
+from server_gui.core.experiments.plan import (
+    FEWEST_CYCLES,
+    FEWEST_PAIRS,
+    MOST_CYCLES,
+    MOST_PAIRS,
+    USUAL_CYCLES,
+    USUAL_PAIRS,
+    USUAL_TRANSIENT,
+    BadPlan,
+    Bounds,
+    Dwell,
+    Kind,
+    Plan,
+    ab,
+    sweep,
+)
+from server_gui.core.experiments.wording import stated
+from server_gui.core.tuning.edits import unit_of
+from server_gui.views.theme import Theme
+from server_gui.views.widgets.card import set_text
+from server_gui.views.widgets.plain import PlainLabel
+
+WIDTH: Final = 460  # at text of 100 %
+FIELDS: Final = {Kind.AB: ("A", "B"), Kind.SWEEP: ("From", "To", "Step")}
+USUAL: Final = "twice what is usual"
+
+
+class ExperimentForm(QDialog):
+    """Never modal: STOP stays in reach. It begins only what it has said, and only where that can be."""
+
+    def __init__(self, parent: QWidget, desk: Desk, station: Station, theme: Theme, kind: Kind) -> None:
+        super().__init__(parent)
+        self._desk, self._station, self._kind = desk, station, kind
+        self.setWindowTitle(f"{kind.value[0].upper()}{kind.value[1:]} · {station.title}")
+        self.setModal(False)
+        self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        self.parameter = QComboBox()
+        self.parameter.setAccessibleName("Parameter")
+        self.parameter.addItems(list(station.known))
+        self.fields = {name: QLineEdit() for name in FIELDS[kind]}
+        self.unit = PlainLabel()
+        self.pairs = _spin(FEWEST_PAIRS, MOST_PAIRS, USUAL_PAIRS)
+        self.cycles = _spin(FEWEST_CYCLES, MOST_CYCLES, USUAL_CYCLES)
+        self.transient = _spin(0, 20, USUAL_TRANSIENT)
+        self.error, self.current = QLineEdit(), QLineEdit()
+        for bound in (self.error, self.current):
+            bound.setPlaceholderText(USUAL)
+        self.words = PlainLabel()
+        self.words.setWordWrap(True)
+        self.words.setMinimumWidth(theme.px(WIDTH))
+        self.begin, cancel = QPushButton("Begin"), QPushButton("Cancel")
+        self.begin.setObjectName("primary")
+        self.begin.setAutoDefault(False)
+        self.begin.clicked.connect(self._begin)
+        cancel.clicked.connect(self.reject)
+        column = QVBoxLayout(self)
+        column.addLayout(self._grid())
+        column.addWidget(self.words)
+        buttons = QGridLayout()
+        buttons.setColumnStretch(0, 1)
+        buttons.addWidget(cancel, 0, 1)
+        buttons.addWidget(self.begin, 0, 2)
+        column.addLayout(buttons)
+        self.parameter.currentIndexChanged.connect(lambda _: self._chosen())
+        for field in (*self.fields.values(), self.error, self.current):
+            field.textChanged.connect(lambda _: self._look())
+        for spin in (self.pairs, self.cycles, self.transient):
+            spin.valueChanged.connect(lambda _: self._look())
+        trial = station.writing.trial
+        edited = next(iter(trial.values if trial else station.edits.staged), "")
+        self.parameter.setCurrentIndex(max(0, self.parameter.findText(edited)))
+        self._chosen()
+
+    @property
+    def plan(self) -> Plan:
+        """What is typed, as a plan; raises `BadPlan`."""
+        info, held, unit = self._held()
+        refused = self._station.refused(PARAMETER_WRITE)
+        if refused:
+            raise BadPlan(refused)
+        if self._station.writing.trial is not None:
+            raise BadPlan("something is on trial: keep it, or take it back, first")
+        values = [_number(field.text(), name, unit) for name, field in self.fields.items()]
+        dwell = Dwell(self.cycles.value(), self.transient.value())
+        bounds = Bounds(_bound(self.error, "tracking error"), _bound(self.current, "current"))
+        if self._kind is Kind.AB:
+            first, second = values
+            pairs = self.pairs.value()
+            return ab(info, held, (first, second), unit, pairs=pairs, dwell=dwell, bounds=bounds)
+        first, last, step = values
+        return sweep(info, held, (first, last, step), unit, dwell=dwell, bounds=bounds)
+
+    def _grid(self) -> QGridLayout:
+        grid = QGridLayout()
+        grid.setColumnStretch(1, 1)
+        pairs = {"Pairs": self.pairs} if self._kind is Kind.AB else {}
+        rows: dict[str, QWidget] = {
+            "Parameter": self.parameter,
+            "In": self.unit,
+            **self.fields,
+            **pairs,
+            "Gait cycles each": self.cycles,
+            "Left out after a change": self.transient,
+            "Most tracking error (rad)": self.error,
+            "Most current (A)": self.current,
+        }
+        for row, (name, field) in enumerate(rows.items()):
+            title = PlainLabel(name)
+            title.setObjectName("dim")
+            field.setAccessibleName(name)
+            grid.addWidget(title, row, 0)
+            grid.addWidget(field, row, 1)
+        return grid
+
+    def _held(self) -> tuple[ParameterInfo, float, Unit]:
+        name = self.parameter.currentText()
+        info, held = self._station.known.get(name), self._station.robot.parameters.get(name)
+        if info is None or held is None or held.value is None:
+            raise BadPlan("what is held now is not known: wait until it was read")
+        return info, float(held.value), unit_of(name, info.unit, self._desk.shown.units)
+
+    def _chosen(self) -> None:
+        """Another parameter: begin with what is held, and what was typed for it."""
+        try:
+            info, held, unit = self._held()
+        except BadPlan:
+            self._look()
+            return
+        staged = self._station.edits.staged.get(info.name)
+        self.unit.setText(unit.symbol or "no unit")
+        first = next(iter(self.fields.values()))
+        first.setText(unit.editable(held))
+        if self._kind is Kind.AB:
+            self.fields["B"].setText("" if staged is None else unit.editable(staged.value))
+        self._look()
+
+    def _look(self) -> None:
+        try:
+            plan = self.plan
+        except BadPlan as error:
+            self.begin.setEnabled(False)
+            set_text(self.words, f"{str(error)[:1].upper()}{str(error)[1:]}.")
+            return
+        self.begin.setEnabled(True)
+        set_text(self.words, "\n".join(line.strip() for line in stated(plan)))
+
+    def _begin(self) -> None:
+        try:
+            self._station.begin(self.plan)
+        except BadPlan as error:
+            set_text(self.words, str(error))
+            return
+        self.accept()
+
+
+def _spin(least: int, most: int, usual: int) -> QSpinBox:
+    spin = QSpinBox()
+    spin.setRange(least, most)
+    spin.setValue(usual)
+    return spin
+
+
+def _number(text: str, name: str, unit: Unit) -> float:
+    try:
+        return float(unit.si_value(text))
+    except ValueError as error:
+        raise BadPlan(f"{name}: type a number" if not text else f"{name}: {error}") from error
+
+
+def _bound(field: QLineEdit, name: str) -> float | None:
+    text = field.text().strip()
+    if not text:
+        return None
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 0.0 < value < 1e9:
+        raise BadPlan(f"the most {name} is a number above 0, or empty: {USUAL}")
+    return value

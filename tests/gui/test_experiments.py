@@ -1,0 +1,131 @@
+"""A/B trials and sweeps in the window: begun from the page of edits, ended from the bar, told on the page."""
+
+import pytest
+from msgspec.structs import replace
+
+from gateway.wire.parameter import Reverted, Written
+from server_gui.core.evidence.comparison import Evidence, Word
+from server_gui.core.evidence.experiment import Experiment, Period, Point, Response
+from server_gui.core.evidence.file import Told
+from server_gui.core.experiments.machine import Event, State
+from server_gui.core.tuning.commands import ReadBack
+from server_gui.views.main_window import MainWindow
+from tests.gui.fakes import Bench
+from tests.support.desk import looked
+from tests.unit.evidence.test_file import told
+
+NAME = "gait.step_length"
+
+
+def swept() -> Told:
+    """A sweep whose second value is the best."""
+    points = tuple(
+        Point(value, 6, mean, mean - 0.0002, mean + 0.0002)
+        for value, mean in ((2800.0, 0.0050), (3000.0, 0.0047), (3200.0, 0.0041))
+    )
+    title = "left_knee tracking error RMS"
+    response = Response("left_knee.error_rms", title, "rad", points)
+    periods = tuple(Period(point.value, 7 + place, 0, 1, 6) for place, point in enumerate(points))
+    tried = Experiment(
+        kind="sweep",
+        parameter="left_knee.position_gain",
+        unit="N·m/rad",
+        original=3000.0,
+        values=(2800.0, 3000.0, 3200.0),
+        cycles=6,
+        transient=2,
+        seconds=None,
+        seed=None,
+        periods=periods,
+        ended="",
+        is_back=True,
+        back="the original value is back",
+        responses=(response,),
+        judged_by="left_knee.error_rms",
+        proposal=3200.0,
+        reason="least left_knee tracking error RMS",
+    )
+    found = Evidence(Word.CHANGED, "", (), 0, 18)
+    return replace(told(), evidence=found, experiment=tried, curves=())
+
+
+def begun(bench: Bench, window: MainWindow) -> None:
+    """An A/B trial of two step lengths."""
+    bench.station.take([looked()])
+    window.edits.refresh()
+    window.edits.ab.click()
+    form = window.edits.form
+    form.parameter.setCurrentText(NAME)
+    form.fields["B"].setText("420")
+    assert form.begin.isEnabled(), form.words.text()
+    assert "10 pairs of 0.4 (A) and 0.42 (B)" in form.words.text()
+    form.begin.click()
+
+
+def test_the_form_says_what_it_will_do_and_what_cannot_be(bench: Bench, window: MainWindow) -> None:
+    bench.station.take([looked()])
+    window.edits.refresh()
+    window.edits.ab.click()
+    form = window.edits.form
+    form.parameter.setCurrentText(NAME)
+    assert not form.begin.isEnabled()
+    assert form.words.text() == "B: type a number."
+    form.fields["B"].setText("900")
+    assert "largest allowed" in form.words.text()
+    form.reject()
+
+
+def test_stop_and_take_back_is_in_sight_until_it_was_read_back(bench: Bench, window: MainWindow) -> None:
+    begun(bench, window)
+    run = bench.station.experiment
+    assert run is not None
+    run._do(Event.READY)
+    bench.first.answer(Written(5, {NAME: 0.4}, {NAME: 0.4}, 40.0))
+    window.experiment.refresh()
+    assert window.experiment.isVisible()
+    assert "back by itself in" in window.experiment.words.text()
+    window.experiment.end.click()
+    assert bench.first.named("revert") == [(5,)]
+    assert run.state is State.TAKING_BACK
+    bench.first.answer(Reverted(5, {NAME: "taken back"}))
+    window.experiment.refresh()
+    assert bench.first.named("read_back") == [(NAME,)]
+    bench.first.answer(ReadBack(0.4, None, on_trial=False))
+    window.experiment.refresh()
+    assert "the original value is back" in window.experiment.words.text()
+    assert "ended early: asked for" in window.experiment.words.text()
+    window.edits.refresh()
+    assert window.edits.list.count() == 1
+    assert "A/B" in window.edits.list.item(0).text()
+    window.experiment.end.click()
+    assert not window.experiment.isVisible()
+
+
+def test_a_second_one_is_refused_while_one_goes_on(bench: Bench, window: MainWindow) -> None:
+    begun(bench, window)
+    window.edits.ab.click()
+    window.edits.form.parameter.setCurrentText(NAME)
+    window.edits.form.fields["B"].setText("430")
+    window.edits.form.begin.click()
+    assert "goes on" in window.edits.form.words.text()
+
+
+@pytest.mark.parametrize("is_back", [True, False])
+def test_a_sweep_is_told_with_its_response_and_without_its_parts(
+    bench: Bench, window: MainWindow, is_back: bool
+) -> None:
+    one = swept()
+    assert one.experiment is not None
+    one = replace(one, experiment=replace(one.experiment, is_back=is_back))
+    for write in (7, 8, 9):
+        part = told(write)
+        bench.station.take_evidence(replace(part, edit=replace(part.edit, boot_id=one.edit.boot_id)))
+    bench.station.take_evidence(replace(one, edit=replace(one.edit, id="ffff")))
+    window.tabs.setCurrentIndex(window._views.index(window.edits))
+    window.edits.refresh()
+    assert window.edits.list.count() == 1
+    assert "sweep 2800 … 3200" in window.edits.verdict.text()
+    assert ("NOT CONFIRMED" in window.edits.verdict.text()) is not is_back
+    assert "proposal: 3200" in window.edits.words.text()
+    assert "3200: 0.0041" in window.edits.response.accessibleDescription()
+    window.grab()

@@ -1,0 +1,180 @@
+"""Whatever happens, in whatever order: the original value is back and was read to be, or that is an error."""
+
+from collections.abc import Callable, Mapping
+from typing import Any, Final
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gateway.wire.control import JournalEntries
+from server_gui.core.experiments.machine import ENDS, TABLE, Action, State
+from server_gui.core.experiments.machine import Event as Step
+from server_gui.core.follow.events import Journalled
+from tests.unit.experiments.world import NAME, ORIGINAL, World
+
+HAPPENINGS: Final[Mapping[str, Callable[[World], Any]]] = {
+    "answer": World.carry_out,
+    "a while": lambda world: world.sleep(1.0),
+    "a long while": lambda world: world.sleep(36.0),
+    "the link dies": World.drop,
+    "the link dies between write and answer": World.drop_late,
+    "the link is back": World.link,
+    "the guard warns": World.alarm,
+    "somebody stops": World.stop,
+    "the user says stop": lambda world: world.run.halt("asked for"),
+    "the robot restarts": World.restart,
+    "another desk has the lease": lambda world: setattr(world, "is_taken", True),
+    "nobody walks": lambda world: setattr(world, "is_walking", False),
+    "no telemetry": lambda world: setattr(world, "is_told", False),
+    "nobody watches": lambda world: setattr(world, "is_watched", False),
+}
+
+
+def check(world: World) -> None:
+    """What must hold always."""
+    if world.run.state is State.OVER:
+        assert world.trial is None
+        assert world.value == ORIGINAL
+    if world.run.state is State.NOTHING_DONE:
+        assert not world.wrote
+
+
+@given(st.lists(st.sampled_from(sorted(HAPPENINGS)), max_size=14), st.booleans())
+@settings(max_examples=40, deadline=None)
+def test_in_any_order_the_original_is_back_or_it_is_an_error(orders: list[str], steals: bool) -> None:
+    world = World()
+    world.sleep(2.0)
+    for place, what in enumerate(orders):
+        HAPPENINGS[what](world)
+        check(world)
+        if steals and place == 5:
+            world.steal()
+            break
+    world.settle()
+    assert world.trial is None
+    if world.value == ORIGINAL:
+        assert world.run.state in (State.OVER, State.NOTHING_DONE, State.NOT_CONFIRMED)
+    elif world.wrote and world.run.state is State.OVER:
+        raise AssertionError("another value is held, and nobody has said so")
+
+
+@pytest.mark.parametrize(
+    "state", [State.LOOKING, State.WRITING, State.HOLDING, State.TAKING_BACK, State.READING]
+)
+@pytest.mark.parametrize("what", sorted(HAPPENINGS))
+def test_each_happening_in_each_state_ends_well(state: State, what: str) -> None:
+    world = World()
+    if state is not State.LOOKING:
+        world.until(State.WRITING if state is State.WRITING else State.HOLDING)
+    if state in (State.TAKING_BACK, State.READING):
+        world.run.halt("asked for")
+    if state is State.READING:
+        world.carry_out()
+    assert world.run.state is state
+    HAPPENINGS[what](world)
+    check(world)
+    world.settle()
+    check(world)
+    assert world.run.is_over
+    assert world.run.state is not State.NOT_CONFIRMED or what in ("a long while", "no telemetry")
+
+
+def test_all_goes_well() -> None:
+    world = World()
+    world.settle()
+    assert world.run.is_whole
+    assert world.wrote == [0.4, 0.42, 0.44]
+    assert [period.cycles for period, _ in world.run.periods] == [3, 3, 3]
+    assert world.run.transients == 3
+
+
+@pytest.mark.parametrize(
+    ("what", "why"),
+    [
+        ("the guard warns", "too far"),
+        ("somebody stops", "STOP"),
+        ("nobody walks", "does not walk any more"),
+        ("no telemetry", "no telemetry for 2 s"),
+        ("nobody watches", "nobody watches"),
+        ("the robot restarts", "started anew"),
+        ("another desk has the lease", "another desk has control"),
+        ("the user says stop", "asked for"),
+    ],
+)
+def test_each_rule_ends_it_at_once_with_its_reason(what: str, why: str) -> None:
+    world = World()
+    world.until(State.HOLDING)
+    HAPPENINGS[what](world)
+    wrote = len(world.wrote)
+    world.sleep(7.0)
+    world.settle()
+    assert why in world.run.why
+    assert len(world.wrote) <= wrote + (what in ("another desk has the lease", "nobody watches"))
+    assert world.run.state is State.OVER
+
+
+def test_what_another_master_has_written_is_never_called_back() -> None:
+    world = World()
+    world.until(State.HOLDING)
+    world.sleep(0.5)
+    world.steal()
+    world.settle()
+    assert world.run.state is State.NOT_CONFIRMED
+    assert "somebody else has written it" in world.run.why
+    assert f"{NAME} = 0.55" in world.run.back
+
+
+def test_a_robot_that_never_answers_again_is_not_confirmed() -> None:
+    world = World()
+    world.until(State.HOLDING)
+    world.drop()
+    world.run.halt("asked for")
+    world.sleep(120.0)
+    assert world.run.state is State.NOT_CONFIRMED
+
+
+def test_a_value_that_has_changed_meanwhile_begins_nothing() -> None:
+    world = World()
+    world.value = 0.43
+    world.settle()
+    assert world.run.state is State.NOTHING_DONE
+    assert "begin anew" in world.run.why
+    assert not world.wrote
+
+
+def test_from_every_state_there_is_a_way_out_and_nothing_is_written_on_it() -> None:
+    for state in State:
+        told = {step: after for (before, step), after in TABLE.items() if before is state}
+        if state in ENDS:
+            assert set(told) <= {Step.WRITTEN}
+            continue
+        assert Step.LATE in told
+        for step in (Step.HALT, Step.LATE, Step.REFUSED, Step.UNSURE):
+            if step in told:
+                assert told[step][1] is not Action.WRITE
+
+
+@pytest.mark.parametrize(
+    ("entry", "why"),
+    [
+        (
+            {"n": 7, "who": "guard", "what": "alarm", "about": "tilt", "reason": "too far"},
+            "the guard: alarm, too far",
+        ),
+        (
+            {"n": 7, "who": "anna", "what": "write", "after": {"gait.cycle_time": 1.1}},
+            "a write of another: anna",
+        ),
+        ({"n": 7, "who": "anna", "what": "write", "after": {NAME: 0.42}, "trial_s": 30.0}, ""),
+        ({"n": 7, "who": "anna", "what": "trial begun", "after": {NAME: 0.42}}, ""),
+        ({"n": 7, "who": "gateway", "what": "taken back"}, "taken the trial back"),
+        ({"n": 7, "who": "anna", "what": "stop", "monotonic_ns": 1}, ""),  # long ago
+    ],
+)
+def test_the_journal_ends_it_by_what_others_do_now(entry: dict[str, Any], why: str) -> None:
+    world = World()
+    world.until(State.HOLDING)
+    world.run.take(Journalled(JournalEntries([entry])))
+    assert why in (world.run.watch.why or "")
+    assert bool(world.run.watch.why) is bool(why)
