@@ -20,8 +20,8 @@ from gateway.cli.text import say, say_json, warn
 from gateway.commission.bench import CanBench
 from gateway.commission.dialogue import At, Talk, agree, run
 from gateway.commission.draft import Draft, alone
-from gateway.commission.homing import NotStopped
 from gateway.commission.keeping import journal, put
+from gateway.commission.powered_run import NotStopped
 from gateway.commission.progress import Progress
 from gateway.commission.serial_bench import SerialPorts
 from gateway.commission.steps import commission
