@@ -183,11 +183,11 @@ class PoweredRun:
         led = self._asked(self._power.drive.look)
         return None if led is None else led.state
 
-    def _asked(self, ask: "Callable[[], Future[T]]") -> T | None:
+    def _asked(self, ask: "Callable[[], Future[T]]", within_s: float = RESET_S + STOP_S) -> T | None:
         """Its answer; `None` where there is none in time. Our heartbeat goes on meanwhile."""
         try:
             future = ask()
-            until = time.monotonic() + RESET_S + STOP_S
+            until = time.monotonic() + within_s
             while not future.done() and time.monotonic() < until:
                 self._power.heartbeat.feed()
                 concurrent.futures.wait([future], TICK_S)
