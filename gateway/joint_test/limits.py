@@ -90,8 +90,12 @@ def limits(
         raise NotAllowed(
             f"its target would move at {math.degrees(fastest):.3g}°/s, its limit is {math.degrees(speed):.3g}°/s"
         )
-    most = min(drive.torque, *_levels(rules, joint, "torque"), drive.rated_torque)
-    torque = most if asked.torque is None else _least("torque", "N·m", asked.torque, most, ())
+    most = min((drive.torque, *_levels(rules, joint, "torque")))
+    torque = (
+        min(drive.rated_torque, most)
+        if asked.torque is None
+        else _least("torque", "N·m", asked.torque, most, ())
+    )
     if wish.kind is Kind.RELAY and wish.torque > torque / 2:
         raise NotAllowed(
             f"a relay of {wish.torque:g} N·m needs room for the load's torque: its limit, {torque:.3g} N·m, "

@@ -12,6 +12,7 @@ from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from drivers.bus.cycles import next_due
 from drivers.bus.master import SYNC
 from drivers.bus.sdo.channel import SdoChannel
 from drivers.bus.sender import always
@@ -21,6 +22,7 @@ from drivers.joint.homing import MODE
 from drivers.joint.quantities import AXIS_OFFSET
 from drivers.joint.scaling import scalings
 from drivers.samples import Sample
+from drivers.urgency import make_urgent
 from gateway.commission.power import Power
 from gateway.commission.powered_run import Ended, PoweredRun
 from gateway.joint_test import parameters
@@ -144,6 +146,7 @@ class TestRun(PoweredRun):
         self._wait(self._power.drive.ask(lambda axis: axis.write(MODE, bytes([mode]))))
 
     def _act(self) -> None:
+        make_urgent()
         began = time.monotonic()
         self._start = self._hold()
         self.said = f"{self._plan.wish.kind} test"
@@ -160,7 +163,7 @@ class TestRun(PoweredRun):
                 target = targets.send(seen.position - self._start)
             except StopIteration:
                 return
-            due += self._plan.period_s
+            due = next_due(due, self._plan.period_s, time.monotonic())
 
     def _hold(self) -> float:
         """Let it stand where it is; returns where that is. A joint that moves then is not begun with."""
