@@ -1,4 +1,4 @@
-"""`gwrms joint-test step|chirp|friction|relay`: one joint is moved on a bench, and what it does is recorded."""
+"""`gwrms joint-test step`, `chirp`, `friction`, `relay`: one joint is moved on a bench, and recorded."""
 
 import argparse
 import datetime
@@ -34,8 +34,8 @@ example
 
 The joint is free on a bench, everybody is off the robot, the hardware emergency stop in your hand. It gets
 power when its phrase is typed, and not before. Enter, Ctrl-C, SIGTERM, a closed terminal, and in another
-terminal gwrms joint-test stop ROBOT.toml:JOINT end the motion; every end disables the drive, as its statusword
-confirms. It is software, not a safety-rated emergency stop.
+terminal gwrms joint-test stop ROBOT.toml:JOINT end the motion; every end disables the drive, as its
+statusword confirms. It is software, not a safety-rated emergency stop.
 
 exit status
   0 recorded to its end, 1 not, 2 usage
@@ -103,8 +103,8 @@ def _parser(test: str) -> argparse.ArgumentParser:
 def _motion(parser: argparse.ArgumentParser, kind: Kind) -> None:
     """How it moves; the defaults are gentle ones."""
     usual = {
-        Kind.STEP: (1.0, 20.0),
-        Kind.CHIRP: (1.0, 20.0),
+        Kind.STEP: (1.0, 10.0),
+        Kind.CHIRP: (1.0, 15.0),
         Kind.FRICTION: (10.0, 20.0),
         Kind.RELAY: (5.0, 90.0),
     }
@@ -201,14 +201,14 @@ def _load(file: Path, joint: str) -> RobotConfig:
 
 @contextmanager
 def _records(config: RobotConfig) -> Iterator[Records]:
-    """The robot's records, for this command alone: no gateway runs meanwhile, and none is to act when one starts."""
+    """The robot's records, for this command alone: no gateway runs meanwhile, and none has left something."""
     records = Records(config.records)
     try:
         if records.unusable is not None:
             raise SettingsError(f"{records.unusable}; a test is nothing that goes without a record")
         if records.folder.unfinished:
             raise SettingsError(
-                "a stop is held, or a write is still to be taken back: start the gateway, and gwrms reset, first"
+                "a stop is held, or a write is to be taken back: start the gateway, and gwrms reset, first"
             )
         yield records
     finally:

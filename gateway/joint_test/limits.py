@@ -1,4 +1,4 @@
-"""How far, how fast and how hard a joint may be moved: the narrowest of what the robot's file and drive allow."""
+"""How far, how fast and how hard a joint may be moved: the narrowest of what file and drive allow."""
 
 import fnmatch
 import math
@@ -11,7 +11,7 @@ from gateway.joint_test.motion import MOST_SHARE, Kind, Wish, planned
 MOST_SPEED = math.radians(180.0)  # rad/s, whatever the drive allows
 LAG = math.radians(5.0)  # that a joint may follow behind
 LATE_S = 0.1  # that a cycle may come after its time: the heartbeat may stay away for 0.25 s
-EXTRA_S = 5.0
+EXTRA_S, SLOWER = 5.0, 1.25  # a cycle that is late moves the others
 OVERSHOOT = 0.5  # of the amplitude, for which there must be room before an end
 
 
@@ -81,14 +81,14 @@ def limits(
     if not low <= angle + first - room or not angle + last + room <= high:
         raise NotAllowed(
             f"from {math.degrees(angle):.1f}° it would go to {math.degrees(angle + first):.1f}° … "
-            f"{math.degrees(angle + last):.1f}°, and may overshoot by {math.degrees(room):.1f}°, which is not "
-            f"within its limits {math.degrees(low):.1f}° … {math.degrees(high):.1f}°: bring it elsewhere by "
+            f"{math.degrees(angle + last):.1f}°, and may overshoot by {math.degrees(room):.1f}°: that is not "
+            f"within its limits {math.degrees(low):.1f}° … {math.degrees(high):.1f}°. Bring it elsewhere by "
             "hand, or ask for less"
         )
     speed = _least("speed", "rad/s", asked.speed, MOST_SPEED, _levels(rules, joint, "velocity"))
     if fastest > speed:
         raise NotAllowed(
-            f"its target would move at {math.degrees(fastest):.3g}°/s, its limit is {math.degrees(speed):.3g}°/s"
+            f"its target would move at {math.degrees(fastest):.3g}°/s, beyond {math.degrees(speed):.3g}°/s"
         )
     most = min((drive.torque, *_levels(rules, joint, "torque")))
     torque = (
@@ -110,7 +110,7 @@ def limits(
         torque=torque,
         current=min(currents, default=None),
         lag=min((LAG, *lags)),
-        time_s=time_s + EXTRA_S,
+        time_s=EXTRA_S + SLOWER * time_s,
         late_s=LATE_S,
     )
 

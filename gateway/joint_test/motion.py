@@ -138,7 +138,8 @@ _MADE = {Kind.STEP: _step, Kind.CHIRP: _chirp, Kind.FRICTION: _friction}
 def _relay(wish: Wish, period_s: float) -> Motion:
     """Torque against where the joint is (Åström and Hägglund, 1984).
 
-    What a cycle lacks in symmetry is the load's, and shifts the middle. It ends after so many cycles, or where nothing oscillates.
+    What a cycle lacks in symmetry is the load's, and shifts the middle. It ends after so many cycles, or
+    where nothing oscillates.
     """
     side, bias, position = 1.0, 0.0, 0.0
     lasted = {1.0: 0.0, -1.0: 0.0}

@@ -275,7 +275,8 @@ class TestRun(PoweredRun):
         speed = max(speed, abs(seen.velocity or 0.0))
         if speed > self._plan.limits.speed:
             raise Ended(
-                f"the joint moves at {math.degrees(speed):.3g}°/s, beyond {math.degrees(self._plan.limits.speed):.3g}°/s"
+                f"the joint moves at {math.degrees(speed):.3g}°/s, beyond its limit of "
+                f"{math.degrees(self._plan.limits.speed):.3g}°/s"
             )
 
     # Afterwards, without power.

@@ -34,7 +34,7 @@ from gateway.config.robot import JointTable, RobotConfig
 from gateway.joint_test import limits as limiting
 from gateway.joint_test import parameters
 from gateway.joint_test.limits import Asked, Drive, Limits, NotAllowed
-from gateway.joint_test.motion import Wish
+from gateway.joint_test.motion import Wish, planned
 from gateway.joint_test.recording import Recording
 from gateway.joint_test.run import NEEDED, POSITION_MODE, READ_S, TORQUE_MODE, Plan, TestRun
 from gateway.joint_test.watching import Guarding
@@ -112,8 +112,8 @@ def tested(bench: Bench, others: Mapping[str, Bench], test: Test) -> Talk[Outcom
 def _may_be_led(test: Test) -> None:
     if test.config.gateway.role is not Role.MASTER:
         raise NotAllowed(
-            'this robot is led by somebody else: only where its file says role = "master" in [gateway], as on a '
-            "bench, may this command lead its bus"
+            'this robot is led by somebody else: only where its file says role = "master" in [gateway], as '
+            "on a bench, may this command lead its bus"
         )
     if test.settings.sdo_cob_ids is not None:
         raise NotAllowed("it is asked by an SDO channel of its own (sdo_cob_ids), which this does not use")
@@ -207,11 +207,12 @@ def _agreed(test: Test, known: Known) -> Talk[bool]:
 def explained(test: Test, known: Known) -> Iterator[str]:
     """What will happen, line by line."""
     limits, wish = known.limits, test.wish
-    low, high, _, time_s = limiting.planned(wish, known.period_s)
+    low, high, _, time_s = planned(wish, known.period_s)
     yield f"What will happen, to the {words(test.joint)} ({test.axis}) alone: a {wish.kind} test"
     yield (
-        f"  it moves, from {math.degrees(known.angle):.1f}°, between {math.degrees(known.angle + low):.1f}° and "
-        f"{math.degrees(known.angle + high):.1f}°, for {time_s:.0f} s, a target each {known.period_s * 1000:g} ms"
+        f"  it moves, from {math.degrees(known.angle):.1f}°, between {math.degrees(known.angle + low):.1f}° "
+        f"and {math.degrees(known.angle + high):.1f}°, for {time_s:.0f} s, a target each "
+        f"{known.period_s * 1000:g} ms"
     )
     yield (
         f"  power is taken beyond {math.degrees(limits.low):.1f}° … {math.degrees(limits.high):.1f}°, "
@@ -220,7 +221,8 @@ def explained(test: Test, known: Known) -> Iterator[str]:
         + f", {math.degrees(limits.lag):.1f}° behind its target, {limits.time_s:.0f} s, a cycle that is "
         f"{limits.late_s * 1000:.0f} ms late, and by any rule of the guard"
     )
-    yield f"  a stop: the drive {option_text(QUICK_STOP_OPTIONS, known.options[TOLD[0]])} (605Ah), and is disabled"
+    on_stop = option_text(QUICK_STOP_OPTIONS, known.options[TOLD[0]])
+    yield f"  a stop: the drive {on_stop} (605Ah), and is disabled"
     on_loss = option_text(ABORT_CONNECTION_OPTIONS, known.options[TOLD[1]])
     yield f"  if this program dies: the drive {on_loss} (6007h), a quarter of a second later"
     yield f"  recorded into {test.file}"
@@ -274,8 +276,8 @@ def _led(
     missing += [] if {"torque", "current"} & reader.synchronous else ["torque or current"]
     if missing:
         raise SettingsError(
-            f"its {' and '.join(missing)} does not come with each SYNC: map it into a TPDO of transmission type 1 "
-            "(gwrms docs how-to/wire-a-joint)"
+            f"its {' and '.join(missing)} does not come with each SYNC: map it into a TPDO of transmission "
+            "type 1 (gwrms docs how-to/wire-a-joint)"
         )
     before = yield from _parameters(power, known)
     if before is None:

@@ -1,12 +1,13 @@
 """The guard's rules, on while one joint is moved: any that trips, or cannot see what it watches, ends that.
 
-No gateway runs beside a test, so the rules of the robot's file are judged here, by the guard's own watchers, in
-the thread that brings what they see. Whatever a rule would do by itself, here it ends the motion.
+No gateway runs beside a test, so the rules of the robot's file are judged here, by the guard's own watchers,
+in the thread that brings what they see. Whatever a rule would do by itself, here it ends the motion.
 """
 
 import threading
 import time
 from collections.abc import Iterator
+from functools import partial
 from typing import Self
 
 from drivers.bus.bus import CanBus
@@ -33,10 +34,7 @@ class Guarding:
         robot = Robot(buses={bus.name: bus}, components={reader.name: reader}, absent=absent)
         now_ns = time.monotonic_ns()
         self._wirings = {
-            name: Wiring(
-                rule, robot, now_ns, lambda watcher, change, name=name: self._changed(name, watcher, change)
-            )  # type: ignore[misc]
-            for name, rule in _rules(config)
+            name: Wiring(rule, robot, now_ns, partial(self._changed, name)) for name, rule in _rules(config)
         }
         self._names = {reader.name, bus.name}
 

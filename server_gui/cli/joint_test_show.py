@@ -10,7 +10,8 @@ from server_gui.core.joint_tests.comparing import Shown, analysed, differences, 
 from server_gui.core.joint_tests.file import NotReadable
 from server_gui.core.joint_tests.measures import Measure
 
-EPILOG: Final = """What could not be measured stands as a dash, with its reason. Proposals are for somebody who decides: nothing
+EPILOG: Final = """\
+What could not be measured stands as a dash, with its reason. Proposals are for somebody who decides: nothing
 writes them. gwrms docs how-to/test-a-joint says how each figure is found.
 
 exit status
@@ -31,7 +32,7 @@ def main(argv: list[str]) -> int:
         "--compare",
         type=Path,
         metavar="FILE",
-        help="with this one (default: the joint's last test beside it)",
+        help="with this one (default: the last one beside it)",
     )
     parser.add_argument("--json", action="store_true", help="all of it, with the curves, as one JSON object")
     options = parser.parse_args(argv)

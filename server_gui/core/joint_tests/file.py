@@ -1,4 +1,4 @@
-"""A test's file: its conditions, its samples, and how it ended (`gateway/joint_test/recording.py` writes it)."""
+"""A test's file: its conditions, its samples, how it ended (`gateway/joint_test/recording.py` writes it)."""
 
 import json
 from collections.abc import Mapping
@@ -64,7 +64,8 @@ class Test:
     def times(self) -> Samples:
         """Seconds since the first SYNC."""
         sync = self.columns["sync_ns"]
-        return (sync - sync[0]) / 1e9
+        seconds: Samples = (sync - sync[0]) / 1e9
+        return seconds
 
     def __getitem__(self, name: str) -> Samples:
         return self.columns[name]

@@ -1,9 +1,9 @@
 """Friction, load and cogging from runs at constant speeds, there and back over the same angles.
 
-At one speed the motor's torque is load + friction one way, and load − friction the other: half their difference
-at the same angle is friction, half their sum is the load (gravity, springs). Friction over speed is a straight
-line, Coulomb + viscous · |speed|. What is left of the slowest runs, by the motor's angle, is cogging. All is
-seen where the drive measures its torque, so that what the gear loses counts as friction.
+At one speed the motor's torque is load + friction one way, and load − friction the other: half their
+difference at the same angle is friction, half their sum is the load (gravity, springs). Friction over speed
+is a straight line, Coulomb + viscous · |speed|. What is left of the slowest runs, by the motor's angle, is
+cogging. All is seen where the drive measures its torque, so that what the gear loses counts as friction.
 """
 
 from collections.abc import Sequence
@@ -20,7 +20,7 @@ from server_gui.core.joint_tests.measures import Curve, Measure, Result, unknown
 EDGES: Final = 0.15  # of a run, at either end, in which it gets up to speed and slows down
 LEAST_SAMPLES: Final = 20  # of a run
 LEAST_LEVELS: Final = 3  # of speed, for a line
-SAME_SPEED: Final = 0.05  # a share by which the speeds of one level differ
+SAME_SPEED: Final = 0.2  # a share by which the speeds of one level may differ
 BINS: Final = 12  # of angle
 ORDERS: Final = 36  # of a motor's turn, that are looked for
 LEAST_TURNS: Final = 1.0  # of the motor
@@ -59,8 +59,8 @@ def friction(test: Test) -> Result:
             *cogging,
         ],
         [
-            Curve("friction", list(speeds[order]), list(losses[order]), "rad/s", "N·m"),
-            Curve("load", list(np.degrees(angles)), list(loads), "°", "N·m"),
+            Curve("friction", speeds[order].tolist(), losses[order].tolist(), "rad/s", "N·m"),
+            Curve("load", np.degrees(angles).tolist(), loads.tolist(), "°", "N·m"),
             *spectrum,
         ],
     )
@@ -117,7 +117,8 @@ def _binned(run: Run, edges: Samples) -> Samples:
     inside = (run.angles >= edges[0]) & (run.angles <= edges[-1]) & (place < BINS)
     count = np.bincount(place[inside], minlength=BINS).astype(np.float64)
     total = np.bincount(place[inside], weights=run.torques[inside], minlength=BINS)
-    return np.divide(total, count, out=np.full(BINS, np.nan), where=count > 0)
+    means: Samples = np.divide(total, count, out=np.full(BINS, np.nan), where=count > 0)
+    return means
 
 
 def _line(speeds: Samples, losses: Samples) -> tuple[Measure, Measure]:
@@ -152,8 +153,8 @@ def _cogging(test: Test, runs: Sequence[Run]) -> tuple[list[Measure], list[Curve
     found = np.linalg.lstsq(matrix, rest, rcond=None)[0]
     sizes = np.hypot(found[: len(orders)], found[len(orders) :])
     strongest = int(np.argmax(sizes))
-    curve = Curve("cogging by order", list(map(float, orders)), list(sizes), "1/turn", "N·m")
-    floor = float(np.median(sizes))
+    curve = Curve("cogging by order", list(map(float, orders)), sizes.tolist(), "1/turn", "N·m")
+    floor = max(float(np.median(sizes)), _resolution(test["torque"]) / SURE)
     if sizes[strongest] < SURE * floor:
         why = f"no order stands out of the noise, {floor:.2g} N·m"
         return [unknown("cogging", "N·m", why), unknown("cogging_order", "", why)], [curve]
@@ -162,6 +163,12 @@ def _cogging(test: Test, runs: Sequence[Run]) -> tuple[list[Measure], list[Curve
         Measure("cogging_order", float(orders[strongest]), "1/turn"),
         Measure("cogging_seen_at", float(orders[strongest]) * gear * slow / (2.0 * np.pi), "Hz"),
     ], [curve]
+
+
+def _resolution(torques: Samples) -> float:
+    """The least that two of the drive's figures differ by."""
+    steps = np.diff(np.unique(np.round(torques, 9)))
+    return float(steps.min()) if len(steps) else 0.0
 
 
 def _flattened(run: Run) -> Samples:

@@ -6,7 +6,7 @@ from msgspec import Struct
 
 
 class Measure(Struct, frozen=True):
-    """One result. `value` is `None` where nobody can tell it, and `why` says so; `spread` is a standard deviation."""
+    """One result; `spread` is a standard deviation. `value` is `None` where nobody can tell it: `why`."""
 
     name: str
     value: float | None

@@ -1,9 +1,10 @@
-"""Relay feedback (Åström and Hägglund, 1984): ultimate gain and period from a limit cycle, and gains by rules.
+"""Relay feedback (Åström and Hägglund, 1984): ultimate gain and period of a limit cycle, and gains by rules.
 
-With a relay of ±d and a swing of ±a the ultimate gain is 4 d / (π √(a² − ε²)), ε its hysteresis. It is that of
-a loop over the bus: the delay of a cycle is in it, so that a loop inside the drive stands more than this.
+With a relay of ±d and a swing of ±a the ultimate gain is 4 d / (π √(a² − ε²)), ε its hysteresis. It is that
+of a loop over the bus: the delay of a cycle is in it, so that a loop inside the drive stands more than this.
 """
 
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -25,11 +26,11 @@ def relay(test: Test) -> Result:
     """Of a relay test."""
     times, target, position = test.times, test["target"], test["position"]
     curves = [
-        Curve("position", list(times), list(np.degrees(position)), "s", "°"),
-        Curve("torque", list(times), list(target), "s", "N·m"),
+        Curve("position", times.tolist(), np.degrees(position).tolist(), "s", "°"),
+        Curve("torque", times.tolist(), target.tolist(), "s", "N·m"),
     ]
     rises = _rises(target)[SKIPPED:]
-    cycles = list(zip(rises, rises[1:], strict=False))
+    cycles = list(pairwise(rises))
     if len(cycles) < LEAST_CYCLES:
         return _none("it did not swing for enough cycles: a larger relay, or more of them", curves)
     periods = np.array([times[b] - times[a] for a, b in cycles])

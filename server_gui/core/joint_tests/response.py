@@ -120,17 +120,15 @@ def _words(margin: float | None) -> list[str]:
     if margin < low:
         return [f"A phase margin below {low:g}° rings: less stiffness, more damping, or less delay."]
     if margin > high:
-        return [
-            f"A phase margin above {high:g}° leaves room for more stiffness, where torque and noise allow."
-        ]
+        return [f"A phase margin above {high:g}° leaves room for more stiffness, if torque allows."]
     return [f"A phase margin between {low:g}° and {high:g}° is usual of servo loops."]
 
 
 def _curves(response: Response, magnitude: Samples) -> list[Curve]:
-    hz = list(response.hz)
+    hz = response.hz.tolist()
     phase = np.degrees(np.unwrap(np.angle(response.closed)))
     return [
-        Curve("magnitude", hz, list(magnitude), "Hz", "dB"),
-        Curve("phase", hz, list(phase), "Hz", "°"),
-        Curve("coherence", hz, list(response.coherence), "Hz", ""),
+        Curve("magnitude", hz, magnitude.tolist(), "Hz", "dB"),
+        Curve("phase", hz, phase.tolist(), "Hz", "°"),
+        Curve("coherence", hz, response.coherence.tolist(), "Hz", ""),
     ]

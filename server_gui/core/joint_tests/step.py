@@ -92,8 +92,8 @@ def _curves(times: Samples, target: Samples, position: Samples) -> list[Curve]:
     begin = int(_bounds(target)[0][0])
     zero = float(position[begin])
     shown = slice(max(0, begin - 20), None)
-    x = list(times[shown] - times[begin])
+    x = (times[shown] - times[begin]).tolist()
     return [
-        Curve("target", x, list(np.degrees(target[shown] - zero)), "s", "°"),
-        Curve("position", x, list(np.degrees(position[shown] - zero)), "s", "°"),
+        Curve("target", x, np.degrees(target[shown] - zero).tolist(), "s", "°"),
+        Curve("position", x, np.degrees(position[shown] - zero).tolist(), "s", "°"),
     ]
