@@ -20,7 +20,7 @@ from gateway.commission.draft import Draft, alone
 from gateway.commission.powered_run import NotStopped, Outcome
 from gateway.config.reading import load
 from gateway.config.robot import RobotConfig
-from gateway.joint_test.limits import Asked, NotAllowed
+from gateway.joint_test.limits import LATE_S, Asked, NotAllowed
 from gateway.joint_test.motion import Kind, Wish
 from gateway.joint_test.talk import Test, tested
 from gateway.records.records import Records
@@ -90,6 +90,13 @@ def _parser(test: str) -> argparse.ArgumentParser:
         type=_number(0.01, 1000),
         metavar="N·m",
         help="power is taken beyond it (default: its rated torque)",
+    )
+    parser.add_argument(
+        "--late",
+        type=_number(20, 200),
+        default=LATE_S * 1000,
+        metavar="MS",
+        help="power is taken where a cycle comes so late (default: %(default)g)",
     )
     parser.add_argument(
         "--out", type=Path, metavar="FOLDER", help=f"of the recording (default: {FOLDER} beside the file)"
@@ -232,6 +239,7 @@ def _lead(
         Asked(
             None if options.max_speed is None else math.radians(options.max_speed),
             options.max_torque,
+            options.late / 1000,
         ),
         folder / f"{config.robot.name}.{joint}.{kind}.{began}.jsonl",
         options.who,

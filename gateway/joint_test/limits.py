@@ -39,6 +39,7 @@ class Asked:
 
     speed: float | None = None  # rad/s
     torque: float | None = None  # N·m
+    late_s: float = LATE_S
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +112,7 @@ def limits(
         current=min(currents, default=None),
         lag=min((LAG, *lags)),
         time_s=EXTRA_S + SLOWER * time_s,
-        late_s=LATE_S,
+        late_s=asked.late_s,
     )
 
 
