@@ -1,4 +1,4 @@
-"""A joint is tested by `gwrms joint-test`; whatever ends that leaves it at rest, without power, and as it was."""
+"""A joint is tested by `gwrms joint-test`; whatever ends that leaves it at rest, without power, as it was."""
 
 import json
 import re
@@ -40,7 +40,17 @@ def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SimulatedRobot]:
 @contextmanager
 def begun(robot: SimulatedRobot, *words: str, config: Path | None = None) -> Iterator[Process]:
     where = f"{config or robot.config}:{KNEE}"
-    command = [sys.executable, "-P", "-m", "gateway.main", "joint-test", words[0], where, *words[1:], "--json"]
+    command = [
+        sys.executable,
+        "-P",
+        "-m",
+        "gateway.main",
+        "joint-test",
+        words[0],
+        where,
+        *words[1:],
+        "--json",
+    ]
     pipe = subprocess.PIPE
     with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, text=True) as process:
         try:
@@ -110,7 +120,9 @@ def recordings(robot: SimulatedRobot) -> list[Path]:
 
 def parameters(robot: SimulatedRobot) -> dict[tuple[int, int], object]:
     drive = robot.exoskeleton.drives[KNEE]
-    return {one.key: one.value for one in drive.dictionary if one.writable and one.key[0] in range(0x6060, 0x6070)}
+    return {
+        one.key: one.value for one in drive.dictionary if one.writable and one.key[0] in range(0x6060, 0x6070)
+    }
 
 
 def test_a_step_is_recorded_shown_and_everything_is_as_before(robot: SimulatedRobot) -> None:
@@ -194,9 +206,12 @@ def test_whatever_ends_it_leaves_the_joint_at_rest_and_without_power(
 
 def test_a_rule_of_the_guard_ends_it(robot: SimulatedRobot) -> None:
     angle = robot.exoskeleton.drives[KNEE].joint.position
-    rule = f'\n[guard.rule.end]\nwatch = "stopping_distance"\non = ["{KNEE}"]\nmin = -2.0\nmax = {angle + 0.02}\n'
+    rule = f'\n[guard.rule.end]\nwatch = "stopping_distance"\non = ["{KNEE}"]\nmin = -2.0\n'
+    rule += f"max = {angle + 0.02}\n"
     config = robot.config.with_name("guarded.toml")
-    config.write_text(robot.config.read_text(encoding="utf-8") + rule + "deceleration = 5.0\n", encoding="utf-8")
+    config.write_text(
+        robot.config.read_text(encoding="utf-8") + rule + "deceleration = 5.0\n", encoding="utf-8"
+    )
     with begun(robot, *LONG, config=config) as process:
         said = list(heard(process))
         assert process.wait() == 1

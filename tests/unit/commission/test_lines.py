@@ -9,8 +9,8 @@ from collections.abc import Callable, Iterator
 import pytest
 
 from drivers.errors import DeviceTimeout
-from gateway.cli.motion_ends import ENDS, Ended, ending
 from gateway.cli.commission_lines import JsonFace, Lines
+from gateway.cli.motion_ends import ENDS, Ended, ending
 from gateway.commission.dialogue import Ask, Reading, number, run
 from tests.support.waiting import WAIT_S, until
 

@@ -56,7 +56,7 @@ def test_without_cogging_none_is_found() -> None:
 
 
 def closed_loop(bench: Bench, hz: "np.typing.NDArray[np.float64]") -> "np.typing.NDArray[np.complex128]":
-    """Of the drive's law and the mechanics, as its manual would have it: linear, in the middle of its speeds."""
+    """Of the drive's law and the mechanics, linear, as its manual would have it."""
     gains = bench.drive.servo.settings.gains[bench.drive.servo.control]
     filter_s, period, step = bench.drive.servo.settings.velocity_filter_s, 0.01, 0.001
     inertia = CONSTANTS.inertia + bench.joint.rotor_inertia
@@ -66,7 +66,7 @@ def closed_loop(bench: Bench, hz: "np.typing.NDArray[np.float64]") -> "np.typing
     lag = current / (z - 1.0 + current)
     plant = lag / (inertia * s**2 + CONSTANTS.viscous_friction * s) * np.exp(-s * step / 2)
     seen = gains.damping * s / (1.0 + filter_s * s)
-    ramp = ((1.0 - np.exp(-s * period)) / (s * period)) ** 2  # to each target in a straight line, in a period
+    ramp = ((1.0 - np.exp(-s * period)) / (s * period)) ** 2  # a straight line a period
     return ramp * plant * (gains.stiffness + gains.damping * s) / (1.0 + plant * (gains.stiffness + seen))
 
 
@@ -96,7 +96,9 @@ def test_a_step_of_a_second_order_is_as_the_textbook_says(damping: float) -> Non
     result = step_response(made(sampled(times, target, position), Wish(Kind.STEP, 0.02, 10.0, repeat=1)))
     overshoot = 100 * math.exp(-math.pi * damping / math.sqrt(1 - damping**2))
     assert value(result, "overshoot") == pytest.approx(overshoot, abs=1.0)
-    rise = (2.16 * damping + 0.60) / (2 * math.pi * 2.0)  # Dorf and Bishop, Modern Control Systems, for 0.3 … 0.8
+    rise = (2.16 * damping + 0.60) / (
+        2 * math.pi * 2.0
+    )  # Dorf and Bishop, Modern Control Systems, for 0.3 … 0.8
     assert value(result, "rise_time") == pytest.approx(rise, rel=0.08)
     settling = 4.0 / (damping * 2 * math.pi * 2.0)
     assert value(result, "settling_2") == pytest.approx(settling, rel=0.3)
@@ -139,7 +141,9 @@ def test_a_joint_that_does_not_move_has_no_step_response() -> None:
 def test_a_relay_finds_the_ultimate_gain_and_period_of_the_joint(damping: float) -> None:
     """Without Coulomb friction; with the delay of a cycle and the way to each target, which are in it."""
     bench = Bench(0.3)
-    bench.joint.constants = JointConstants(coulomb_friction=0.0, viscous_friction=damping, gear_efficiency=1.0)
+    bench.joint.constants = JointConstants(
+        coulomb_friction=0.0, viscous_friction=damping, gear_efficiency=1.0
+    )
     wish = Wish(Kind.RELAY, math.radians(10.0), 1.0, repeat=12, torque=8.0)
     result = relay(recorded(bench, wish))
     inertia = bench.joint.constants.inertia + bench.joint.rotor_inertia

@@ -1,6 +1,5 @@
-"""A test's recording of the simulator's own mechanics, cycle by cycle in simulated time: its truth is known."""
+"""A recording of the simulator's own mechanics, cycle by cycle in simulated time: its truth is known."""
 
-import math
 from pathlib import Path
 
 import numpy as np
@@ -38,7 +37,7 @@ def recorded(bench: Bench, wish: Wish) -> Test:
         torque = round(1000 * servo.torque / RATED_NM) / 1000 * RATED_NM
         aimed = target if by_torque else start + target
         rows.append((now_ns, now_ns, aimed, position, servo.velocity, torque, torque / 8, 0x27))
-        bench.drive._on_sync()  # noqa: SLF001 - as its bus would
+        bench.drive._on_sync()
         try:
             target = targets.send(position - start)
         except StopIteration:
@@ -70,13 +69,11 @@ def made(rows: "np.typing.NDArray[np.float64]", wish: Wish, **head: object) -> T
     return Test(Path("test.jsonl"), Head(**told), columns, Ended(None, True, "switch on disabled"))
 
 
-def sampled(times: "np.typing.NDArray[np.float64]", target: object, position: object) -> "np.typing.NDArray[np.float64]":
+def sampled(
+    times: "np.typing.NDArray[np.float64]", target: object, position: object
+) -> "np.typing.NDArray[np.float64]":
     """Rows of a joint without anything but these two."""
     rows = np.zeros((len(times), len(COLUMNS)))
     rows[:, 0] = rows[:, 1] = times * 1e9
     rows[:, 2], rows[:, 3] = target, position
     return rows
-
-
-def degrees(value: float) -> float:
-    return math.radians(value)
