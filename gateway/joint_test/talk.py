@@ -16,6 +16,7 @@ from typing import Any
 import msgspec
 
 import eds
+from drivers.bus.nmt import NmtState
 from drivers.bus.settings import Role
 from drivers.errors import DriverError, SettingsError, Unavailable
 from drivers.joint.cia402 import ABORT_CONNECTION_OPTIONS, ENERGISED, QUICK_STOP_OPTIONS, option_text
@@ -258,7 +259,7 @@ def _reader(test: Test, power: Power, known: Known) -> Iterator[JointDrive]:
     reader.start()
     try:
         until = time.monotonic() + UP_S
-        while reader.reading is None or power.objection is not None:
+        while reader.reading is None or power.objection is not None or not _operational(power):
             power.foreign.check()
             if time.monotonic() > until:
                 raise Unavailable(power.objection or "the drive did not come up")
@@ -267,6 +268,12 @@ def _reader(test: Test, power: Power, known: Known) -> Iterator[JointDrive]:
         yield reader
     finally:
         reader.stop()
+
+
+def _operational(power: Power) -> bool:
+    """Whether its heartbeat says so; one from before our NMT start may still be under way."""
+    life = power.node.life
+    return life.nmt_state is NmtState.OPERATIONAL or life.timeout_s is None
 
 
 def _led(

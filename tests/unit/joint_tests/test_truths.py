@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from scipy import signal
 
 from gateway.joint_test.motion import Kind, Wish
@@ -55,7 +56,7 @@ def test_without_cogging_none_is_found() -> None:
     assert result.value("cogging") is None
 
 
-def closed_loop(bench: Bench, hz: "np.typing.NDArray[np.float64]") -> "np.typing.NDArray[np.complex128]":
+def closed_loop(bench: Bench, hz: NDArray[np.float64]) -> NDArray[np.complex128]:
     """Of the drive's law and the mechanics, linear, as its manual would have it."""
     gains = bench.drive.servo.settings.gains[bench.drive.servo.control]
     filter_s, period, step = bench.drive.servo.settings.velocity_filter_s, 0.01, 0.001
@@ -67,7 +68,10 @@ def closed_loop(bench: Bench, hz: "np.typing.NDArray[np.float64]") -> "np.typing
     plant = lag / (inertia * s**2 + CONSTANTS.viscous_friction * s) * np.exp(-s * step / 2)
     seen = gains.damping * s / (1.0 + filter_s * s)
     ramp = ((1.0 - np.exp(-s * period)) / (s * period)) ** 2  # a straight line a period
-    return ramp * plant * (gains.stiffness + gains.damping * s) / (1.0 + plant * (gains.stiffness + seen))
+    closed: NDArray[np.complex128] = (
+        ramp * plant * (gains.stiffness + gains.damping * s) / (1.0 + plant * (gains.stiffness + seen))
+    )
+    return closed
 
 
 def test_the_frequency_response_is_that_of_the_law_and_the_mechanics() -> None:

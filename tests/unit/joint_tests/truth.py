@@ -2,7 +2,9 @@
 
 from pathlib import Path
 
+import msgspec
 import numpy as np
+from numpy.typing import NDArray
 
 from gateway.joint_test.motion import Wish, motion
 from server_gui.core.joint_tests.file import FORMAT, Ended, Head, Test
@@ -25,12 +27,13 @@ def recorded(bench: Bench, wish: Wish) -> Test:
     began_ns = bench.clock.now_ns
     for cycle in range(1_000_000):
         bench.clock.run_until(began_ns + cycle * round(PERIOD_S * 1e9))
+        index, counts = 0x607A, (start + target) * COUNTS_PER_RADIAN
         if by_torque:
-            bench.drive.dictionary[0x6071, 0].value = round(target / RATED_NM * 1000)
-            bench.drive.dictionary[0x6071, 0].on_write(0)
-        else:
-            bench.drive.dictionary[0x607A, 0].value = round((start + target) * COUNTS_PER_RADIAN)
-            bench.drive.dictionary[0x607A, 0].on_write(0)
+            index, counts = 0x6071, target / RATED_NM * 1000
+        entry = bench.drive.dictionary[index, 0]
+        entry.value = round(counts)
+        assert entry.on_write is not None
+        entry.on_write(0)
         bench.drive.advance()
         servo, now_ns = bench.drive.servo, bench.clock.now_ns
         position = round(servo.position * COUNTS_PER_RADIAN) / COUNTS_PER_RADIAN
@@ -45,7 +48,7 @@ def recorded(bench: Bench, wish: Wish) -> Test:
     return made(np.array(rows), wish)
 
 
-def made(rows: "np.typing.NDArray[np.float64]", wish: Wish, **head: object) -> Test:
+def made(rows: NDArray[np.float64], wish: Wish, **head: object) -> Test:
     """A recording of these rows, each of `COLUMNS`."""
     told = {
         "format": FORMAT,
@@ -66,12 +69,14 @@ def made(rows: "np.typing.NDArray[np.float64]", wish: Wish, **head: object) -> T
         **head,
     }
     columns = {name: rows[:, at] for at, name in enumerate(COLUMNS)}
-    return Test(Path("test.jsonl"), Head(**told), columns, Ended(None, True, "switch on disabled"))
+    return Test(
+        Path("test.jsonl"), msgspec.convert(told, Head), columns, Ended(None, True, "switch on disabled")
+    )
 
 
 def sampled(
-    times: "np.typing.NDArray[np.float64]", target: object, position: object
-) -> "np.typing.NDArray[np.float64]":
+    times: NDArray[np.float64], target: NDArray[np.float64], position: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Rows of a joint without anything but these two."""
     rows = np.zeros((len(times), len(COLUMNS)))
     rows[:, 0] = rows[:, 1] = times * 1e9
