@@ -212,8 +212,12 @@ def test_a_rule_of_the_guard_ends_it(robot: SimulatedRobot) -> None:
     config.write_text(
         robot.config.read_text(encoding="utf-8") + rule + "deceleration = 5.0\n", encoding="utf-8"
     )
-    with begun(robot, *LONG, config=config) as process:
-        said = list(heard(process))
-        assert process.wait() == 1
-    assert at_rest(robot)
-    assert any("guard rule end" in one.get("say", "") for one in said), said[-3:]
+    for _ in range(TRIES):
+        with begun(robot, *LONG, config=config) as process:
+            said = list(heard(process))
+            assert process.wait() == 1
+        assert at_rest(robot)
+        if any("guard rule end" in one.get("say", "") for one in said):
+            return
+        assert any(word in str(said[-3:]) for word in BUSY), said[-3:]
+    raise AssertionError("this computer is too busy for any test")
