@@ -47,6 +47,10 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "commission": ("gateway.cli.commission:main", "a robot's file found out on the bench, joint by joint"),
     "sensor": ("drivers.cli.sensor:main", "what is on a serial port; record, replay and decode it"),
     "calibrate": ("gateway.cli.calibrate:main", "an insole's pressure, an IMU's or a joint's zero"),
+    "joint-test": (
+        "server_gui.cli.joint_test:main",
+        "a joint tested on a bench: step, chirp, friction, relay",
+    ),
     "collect": ("server_gui.cli.collect:main", "record every robot into the store, without a window"),
     "sessions": (
         "server_gui.cli.sessions:main",

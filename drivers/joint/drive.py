@@ -101,6 +101,14 @@ class JointDrive(PowerDrive):
         self.node.detach(self)
         self.forget()
 
+    @property
+    def synchronous(self) -> frozenset[str]:
+        """The quantities that come by PDO with every SYNC, as it said when it came up."""
+        plan = self._plan
+        decoders = () if plan is None else plan.decoders
+        every = [decoder for tpdo, decoder in decoders if tpdo.transmission_type == 1]
+        return frozenset(self.channels[index].quantity for decoder in every for index in decoder.channels)
+
     def compare_with(self, other: "JointDrive") -> None:
         """Judge it against the same joint of the other leg too."""
         self._watch.compare_with(other.latest)

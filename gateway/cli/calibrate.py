@@ -30,7 +30,7 @@ def main(argv: list[str]) -> int:
     if argv[:1] != ["joint"]:
         return sensors.main(argv)
     options = _parser().parse_args(argv[1:])
-    file, joint = _named(options.joint)
+    file, joint = named_joint(options.joint)
     with alone(file):
         config = load(file)
         if joint not in config.joint:
@@ -75,7 +75,7 @@ def _degrees(low: float, high: float) -> Callable[[str], float]:
     return degrees
 
 
-def _named(where: str) -> tuple[Path, str]:
+def named_joint(where: str) -> tuple[Path, str]:
     file, colon, joint = where.rpartition(":")
     if not (colon and file.endswith(".toml")):
         raise SettingsError(f"{where!r} names no joint of a robot's file: ROBOT.toml:left_knee")
@@ -87,7 +87,7 @@ def _lead(config: RobotConfig, joint: str, options: argparse.Namespace) -> int:
     face, bench = Terminal(), CanBench(settings.bus, config.can[settings.bus])
     degrees = options.angle if options.angle is not None else posture(comment_of(text, f"joint.{joint}", KEY))
     try:
-        _alone_on(config.can[settings.bus], settings)
+        alone_on(config.can[settings.bus], settings)
         zero = run(repeated(bench, joint, settings, degrees, options.max_change), face)
         if zero is None:
             face.say("Nothing is written.")
@@ -108,7 +108,7 @@ def _text(file: Path) -> str:
     return file.read_bytes().decode()
 
 
-def _alone_on(bus: CanSettings, settings: JointTable) -> None:
+def alone_on(bus: CanSettings, settings: JointTable) -> None:
     """Two who ask one node by SDO take each other's answers. Raises `DriverError`."""
     if settings.sdo_cob_ids is not None:
         raise SettingsError("it is asked by an SDO channel of its own (sdo_cob_ids), which this does not use")

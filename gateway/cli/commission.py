@@ -2,30 +2,27 @@
 
 import argparse
 import datetime
-import signal
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from pathlib import Path
-from types import FrameType
 
 import msgspec
 
 from drivers.bus.settings import CanSettings
 from drivers.cli.buses import named
-from drivers.errors import DriverError, SettingsError
+from drivers.errors import SettingsError
 from drivers.scan.products import Library, files
 from gateway.cli.commission_faces import Terminal
 from gateway.cli.commission_lines import JsonFace, Lines, stdin
-from gateway.cli.text import say, say_json, warn
+from gateway.cli.motion_ends import Ended, ending, stop_drives
+from gateway.cli.text import warn
 from gateway.commission.bench import CanBench
 from gateway.commission.dialogue import At, Talk, agree, run
 from gateway.commission.draft import Draft, alone
-from gateway.commission.homing import NotStopped
 from gateway.commission.keeping import journal, put
+from gateway.commission.powered_run import NotStopped
 from gateway.commission.progress import Progress
 from gateway.commission.serial_bench import SerialPorts
 from gateway.commission.steps import commission
-from gateway.commission.stopping import Stopped, stop
 from gateway.commission.writing import Written, text, unfinished
 from gateway.user_name import user_name
 
@@ -45,8 +42,6 @@ exit status
   0 written, 1 not (interrupted, or something failed), 2 usage
 """
 
-ENDS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-
 
 def main(argv: list[str]) -> int:
     """Run `gwrms commission`."""
@@ -54,11 +49,11 @@ def main(argv: list[str]) -> int:
     options = parser.parse_args(argv)
     name, settings = _the_bus(options.bus, options.bitrate)
     if options.stop:
-        return _stop(_known_to(options.file), CanBench(name, settings), as_json=options.json)
+        return stop_drives(_known_to(options.file), CanBench(name, settings), as_json=options.json)
     missing = [str(folder) for folder in options.eds if not folder.is_dir()]
     if missing:
         parser.error(f"--eds {', '.join(missing)}: there is no such folder")
-    with alone(options.file), _ending(), ExitStack() as ends:
+    with alone(options.file), ending(), ExitStack() as ends:
         draft = Draft(options.file)
         bench = CanBench(name, settings)
         ends.callback(bench.close)
@@ -92,7 +87,7 @@ def _lead(
         return _left(draft, "nobody answers any more", 1)
     except Ended as end:
         if lines is not None and lines.stop_asked:
-            return _stop(draft, bench, as_json=True)
+            return stop_drives(draft, bench, as_json=True)
         return _left(draft, "interrupted", end.status)
     except OSError as error:
         warn("commission", f"{error}; {draft.path} has what was found until then")
@@ -114,58 +109,12 @@ def _known_to(file: Path) -> Draft:
 def _not_stopped(draft: Draft, bench: CanBench, why: str, lines: Lines | None) -> int:
     """A drive that was under power has not confirmed that it is off: it is asked once more."""
     warn("commission", f"NOT STOPPED: {why}")
-    return _stop(draft, bench, as_json=lines is not None) or 1
+    return stop_drives(draft, bench, as_json=lines is not None) or 1
 
 
 def _left(draft: Draft, why: str, status: int) -> int:
     warn("commission", f"{why}; {draft.path} has what was found, go on with the same command")
     return status
-
-
-def _stop(draft: Draft, bench: CanBench, *, as_json: bool) -> int:
-    """Quick stop to every drive that is known; nothing but SIGKILL keeps it from its end."""
-    for number in ENDS:
-        signal.signal(number, signal.SIG_IGN)
-    try:
-        stopped = stop(bench, draft)
-    except DriverError as error:
-        stopped = Stopped({}, str(error))
-    finally:
-        bench.close()
-    if as_json:
-        told = {"confirmed": stopped.confirmed, "drives": stopped.drives, "words": stopped.words}
-        say_json({"stopped": told})
-    else:
-        say(stopped.words + "\n")
-    return 0 if stopped.confirmed else 1
-
-
-class Ended(KeyboardInterrupt):
-    """Ctrl-C, SIGTERM or a terminal that is gone: the dialogue is closed, which ends what it has begun."""
-
-    def __init__(self, number: int) -> None:
-        super().__init__()
-        self.status = 128 + number
-
-
-@contextmanager
-def _ending() -> Iterator[None]:
-    """While inside, the first of `ENDS` raises `Ended` in whatever the dialogue does.
-
-    The others change nothing: what ends and confirms a motion is not itself interrupted, and has its time.
-    """
-    before = {number: signal.signal(number, _end) for number in ENDS}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-
-
-def _end(number: int, _frame: FrameType | None) -> None:
-    for one in ENDS:
-        signal.signal(one, signal.SIG_IGN)
-    raise Ended(number)
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -5,6 +5,7 @@ They are commanded by a homing alone, for which one of them is put under power (
 
 import threading
 import time
+from collections.abc import Collection
 from contextlib import AbstractContextManager
 from typing import Protocol
 
@@ -52,7 +53,9 @@ class Bench(Protocol):
         """
         ...
 
-    def power(self, joint: JointSettings, description: Description) -> AbstractContextManager[Power]:
+    def power(
+        self, joint: JointSettings, description: Description, others: Collection[int] = ()
+    ) -> AbstractContextManager[Power]:
         """The axis as it may be put under power; entering raises `DriverError` where it must not be."""
         ...
 
@@ -104,13 +107,16 @@ class CanBench:
         channel.download(STORE, ALL, SAVE, STORE_S)
         return f"{done}; stored (1010h)"
 
-    def power(self, joint: JointSettings, description: Description) -> AbstractContextManager[Power]:
+    def power(
+        self, joint: JointSettings, description: Description, others: Collection[int] = ()
+    ) -> AbstractContextManager[Power]:
         self.close()  # it is opened as its master
-        return opened(self._bus.name, self._as_master(), joint, description, threading.Event().wait)
+        wait = threading.Event().wait
+        return opened(self._bus.name, self._as_master(others), joint, description, wait, others)
 
-    def _as_master(self) -> CanSettings:
+    def _as_master(self, others: Collection[int]) -> CanSettings:
         """With a node id of our own that nobody has, and no cycles."""
-        taken = {*self._nodes, self._settings.node_id}
+        taken = {*self._nodes, *others, self._settings.node_id}
         ours = self._settings.node_id or next(node for node in range(127, 0, -1) if node not in taken)
         return msgspec.structs.replace(self._settings, node_id=ours, sync_period_s=None, heartbeat_s=None)
 

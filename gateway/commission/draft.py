@@ -50,7 +50,9 @@ def alone(file: Path) -> Iterator[None]:
             if not os.path.samestat(os.fstat(lock.fileno()), path.stat()):
                 raise FileNotFoundError  # who had it has just removed it: somebody may hold another one
         except (BlockingIOError, FileNotFoundError) as error:
-            raise SettingsError(f"{file}: another gwrms commission is at it; end that first") from error
+            raise SettingsError(
+                f"{file}: another gwrms commission, or joint-test, is at it: end that first"
+            ) from error
         try:
             yield
         finally:

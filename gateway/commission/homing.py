@@ -30,17 +30,14 @@ from gateway.commission.homing_plan import (
     refusal,
     told,
 )
-from gateway.commission.homing_run import HomingRun, Outcome, Plan
+from gateway.commission.homing_run import HomingRun, Plan
 from gateway.commission.joints import ENDS, held, table, words
 from gateway.commission.nodes import table as node_table
+from gateway.commission.powered_run import NotStopped, Outcome
 from gateway.commission.scale import Scale
 
 NO = "no"
 LASTING = "an encoder that is not absolute forgets it with its power: home it again then"
-
-
-class NotStopped(Exception):
-    """A drive has not confirmed that it is disabled."""
 
 
 def homing(draft: Draft, bench: Bench, joint: str, axis: Axis, scale: Scale) -> Talk[None]:

@@ -5,7 +5,7 @@ stops by itself when this program dies, is suspended, or stands still (`drivers/
 """
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 
 from drivers.bus.arming import Arming
@@ -32,13 +32,14 @@ _NODES = range(1, 128)
 class Foreign:
     """Hears whether somebody else leads the bus, or speaks to its nodes."""
 
-    def __init__(self, bus: CanBus, node_id: int) -> None:
+    def __init__(self, bus: CanBus, node_id: int, others: Collection[int] = ()) -> None:
+        """`others` are further nodes that nobody may lead meanwhile."""
         self.words: str | None = None  # what was heard
         for can_id, words in {
             NMT_COMMAND: "NMT commands",
             SYNC: "SYNC",
             **{SDO_REQUEST + node: f"SDO requests to node {node}" for node in _NODES},
-            **{base + node_id: f"process data to node {node_id}" for base in _RPDOS},
+            **{base + node: f"process data to node {node}" for node in {node_id, *others} for base in _RPDOS},
         }.items():
             bus.subscribe(can_id, self._noting(words))
 
@@ -57,9 +58,11 @@ class Foreign:
 class Power:
     """An axis that may be put under power, between `opened` and its end."""
 
-    def __init__(self, bus: CanBus, settings: JointSettings, description: Description) -> None:
+    def __init__(
+        self, bus: CanBus, settings: JointSettings, description: Description, others: Collection[int] = ()
+    ) -> None:
         self.bus = bus
-        self.foreign = Foreign(bus, settings.node_id)
+        self.foreign = Foreign(bus, settings.node_id, others)
         self.node = shared_node(bus, settings.node_id, description, settings)
         self.drive = PowerDrive(self.node, settings)
         self.heartbeat = Heartbeat(bus, HEARTBEAT_S)
@@ -111,9 +114,13 @@ def opened(
     joint: JointSettings,
     description: Description,
     wait: Callable[[float], object],
+    others: Collection[int] = (),
 ) -> Iterator[Power]:
-    """The axis, with the bus opened as its master; raises `DriverError` where it must not be."""
-    power = Power(CanBus(name, settings, Role.MASTER), joint, description)
+    """The axis, with the bus opened as its master; raises `DriverError` where it must not be.
+
+    `others` are the nodes of further drives, which nobody may lead meanwhile.
+    """
+    power = Power(CanBus(name, settings, Role.MASTER), joint, description, others)
     try:
         power.open(wait)
         yield power

@@ -32,6 +32,7 @@ _shtab_gwrms_commands() {
     get:'Read parameters from the devices, now.'
     gui:'The window: robots live, their parameters changed safely, STOP always in sight.'
     install-service:'Writes systemd units for the gateway of CONFIG.'
+    joint-test:'a joint tested on a bench: step, chirp, friction, relay'
     journal:'who did what to the robot; is the record whole'
     keys:'on the robot: who is let in, and as what'
     label:'What robot and wearer did in a recorded session.'
@@ -95,6 +96,18 @@ _shtab_gwrms_edits_commands() {
     show:'Everything that is known of one edit.'
   )
   _describe 'gwrms edits commands' _commands
+}
+
+_shtab_gwrms_joint_test_commands() {
+  local _commands=(
+    chirp:'chirp: a sine that gets faster: bandwidth, phase margin.'
+    friction:'friction: at constant speeds both ways: Coulomb and viscous friction, load, cogging.'
+    relay:'relay: torque against where it is: ultimate gain and period.'
+    show:'What a test of a joint has measured.'
+    step:'step: there and back some times: rise, overshoot, settling.'
+    stop:'stop: ask nothing: quick stop to every drive of the robot'"'"'s file.'
+  )
+  _describe 'gwrms joint-test commands' _commands
 }
 
 _shtab_gwrms_journal_commands() {
@@ -616,6 +629,102 @@ _shtab_gwrms_install_service_options=(
 
 # guard to ensure default positional specs are added only once per session
 _shtab_gwrms_install_service_defaults_added=0
+
+_shtab_gwrms_joint_test_options=(
+  "(- : *)"{-h,--help}"[show this help message and exit]"
+)
+
+# guard to ensure default positional specs are added only once per session
+_shtab_gwrms_joint_test_defaults_added=0
+
+_shtab_gwrms_joint_test_chirp_options=(
+  "(- : *)"{-h,--help}"[show this help message and exit]"
+  "--json[questions and answers as JSON lines, as of gwrms commission]"
+  "--amplitude[how far it moves (default\: 1)]:°:"
+  "--speed[of its target, at most (default\: 15)]:°/S:"
+  "--from[Hz, where it begins (default\: 0.2)]:N:"
+  "--to[Hz, where it ends (default\: 15)]:N:"
+  "--seconds[how long it takes (default\: 30)]:N:"
+  "--max-speed[power is taken beyond it (default\: 180)]:°/S:"
+  "--max-torque[power is taken beyond it (default\: its rated torque)]:N·m:"
+  "--late[power is taken where a cycle comes so late (default\: 100)]:MS:"
+  "--out[of the recording (default\: joint-tests beside the file)]:FOLDER:_files"
+  "--who[who does it, for the record (default\: your user name)]:who:"
+  ":the joint of a robot\'s file:"
+)
+
+# guard to ensure default positional specs are added only once per session
+_shtab_gwrms_joint_test_chirp_defaults_added=0
+
+_shtab_gwrms_joint_test_friction_options=(
+  "(- : *)"{-h,--help}"[show this help message and exit]"
+  "--json[questions and answers as JSON lines, as of gwrms commission]"
+  "--amplitude[how far it moves (default\: 10)]:°:"
+  "--speed[of its target, at most (default\: 20)]:°/S:"
+  "--max-speed[power is taken beyond it (default\: 180)]:°/S:"
+  "--max-torque[power is taken beyond it (default\: its rated torque)]:N·m:"
+  "--late[power is taken where a cycle comes so late (default\: 100)]:MS:"
+  "--out[of the recording (default\: joint-tests beside the file)]:FOLDER:_files"
+  "--who[who does it, for the record (default\: your user name)]:who:"
+  ":the joint of a robot\'s file:"
+)
+
+# guard to ensure default positional specs are added only once per session
+_shtab_gwrms_joint_test_friction_defaults_added=0
+
+_shtab_gwrms_joint_test_relay_options=(
+  "(- : *)"{-h,--help}"[show this help message and exit]"
+  "--json[questions and answers as JSON lines, as of gwrms commission]"
+  "--amplitude[how far it may swing (default\: 5)]:°:"
+  "--repeat[times (default\: 8)]:repeat:"
+  "--torque[of the relay]:N·m:"
+  "--hysteresis[of the relay, against noise (default\: 0)]:°:"
+  "--max-speed[power is taken beyond it (default\: 180)]:°/S:"
+  "--max-torque[power is taken beyond it (default\: its rated torque)]:N·m:"
+  "--late[power is taken where a cycle comes so late (default\: 100)]:MS:"
+  "--out[of the recording (default\: joint-tests beside the file)]:FOLDER:_files"
+  "--who[who does it, for the record (default\: your user name)]:who:"
+  ":the joint of a robot\'s file:"
+)
+
+# guard to ensure default positional specs are added only once per session
+_shtab_gwrms_joint_test_relay_defaults_added=0
+
+_shtab_gwrms_joint_test_show_options=(
+  "(- : *)"{-h,--help}"[show this help message and exit]"
+  "--compare[with this one (default\: the last one beside it)]:FILE:_files"
+  "--json[all of it, with the curves, as one JSON object]"
+  ":of gwrms joint-test step, chirp, \…:_files"
+)
+
+# guard to ensure default positional specs are added only once per session
+_shtab_gwrms_joint_test_show_defaults_added=0
+
+_shtab_gwrms_joint_test_step_options=(
+  "(- : *)"{-h,--help}"[show this help message and exit]"
+  "--json[questions and answers as JSON lines, as of gwrms commission]"
+  "--amplitude[how far it moves (default\: 1)]:°:"
+  "--speed[of its target, at most (default\: 10)]:°/S:"
+  "--repeat[times (default\: 3)]:repeat:"
+  "--max-speed[power is taken beyond it (default\: 180)]:°/S:"
+  "--max-torque[power is taken beyond it (default\: its rated torque)]:N·m:"
+  "--late[power is taken where a cycle comes so late (default\: 100)]:MS:"
+  "--out[of the recording (default\: joint-tests beside the file)]:FOLDER:_files"
+  "--who[who does it, for the record (default\: your user name)]:who:"
+  ":the joint of a robot\'s file:"
+)
+
+# guard to ensure default positional specs are added only once per session
+_shtab_gwrms_joint_test_step_defaults_added=0
+
+_shtab_gwrms_joint_test_stop_options=(
+  "(- : *)"{-h,--help}"[show this help message and exit]"
+  "--json[questions and answers as JSON lines, as of gwrms commission]"
+  ":the joint of a robot\'s file:"
+)
+
+# guard to ensure default positional specs are added only once per session
+_shtab_gwrms_joint_test_stop_defaults_added=0
 
 _shtab_gwrms_journal_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
@@ -1350,6 +1459,7 @@ _shtab_gwrms() {
         get) _arguments -C -s $_shtab_gwrms_get_options ;;
         gui) _arguments -C -s $_shtab_gwrms_gui_options ;;
         install-service) _arguments -C -s $_shtab_gwrms_install_service_options ;;
+        joint-test) _shtab_gwrms_joint_test ;;
         journal) _shtab_gwrms_journal ;;
         keys) _shtab_gwrms_keys ;;
         label) _arguments -C -s $_shtab_gwrms_label_options ;;
@@ -1459,6 +1569,34 @@ _shtab_gwrms_edits() {
       curcontext="${curcontext%:*:*}:_shtab_gwrms_edits-$line[1]:"
       case $line[1] in
         show) _arguments -C -s $_shtab_gwrms_edits_show_options ;;
+      esac
+  esac
+}
+
+_shtab_gwrms_joint_test() {
+  local context state line curcontext="$curcontext" one_or_more='(*)' remainder='(-)*:' default='*::: :->joint-test'
+
+  # Add default positional/remainder specs only if none exist, and only once per session
+  if (( ! _shtab_gwrms_joint_test_defaults_added )); then
+    if (( ${_shtab_gwrms_joint_test_options[(I)${(q)one_or_more}*]} +          ${_shtab_gwrms_joint_test_options[(I)${(q)remainder}*]} +          ${_shtab_gwrms_joint_test_options[(I)${(q)default}]} == 0 )); then
+      _shtab_gwrms_joint_test_options+=(': :_shtab_gwrms_joint_test_commands' '*::: :->joint-test')
+    fi
+    _shtab_gwrms_joint_test_defaults_added=1
+  fi
+  _arguments -C -s $_shtab_gwrms_joint_test_options
+
+  case $state in
+    joint-test)
+      words=($line[1] "${words[@]}")
+      (( CURRENT += 1 ))
+      curcontext="${curcontext%:*:*}:_shtab_gwrms_joint_test-$line[1]:"
+      case $line[1] in
+        chirp) _arguments -C -s $_shtab_gwrms_joint_test_chirp_options ;;
+        friction) _arguments -C -s $_shtab_gwrms_joint_test_friction_options ;;
+        relay) _arguments -C -s $_shtab_gwrms_joint_test_relay_options ;;
+        show) _arguments -C -s $_shtab_gwrms_joint_test_show_options ;;
+        step) _arguments -C -s $_shtab_gwrms_joint_test_step_options ;;
+        stop) _arguments -C -s $_shtab_gwrms_joint_test_stop_options ;;
       esac
   esac
 }

@@ -28,7 +28,9 @@ class Joint:
 
     `friction_factor` multiplies every friction, as worn or dry bearings do; `creep` is how fast (rad/s) the
     joint gives way without power. Both may be set at any time.
-    `rotor_inertia` (kg·m², through the gear) is the motor's own.
+    `rotor_inertia` (kg·m², through the gear) is the motor's own. On a bench `gravity` is what the limb weighs
+    where it is level (N·m), which hangs down at 0; `cogging` what the motor's teeth do (N·m at the joint),
+    `cogging_cycles` times a turn of the joint. Both are 0 where a wearer stands in the robot.
     """
 
     def __init__(self, constants: JointConstants, position: float = 0.0) -> None:
@@ -40,6 +42,9 @@ class Joint:
         self.friction_factor = 1.0
         self.creep = 0.0
         self.slipped = 0.0
+        self.gravity = 0.0
+        self.cogging = 0.0
+        self.cogging_cycles = 0.0
 
     @property
     def motor_position(self) -> float:
@@ -73,6 +78,8 @@ class Joint:
         constants = self.constants
         position, factor = self.position, self.friction_factor
         push = torque - self.load
+        if self.gravity or self.cogging:
+            push -= self._bench_torque()
         if not constants.low_stop <= position <= constants.high_stop:
             push += self._stop_torque()
         share = STEP_S / (constants.inertia + self.rotor_inertia)
@@ -94,6 +101,10 @@ class Joint:
         holding = self.constants.holding_friction * self.friction_factor
         if self.velocity or abs(self.load) > holding:
             self.step(0.0)
+
+    def _bench_torque(self) -> float:
+        teeth = math.sin(self.cogging_cycles * self.motor_position)
+        return self.gravity * math.sin(self.position) + self.cogging * teeth
 
     def _stop_torque(self) -> float:
         """A stop pushes back and never pulls."""

@@ -62,6 +62,11 @@ NOT_TYPED: Final[Mapping[str, tuple[str, ...]]] = {
     "how-to/record.md": ("root, and systemd",),
     "how-to/release.md": ("a clone to build, and the package index", "a remote that takes the tag"),
     "how-to/run-as-a-service.md": ("root, and systemd",),
+    "how-to/test-a-joint.md": (
+        "a joint on a bench, and an emergency stop",
+        "a recording of that joint",
+        "a phrase that is typed when it is asked for",
+    ),
     "how-to/train.md": ("a wearer who steps for more than a minute, and a model of others",),
     "how-to/wire-a-joint.md": ("root, and a CAN adapter",),
     "how-to/wire-a-sensor.md": ("somebody who loads an insole with known weights",),

@@ -36,6 +36,7 @@ WORDS: Final[Mapping[str, tuple[str, ...]]] = {
     ),
     "models": ("ls", "show", "promote", "rollback", "history", "export"),
     "edits": ("show",),
+    "joint-test": ("step", "chirp", "friction", "relay", "stop", "show"),
     "sim": ("run",),
 }
 ALONE: Final = frozenset({"edits", "sensor", "sim"})  # which are commands without such a word too

@@ -1,6 +1,6 @@
 """A bus of drives that a test bends by hand, switches on, and takes away."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 
@@ -66,7 +66,9 @@ class FakeBench:
     def map(self, node: int, axis: int, description: Description) -> str:
         raise AssertionError(f"nobody agreed to map PDOs of node {node}, axis {axis}, {description.product}")
 
-    def power(self, joint: JointSettings, description: Description) -> AbstractContextManager[Power]:
+    def power(
+        self, joint: JointSettings, description: Description, others: Collection[int] = ()
+    ) -> AbstractContextManager[Power]:
         raise AssertionError(f"nobody agreed to power for node {joint.node_id}, {description.product}")
 
 

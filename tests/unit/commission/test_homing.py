@@ -14,7 +14,8 @@ from gateway.commission.axes import Axis
 from gateway.commission.bench import CanBench
 from gateway.commission.dialogue import run
 from gateway.commission.draft import Draft
-from gateway.commission.homing import NotStopped, homing
+from gateway.commission.homing import homing
+from gateway.commission.powered_run import NotStopped
 from gateway.commission.scale import Scale
 from tests.unit.commission.fake_bench import Hands
 from tests.unit.commission.homing_drive import COMPLETE, FAILED, UNDER_WAY, HomingDrive, encoded

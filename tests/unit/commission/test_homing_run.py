@@ -12,9 +12,10 @@ from drivers.errors import Unavailable
 from drivers.joint import power as drive_power
 from drivers.joint.homing import METHODS, Progress, Setup, offered, progress
 from drivers.joint.settings import JointSettings
-from gateway.commission import homing_run, power
+from gateway.commission import homing_run, power, powered_run
 from gateway.commission.bench import CanBench
-from gateway.commission.homing_run import HomingRun, Outcome, Plan
+from gateway.commission.homing_run import HomingRun, Plan
+from gateway.commission.powered_run import Outcome
 from tests.support.waiting import until
 from tests.unit.commission.homing_drive import ATTAINED, COMPLETE, FAILED, NOT_STARTED, UNDER_WAY, HomingDrive
 from tests.unit.joint.standard import S
@@ -222,7 +223,7 @@ def test_stop_is_followed_at_once_and_the_first_reason_is_told(channel: str) -> 
 def test_who_does_not_say_that_stop_is_in_reach_any_more_has_let_go(
     channel: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(homing_run, "KEEP_S", 0.5)
+    monkeypatch.setattr(powered_run, "KEEP_S", 0.5)
     with HomingDrive(channel, NODE, home=None, step=0) as drive, begun(channel) as run:
         until(lambda: run.done)
         assert run.end().problem == "nobody has STOP in reach any more"
@@ -235,7 +236,7 @@ def test_a_gap_in_which_nobody_had_stop_in_reach_is_not_made_up_for(
     with HomingDrive(channel, NODE, home=None, step=0) as drive, begun(channel) as run:
         until_it_homes(run, drive)
         with monkeypatch.context() as context:
-            context.setattr(homing_run, "KEEP_S", 0.0)  # as after the whole program was suspended
+            context.setattr(powered_run, "KEEP_S", 0.0)  # as after the whole program was suspended
             run.keep()
         assert finished(run).problem == "nobody has STOP in reach any more"
 

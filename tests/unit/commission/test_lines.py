@@ -9,8 +9,8 @@ from collections.abc import Callable, Iterator
 import pytest
 
 from drivers.errors import DeviceTimeout
-from gateway.cli.commission import ENDS, Ended, _ending
 from gateway.cli.commission_lines import JsonFace, Lines
+from gateway.cli.motion_ends import ENDS, Ended, ending
 from gateway.commission.dialogue import Ask, Reading, number, run
 from tests.support.waiting import WAIT_S, until
 
@@ -100,14 +100,14 @@ def stopped_in(pipe: Pipe, lines: Lines, busy: Callable[[Lines], object]) -> Non
 
 @pytest.mark.parametrize("busy", [lambda lines: lines.get(1, None), lambda _: threading.Event().wait(WAIT_S)])
 def test_a_stop_ends_whatever_is_done_and_once(pipe: Pipe, busy: Callable[[Lines], object]) -> None:
-    with _ending(), Lines(pipe.source) as lines:
+    with ending(), Lines(pipe.source) as lines:
         with pytest.raises(Ended):
             stopped_in(pipe, lines, busy)
         assert lines.stop_asked
 
 
 def test_a_second_signal_does_not_end_what_the_first_one_ends() -> None:
-    with _ending():
+    with ending():
         with pytest.raises(Ended):
             signal.raise_signal(signal.SIGINT)
         for number in ENDS:

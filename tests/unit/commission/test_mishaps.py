@@ -252,7 +252,7 @@ def test_a_damaged_draft_is_named_and_not_gone_on_with(tmp_path: Path, left: byt
 def test_a_stop_asks_all_where_the_draft_is_damaged_or_a_folder_is_gone(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, left: bytes
 ) -> None:
-    monkeypatch.setattr("gateway.cli.commission.signal.signal", lambda *_: None)
+    monkeypatch.setattr("gateway.cli.motion_ends.signal.signal", lambda *_: None)
     file = tmp_path / "exo-01.toml"
     file.with_name("exo-01.toml.commission").write_bytes(left)
     with can.Bus(interface="virtual", channel="damaged") as other:
@@ -266,7 +266,7 @@ def test_a_stop_asks_all_where_the_draft_is_damaged_or_a_folder_is_gone(
 def test_a_stop_after_the_file_is_written_asks_its_joints(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("gateway.cli.commission.signal.signal", lambda *_: None)
+    monkeypatch.setattr("gateway.cli.motion_ends.signal.signal", lambda *_: None)
     file = tmp_path / "exo-01.toml"
     file.write_text("[joint.left_knee]\nnode_id = 2\n[joint.right_knee]\nnode_id = 5\naxis = 1\n")
     with can.Bus(interface="virtual", channel="written") as other:

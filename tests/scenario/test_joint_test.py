@@ -1,0 +1,223 @@
+"""A joint is tested by `gwrms joint-test`; whatever ends that leaves it at rest, without power, as it was."""
+
+import json
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from hil_sim.control_socket import ask
+from hil_sim.drive.power_state import ENERGISED
+from hil_sim.exoskeleton import Scenario
+from hil_sim.robot import SimulatedRobot
+from server_gui.core.joint_tests.comparing import analysed
+from server_gui.core.joint_tests.file import read
+from tests.support.waiting import until
+
+KNEE = "left_knee"
+Process = subprocess.Popen[str]
+ROOM = ("--max-torque", "80", "--late", "200")  # for a busy machine
+LONG = ("friction", "--amplitude", "10", *ROOM)
+TRIES = 6  # a machine that is too busy ends a test, as it should
+BUSY = ("busy", "stay away", "beyond the limit", "behind its target", "is missing")
+
+
+@pytest.fixture(scope="module")
+def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SimulatedRobot]:
+    folder = tmp_path_factory.mktemp("joint-test")
+    with SimulatedRobot(folder / "sim", Scenario.STAND, without=["gait"]) as robot:
+        text = robot.config.read_text(encoding="utf-8").replace('role = "observer"', 'role = "master"')
+        robot.config.write_text(text, encoding="utf-8")
+        yield robot
+
+
+@contextmanager
+def begun(robot: SimulatedRobot, *words: str, config: Path | None = None) -> Iterator[Process]:
+    where = f"{config or robot.config}:{KNEE}"
+    command = [
+        sys.executable,
+        "-P",
+        "-m",
+        "gateway.main",
+        "joint-test",
+        words[0],
+        where,
+        *words[1:],
+        "--json",
+    ]
+    pipe = subprocess.PIPE
+    with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, text=True) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
+
+
+def typed(process: Process, text: str) -> None:
+    assert process.stdin is not None
+    process.stdin.write(text + "\n")
+    process.stdin.flush()
+
+
+def heard(process: Process, phrase: str | None = None) -> Iterator[dict[str, Any]]:
+    """What it says; its questions are answered, the last one by its phrase, or by `phrase`."""
+    assert process.stdout is not None
+    for one in map(json.loads, process.stdout):
+        yield one
+        if "ask" in one:
+            found = re.search(r"Type  (.*)  to put", one["ask"])
+            typed(process, "" if found is None else found[1] if phrase is None else phrase)
+
+
+def moves(process: Process) -> bool:
+    """Whether the joint has come on its way; a computer that is too busy for that ends it."""
+    for one in heard(process):
+        degrees = re.search(r"\(([+-][\d.]+)°\)", one.get("moving") or "")
+        if degrees is not None and abs(float(degrees[1])) > 0.3:
+            return True
+        if "tested" in one:
+            assert any(word in one["tested"]["problem"] for word in BUSY), one
+    return False
+
+
+@contextmanager
+def under_way(robot: SimulatedRobot, *words: str) -> Iterator[Process]:
+    """A test that moves the joint."""
+    for _ in range(TRIES):
+        with begun(robot, *words) as process:
+            if moves(process):
+                yield process
+                return
+    raise AssertionError("this computer is too busy for any test")
+
+
+def recorded(robot: SimulatedRobot, *words: str) -> list[dict[str, Any]]:
+    """What a test has said that was recorded to its end."""
+    for _ in range(TRIES):
+        with begun(robot, *words) as process:
+            said = list(heard(process))
+            if process.wait() == 0:
+                return said
+            problem = said[-1].get("tested", {}).get("problem") or str(said[-3:])
+            assert any(word in problem for word in BUSY), said[-3:]
+    raise AssertionError("this computer is too busy for any test")
+
+
+def at_rest(robot: SimulatedRobot) -> bool:
+    drive = robot.exoskeleton.drives[KNEE]
+    return drive.power_state not in ENERGISED and abs(drive.joint.velocity) < 1e-3
+
+
+def recordings(robot: SimulatedRobot) -> list[Path]:
+    return sorted((robot.config.parent / "joint-tests").glob("*.jsonl"), key=lambda one: one.stat().st_mtime)
+
+
+def parameters(robot: SimulatedRobot) -> dict[tuple[int, int], object]:
+    drive = robot.exoskeleton.drives[KNEE]
+    return {
+        one.key: one.value for one in drive.dictionary if one.writable and one.key[0] in range(0x6060, 0x6070)
+    }
+
+
+def test_a_step_is_recorded_shown_and_everything_is_as_before(robot: SimulatedRobot) -> None:
+    before = parameters(robot)
+    said = recorded(robot, "step", "--repeat", "1", *ROOM)
+    assert {"moving": None} in said
+    assert at_rest(robot)
+    assert parameters(robot) == before
+    shown = analysed(recordings(robot)[-1])
+    assert shown.test.problem is None
+    assert shown.test["torque"].size > 200
+    rise = shown.result.value("rise_time")
+    assert rise is not None
+    assert 0.02 < rise < 0.3
+    assert shown.test.head.parameters["0x2030:1"] == 3000
+
+
+def test_without_its_phrase_nothing_gets_power(robot: SimulatedRobot) -> None:
+    with begun(robot, "step") as process:
+        said = list(heard(process, phrase="yes"))
+        assert process.wait() == 1
+    assert {"say": "Nothing gets power."} in said
+    assert not any("moving" in one for one in said)
+
+
+def ends(number: signal.Signals) -> Callable[[SimulatedRobot, Process], None]:
+    return lambda _robot, process: process.send_signal(number)
+
+
+def stop_from_elsewhere(robot: SimulatedRobot, _process: Process) -> None:
+    with begun(robot, "stop") as other:
+        said = list(heard(other))
+    assert any("stopped" in one for one in said)
+
+
+def faults(name: str) -> Callable[[SimulatedRobot, Process], None]:
+    def make(robot: SimulatedRobot, _process: Process) -> None:
+        ask(robot.config.parent, {"fault": name, "on": KNEE, "for_s": 5.0})
+
+    return make
+
+
+def twice(robot: SimulatedRobot, process: Process) -> None:
+    with begun(robot, "step") as other:
+        _, errors = other.communicate(timeout=30)
+        assert other.returncode == 1
+        assert "is at it" in errors
+    typed(process, "")  # the first one goes on, until it is stopped
+
+
+@pytest.mark.parametrize(
+    "event",
+    [
+        pytest.param(ends(signal.SIGKILL), id="killed"),
+        pytest.param(faults("overcurrent"), id="fault"),
+        *(
+            pytest.param(event, marks=pytest.mark.nightly, id=name)
+            for name, event in {
+                "ctrl_c": ends(signal.SIGINT),
+                "terminated": ends(signal.SIGTERM),
+                "hung_up": ends(signal.SIGHUP),
+                "suspended": ends(signal.SIGSTOP),
+                "enter": lambda _robot, process: typed(process, ""),
+                "stop_from_elsewhere": stop_from_elsewhere,
+                "silent": faults("node_lost"),
+                "sto": faults("sto"),
+                "doubled": twice,
+            }.items()
+        ),
+    ],
+)
+def test_whatever_ends_it_leaves_the_joint_at_rest_and_without_power(
+    robot: SimulatedRobot, event: Callable[[SimulatedRobot, Process], None]
+) -> None:
+    with under_way(robot, *LONG) as process:
+        event(robot, process)
+        until(lambda: at_rest(robot))
+    ask(robot.config.parent, {"clear": "all"})
+    assert read(recordings(robot)[-1]).problem is not None, "that it was cut off is known"
+
+
+def test_a_rule_of_the_guard_ends_it(robot: SimulatedRobot) -> None:
+    angle = robot.exoskeleton.drives[KNEE].joint.position
+    rule = f'\n[guard.rule.end]\nwatch = "stopping_distance"\non = ["{KNEE}"]\nmin = -2.0\n'
+    rule += f"max = {angle + 0.02}\n"
+    config = robot.config.with_name("guarded.toml")
+    config.write_text(
+        robot.config.read_text(encoding="utf-8") + rule + "deceleration = 5.0\n", encoding="utf-8"
+    )
+    for _ in range(TRIES):
+        with begun(robot, *LONG, config=config) as process:
+            said = list(heard(process))
+            assert process.wait() == 1
+        assert at_rest(robot)
+        if any("guard rule end" in one.get("say", "") for one in said):
+            return
+        assert any(word in str(said[-3:]) for word in BUSY), said[-3:]
+    raise AssertionError("this computer is too busy for any test")

@@ -1,0 +1,1 @@
+"""What a joint's test measures, against truths."""
