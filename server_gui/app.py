@@ -40,7 +40,8 @@ from server_gui.views.closing import wait_closed
 from server_gui.views.first_run.demo_bar import DemoBar
 from server_gui.views.first_run.opening import Opening
 from server_gui.views.kept import kept_units
-from server_gui.views.main_window import SLOW, MainWindow
+from server_gui.views.main_window import MainWindow
+from server_gui.views.pace import SLOW
 from server_gui.views.stop_keys import StopKeys
 from server_gui.views.theme import Look, Theme
 from server_gui.views.x11_keys import NoX, X11Keys

@@ -1,6 +1,5 @@
 """The robot's computer over time: CPU, memory, who uses them, disk, network, heat; and its processes."""
 
-import time
 from typing import Final
 
 from PySide6.QtCore import QSize
@@ -10,6 +9,7 @@ from PySide6.QtWidgets import QBoxLayout, QGridLayout, QLineEdit, QWidget
 from gateway.wire.resource import ResourceSnapshot
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
+from server_gui.core.follow.moment import now_ns
 from server_gui.core.processing.process_names import told_apart
 from server_gui.core.processing.resource import DEVICES, SERIES
 from server_gui.views.computer import facts, held_back
@@ -103,6 +103,10 @@ class Resources(QWidget):
         self._watch()
         super().hideEvent(event)
 
+    def read_now(self) -> None:
+        """Let the next frame show it anew: what stands above the tab is shown anew then."""
+        self._frame = 0
+
     def refresh(self) -> None:
         """Show how it is now; there is something new once a second."""
         self._frame += 1
@@ -171,7 +175,7 @@ class Resources(QWidget):
 
 
 def _age_s(at_ns: int | None) -> float | None:
-    return None if at_ns is None else (time.monotonic_ns() - at_ns) / 1e9
+    return None if at_ns is None else (now_ns() - at_ns) / 1e9
 
 
 def _is_old(station: Station) -> bool:

@@ -112,6 +112,10 @@ class Signals(QWidget):
         self._restyle()
         theme.changed.connect(self._restyle)
 
+    def read_now(self) -> None:
+        """Let the next frame say also what is read: what stands beside it is said anew then."""
+        self._frame = 0
+
     def refresh(self) -> None:
         """Draw what is chosen; while paused, what was there then."""
         station = self._desk.selected

@@ -1,6 +1,5 @@
 """How a robot's CAN buses are: what is an alarm, what a warning, and who talks how much."""
 
-import time
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
@@ -8,6 +7,7 @@ from typing import Final
 
 from gateway.client import ConnectionState
 from gateway.wire.bus import CLOSED, BusInfo, NodeInfo
+from server_gui.core.follow.moment import now_ns
 from server_gui.core.follow.robot import Robot
 
 ACTIVE: Final = "error active"
@@ -49,7 +49,7 @@ def seen(robot: Robot) -> tuple[BusInfo, ...] | None:
     linked = robot.link.state is ConnectionState.CONNECTED
     if robot.buses is None or robot.buses_at_ns is None or not linked:
         return None
-    old = time.monotonic_ns() - robot.buses_at_ns > OLD_S * 1e9
+    old = now_ns() - robot.buses_at_ns > OLD_S * 1e9
     return None if old else robot.buses
 
 
