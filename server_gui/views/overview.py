@@ -85,14 +85,27 @@ class Overview(QWidget):
         self._grid = QGridLayout(self)
         self._grid.setContentsMargins(6, 6, 6, 6)
         self._grid.setSpacing(6)
-        self._columns = 0
+        self._columns, self._is_plots = 0, False
         self._arrange(len(SHARES))
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        columns = min(max(self.width() // self._theme.px(A_COLUMN), 1), len(SHARES))
+        columns = self._fitting
         if columns != self._columns:
             self._arrange(columns)
+
+    @property
+    def _fitting(self) -> int:
+        """How many cards have room beside each other."""
+        return min(max(self.width() // self._theme.px(A_COLUMN), 1), len(SHARES))
+
+    def show_plots_alone(self, alone: bool) -> None:
+        """Show the first line and the plots, and leave out the rest, for who labels what they show."""
+        if alone is not self._is_plots:
+            self._is_plots = alone
+            for card in (self._status, self._posture, self._pressure, self._joints):
+                card.setVisible(not alone)
+            self._arrange(self._fitting)
 
     def minimumSizeHint(self) -> QSize:
         """As narrow as one column: then it is arranged for less."""
@@ -102,14 +115,15 @@ class Overview(QWidget):
         """The cards beside each other, as many as have room, and the joints below all of them."""
         self._columns, grid = columns, self._grid
         grid.addWidget(self.now, 0, 0, 1, columns)
-        for place, card in enumerate((self._status, self._posture, self._pressure, *self._plots)):
+        cards = [] if self._is_plots else [self._status, self._posture, self._pressure]
+        for place, card in enumerate((*cards, *self._plots)):
             grid.addWidget(card, 1 + place // columns, place % columns)
-        rows = 1 + -(-6 // columns)
+        rows = 1 + -(-(len(cards) + len(self._plots)) // columns)
         grid.addWidget(self._joints, rows, 0, 1, columns)
         for column, share in enumerate(SHARES):
             grid.setColumnStretch(column, share if column < columns else 0)
         for row in range(8):
-            is_plots = (row - 1) * columns >= 3
+            is_plots = (row - 1) * columns >= len(cards)
             grid.setRowStretch(row, 0 if row in (0, rows) or row > rows else 6 if is_plots else 10)
 
     def read_now(self) -> None:

@@ -52,11 +52,14 @@ def test_load_counters_and_who_talks_stand_there(view: BusHealthView, bench: Ben
 
 def test_a_full_bus_is_an_alarm(view: BusHealthView, bench: Bench) -> None:
     show(view, bench, replace(BUS, load_percent=100.0))
-    assert view.said.text().startswith("ALARM: bus main: it is full: 100 % of its time is taken · check: ")
+    assert view.said.text() == "ALARM: bus main: it is full: 100 % of its time is taken"
+    assert view.checks.text().startswith("→ look who sends so much")
+    assert view.checks.isVisible()
     assert view.said.property("tone") == "bad"
     assert view.cards[0]._icon.accessibleName() == "ALARM"
     show(view, bench, BUS)
     assert not view.said.isVisible()
+    assert not view.checks.isVisible()
     assert view.cards[0]._icon.accessibleName() == "ok"
 
 

@@ -35,7 +35,7 @@ IF_ROOM: Final = (FILE, RANGE, DEFAULT, STORED)  # shown while they fit; the cho
 REFUSED: Final = "✕ limit"  # the robot would refuse what is staged
 WRONG: Final = ("✕", REFUSED, "⚠ changed")
 BEGINS: Final = "0123456789+-.,"  # a number
-NAME_PX: Final = 110  # that a name has at least
+NAME_PX: Final = 110  # that a name has at least; whole names where all else has room beside them
 
 
 class NewValue(QStyledItemDelegate):
@@ -90,6 +90,7 @@ class ParameterTree(QTreeView):
         self.setAccessibleName("Parameters")
         self.setObjectName("framed")
         self.setUniformRowHeights(True)
+        self.setTextElideMode(Qt.TextElideMode.ElideMiddle)
         self.setIndentation(theme.px(12))
         self.setEditTriggers(
             QAbstractItemView.EditTrigger.DoubleClicked
@@ -309,7 +310,8 @@ class ParameterTree(QTreeView):
 
     def _show_columns(self) -> None:
         station = self._desk.selected
-        always = sum(self._width(column) for column in (ROBOT, NEW, UNIT, SAID))
+        always = sum(self._width(column) for column in (ROBOT, NEW, UNIT))
+        always += 0 if self.isColumnHidden(SAID) else self._width(SAID)
         room = self.viewport().width() - self._theme.px(NAME_PX) - always
         for column in IF_ROOM:
             wanted = column != FILE or (station is not None and station.file is not None)

@@ -16,11 +16,13 @@ MIDDLE: Final = Qt.TextElideMode.ElideMiddle
 class Wrapped(QLabel):
     """`say` brings the parts: a colour (#rrggbb) each, what is drawn of it, and what it says.
 
-    A part that is wider than this is broken between its words, so that the number at its end is in sight.
+    A part that is wider than this is broken between its words, so that the number at its end is in sight;
+    one that is `named` has it behind a name, which is elided in its middle.
     """
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, *, named: bool = False) -> None:
         super().__init__()
+        self._named = named
         self._parts: tuple[tuple[str, str, str], ...] = ()
         self.setAccessibleName(name)
         self.setTextFormat(Qt.TextFormat.RichText)
@@ -55,5 +57,10 @@ class Wrapped(QLabel):
         if metrics.horizontalAdvance(whole) <= room:
             return rich(whole).replace(" ", "&nbsp;")
         room -= metrics.horizontalAdvance(f"{glyph} ")
+        name, _, number = text.rpartition(" ")
+        if self._named and name:
+            room = max(room - metrics.horizontalAdvance(f" {number}"), 0)
+            short = f"{glyph} {metrics.elidedText(name, MIDDLE, room)} {number}"
+            return rich(short).replace(" ", "&nbsp;")
         words = (metrics.elidedText(word, MIDDLE, room) for word in text.split())
         return f"{rich(glyph)}&nbsp;{rich(' '.join(words))}"

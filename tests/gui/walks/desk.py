@@ -216,4 +216,5 @@ PAGES: Final[tuple[tuple[str, Callable[[Hand], None], str], ...]] = (
     ("Bus", lambda _: None, "main"),
     ("Objects", a_locked_object, "Read all"),
     ("Audit", lambda _: None, "journal"),
+    ("Edits", lambda _: None, "No edit is known yet"),
 )
