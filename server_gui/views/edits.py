@@ -61,6 +61,7 @@ class Edits(QWidget):
         row.addLayout(right, 1)
         self._scale()
         theme.scaled.connect(self._scale)
+        self._choose()
 
     def refresh(self) -> None:
         """Show what is known now."""
@@ -102,6 +103,7 @@ class Edits(QWidget):
     def _choose(self) -> None:
         told = self._drawn = self._chosen
         self._legend.setVisible(bool(told and told.curves))
+        self.list.setVisible(bool(self._shown))  # an empty frame says nothing
         self.verdict.setVisible(told is not None)
         if told is None:
             set_text(self.words, NONE)

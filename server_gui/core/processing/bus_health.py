@@ -188,9 +188,17 @@ def _gathered(nodes: Sequence[NodeInfo]) -> Iterator[tuple[str, str]]:
         for words, check in said:
             same.setdefault((NUMBER.sub("#", words), check), []).append((node, words))
     for (_, check), found in same.items():
-        whole = len(found) == len(nodes) > MANY
-        who = f"all {len(nodes)} nodes" if whole else ", ".join(_who(node) for node, _ in found)
-        yield f"{who}: {_spread([words for _, words in found])}", check
+        yield f"{_whose([node for node, _ in found], nodes)}: {_spread([words for _, words in found])}", check
+
+
+def _whose(found: Sequence[NodeInfo], nodes: Sequence[NodeInfo]) -> str:
+    """Those nodes by their names; many of them by the fewer that are not among them, or by their number."""
+    others = [node for node in nodes if node not in found]
+    if len(found) <= MANY:
+        return ", ".join(map(_who, found))
+    if len(others) > MANY:
+        return f"{', '.join(map(_who, found[:MANY]))} and {len(found) - MANY} more nodes"
+    return f"all nodes but {', '.join(map(_who, others))}" if others else f"all {len(nodes)} nodes"
 
 
 def _spread(texts: Sequence[str]) -> str:

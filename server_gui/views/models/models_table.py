@@ -20,7 +20,7 @@ from server_gui.views.widgets.rows import SORT_ROLE, Filtered, Index, RowsModel,
 TITLES: Final = ("Model", "Serves", "Signed", "Judged", "Age, days", "Right last week", "Learned from")
 NAME, SERVES, SIGNED, JUDGED, AGE, WEEK, FROM = range(len(TITLES))
 NUMBERS: Final = frozenset({JUDGED, AGE})
-NAMES: Final = {NAME: 120, SERVES: 84, SIGNED: 70, WEEK: 90, FROM: 90}  # wide at least, at text of 100 %
+NAMES: Final = {NAME: 190, SERVES: 84, SIGNED: 70, WEEK: 90, FROM: 90}  # wide at least, at text of 100 %
 SPARE: Final = (FROM, AGE, SIGNED)  # left out in this order where there is less room; tips have all
 
 

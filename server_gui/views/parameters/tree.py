@@ -129,8 +129,8 @@ class ParameterTree(QTreeView):
             for name, info in known.items():
                 self._refresh_row(station, name, info)
                 self._refresh_facts(station, name, info, pinned)
-        if (shape, file) != self._fitted:
-            self._fitted = shape, file
+        if (shape, file, self._says) != self._fitted:
+            self._fitted = shape, file, self._says
             self._show_columns()
 
     def show_only(self, words: str, names: Iterable[str] | None) -> None:
@@ -308,8 +308,14 @@ class ParameterTree(QTreeView):
         super().resizeEvent(event)
         self._show_columns()
 
+    @property
+    def _says(self) -> bool:
+        """Whether anything is said beside a value: else that column gives its room to names."""
+        return any(items[SAID].text() for items in self._rows.values())
+
     def _show_columns(self) -> None:
         station = self._desk.selected
+        self.setColumnHidden(SAID, not self._says)
         always = sum(self._width(column) for column in (ROBOT, NEW, UNIT))
         always += 0 if self.isColumnHidden(SAID) else self._width(SAID)
         room = self.viewport().width() - self._theme.px(NAME_PX) - always

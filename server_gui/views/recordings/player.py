@@ -88,7 +88,8 @@ class Player(QWidget):
     def _make_room(self) -> None:
         """While somebody labels, what is labelled is in sight: the plots, beside what it was then."""
         is_low = self.height() < self._theme.px(ALL)
-        self.overview.show_plots_alone(is_low and self.labelling.isChecked())
+        alone = is_low and self.labelling.isChecked()
+        self.overview.show_plots_alone(alone, with_now=self._is_roomy)
 
     def heightForWidth(self, width: int) -> int:
         """As low as it can be: what scrolls it would give the views all that they would like to have."""

@@ -57,6 +57,15 @@ def trial_runs_out(bench: Bench) -> None:
     hand.keep("run-out")
 
 
+def edits(bench: Bench) -> None:
+    """What was tried is listed, with what it did to the walk, or that this is not known yet."""
+    hand = bench.hand
+    hand.click("Edits")
+    hand.sees("step_length", "gait cycle", within_s=AGAIN_S)
+    hand.keep("edits")
+    hand.click("Overview")
+
+
 def pages(bench: Bench) -> None:
     """Each tab that only shows something, with what is done there first."""
     hand = bench.hand
