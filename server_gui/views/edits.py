@@ -3,7 +3,8 @@
 from typing import Final
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QListWidget, QListWidgetItem, QVBoxLayout, QWidget
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QBoxLayout, QGridLayout, QListWidget, QListWidgetItem, QVBoxLayout, QWidget
 
 from gateway.amounts import counted
 from server_gui.core.desk.desk import Desk
@@ -16,7 +17,9 @@ from server_gui.views.widgets.card import set_text, set_tone
 from server_gui.views.widgets.plain import PlainLabel
 from server_gui.views.widgets.stride_curves import StrideCurves
 
-LIST: Final = 280  # wide, at text of 100 %
+LIST: Final = 240  # wide, at text of 100 %
+NARROW, ABOVE = 620, 84  # wide, likewise: then the list is above the strides, and so high
+MOST_PX: Final = 16_777_215  # what Qt takes for no end
 MOST: Final = 8  # metrics that are told one by one
 UNIT: Final = {"position": "rad", "following_error": "rad", "current": "A", "torque": "N·m"}
 TONES: Final = {Word.BETTER: "good", Word.WORSE: "bad", Word.MIXED: "bad"}
@@ -56,9 +59,9 @@ class Edits(QWidget):
         right.addLayout(self._grid, 1)
         right.addWidget(self._legend)
         right.addStretch()
-        row = QHBoxLayout(self)
-        row.addWidget(self.list)
-        row.addLayout(right, 1)
+        self._row = QBoxLayout(QBoxLayout.Direction.LeftToRight, self)
+        self._row.addWidget(self.list)
+        self._row.addLayout(right, 1)
         self._scale()
         theme.scaled.connect(self._scale)
         self._choose()
@@ -128,8 +131,17 @@ class Edits(QWidget):
             self._grid.addWidget(widget, joints.index(joint), DRAWN.index(quantity))
             widget.show_curves(one, self._desk.shown.units.unit(quantity, UNIT[quantity]))
 
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._scale()
+
     def _scale(self) -> None:
-        self.list.setFixedWidth(self._theme.px(LIST))
+        """The list is beside the strides, or above them where there is less room."""
+        px, direction = self._theme.px, QBoxLayout.Direction
+        is_narrow = self.width() < px(NARROW)
+        self._row.setDirection(direction.TopToBottom if is_narrow else direction.LeftToRight)
+        self.list.setMaximumSize(MOST_PX if is_narrow else px(LIST), px(ABOVE) if is_narrow else MOST_PX)
+        self.list.setMinimumWidth(0 if is_narrow else px(LIST))
 
 
 def _line(told: Told) -> str:

@@ -20,7 +20,7 @@ MISSING_PERCENT: Final = 1.0  # of a node's PDOs
 OLD_S: Final = 5.0  # what was seen before is not known now
 FEWER: Final = "look who sends so much, and send fewer PDOs or SYNC less often"
 UNKNOWN: Final = "bus not known"
-MANY: Final = 2  # nodes that are named one by one, also where all of them are meant
+FEW: Final = 2  # nodes that are named one by one, also where all of them are meant
 NUMBER: Final = re.compile(r"(?<![\w.])\d+(?:\.\d+)?(?![\w.])")
 
 
@@ -194,11 +194,13 @@ def _gathered(nodes: Sequence[NodeInfo]) -> Iterator[tuple[str, str]]:
 def _whose(found: Sequence[NodeInfo], nodes: Sequence[NodeInfo]) -> str:
     """Those nodes by their names; many of them by the fewer that are not among them, or by their number."""
     others = [node for node in nodes if node not in found]
-    if len(found) <= MANY:
+    if not others and len(found) > FEW:
+        return f"all {len(nodes)} nodes"
+    if len(found) <= FEW + 1:
         return ", ".join(map(_who, found))
-    if len(others) > MANY:
-        return f"{', '.join(map(_who, found[:MANY]))} and {len(found) - MANY} more nodes"
-    return f"all nodes but {', '.join(map(_who, others))}" if others else f"all {len(nodes)} nodes"
+    if len(others) <= FEW:
+        return f"all nodes but {', '.join(map(_who, others))}"
+    return f"{', '.join(map(_who, found[:FEW]))} and {len(found) - FEW} more nodes"
 
 
 def _spread(texts: Sequence[str]) -> str:

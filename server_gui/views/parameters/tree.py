@@ -110,7 +110,12 @@ class ParameterTree(QTreeView):
         self.addAction(pin)
         self.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
         self._size_columns()
+        self._scale()
         theme.changed.connect(self.refresh)
+        theme.scaled.connect(self._scale)
+
+    def _scale(self) -> None:
+        self.setMinimumHeight(self._theme.px(LOW))  # else what is below leaves no row in sight
 
     def sizeHint(self) -> QSize:
         return QSize(super().sizeHint().width(), self._theme.px(LOW))

@@ -27,13 +27,14 @@ def fit(
 ) -> None:
     """Make columns as wide as what is in them.
 
-    Where that has no room, those of `names` are narrowed as far as to the width given (pixels), then those of
+    Where that has no room, those of `names` are narrowed to the width given (pixels) or their title, those of
     `spare` are left out, the first ones first. What room is left the first of `names` gets.
     """
     header = header_of(view)
     shown = {column for column in range(header.count()) if column not in unwanted}
-    wanted = {one: max(view.sizeHintForColumn(one), header.sectionSizeHint(one)) for one in shown}
-    least = {one: min(width, names.get(one, width)) for one, width in wanted.items()}
+    titles = {one: header.sectionSizeHint(one) for one in shown}
+    wanted = {one: max(view.sizeHintForColumn(one), titles[one]) for one in shown}
+    least = {one: min(width, max(names.get(one, width), titles[one])) for one, width in wanted.items()}
     room = view.viewport().width()
     for column in spare:
         if sum(least[one] for one in shown) > room:

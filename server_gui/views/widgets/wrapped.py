@@ -5,15 +5,17 @@ from typing import Final
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QLabel, QSizePolicy
+from PySide6.QtWidgets import QSizePolicy
 
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.plain import rich
+from server_gui.views.widgets.whole import WholeHeight
 
+HYPHEN: Final = "\N{NON-BREAKING HYPHEN}"
 MIDDLE: Final = Qt.TextElideMode.ElideMiddle
 
 
-class Wrapped(QLabel):
+class Wrapped(WholeHeight):
     """`say` brings the parts: a colour (#rrggbb) each, what is drawn of it, and what it says.
 
     A part that is wider than this is broken between its words, so that the number at its end is in sight;
@@ -26,8 +28,8 @@ class Wrapped(QLabel):
         self._parts: tuple[tuple[str, str, str], ...] = ()
         self.setAccessibleName(name)
         self.setTextFormat(Qt.TextFormat.RichText)
-        self.setWordWrap(True)
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Minimum)
+        self.wrap()
 
     def say(self, parts: Sequence[tuple[str, str, str]]) -> None:
         """Say these."""
@@ -59,8 +61,8 @@ class Wrapped(QLabel):
         room -= metrics.horizontalAdvance(f"{glyph} ")
         name, _, number = text.rpartition(" ")
         if self._named and name:
-            room = max(room - metrics.horizontalAdvance(f" {number}"), 0)
+            room = max(room - metrics.horizontalAdvance(f" {number}") - metrics.averageCharWidth(), 0)
             short = f"{glyph} {metrics.elidedText(name, MIDDLE, room)} {number}"
-            return rich(short).replace(" ", "&nbsp;")
+            return rich(short.replace("-", HYPHEN)).replace(" ", "&nbsp;")  # no line ends within it
         words = (metrics.elidedText(word, MIDDLE, room) for word in text.split())
         return f"{rich(glyph)}&nbsp;{rich(' '.join(words))}"

@@ -165,7 +165,7 @@ def learning(bench: Bench) -> None:
     days = [day(f"s{number}", number, each_s=5.0) for number in range(WEARERS)]
     put(bench.store.as_uri(), bench.folder / "walks", days)
     hand.key("alt+m")
-    hand.click("Train a model")
+    hand.insist("Train a model", lambda: hand.reads("What it predicts"))
     hand.reach("Start training")
     hand.keep("train")
     hand.click("Start training")
@@ -174,8 +174,7 @@ def learning(bench: Bench) -> None:
     )  # or not better: the session of this bench may be among the judges
     hand.keep("trained")
     hand.click("Train a model")
-    hand.click("Promote…")
-    hand.sees("Serves now")
+    hand.insist("Promote…", lambda: hand.reads("Serves now"))
     hand.keep("promote")
     hand.click("Change nothing")
 
