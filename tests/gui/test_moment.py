@@ -21,7 +21,7 @@ def test_all_of_a_frame_is_judged_by_one_moment(
     bench.draw(window)
     ticks = itertools.count(time.monotonic_ns(), robot.STALE_NS // 20)
     monkeypatch.setattr(moment, "time", SimpleNamespace(monotonic_ns=lambda: next(ticks)))
-    said = []
+    said = list[str]()
     for _ in range(40):
         window.refresh()
         chip, fact = window.header._chips["drives"], window.overview.now.drives
@@ -35,7 +35,7 @@ def test_what_is_read_is_shown_anew_in_the_same_frames(bench: Bench, window: Mai
     """Header and overview: a drive that goes off is off in both."""
     bench.station.take([described(), walking(600), looked()])
     bench.draw(window)
-    shown = set()
+    shown = set[str]()
     for _ in range(20):
         bench.station.robot.values["left_knee.state"] = float(len(shown) % 2)
         window.refresh()
