@@ -40,7 +40,8 @@ from server_gui.views.closing import wait_closed
 from server_gui.views.first_run.demo_bar import DemoBar
 from server_gui.views.first_run.opening import Opening
 from server_gui.views.kept import kept_units
-from server_gui.views.main_window import SLOW, MainWindow
+from server_gui.views.main_window import MainWindow
+from server_gui.views.pace import SLOW
 from server_gui.views.stop_keys import StopKeys
 from server_gui.views.theme import Look, Theme
 from server_gui.views.x11_keys import NoX, X11Keys
@@ -144,7 +145,7 @@ class App:
         self.window.commission.connect_to.connect(self._start_gateway)
         self.window.stopped.connect(lambda: self.stop("STOP button of the window"))
         self.window.stop_all.connect(lambda: self.desk.stop_all("STOP ALL of the window"))
-        self.window.added.connect(lambda where: self.follow(name_of(where), Address.parse(where)))
+        self.window.added.connect(self._add)
         self.window.removed.connect(self.leave)
         self.window.simulator.connect(self._own.start)
         self.window.closed.connect(qt.quit)
@@ -153,6 +154,7 @@ class App:
         self._timer = QTimer(interval=FRAME_MS, timerType=Qt.TimerType.PreciseTimer)
         self._timer.timeout.connect(self.tick)
         self._robots = settings.robots
+        self._names = {str(robot.where): name for name, robot in settings.robots.items()}  # by the user
 
     def __enter__(self) -> "App":
         self.feeds.__enter__()
@@ -204,6 +206,13 @@ class App:
         self.feeds.follow(name, address)
         self.desk.add(station)
         return station
+
+    def _add(self, text: str) -> None:
+        """One more robot, `[NAME=]HOST:PORT`; without a name by that which the user has given it before."""
+        name, _, where = text.rpartition("=")
+        self._names |= {where: name} if name else {}
+        name = self._names.get(where, name_of(where))
+        self.follow(name_of(where) if name in self._stations else name, Address.parse(where))
 
     def leave(self, station: Station) -> None:
         """Follow a robot no more; it goes on as it is."""

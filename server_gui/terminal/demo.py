@@ -5,12 +5,15 @@ What is said is said from the beginning, and what takes long (Qt, tables, plots)
 
 import contextlib
 import importlib
+import os
 import tempfile
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+import msgspec
 
 from gateway.client import Address
 from server_gui.core.desk.first_steps import FirstSteps, Step
@@ -20,6 +23,7 @@ from server_gui.processes.simulated import Part
 from server_gui.terminal.saying import say
 
 if TYPE_CHECKING:  # what takes long to import is imported while simulator and gateway start
+    from server_gui.core.desk.station import Station
     from server_gui.terminal.controls import Controls
     from server_gui.terminal.followed_robot import FollowedRobot
 
@@ -178,7 +182,25 @@ def _picture(path: Path | None, session: "FollowedRobot", controls: "Controls", 
     if path is not None:
         from server_gui.terminal.dashboard import save_picture
 
+        _leave_out_others(session.station)
         save_picture(path, session.station, controls, where)
+
+
+def _leave_out_others(station: "Station") -> None:
+    """In a picture that others see, no process stands but those that the demo has started."""
+    table = station.processes
+    if table is not None and isinstance(table.processes, list):
+        ours = [process for process in table.processes if is_of_demo(process.pid)]
+        station.processes = msgspec.structs.replace(table, processes=ours)
+
+
+def is_of_demo(pid: int) -> bool:
+    """Return whether a process is this one or a child of it; one that is gone is not."""
+    try:
+        parent = Path(f"/proc/{pid}/stat").read_text(encoding="ascii", errors="replace")
+    except OSError:
+        return False
+    return os.getpid() in (pid, int(parent.rpartition(")")[2].split()[1]))
 
 
 def _wait_whole(session: "FollowedRobot", check: Callable[[], None]) -> None:

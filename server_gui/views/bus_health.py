@@ -24,20 +24,20 @@ from server_gui.core.processing.bus_health import (
     FULL_PERCENT,
     Level,
     Talking,
+    findings,
     level,
     load_text,
     node_level,
     seen,
     talking,
-    trouble,
 )
 from server_gui.views.marks import Mark
 from server_gui.views.theme import Theme
-from server_gui.views.widgets.card import Card
+from server_gui.views.widgets.card import Card, set_text
 from server_gui.views.widgets.fitted import FittedLabel
 from server_gui.views.widgets.mark import MarkIcon
-from server_gui.views.widgets.plain import PlainLabel
 from server_gui.views.widgets.plot import css
+from server_gui.views.widgets.whole import WholeLabel
 from server_gui.views.widgets.wrapped import Wrapped
 
 READ: Final = 6  # frames between two looks
@@ -218,13 +218,14 @@ class BusHealthView(QWidget):
         self._frame = 0
         self.cards: list[BusCard] = []
         self.setObjectName("page")
-        self.said = PlainLabel()
-        self.said.setWordWrap(True)
-        self.said.setObjectName("banner")
+        self.said, self.checks = WholeLabel("banner"), WholeLabel("dim")
+        self._check = Card("What to check")
+        self._check.body.addWidget(self.checks)
         self._column = QVBoxLayout(self)
         self._column.setContentsMargins(8, 8, 8, 8)
         self._column.setSpacing(8)
         self._column.addWidget(self.said)
+        self._column.addWidget(self._check)
         self._column.addStretch(1)
 
     def read_now(self) -> None:
@@ -249,8 +250,7 @@ class BusHealthView(QWidget):
                 card.show_bus(shown[place])
 
     def _say(self, station: Station, buses: Sequence[BusInfo] | None) -> None:
-        known = [(bus, trouble(bus)) for bus in buses or ()]
-        found = [(level(bus), f"bus {bus.name}", *said) for bus, said in known if said is not None]
+        found = [(level(bus), bus.name, *one) for bus in buses or () for one in findings(bus)]
         if buses is None:
             is_old = (
                 station.is_linked and station.robot.buses_at_ns is not None and station.robot.buses is None
@@ -259,15 +259,16 @@ class BusHealthView(QWidget):
         elif not buses:
             text = "This robot has no CAN bus."
         else:
-            text = "\n".join(
-                f"{LEVELS[bad].word}: {bus}: {what}{f' · check: {check}' if check else ''}"
-                for bad, bus, what, check in found
-            )
+            rows = dict.fromkeys(f"{LEVELS[bad].word}: bus {bus}: {what}" for bad, bus, what, _ in found)
+            text = "\n".join(rows)
+        checks = dict.fromkeys(check for *_, check in found if check)
+        set_text(self.checks, "\n".join(f"→ {check}" for check in checks))
+        self._check.setVisible(bool(checks))
         tone = "bad" if any(bad is Level.ALARM for bad, *_ in found) else ""
         if self.said.property("tone") != tone:
             self.said.setProperty("tone", tone)
             self.said.style().polish(self.said)
-        self.said.setText(text)
+        set_text(self.said, text)
         self.said.setVisible(bool(text))
 
 

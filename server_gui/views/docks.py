@@ -11,7 +11,7 @@ from server_gui.views.theme import Theme
 LAYOUT: Final = 1  # rises when a stored layout no longer fits
 # Robots and parameters, by how wide the window is at text of 100 %: in all but the last, parameters are shown
 # with range and default.
-WIDTHS: Final = ((1600, (225, 600)), (1340, (190, 474)), (0, (225, 400)))
+WIDTHS: Final = ((1600, (225, 600)), (1340, (190, 492)), (0, (225, 400)))
 ROOMY: Final = 1200  # wide, at text of 100 %: what is narrower has no room for everything at once
 BELOW: Final = (120, 96)  # high, likewise: events, where the window is `HIGH` and where it is not
 HIGH: Final = 820

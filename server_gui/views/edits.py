@@ -3,7 +3,9 @@
 from typing import Final
 
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
+    QBoxLayout,
     QGridLayout,
     QHBoxLayout,
     QListWidget,
@@ -28,7 +30,9 @@ from server_gui.views.widgets.card import set_text, set_tone
 from server_gui.views.widgets.plain import PlainLabel
 from server_gui.views.widgets.stride_curves import StrideCurves
 
-LIST: Final = 280  # wide, at text of 100 %
+LIST: Final = 240  # wide, at text of 100 %
+NARROW, ABOVE = 620, 84  # wide, likewise: then the list is above the strides, and so high
+MOST_PX: Final = 16_777_215  # what Qt takes for no end
 MOST: Final = 8  # metrics that are told one by one
 UNIT: Final = {"position": "rad", "following_error": "rad", "current": "A", "torque": "N·m"}
 TONES: Final = {Word.BETTER: "good", Word.WORSE: "bad", Word.MIXED: "bad"}
@@ -71,11 +75,12 @@ class Edits(QWidget):
         right.addWidget(self.response, 1)
         right.addWidget(self._legend)
         right.addStretch()
-        row = QHBoxLayout(self)
-        row.addLayout(self._left())
-        row.addLayout(right, 1)
+        self._row = QBoxLayout(QBoxLayout.Direction.LeftToRight, self)
+        self._row.addLayout(self._left())
+        self._row.addLayout(right, 1)
         self._scale()
         theme.scaled.connect(self._scale)
+        self._choose()
 
     def refresh(self) -> None:
         """Show what is known now."""
@@ -139,6 +144,7 @@ class Edits(QWidget):
     def _choose(self) -> None:
         told = self._drawn = self._chosen
         self._legend.setVisible(bool(told and told.curves))
+        self.list.setVisible(bool(self._shown))  # an empty frame says nothing
         self.verdict.setVisible(told is not None)
         if told is None:
             set_text(self.words, NONE)
@@ -165,8 +171,17 @@ class Edits(QWidget):
             self._grid.addWidget(widget, joints.index(joint), DRAWN.index(quantity))
             widget.show_curves(one, self._desk.shown.units.unit(quantity, UNIT[quantity]))
 
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._scale()
+
     def _scale(self) -> None:
-        self.list.setFixedWidth(self._theme.px(LIST))
+        """The list is beside the strides, or above them where there is less room."""
+        px, direction = self._theme.px, QBoxLayout.Direction
+        is_narrow = self.width() < px(NARROW)
+        self._row.setDirection(direction.TopToBottom if is_narrow else direction.LeftToRight)
+        self.list.setMaximumSize(MOST_PX if is_narrow else px(LIST), px(ABOVE) if is_narrow else MOST_PX)
+        self.list.setMinimumWidth(0 if is_narrow else px(LIST))
 
 
 def _line(told: Told) -> str:

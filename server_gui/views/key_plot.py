@@ -8,7 +8,7 @@ import numpy as np
 
 from gateway.units import Unit
 from server_gui.core.desk.desk import Desk
-from server_gui.core.desk.measuring import nearest
+from server_gui.core.desk.measuring import row_at
 from server_gui.core.desk.station import Station
 from server_gui.views.marks import old_text
 from server_gui.views.theme import Theme
@@ -110,7 +110,7 @@ class KeyPlot(Card):
         if self._hover is None:
             return [station.robot.values.get(name) for name in self.channels]
         times = station.rings.times(SECONDS)
-        row = nearest(times, times[-1] + self._hover) if len(times) else None
+        row = row_at(times, times[-1] + self._hover) if len(times) else None
         if row is None:
             return [None] * len(self.channels)
         found = [station.rings.values(name, len(times))[row] for name in self.channels]

@@ -32,6 +32,7 @@ from server_gui.core.commissioning.commissioning import Commissioning
 from server_gui.core.commissioning.stages import Stage
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
+from server_gui.core.follow.moment import one_moment
 from server_gui.views.alarms import AlarmStrip
 from server_gui.views.ask import ask
 from server_gui.views.audit import Audit
@@ -50,6 +51,7 @@ from server_gui.views.keys_sheet import KeysSheet
 from server_gui.views.models.panel import ModelsPage
 from server_gui.views.objects.panel import ObjectsPage
 from server_gui.views.overview import Overview
+from server_gui.views.pace import Pace
 from server_gui.views.page_bar import PageBar
 from server_gui.views.parameters.panel import ParametersPanel
 from server_gui.views.parameters.trial_bar import TrialBar
@@ -65,7 +67,6 @@ from server_gui.views.widgets.scrolled import Scrolled
 
 OF_A_ROBOT: Final = ("&Overview", "&Signals", "&Resources", "&Bus", "Ob&jects", "&Audit", "&Edits")
 SCALES: Final = (80, 90, 100, 125, 150, 175, 200)
-SLOW: Final = 6  # frames between two looks at what people read
 # Quantities with more than one unit worth choosing.
 CHOICES: Final = ("rad", "rad/s", "m", "Pa", "m/s²", "s", "A")
 CLOSING: Final = (
@@ -113,8 +114,7 @@ class MainWindow(QMainWindow):
         self._theme = theme
         self.kept = settings
         desk.pins.take(settings.value("pinned"))
-        self._frame = 0
-        self._known: tuple[object, ...] | None = None  # of the robot of header and panels, when last read
+        self._pace = Pace()
         self._is_arranged = False  # the panels, which may wait for the window to be shown
         self.setWindowTitle("GWRMS")
         self.resize(opening_size(self.screen().availableSize(), theme.scale))
@@ -146,6 +146,7 @@ class MainWindow(QMainWindow):
         self.events = EventsPanel(desk, theme)
         self.events.shown.connect(self.show_around)
         self.overview, self.signals = Overview(desk, theme), Signals(desk, theme)
+        self.overview.is_paced = False
         self.overview.opened.connect(self._open_in_signals)
         self.resources = Resources(desk, theme)
         self.buses = BusHealthView(desk, theme)
@@ -193,7 +194,10 @@ class MainWindow(QMainWindow):
 
     def refresh(self) -> None:
         """Draw a frame: what moves each time, what is read now and then, and only what is visible."""
-        self._frame += 1
+        with one_moment():  # however long it takes, all of it is of one
+            self._draw()
+
+    def _draw(self) -> None:
         if self._is_closing and self._commissioning is not None and not self._commissioning.runs:
             self._is_closing = False
             if self._commissioning.stage is not Stage.NOT_CONFIRMED:  # that somebody has to see
@@ -202,7 +206,7 @@ class MainWindow(QMainWindow):
         self._bar.frame()
         due = self._is_due()
         if due:
-            for page in (self.overview, self.buses):
+            for page in (self.overview, self.signals, self.resources, self.buses):
                 page.read_now()  # what header, alarms and page say is of the same moment
         shown = self._desk.selected is not None or self.tabs.currentIndex() >= self._live
         if shown:
@@ -225,10 +229,9 @@ class MainWindow(QMainWindow):
 
     def _is_due(self) -> bool:
         """Whether what is read now and then is: at once where another robot is named, or a STOP goes on."""
-        station = self._desk.selected
-        known = None if station is None else (station, station.is_live, *station.stopping.stage)
-        before, self._known = self._known, known
-        return self._frame % SLOW == 0 or known != before
+        station, page = self._desk.selected, self.tabs.currentIndex()
+        about = (station.is_live, *station.stopping.stage) if station is not None else ()
+        return self._pace.is_due((page, station, *about))
 
     def show_signals(self, globs: Sequence[str]) -> None:
         """Begin with these channels in sight."""

@@ -1,6 +1,5 @@
 """The overview: what is so now, gait phase, posture, pressure of both feet, three plots, and the joints."""
 
-import time
 from collections.abc import Collection
 from typing import Final
 
@@ -14,11 +13,13 @@ from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.leg_phase import leg_phase
 from server_gui.core.desk.soles import Load, Sole, loads, sole
 from server_gui.core.desk.station import Station
+from server_gui.core.follow.moment import now_ns
 from server_gui.core.processing.gait_events import Leg
 from server_gui.views.joint_table import JointModel, JointTable
 from server_gui.views.key_plot import SECONDS, KeyPlot, Kind
 from server_gui.views.marks import age_text, old_text
 from server_gui.views.now_line import NowLine
+from server_gui.views.pace import READ_NS
 from server_gui.views.predictions import STOPPED, activity, lines, model_phases
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_tone
@@ -33,7 +34,6 @@ from server_gui.views.widgets.pressure_map import PressureMap
 SHARES: Final = (10, 9, 11)  # of the width, where three cards stand beside each other
 A_COLUMN: Final = 190  # wide at least, at text of 100 %
 STATUS_LINES: Final = 3
-READ_S: Final = 0.2  # between changes of what is read rather than seen
 SIDES: Final = ("left", "right")
 PLOTS: Final = (
     Kind(
@@ -62,7 +62,8 @@ class Overview(QWidget):
         super().__init__()
         self._desk = desk
         self._theme = theme
-        self._read_s = 0.0  # when what is read was last shown
+        self._read_ns: int | None = None  # when what is read was last shown
+        self.is_paced = True  # by itself; else only as it is told: with what stands beside it
         self._station: Station | None = None
         self._soles = dict.fromkeys(SIDES, Sole())
         self._angles: dict[str, list[str]] = {}
@@ -84,14 +85,28 @@ class Overview(QWidget):
         self._grid = QGridLayout(self)
         self._grid.setContentsMargins(6, 6, 6, 6)
         self._grid.setSpacing(6)
-        self._columns = 0
+        self._columns, self._is_plots = 0, False
         self._arrange(len(SHARES))
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        columns = min(max(self.width() // self._theme.px(A_COLUMN), 1), len(SHARES))
+        columns = self._fitting
         if columns != self._columns:
             self._arrange(columns)
+
+    @property
+    def _fitting(self) -> int:
+        """How many cards have room beside each other."""
+        return min(max(self.width() // self._theme.px(A_COLUMN), 1), len(SHARES))
+
+    def show_plots_alone(self, alone: bool, *, with_now: bool = True) -> None:
+        """Show plots, below the first line or without it, and not the rest: for who labels what they show."""
+        self.now.setVisible(with_now or not alone)
+        if alone is not self._is_plots:
+            self._is_plots = alone
+            for card in (self._status, self._posture, self._pressure, self._joints):
+                card.setVisible(not alone)
+            self._arrange(self._fitting)
 
     def minimumSizeHint(self) -> QSize:
         """As narrow as one column: then it is arranged for less."""
@@ -101,19 +116,20 @@ class Overview(QWidget):
         """The cards beside each other, as many as have room, and the joints below all of them."""
         self._columns, grid = columns, self._grid
         grid.addWidget(self.now, 0, 0, 1, columns)
-        for place, card in enumerate((self._status, self._posture, self._pressure, *self._plots)):
+        cards = [] if self._is_plots else [self._status, self._posture, self._pressure]
+        for place, card in enumerate((*cards, *self._plots)):
             grid.addWidget(card, 1 + place // columns, place % columns)
-        rows = 1 + -(-6 // columns)
+        rows = 1 + -(-(len(cards) + len(self._plots)) // columns)
         grid.addWidget(self._joints, rows, 0, 1, columns)
         for column, share in enumerate(SHARES):
             grid.setColumnStretch(column, share if column < columns else 0)
         for row in range(8):
-            is_plots = (row - 1) * columns >= 3
+            is_plots = (row - 1) * columns >= len(cards)
             grid.setRowStretch(row, 0 if row in (0, rows) or row > rows else 6 if is_plots else 10)
 
     def read_now(self) -> None:
         """Let the next frame show also what is read: what stands beside it is shown anew then."""
-        self._read_s = 0.0
+        self._read_ns = None
 
     def refresh(self) -> None:
         """Draw how it is now; what is read rather than seen changes more slowly."""
@@ -123,10 +139,10 @@ class Overview(QWidget):
         if station is not self._station:
             self._station = station
             self._fit_time()
-        now_s = time.monotonic()
-        slow = now_s - self._read_s >= READ_S
+        due_ns = None if self._read_ns is None else self._read_ns + READ_NS
+        slow = due_ns is None or (self.is_paced and now_ns() >= due_ns)
         if slow:
-            self._read_s = now_s
+            self._read_ns = now_ns()
             self.now.refresh()
         self._refresh_status(station, slow=slow)
         self._refresh_posture(station, slow=slow)

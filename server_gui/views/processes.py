@@ -54,7 +54,7 @@ class ProcessTable(RowsTable):
         header = self.horizontalHeader()
         header.setSectionResizeMode(QHeaderView.ResizeMode.Interactive)
         header.setSectionResizeMode(COMMAND, QHeaderView.ResizeMode.Stretch)
-        self.setTextElideMode(Qt.TextElideMode.ElideRight)  # a command begins with what tells it apart
+        self.setTextElideMode(Qt.TextElideMode.ElideMiddle)  # how a command begins and ends tells it apart
         theme.changed.connect(self._restyle)
         self._restyle()
 

@@ -1,6 +1,5 @@
 """The robot's computer over time: CPU, memory, who uses them, disk, network, heat; and its processes."""
 
-import time
 from typing import Final
 
 from PySide6.QtCore import QSize
@@ -10,6 +9,7 @@ from PySide6.QtWidgets import QBoxLayout, QGridLayout, QLineEdit, QWidget
 from gateway.wire.resource import ResourceSnapshot
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
+from server_gui.core.follow.moment import now_ns
 from server_gui.core.processing.process_names import told_apart
 from server_gui.core.processing.resource import DEVICES, SERIES
 from server_gui.views.computer import facts, held_back
@@ -40,7 +40,7 @@ DISK_AND_NETWORK: Final = {
     "received": Curve("network in", OTHERS[1]),
     "sent": Curve("out", OTHERS[2]),
 }
-NARROW, TRENDS = 520, 260  # wide, at text of 100 %: trends and processes; trends alone
+NARROW, THREE, TRENDS = 800, 500, 260  # wide, at text of 100 %: trends and processes; three trends; two
 TEMPERATURE: Final = {"hottest": Curve("hottest °C", "warn")}
 
 
@@ -72,17 +72,14 @@ class Resources(QWidget):
         self._processes = Card("Processes")
         self._processes.body.addWidget(self.words)
         self._processes.body.addWidget(self.table, 1)
-        grid = QGridLayout()
-        cards = (self.cpu, self.memory, self.top, self.devices, self.temperature, computer)
-        for place, card in enumerate(cards):
-            grid.addWidget(card, place // 2, place % 2)
-        for column in (0, 1):
-            grid.setColumnStretch(column, 1)
+        self._grid = QGridLayout()
+        self._cards = (self.cpu, self.memory, self.top, self.devices, self.temperature, computer)
         self._theme = theme
         self._layout = QBoxLayout(QBoxLayout.Direction.LeftToRight, self)
         self._layout.setContentsMargins(8, 8, 8, 8)
-        self._layout.addLayout(grid, 4)
+        self._layout.addLayout(self._grid, 4)
         self._layout.addWidget(self._processes, 3)
+        self._arrange(2)
         desk.on_select.append(lambda _station: self._watch())
 
     def minimumSizeHint(self) -> QSize:
@@ -93,7 +90,14 @@ class Resources(QWidget):
         super().resizeEvent(event)
         direction, is_narrow = QBoxLayout.Direction, self.width() < self._theme.px(NARROW)
         self._layout.setDirection(direction.BottomToTop if is_narrow else direction.LeftToRight)
-        self._processes.setMinimumHeight(self._theme.px(220) if is_narrow else 0)
+        self._processes.setMinimumHeight(self._theme.px(200) if is_narrow else 0)
+        self._arrange(3 if is_narrow and self.width() >= self._theme.px(THREE) else 2)
+
+    def _arrange(self, columns: int) -> None:
+        for place, card in enumerate(self._cards):
+            self._grid.addWidget(card, place // columns, place % columns)
+        for column in range(3):
+            self._grid.setColumnStretch(column, int(column < columns))
 
     def showEvent(self, event: QShowEvent) -> None:
         self._watch()
@@ -102,6 +106,10 @@ class Resources(QWidget):
     def hideEvent(self, event: QHideEvent) -> None:
         self._watch()
         super().hideEvent(event)
+
+    def read_now(self) -> None:
+        """Let the next frame show it anew: what stands above the tab is shown anew then."""
+        self._frame = 0
 
     def refresh(self) -> None:
         """Show how it is now; there is something new once a second."""
@@ -171,7 +179,7 @@ class Resources(QWidget):
 
 
 def _age_s(at_ns: int | None) -> float | None:
-    return None if at_ns is None else (time.monotonic_ns() - at_ns) / 1e9
+    return None if at_ns is None else (now_ns() - at_ns) / 1e9
 
 
 def _is_old(station: Station) -> bool:

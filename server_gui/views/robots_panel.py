@@ -17,6 +17,7 @@ from gateway.client import Address, BadAddress
 from gateway.wire.pairing import is_link
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
+from server_gui.core.settings.server_file import name_of
 from server_gui.views.ask import ask
 from server_gui.views.marks import age_text
 from server_gui.views.pairing import PairingDialog, show_pairing
@@ -107,7 +108,10 @@ class RobotCard(Choosable):
 
 
 class RobotsPanel(QWidget):
-    """`added` brings an address, `removed` the station of a robot to leave; `stop_all` is STOP ALL."""
+    """`added` brings an address, or NAME=ADDRESS, `removed` the station of a robot to leave.
+
+    `stop_all` is STOP ALL.
+    """
 
     added = Signal(str)
     removed = Signal(object)
@@ -133,6 +137,7 @@ class RobotsPanel(QWidget):
         self.address = QLineEdit()
         self.address.setPlaceholderText("Add a robot: HOST:PORT")
         self.address.setAccessibleName("Address of a robot to add")
+        self.address.setToolTip("NAME=HOST:PORT: called so in this window, whatever it calls itself")
         self.address.returnPressed.connect(self._add)
         self.pair = QPushButton("Pair…")
         self.pair.setToolTip("With a robot that has keys: it shows a code (gwrms keys pair)")
@@ -196,8 +201,15 @@ class RobotsPanel(QWidget):
         if is_link(text):
             self.begin_pairing(text)
             return
+        name, equals, address = text.rpartition("=")
+        if equals and (not name or name_of(name) != name):
+            self.say(f"{name!r} is no name: letters, digits, _, . and -, then = and the address")
+            return
+        if name in {station.name for station in self._desk}:
+            self.say(f"{name} is in the list already: give it another name")
+            return
         try:
-            where = str(Address.parse(text)) if text else ""
+            where = str(Address.parse(address)) if text else ""
         except BadAddress as error:
             self.say(str(error))
             return
@@ -206,7 +218,7 @@ class RobotsPanel(QWidget):
         elif where:
             self.say("")
             self.address.clear()
-            self.added.emit(where)
+            self.added.emit(f"{name}{equals}{where}")
 
     def begin_pairing(self, where: str) -> PairingDialog:
         """Ask for address and code of a robot that pairs; when it has, it is followed."""

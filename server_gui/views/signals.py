@@ -24,7 +24,7 @@ from PySide6.QtWidgets import (
 
 from gateway.units import Unit
 from server_gui.core.desk.desk import Desk
-from server_gui.core.desk.measuring import measure, nearest
+from server_gui.core.desk.measuring import measure, nearest, row_at
 from server_gui.core.desk.station import Station
 from server_gui.views.channel_tree import MOST_CURVES, ChannelTree, channels_of
 from server_gui.views.marks import age_text
@@ -111,6 +111,10 @@ class Signals(QWidget):
         everything.addWidget(splitter, 1)
         self._restyle()
         theme.changed.connect(self._restyle)
+
+    def read_now(self) -> None:
+        """Let the next frame say also what is read: what stands beside it is said anew then."""
+        self._frame = 0
 
     def refresh(self) -> None:
         """Draw what is chosen; while paused, what was there then."""
@@ -397,18 +401,20 @@ class Signals(QWidget):
             plot.plot.show_cursors(at, self._active)
 
     def _measure(self, station: Station) -> None:
-        """Read every curve at the samples that are nearest to the cursors, and over what is in sight."""
+        """Read every curve at the cursors, where there are samples, and over what is in sight."""
         times, (left, right) = self._times(station), self._window
-        a, b = (nearest(times, at) for at in self._at)
-        if a is None or b is None:
+        if not len(times):
             return
+        a, b = (row_at(times, cursor) for cursor in self._at)
         first, last = np.searchsorted(times, left), np.searchsorted(times, right, "right")
         rows = [
             (name, plot.unit, measure(self._column(station, name, len(times)), a, b, int(first), int(last)))
             for plot in self.plots
             for name in plot.channels
         ]
-        self.measuring.show_readings(float(times[a]), float(times[b]), self._active, rows)
+        a_s, b_s = self._at
+        a_s, b_s = (a_s if a is None else float(times[a])), (b_s if b is None else float(times[b]))
+        self.measuring.show_readings(a_s, b_s, self._active, rows)
 
     def _ask(self, kind: str, save: Callable[[Path], None]) -> None:
         station = self._desk.selected

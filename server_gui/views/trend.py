@@ -14,6 +14,7 @@ from server_gui.views.widgets.plot import Curve, Plot, css
 from server_gui.views.widgets.wrapped import Wrapped
 
 Floats = npt.NDArray[np.float64]
+LEAST_HIGH: Final = 60  # a plot, at text of 100 %: its legend leaves it so much
 SPANS_S: Final = (30.0, 60.0, 120.0, 300.0, 600.0)  # of the past, the shortest that holds what there is
 
 
@@ -27,9 +28,8 @@ class Trend(Card):
         self._name, self._least, self._scale = title, least, scale
         self._shown: tuple[object, ...] = ()
         self._rows = object()  # another one where what is drawn is no longer only added to
-        self.legend = Wrapped(f"Values of {title}")
+        self.legend = Wrapped(f"Values of {title}", named=True)
         self.body.addWidget(self.legend)
-        self._resize()
         theme.scaled.connect(self._resize)
 
     @cached_property
@@ -38,6 +38,7 @@ class Trend(Card):
         made = Plot(self._theme, SPANS_S[0], self._least)
         made.setAccessibleName(self._name)
         self.body.addWidget(made, 1)
+        made.setMinimumHeight(self._theme.px(LEAST_HIGH))
         return made
 
     def showEvent(self, event: QShowEvent) -> None:
@@ -65,7 +66,8 @@ class Trend(Card):
         self._say(curves, columns)
 
     def _resize(self) -> None:
-        self.setMinimumHeight(self._theme.px(110))
+        if "plot" in self.__dict__:  # it has been shown
+            self.plot.setMinimumHeight(self._theme.px(LEAST_HIGH))
 
     def _say(self, curves: Sequence[Curve], columns: Sequence[Floats]) -> None:
         said = []

@@ -136,6 +136,23 @@ def test_a_robot_is_left_while_the_window_runs_and_can_come_back(app: App, robot
     assert app.desk.stations[0].is_linked
 
 
+def test_robots_that_call_themselves_alike_keep_the_names_that_the_user_gave(
+    app: App, robot: FakeRobot
+) -> None:
+    """Also when one is removed, and added again by its address alone."""
+    with FakeRobot() as other:
+        app.window.added.emit(f"second={other.address}")
+        wait(lambda: app.desk.stations[1].is_linked, "followed the other")
+        for station in app.desk.stations[:]:
+            title, address = station.title, station.address
+            app.window.removed.emit(station)
+            app.window.added.emit(address)
+            wait(lambda: app.desk.stations[-1].is_linked, "followed it again")
+            assert app.desk.stations[-1].title == title
+        assert len({station.called for station in app.desk}) == 1
+        assert "second" in [station.title for station in app.desk]
+
+
 def test_the_simulator_that_is_offered_at_first_walks_in_the_window(qt: QApplication, tmp_path: Path) -> None:
     kept = QSettings(str(tmp_path / "kept.ini"), QSettings.Format.IniFormat)
     with running(qt, ServerSettings(), kept) as app:

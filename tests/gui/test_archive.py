@@ -243,6 +243,9 @@ def test_the_controls_of_the_player_stay_in_sight_at_every_size(
             assert full_window.tabs.rect().contains(
                 control.mapTo(full_window.tabs, control.rect().bottomLeft())
             )
+        plot = player.overview._plots[0].plot
+        seen = player._stack.height() - plot.mapTo(player._stack, QPoint()).y()
+        assert seen >= theme.px(20), "what is labelled is not seen"
 
 
 def test_both_tabs_are_drawn_dark_and_light(

@@ -10,7 +10,8 @@ from gateway.wire.bus import BusInfo, NodeInfo, TalkInfo
 from server_gui.core.follow.events import BusesSeen
 from server_gui.core.processing.bus_health import TAKEN
 from server_gui.views.bus_health import NOT_NOW, TOO_OLD, BusHealthView
-from server_gui.views.main_window import SLOW, MainWindow
+from server_gui.views.main_window import MainWindow
+from server_gui.views.pace import SLOW
 from server_gui.views.theme import Theme
 from tests.gui.fakes import Bench, destroy
 
@@ -51,11 +52,14 @@ def test_load_counters_and_who_talks_stand_there(view: BusHealthView, bench: Ben
 
 def test_a_full_bus_is_an_alarm(view: BusHealthView, bench: Bench) -> None:
     show(view, bench, replace(BUS, load_percent=100.0))
-    assert view.said.text().startswith("ALARM: bus main: it is full: 100 % of its time is taken · check: ")
+    assert view.said.text() == "ALARM: bus main: it is full: 100 % of its time is taken"
+    assert view.checks.text().startswith("→ look who sends so much")
+    assert view.checks.isVisible()
     assert view.said.property("tone") == "bad"
     assert view.cards[0]._icon.accessibleName() == "ALARM"
     show(view, bench, BUS)
     assert not view.said.isVisible()
+    assert not view.checks.isVisible()
     assert view.cards[0]._icon.accessibleName() == "ok"
 
 

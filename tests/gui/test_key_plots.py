@@ -41,7 +41,7 @@ def overview(theme: Theme, bench: Bench) -> Iterator[Overview]:
 
 def draw(overview: Overview) -> None:
     QApplication.processEvents()
-    overview._read_s = 0.0
+    overview.read_now()
     overview.refresh()
     QApplication.processEvents()
 

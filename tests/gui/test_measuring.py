@@ -12,7 +12,7 @@ from PySide6.QtGui import QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
-from server_gui.core.desk.measuring import Measured, measure, nearest
+from server_gui.core.desk.measuring import Measured, measure, nearest, row_at
 from server_gui.views.measuring import TITLES, Measuring
 from server_gui.views.signals import Signals
 from server_gui.views.theme import Theme
@@ -252,3 +252,23 @@ def test_without_data_nothing_is_measured(theme: Theme, bench: Bench) -> None:
     made.refresh()
     assert made.measuring.table.rowCount() == 0
     destroy(made)
+
+
+def test_where_there_is_no_sample_nothing_is_told() -> None:
+    """Before the first, after the last, and while nothing came."""
+    times = np.concatenate([np.arange(-5.0, -3.0, 0.01), np.arange(-1.0, 0.001, 0.01)])
+    told = {at_s: row_at(times, at_s) for at_s in (-6.0, -5.0, -4.004, -2.0, -1.2, -0.5, 0.0, 1.0)}
+    assert {at_s for at_s, row in told.items() if row is None} == {-6.0, -2.0, -1.2, 1.0}
+    assert times[told[-4.004] or 0] == pytest.approx(-4.0)
+    assert row_at(np.zeros(0), 0.0) is None
+
+
+def test_a_cursor_in_a_gap_reads_nothing(signals: Signals, bench: Bench) -> None:
+    add(bench, 1400, 100)  # four seconds nobody has sent
+    signals.cursors.click()
+    signals._at = [-3.0, -0.5]
+    title(signals)
+    view = signals.measuring
+    assert [cell(view, 0, column) for column in ("A", "B − A")] == ["–", "–"]
+    assert cell(view, 0, "B") == "830.22"  # °
+    assert "A -3.000 s" in title(signals).replace("−", "-")

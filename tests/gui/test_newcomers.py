@@ -59,7 +59,7 @@ def test_what_is_old_looks_old_and_is_not_called_now(window: MainWindow, bench: 
 
     def is_live() -> bool:
         bench.look_again([walking(200), looked()])
-        overview._read_s = 0.0
+        overview.read_now()
         bench.draw(window)
         return {label.property("tone") for label in overview._loads.values()} == {""}
 
@@ -68,7 +68,7 @@ def test_what_is_old_looks_old_and_is_not_called_now(window: MainWindow, bench: 
     assert axis.tickStrings([0.0], 1.0, 1.0) == [NOW]
     live = overview._plots[0].legend.text()
     bench.look_again([walking(200, age_s=OLD_S), looked()])
-    overview._read_s = 0.0
+    overview.read_now()
     bench.draw(window)
     assert not bench.station.is_live
     assert axis.tickStrings([0.0], 1.0, 1.0) == [LAST]

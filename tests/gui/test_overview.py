@@ -216,7 +216,7 @@ def test_a_sole_that_tells_nothing_says_why_and_leaves_the_other_no_share(
     overview: Overview, bench: Bench
 ) -> None:
     bench.station.take([walking(20, -3600.0)])
-    overview._read_s = 0.0
+    overview.read_now()
     overview.refresh()
     texts = {side: overview._loads[side].text() for side in ("left", "right")}
     assert all(text.endswith(" N") for text in texts.values())
@@ -226,7 +226,7 @@ def test_a_sole_that_tells_nothing_says_why_and_leaves_the_other_no_share(
     columns: dict[str, list[float | None]] = {"left_insole.force": [None], "right_insole.force": [600.0]}
     newest_ns = bench.station.rings.newest_ns or 0
     bench.station.take([lost, telemetry([newest_ns + 1], columns)])
-    overview._read_s = 0.0
+    overview.read_now()
     overview.refresh()
     assert overview._loads["left"].text() == "LEFT  insole lost"
     assert overview._maps["left"].accessibleDescription() == "insole lost"
@@ -270,7 +270,7 @@ def test_a_trial_is_kept_or_taken_back_where_it_is_seen(overview: Overview, benc
     until_ns = time.monotonic_ns() + 24 * 10**9
     trial = Trial(7, {"gait.step_length": 0.42}, {"gait.step_length": 0.4}, until_ns)
     bench.station.writing.trial = trial
-    overview._read_s = 0.0
+    overview.read_now()
     overview.refresh()
     assert overview.now.trial.isVisible()
     assert overview.now.trial.main.text() == "On trial: gait step length 400 → 420 mm"
@@ -314,7 +314,7 @@ def test_nothing_on_the_overview_is_green_where_nothing_is_known(
         bench.station.take([walking(300, 3.0 if happened == "old" else -3600.0), looked()])
     if happened == "link lost":
         bench.station.take([LinkChanged(ConnectionState.WAITING, "no route", time.monotonic_ns())])
-    overview._read_s = 0.0
+    overview.read_now()
     overview.refresh()
     marks = [fact._icon._mark for fact in (overview.now.drives, overview.now.activity)]
     marks += [icon._mark for icon, label in overview.status_lines._rows if not label.isHidden()]

@@ -70,6 +70,25 @@ def test_a_legend_breaks_a_long_name_and_never_its_number(theme: Theme, scale: f
     destroy(legend)
 
 
+@pytest.mark.parametrize("scale", [1.0, 1.5, 2.0])
+def test_no_legend_takes_the_room_of_its_plot(view: Resources, theme: Theme, scale: float) -> None:
+    """Of what is called at length each has a line; the name is cut in its middle, its number is whole."""
+    theme.set(scale=scale)
+    view.resize(theme.px(540), theme.px(500))
+    names = [f"python -m a.program.with.a.long.name --of {number}" for number in range(4)]
+    curves = [Curve(name, "accent") for name in names]
+    times = np.arange(10.0)
+    for _ in range(3):
+        view.top.show_rows(view, times, curves, [np.full(10, 1234.5)] * 4, live=True)
+        QApplication.processEvents()
+    legend, plot = view.top.legend, view.top.plot
+    assert plot.height() >= theme.px(60)
+    assert legend.height() >= legend._height, "lines are cut"
+    lines = legend._height / legend.fontMetrics().lineSpacing()
+    assert lines < 5, "one line each"
+    assert legend.text().count("1234.5") == 4
+
+
 def test_every_title_of_the_resources_is_whole_where_they_are_narrow(view: Resources, theme: Theme) -> None:
     for scale in (1.0, 1.5):
         theme.set(scale=scale)

@@ -57,7 +57,12 @@ def test_two_robots_of_one_name_are_told_apart(theme: Theme, bench: Bench) -> No
 
 @pytest.mark.parametrize(
     ("typed", "said"),
-    [("host:port", "is not a robot's address"), ("127.0.0.1:7420", "is in the list already")],
+    [
+        ("host:port", "is not a robot's address"),
+        ("127.0.0.1:7420", "is in the list already"),
+        ("my exo=192.0.2.7", "is no name"),
+        ("exo-01=192.0.2.7", "give it another name"),
+    ],
 )
 def test_an_address_that_cannot_be_added_says_why(theme: Theme, bench: Bench, typed: str, said: str) -> None:
     panel = RobotsPanel(bench.desk, theme)
@@ -73,9 +78,10 @@ def test_an_address_is_added(theme: Theme, bench: Bench) -> None:
     panel = RobotsPanel(bench.desk, theme)
     added: list[str] = []
     panel.added.connect(added.append)
-    panel.address.setText(" 192.0.2.7 ")
-    QTest.keyClick(panel.address, Qt.Key.Key_Return)
-    assert added == ["192.0.2.7:7420"]
+    for typed in (" 192.0.2.7 ", "left=192.0.2.8"):
+        panel.address.setText(typed)
+        QTest.keyClick(panel.address, Qt.Key.Key_Return)
+    assert added == ["192.0.2.7:7420", "left=192.0.2.8:7420"]
 
 
 def test_a_robot_is_chosen_by_keyboard(window: MainWindow, bench: Bench) -> None:

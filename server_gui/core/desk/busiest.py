@@ -1,10 +1,10 @@
 """Which process of the robot's computer takes most of it, as far as its table was looked at of late."""
 
-import time
 from dataclasses import dataclass
 from typing import Final
 
 from server_gui.core.desk.station import Station
+from server_gui.core.follow.moment import now_ns
 from server_gui.core.processing.process_names import short_name
 
 OLD_S: Final = 10.0  # a look before says nothing of now
@@ -23,6 +23,6 @@ def busiest(station: Station) -> Busiest | None:
     if station.most is None or not station.is_linked:
         return None
     most, at_ns = station.most
-    if most.cpu_percent is None or time.monotonic_ns() - at_ns > OLD_S * 1e9:
+    if most.cpu_percent is None or now_ns() - at_ns > OLD_S * 1e9:
         return None
     return Busiest(short_name(most), most.cpu_percent)

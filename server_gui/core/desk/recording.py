@@ -12,6 +12,7 @@ from server_gui.core.alarms.alarm import Alarm, Alarms
 from server_gui.core.alarms.texts import Kind, check_of
 from server_gui.core.fleet.collector import CollectorReport
 from server_gui.core.fleet.link_statistics import LinkReport
+from server_gui.core.follow.moment import now_ns
 from server_gui.core.follow.news import News, NewsKind
 from server_gui.core.recording.recorder import AlarmKind
 from server_gui.core.threads.answers import Deliver, when_done
@@ -113,11 +114,11 @@ class Recording:
 
     def look(self) -> None:
         """Ask again, now and then."""
-        now_ns = time.monotonic_ns()
-        due = self._asked_ns is None or now_ns - self._asked_ns >= LOOK_NS
+        at_ns = time.monotonic_ns()
+        due = self._asked_ns is None or at_ns - self._asked_ns >= LOOK_NS
         if self._keeper is None or self._asking or not due:
             return
-        self._asked_ns, self._asking = now_ns, True
+        self._asked_ns, self._asking = at_ns, True
         keeper = self._keeper
         when_done(
             keeper.report(),
@@ -145,7 +146,7 @@ class Recording:
     def is_alone(self, for_s: float) -> bool:
         """Return whether nobody has recorded for so long, as far as one can ask."""
         since_ns = self._alone_since_ns
-        return since_ns is not None and time.monotonic_ns() - since_ns >= for_s * 1e9
+        return since_ns is not None and now_ns() - since_ns >= for_s * 1e9
 
     def taken_over(self, keeper: Keeper, pausing: Pausing | None = None) -> None:
         """Nobody else records any more, and this window does from now on."""
@@ -238,7 +239,7 @@ class Recording:
             return Said(Tone.BAD, "RECORDING HAS STOPPED", "; ".join(ended))
         if self.problem is not None:
             return Said(Tone.BAD, "NOT RECORDING", f"{self.why or self.problem}; {SOON}")
-        if self._asking and self._asked_ns is not None and time.monotonic_ns() - self._asked_ns > UNKNOWN_NS:
+        if self._asking and self._asked_ns is not None and now_ns() - self._asked_ns > UNKNOWN_NS:
             return Said(Tone.BAD, "RECORDING: NO ANSWER", "whether anything is recorded now is not known")
         if report is None:
             return Said(Tone.OFF, "Recording: not known yet", self.why)

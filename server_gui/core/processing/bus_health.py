@@ -1,13 +1,14 @@
 """How a robot's CAN buses are: what is an alarm, what a warning, and who talks how much."""
 
-import time
-from collections.abc import Iterable
+import re
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import Final
 
 from gateway.client import ConnectionState
 from gateway.wire.bus import CLOSED, BusInfo, NodeInfo
+from server_gui.core.follow.moment import now_ns
 from server_gui.core.follow.robot import Robot
 
 ACTIVE: Final = "error active"
@@ -19,6 +20,8 @@ MISSING_PERCENT: Final = 1.0  # of a node's PDOs
 OLD_S: Final = 5.0  # what was seen before is not known now
 FEWER: Final = "look who sends so much, and send fewer PDOs or SYNC less often"
 UNKNOWN: Final = "bus not known"
+FEW: Final = 2  # nodes that are named one by one, also where all of them are meant
+NUMBER: Final = re.compile(r"(?<![\w.])\d+(?:\.\d+)?(?![\w.])")
 
 
 class Level(Enum):
@@ -49,7 +52,7 @@ def seen(robot: Robot) -> tuple[BusInfo, ...] | None:
     linked = robot.link.state is ConnectionState.CONNECTED
     if robot.buses is None or robot.buses_at_ns is None or not linked:
         return None
-    old = time.monotonic_ns() - robot.buses_at_ns > OLD_S * 1e9
+    old = now_ns() - robot.buses_at_ns > OLD_S * 1e9
     return None if old else robot.buses
 
 
@@ -98,22 +101,27 @@ def worst(robot: Robot) -> tuple[Level, tuple[str, ...]]:
 
 def trouble(bus: BusInfo) -> tuple[str, str] | None:
     """Return what is wrong with a bus, and what to check where that is known; None: nothing."""
+    told = findings(bus)
+    return (_joined(words for words, _ in told), _joined(check for _, check in told)) if told else None
+
+
+def findings(bus: BusInfo) -> list[tuple[str, str]]:
+    """Return each thing that is wrong with a bus, and what to check; what several nodes have, once."""
     if level(bus) is Level.GOOD:
-        return None
+        return []
     load, full = bus.load_percent or 0.0, []
     if (load >= BUSY_PERCENT and not bus.findings) or load >= FULL_PERCENT:
         said = "it is full" if load >= FULL_PERCENT else "it is busy"
         full = [(f"{said}: {load_text(bus)} {TAKEN}", FEWER)]
-    findings = [one for one in bus.findings if not (full and one.words.endswith(TAKEN))]  # says no more
+    own = [one for one in bus.findings if not (full and one.words.endswith(TAKEN))]  # says no more
     told = [
         (bus.problem or "", ""),
         (bus.state if bus.state != ACTIVE else "", ""),
         *full,
-        *((one.words, one.check) for one in findings),
-        *((f"{_who(node)}: {one.words}", one.check) for node in bus.nodes for one in node.findings),
-        *((_missing(node), "") for node in bus.nodes if not node.findings and _misses(node)),
+        *((one.words, one.check) for one in own),
+        *_gathered(bus.nodes),
     ]
-    return _joined(words for words, _ in told), _joined(check for _, check in told)
+    return [(words, check) for words, check in told if words]
 
 
 def reason(bus: BusInfo) -> tuple[str, ...] | None:
@@ -170,8 +178,37 @@ def _misses(node: NodeInfo) -> bool:
     return (node.pdos_missing_percent or 0.0) >= MISSING_PERCENT
 
 
-def _missing(node: NodeInfo) -> str:
-    return f"{node.pdos_missing_percent or 0.0:.0f} % of the PDOs of {_who(node)} are missing"
+def _gathered(nodes: Sequence[NodeInfo]) -> Iterator[tuple[str, str]]:
+    """What nodes have, those with the same in one: `all 6 nodes: 3–4 % of its PDOs are missing`."""
+    same: dict[tuple[str, str], list[tuple[NodeInfo, str]]] = {}
+    for node in nodes:
+        said = [(one.words, one.check) for one in node.findings]
+        if not said and _misses(node):
+            said = [(f"{node.pdos_missing_percent or 0.0:.0f} % of its PDOs are missing", "")]
+        for words, check in said:
+            same.setdefault((NUMBER.sub("#", words), check), []).append((node, words))
+    for (_, check), found in same.items():
+        yield f"{_whose([node for node, _ in found], nodes)}: {_spread([words for _, words in found])}", check
+
+
+def _whose(found: Sequence[NodeInfo], nodes: Sequence[NodeInfo]) -> str:
+    """Those nodes by their names; many of them by the fewer that are not among them, or by their number."""
+    others = [node for node in nodes if node not in found]
+    if not others and len(found) > FEW:
+        return f"all {len(nodes)} nodes"
+    if len(found) <= FEW + 1:
+        return ", ".join(map(_who, found))
+    if len(others) <= FEW:
+        return f"all nodes but {', '.join(map(_who, others))}"
+    return f"{', '.join(map(_who, found[:FEW]))} and {len(found) - FEW} more nodes"
+
+
+def _spread(texts: Sequence[str]) -> str:
+    """Texts that differ in their numbers as one, with the least and the most of each: `3–4 % are missing`."""
+    numbers = zip(*(NUMBER.findall(text) for text in texts), strict=True)
+    ends = [(min(each, key=float), max(each, key=float)) for each in numbers]
+    spans = iter([low if low == high else f"{low}–{high}" for low, high in ends])
+    return NUMBER.sub(lambda _: next(spans), texts[0])
 
 
 def _who(node: NodeInfo) -> str:

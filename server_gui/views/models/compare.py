@@ -2,13 +2,12 @@
 
 from typing import Final
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
     QBoxLayout,
     QComboBox,
     QHBoxLayout,
-    QHeaderView,
     QTreeWidget,
     QTreeWidgetItem,
     QVBoxLayout,
@@ -21,6 +20,7 @@ from server_gui.core.models.catalogue import Catalogue, Entry
 from server_gui.core.models.comparison import Row, last_week, notes, percent, rows, signed, usual_other
 from server_gui.views.models.calibration import CalibrationPlot, Curve
 from server_gui.views.theme import Theme
+from server_gui.views.widgets import columns
 from server_gui.views.widgets.card import Card, set_text
 from server_gui.views.widgets.plain import PlainLabel
 
@@ -32,7 +32,7 @@ MARKS: Final = {
     "alike": ("= alike", "dim"),
     "": ("", "dim"),
 }
-NARROW: Final = 620  # at text of 100 %: no room for the plot beside the figures
+NARROW: Final = 800  # at text of 100 %: no room for the plot beside the figures
 CHOOSE: Final = "Choose a model above to see how well it was judged."
 NARROW_ROW: Final = 480  # likewise, for the choice beside the words
 
@@ -79,6 +79,7 @@ class Compare(Card):
         self._both.setDirection(direction.TopToBottom if is_narrow else direction.LeftToRight)
         is_narrow = self.width() < self._theme.px(NARROW_ROW)
         self._row.setDirection(direction.TopToBottom if is_narrow else direction.LeftToRight)
+        QTimer.singleShot(0, self, self._fit)  # once the table has its new width
 
     # --- inside
 
@@ -125,9 +126,7 @@ class Compare(Card):
         table.setAccessibleName("How both were judged")
         table.setRootIsDecorated(False)
         table.setUniformRowHeights(True)
-        table.setTextElideMode(Qt.TextElideMode.ElideMiddle)
-        table.header().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
-        table.header().setStretchLastSection(False)
+        columns.prepare(table)
         return table
 
     def _fill(self) -> None:
@@ -143,8 +142,6 @@ class Compare(Card):
         other = self._found.find(str(self.other.currentData() or ""))
         for part in (self._with, self.other):
             part.setVisible(other is not None)
-        for column in (OTHER, DIFFERENCE, VERDICT):
-            self.table.setColumnHidden(column, other is None)
         set_text(self.said, f"{entry.name}; serves {entry.whom}{_signed(entry)}")
         set_text(self.week, f"Last week: {last_week(entry)}{self._its_week(other)}")
         told = " ".join(notes(entry, other))
@@ -152,6 +149,12 @@ class Compare(Card):
         self.notes.setVisible(bool(told))
         self._fill_rows(rows(entry.card, None if other is None else other.card))
         self._fill_plot(entry, other)
+        self._fit()
+
+    def _fit(self) -> None:
+        """Whole numbers; what a model is better or worse at is seen before how often it was judged."""
+        alone = (OTHER, DIFFERENCE, VERDICT) if self.other.isHidden() else ()
+        columns.fit(self.table, {NAME: self._theme.px(90)}, (DECISIONS, DIFFERENCE), alone)
 
     def _its_week(self, other: Entry | None) -> str:
         return "" if other is None else f"\nThe other, last week: {last_week(other)}"

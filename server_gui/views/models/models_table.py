@@ -3,7 +3,8 @@
 from typing import Any, Final
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QAbstractItemView, QHeaderView
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QAbstractItemView
 
 from gateway.amounts import counted
 from gateway.plain import plain
@@ -12,12 +13,15 @@ from server_gui.core.models.catalogue import Entry
 from server_gui.core.models.comparison import headline, week_short
 from server_gui.core.models.names import SOURCES
 from server_gui.views.theme import Theme
+from server_gui.views.widgets import columns
 from server_gui.views.widgets.plain import tip
 from server_gui.views.widgets.rows import SORT_ROLE, Filtered, Index, RowsModel, RowsTable
 
 TITLES: Final = ("Model", "Serves", "Signed", "Judged", "Age, days", "Right last week", "Learned from")
 NAME, SERVES, SIGNED, JUDGED, AGE, WEEK, FROM = range(len(TITLES))
 NUMBERS: Final = frozenset({JUDGED, AGE})
+NAMES: Final = {NAME: 190, SERVES: 84, SIGNED: 70, WEEK: 90, FROM: 90}  # wide at least, at text of 100 %
+SPARE: Final = (FROM, AGE, SIGNED)  # left out in this order where there is less room; tips have all
 
 
 class ModelsModel(RowsModel[Entry]):
@@ -52,10 +56,9 @@ class ModelsTable(RowsTable):
         self._rows, self._filtered = model, Filtered(model)
         super().__init__(self._filtered, "Models", NAME)
         self.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
-        self.setTextElideMode(Qt.TextElideMode.ElideMiddle)
-        header = self.horizontalHeader()
-        header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
-        header.setStretchLastSection(True)
+        columns.prepare(self)
+        for changed in (model.dataChanged, model.rowsInserted, model.rowsRemoved):
+            changed.connect(self._fit)
         theme.changed.connect(self._restyle)
         self._restyle()
 
@@ -71,9 +74,17 @@ class ModelsTable(RowsTable):
             if entry.card.id == model:
                 self.selectRow(self._filtered.mapFromSource(self._rows.index(row, 0)).row())
 
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._fit()
+
+    def _fit(self) -> None:
+        columns.fit(self, {column: self._theme.px(least) for column, least in NAMES.items()}, SPARE)
+
     def _restyle(self) -> None:
         self.verticalHeader().setDefaultSectionSize(self._theme.px(24))
         self.setMinimumHeight(self._theme.px(120))
+        self._fit()
 
 
 def _cells(entry: Entry) -> tuple[str, ...]:

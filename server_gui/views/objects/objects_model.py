@@ -1,6 +1,5 @@
 """A device's objects as a table: texts are made of what is in sight, when it is drawn."""
 
-import time
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
@@ -9,6 +8,7 @@ from PySide6.QtCore import QAbstractTableModel, QModelIndex, QPersistentModelInd
 
 from gateway.plain import plain
 from gateway.wire.dictionary import ObjectInfo
+from server_gui.core.follow.moment import now_ns
 from server_gui.core.objects.reading import Held
 from server_gui.core.objects.rows import Compared, limits, pin_of
 from server_gui.views.theme import Theme
@@ -47,7 +47,7 @@ class Shown:
 
     def is_now(self, held: Held) -> bool:
         """Whether it may be called how it is."""
-        return self.is_linked and not held.is_old(time.monotonic_ns())
+        return self.is_linked and not held.is_old(now_ns())
 
 
 class ObjectsModel(QAbstractTableModel):
@@ -140,7 +140,7 @@ def _holds(shown: Shown, info: ObjectInfo) -> str:
 
 def _age(shown: Shown, info: ObjectInfo) -> str:
     held = shown.held(info)
-    return "" if held is None else age_text(held.age_s(time.monotonic_ns()))
+    return "" if held is None else age_text(held.age_s(now_ns()))
 
 
 def _other(shown: Shown, info: ObjectInfo) -> str:

@@ -73,6 +73,11 @@ class ParametersPanel(QWidget):
         everything.addWidget(self._below)
         self._connect()
 
+    def heightForWidth(self, width: int) -> int:
+        """As low as it can be: what scrolls it would give the tree all that it would like to have."""
+        layout = self.layout()
+        return -1 if layout is None else layout.totalMinimumHeightForWidth(width)
+
     def refresh(self) -> None:
         """Show how it is now."""
         for part in (self.control, self.file, self.tree, self.trial, self.detail):

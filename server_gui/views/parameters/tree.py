@@ -35,7 +35,7 @@ IF_ROOM: Final = (FILE, RANGE, DEFAULT, STORED)  # shown while they fit; the cho
 REFUSED: Final = "✕ limit"  # the robot would refuse what is staged
 WRONG: Final = ("✕", REFUSED, "⚠ changed")
 BEGINS: Final = "0123456789+-.,"  # a number
-NAME_PX: Final = 110  # that a name has at least
+NAME_PX: Final = 110  # that a name has at least; whole names where all else has room beside them
 
 
 class NewValue(QStyledItemDelegate):
@@ -90,6 +90,7 @@ class ParameterTree(QTreeView):
         self.setAccessibleName("Parameters")
         self.setObjectName("framed")
         self.setUniformRowHeights(True)
+        self.setTextElideMode(Qt.TextElideMode.ElideMiddle)
         self.setIndentation(theme.px(12))
         self.setEditTriggers(
             QAbstractItemView.EditTrigger.DoubleClicked
@@ -109,7 +110,12 @@ class ParameterTree(QTreeView):
         self.addAction(pin)
         self.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
         self._size_columns()
+        self._scale()
         theme.changed.connect(self.refresh)
+        theme.scaled.connect(self._scale)
+
+    def _scale(self) -> None:
+        self.setMinimumHeight(self._theme.px(LOW))  # else what is below leaves no row in sight
 
     def sizeHint(self) -> QSize:
         return QSize(super().sizeHint().width(), self._theme.px(LOW))
@@ -128,8 +134,8 @@ class ParameterTree(QTreeView):
             for name, info in known.items():
                 self._refresh_row(station, name, info)
                 self._refresh_facts(station, name, info, pinned)
-        if (shape, file) != self._fitted:
-            self._fitted = shape, file
+        if (shape, file, self._says) != self._fitted:
+            self._fitted = shape, file, self._says
             self._show_columns()
 
     def show_only(self, words: str, names: Iterable[str] | None) -> None:
@@ -307,9 +313,16 @@ class ParameterTree(QTreeView):
         super().resizeEvent(event)
         self._show_columns()
 
+    @property
+    def _says(self) -> bool:
+        """Whether anything is said beside a value: else that column gives its room to names."""
+        return any(items[SAID].text() for items in self._rows.values())
+
     def _show_columns(self) -> None:
         station = self._desk.selected
-        always = sum(self._width(column) for column in (ROBOT, NEW, UNIT, SAID))
+        self.setColumnHidden(SAID, not self._says)
+        always = sum(self._width(column) for column in (ROBOT, NEW, UNIT))
+        always += 0 if self.isColumnHidden(SAID) else self._width(SAID)
         room = self.viewport().width() - self._theme.px(NAME_PX) - always
         for column in IF_ROOM:
             wanted = column != FILE or (station is not None and station.file is not None)

@@ -35,6 +35,7 @@ from server_gui.views.widgets.plain import PlainLabel, set_tip
 from server_gui.views.widgets.scrolled import Scrolled
 
 ROOMY: Final = 440  # high, at text of 100 %: what is lower shows the robot rather than what labels it
+ALL: Final = 960  # high, likewise: from there on all of the robot is seen above the labels
 SLOW: Final = 5  # frames between two looks at what people read
 
 
@@ -82,6 +83,13 @@ class Player(QWidget):
         if is_roomy is not self._is_roomy:
             self._is_roomy = is_roomy
             self.labelling.setChecked(is_roomy)
+        self._make_room()
+
+    def _make_room(self) -> None:
+        """While somebody labels, what is labelled is in sight: the plots, beside what it was then."""
+        is_low = self.height() < self._theme.px(ALL)
+        alone = is_low and self.labelling.isChecked()
+        self.overview.show_plots_alone(alone, with_now=self._is_roomy)
 
     def heightForWidth(self, width: int) -> int:
         """As low as it can be: what scrolls it would give the views all that they would like to have."""
@@ -156,6 +164,7 @@ class Player(QWidget):
         self.labelling.setChecked(True)
         self.labelling.setToolTip("Label a span of it, or leave that room to the robot")
         self.labelling.toggled.connect(self.labels.setVisible)
+        self.labelling.toggled.connect(lambda _on: self._make_room())
         row.addWidget(self.labelling)
         row.addWidget(self.export)
         return row

@@ -11,6 +11,7 @@ class Scrolled(QScrollArea):
     def __init__(self, view: QWidget) -> None:
         super().__init__()
         self._view = view
+        self._has_grown = False
         self.setWidgetResizable(True)
         self.setWidget(view)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
@@ -28,4 +29,8 @@ class Scrolled(QScrollArea):
         layout = self._view.layout()
         if layout is not None and layout.hasHeightForWidth():
             width = max(self.viewport().width(), layout.totalMinimumSize().width())
+            self._has_grown = True
             self._view.setMinimumHeight(layout.totalMinimumHeightForWidth(width))
+        elif self._has_grown:  # what it needs is known without its width by now
+            self._has_grown = False
+            self._view.setMinimumHeight(0)

@@ -4,18 +4,18 @@ from typing import Final
 
 from PySide6.QtCore import QSize
 from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QLabel
 
 from server_gui.views.widgets.plain import PlainLabel
 
 LEAST: Final = 8  # letters
 
 
-class WholeLabel(PlainLabel):
+class WholeHeight(QLabel):
     """Its height follows its width also within nested layouts, which forget a label's own rule for that."""
 
-    def __init__(self, name: str = "") -> None:
-        super().__init__()
-        self.setObjectName(name)
+    def wrap(self) -> None:
+        """Have lines from now on, as many as are needed."""
         self.setWordWrap(True)
         policy = self.sizePolicy()
         policy.setHeightForWidth(False)
@@ -40,3 +40,12 @@ class WholeLabel(PlainLabel):
         if self.width() < self.fontMetrics().averageCharWidth() * LEAST:  # it has no place yet
             return self.fontMetrics().height()
         return max(super().heightForWidth(self.width()), 0)
+
+
+class WholeLabel(WholeHeight, PlainLabel):
+    """Of plain text."""
+
+    def __init__(self, name: str = "") -> None:
+        super().__init__()
+        self.setObjectName(name)
+        self.wrap()

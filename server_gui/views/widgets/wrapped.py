@@ -5,27 +5,31 @@ from typing import Final
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QLabel, QSizePolicy
+from PySide6.QtWidgets import QSizePolicy
 
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.plain import rich
+from server_gui.views.widgets.whole import WholeHeight
 
+HYPHEN: Final = "\N{NON-BREAKING HYPHEN}"
 MIDDLE: Final = Qt.TextElideMode.ElideMiddle
 
 
-class Wrapped(QLabel):
+class Wrapped(WholeHeight):
     """`say` brings the parts: a colour (#rrggbb) each, what is drawn of it, and what it says.
 
-    A part that is wider than this is broken between its words, so that the number at its end is in sight.
+    A part that is wider than this is broken between its words, so that the number at its end is in sight;
+    one that is `named` has it behind a name, which is elided in its middle.
     """
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, *, named: bool = False) -> None:
         super().__init__()
+        self._named = named
         self._parts: tuple[tuple[str, str, str], ...] = ()
         self.setAccessibleName(name)
         self.setTextFormat(Qt.TextFormat.RichText)
-        self.setWordWrap(True)
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Minimum)
+        self.wrap()
 
     def say(self, parts: Sequence[tuple[str, str, str]]) -> None:
         """Say these."""
@@ -55,5 +59,10 @@ class Wrapped(QLabel):
         if metrics.horizontalAdvance(whole) <= room:
             return rich(whole).replace(" ", "&nbsp;")
         room -= metrics.horizontalAdvance(f"{glyph} ")
+        name, _, number = text.rpartition(" ")
+        if self._named and name:
+            room = max(room - metrics.horizontalAdvance(f" {number}") - metrics.averageCharWidth(), 0)
+            short = f"{glyph} {metrics.elidedText(name, MIDDLE, room)} {number}"
+            return rich(short.replace("-", HYPHEN)).replace(" ", "&nbsp;")  # no line ends within it
         words = (metrics.elidedText(word, MIDDLE, room) for word in text.split())
         return f"{rich(glyph)}&nbsp;{rich(' '.join(words))}"

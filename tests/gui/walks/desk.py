@@ -57,6 +57,15 @@ def trial_runs_out(bench: Bench) -> None:
     hand.keep("run-out")
 
 
+def edits(bench: Bench) -> None:
+    """What was tried is listed, with what it did to the walk, or that this is not known yet."""
+    hand = bench.hand
+    hand.click("Edits")
+    hand.sees("step_length", "gait cycle", within_s=AGAIN_S)
+    hand.keep("edits")
+    hand.click("Overview")
+
+
 def pages(bench: Bench) -> None:
     """Each tab that only shows something, with what is done there first."""
     hand = bench.hand
@@ -156,7 +165,7 @@ def learning(bench: Bench) -> None:
     days = [day(f"s{number}", number, each_s=5.0) for number in range(WEARERS)]
     put(bench.store.as_uri(), bench.folder / "walks", days)
     hand.key("alt+m")
-    hand.click("Train a model")
+    hand.insist("Train a model", lambda: hand.reads("What it predicts"))
     hand.reach("Start training")
     hand.keep("train")
     hand.click("Start training")
@@ -165,8 +174,7 @@ def learning(bench: Bench) -> None:
     )  # or not better: the session of this bench may be among the judges
     hand.keep("trained")
     hand.click("Train a model")
-    hand.click("Promote…")
-    hand.sees("Serves now")
+    hand.insist("Promote…", lambda: hand.reads("Serves now"))
     hand.keep("promote")
     hand.click("Change nothing")
 
@@ -216,4 +224,5 @@ PAGES: Final[tuple[tuple[str, Callable[[Hand], None], str], ...]] = (
     ("Bus", lambda _: None, "main"),
     ("Objects", a_locked_object, "Read all"),
     ("Audit", lambda _: None, "journal"),
+    ("Edits", lambda _: None, "No edit is known yet"),
 )

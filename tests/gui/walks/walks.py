@@ -65,6 +65,7 @@ WALKS: Final = {
             robot.alive,
             desk.tuning,
             desk.trial_runs_out,
+            desk.edits,
             robot.drive_fault,
             robot.insole_lost,
             robot.bus_in_trouble,

@@ -10,7 +10,7 @@ from gateway.wire.bus import CLOSED, BusInfo, NodeInfo, TalkInfo
 from gateway.wire.finding import FindingInfo
 from server_gui.core.follow.events import BusesSeen, LinkChanged
 from server_gui.core.follow.robot import Robot
-from server_gui.core.processing.bus_health import Level, level, seen, talking, trouble, worst
+from server_gui.core.processing.bus_health import Level, findings, level, seen, talking, trouble, worst
 
 NODE = NodeInfo(2, ["left_knee"], 0.44, 12.0, 88, 0, 0, 0.0)
 TALKS = [TalkInfo("TPDO", 2, 900.0), TalkInfo("SYNC", None, 100.0), TalkInfo("heartbeat", 2, 10.0)]
@@ -55,7 +55,7 @@ def test_a_full_bus_is_an_alarm_that_says_what_to_check() -> None:
     assert trouble(BUS) is None
     missing = trouble(replace(BUS, nodes=[replace(NODE, pdos_missing_percent=20.0)]))
     assert missing is not None
-    assert missing[0] == "20 % of the PDOs of left knee are missing"
+    assert missing[0] == "left knee: 20 % of its PDOs are missing"
 
 
 def test_what_is_old_or_never_came_or_is_of_a_link_that_is_gone_is_not_known() -> None:
@@ -101,3 +101,26 @@ def test_who_talks_is_told_by_node_and_kind() -> None:
     assert knee.kinds == (("TPDO", 900.0), ("heartbeat", 10.0))
     assert knee.share == pytest.approx(910 / 1010)
     assert (nobody.node_id, nobody.kinds) == (None, (("SYNC", 100.0),))
+
+
+def test_what_several_nodes_have_is_said_once() -> None:
+    names = ("left_hip", "left_knee", "right_knee")
+    nodes = [
+        replace(NODE, node_id=place + 1, components=[name], pdos_missing_percent=3.0 + place)
+        for place, name in enumerate(names)
+    ]
+    bus = replace(BUS, load_percent=24.0, nodes=nodes)
+    assert findings(bus) == [("all 3 nodes: 3–5 % of its PDOs are missing", "")]
+    well = replace(NODE, node_id=9, components=["right_hip"], pdos_missing_percent=0.0)
+    whose = "left hip, left knee, right knee"
+    assert findings(replace(bus, nodes=[*nodes, well])) == [(f"{whose}: 3–5 % of its PDOs are missing", "")]
+    nodes.append(replace(nodes[0], node_id=4, components=["left_ankle"]))
+    for others, whose in ((1, "all nodes but right hip"), (3, "left hip, left knee and 2 more nodes")):
+        wells = [replace(well, node_id=9 + place) for place in range(others)]
+        said = f"{whose}: 3–5 % of its PDOs are missing"
+        assert findings(replace(bus, nodes=[*nodes, *wells])) == [(said, "")]
+    lost = [replace(node, findings=[LOST]) for node in nodes[:2]]
+    assert findings(replace(bus, nodes=[*lost, nodes[2]])) == [
+        (f"left hip, left knee: {LOST.words}", LOST.check),
+        ("right knee: 5 % of its PDOs are missing", ""),
+    ]

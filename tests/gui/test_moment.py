@@ -1,0 +1,55 @@
+"""A frame is of one moment: however slowly it is drawn, no two places of the window judge by other clocks."""
+
+import itertools
+import time
+from types import SimpleNamespace
+
+import pytest
+
+from server_gui.core.follow import moment, robot
+from server_gui.views.main_window import MainWindow
+from server_gui.views.widgets.mark import MarkIcon
+from tests.gui.fakes import Bench
+from tests.support.desk import described, looked, walking
+
+
+def test_all_of_a_frame_is_judged_by_one_moment(
+    bench: Bench, window: MainWindow, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each look at the clock takes so long that what is live becomes stale within a frame or two."""
+    bench.station.take([described(), walking(600), looked()])
+    bench.draw(window)
+    ticks = itertools.count(time.monotonic_ns(), robot.STALE_NS // 20)
+    monkeypatch.setattr(moment, "time", SimpleNamespace(monotonic_ns=lambda: next(ticks)))
+    said = list[str]()
+    for _ in range(40):
+        window.refresh()
+        chip, fact = window.header._chips["drives"], window.overview.now.drives
+        colours = {icon._mark.colour for one in (chip, fact) for icon in one.findChildren(MarkIcon)}
+        assert len(colours) == 1, said
+        said.append(colours.pop())
+    assert {said[0], said[-1]} == {"good", "old"}
+
+
+def test_what_is_read_is_shown_anew_in_the_same_frames(bench: Bench, window: MainWindow) -> None:
+    """Header and overview: a drive that goes off is off in both."""
+    bench.station.take([described(), walking(600), looked()])
+    bench.draw(window)
+    shown = set[str]()
+    for _ in range(20):
+        bench.station.robot.values["left_knee.state"] = float(len(shown) % 2)
+        window.refresh()
+        header = window.header._chips["drives"].main_text
+        shown.add(header)
+        assert window.overview.now.drives.main.text() == header
+
+
+def test_within_one_moment_the_clock_stands(monkeypatch: pytest.MonkeyPatch) -> None:
+    ticks = itertools.count()
+    monkeypatch.setattr(moment, "time", SimpleNamespace(monotonic_ns=lambda: next(ticks)))
+    with moment.one_moment():
+        first = moment.now_ns()
+        with moment.one_moment():
+            assert moment.now_ns() == first
+        assert moment.now_ns() == first
+    assert moment.now_ns() > first
