@@ -61,6 +61,7 @@ from server_gui.views.signals import Signals
 from server_gui.views.status_bar import StatusBar
 from server_gui.views.theme import Look, Theme
 from server_gui.views.widgets.scrolled import Scrolled
+from server_gui.views.workspace.beside_menu import others_of
 
 OF_A_ROBOT: Final = ("&Overview", "&Signals", "&Resources", "&Bus", "Ob&jects", "&Audit", "&Edits")
 SCALES: Final = (80, 90, 100, 125, 150, 175, 200)
@@ -143,7 +144,9 @@ class MainWindow(QMainWindow):
         self.trial.take_back.connect(lambda: self.trial.station.end_trial() if self.trial.station else None)
         self.events = EventsPanel(desk, theme)
         self.events.shown.connect(self.show_around)
-        self.overview, self.signals = Overview(desk, theme), Signals(desk, theme)
+        step = None if archive is None else archive.playback.step
+        self.overview = Overview(desk, theme)
+        self.signals = Signals(desk, theme, others=lambda: others_of(desk, archive), step=step)
         self.overview.opened.connect(self._open_in_signals)
         self.resources = Resources(desk, theme)
         self.buses = BusHealthView(desk, theme)
