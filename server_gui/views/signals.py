@@ -374,7 +374,7 @@ class Signals(QWidget):
         scene = self.scene
         set_text(self.beside_said, scene.beside_text())
         self.beside_said.setVisible(scene.beside is not None)
-        set_text(self.trigger.said, scene.trigger_text() or "off: what comes is shown")
+        self.trigger.say(scene.trigger_text() or "off: what comes is shown")
 
     # --- what happened
 

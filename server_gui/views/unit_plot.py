@@ -28,7 +28,7 @@ class Drawn:
     problem: str = ""
 
 
-def legend_row(legend: Wrapped, menu: QMenu, name: str) -> QHBoxLayout:
+def legend_row(theme: Theme, legend: Wrapped, menu: QMenu, name: str) -> QHBoxLayout:
     """Return a plot's legend, with a button for all that can be done with the plot."""
     button = QToolButton()
     button.setText("⋯")
@@ -37,6 +37,8 @@ def legend_row(legend: Wrapped, menu: QMenu, name: str) -> QHBoxLayout:
     button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
     button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
     button.setMenu(menu)
+    button.setStyleSheet("QToolButton { padding: 0; } QToolButton::menu-indicator { image: none; }")
+    button.setFixedSize(theme.px(26), theme.px(18))
     row = QHBoxLayout()
     row.addWidget(legend, 1)
     row.addWidget(button, 0, Qt.AlignmentFlag.AlignTop)
@@ -73,7 +75,7 @@ class UnitPlot(TakesCurves):
         self.plot.setAccessibleName(self.accessibleName())
         self._names = {curve.text: curve.name for curve in curves}
         self._legend = Wrapped(f"Values of {self.accessibleName()}")
-        self.body.addLayout(legend_row(self._legend, self.menu, f"Plot {place + 1}: curves and kind"))
+        self.body.addLayout(legend_row(theme, self._legend, self.menu, f"Plot {place + 1}: curves and kind"))
         self.body.addWidget(self.plot)
         self.setMinimumHeight(theme.px(120))
 
@@ -106,7 +108,7 @@ class EmptyPlot(TakesCurves):
         super().__init__(f"{place + 1} · nothing to draw here")
         self.menu = QMenu(self)
         self.legend = Wrapped(f"What plot {place + 1} lacks")
-        self.body.addLayout(legend_row(self.legend, self.menu, f"Plot {place + 1}: curves and kind"))
+        self.body.addLayout(legend_row(theme, self.legend, self.menu, f"Plot {place + 1}: curves and kind"))
         bad = css(theme, "bad")
         self.legend.say([(bad, "▲", f"{one.name}: {one.problem}") for one in curves])
         self.body.addWidget(QWidget(), 1)

@@ -251,6 +251,11 @@ def test_a_trigger_keeps_what_was_before_and_after_it(signals: Signals, bench: B
     signals.span.setCurrentText("2 s")
     signals.tools.trigger.click()
     signals.trigger.show_condition(Condition(On.RISE, KNEE, 0.5, mode=Mode.SINGLE, before=0.25))
+    signals.trigger.level.setText("a lot")
+    signals.trigger.arm.click()
+    assert "a number that is none" in said(signals)
+    assert signals.scene.trigger.state is State.OFF
+    signals.trigger.level.setText("28.648 °")
     signals.trigger.arm.click()
     signals.refresh()
     assert signals.scene.trigger.state is State.ARMED
@@ -266,7 +271,7 @@ def test_a_trigger_keeps_what_was_before_and_after_it(signals: Signals, bench: B
     assert signals.plots[0].plot._limits == pytest.approx([math.degrees(0.5)], abs=1e-3)
     flags = [flag for flag in signals.plots[0].plot._flags if flag.kind is FlagKind.TRIGGER]
     assert [flag.at for flag in flags] == [pytest.approx(-1.5, abs=0.02)]
-    assert "stopped" in signals.trigger.said.text()
+    assert "stopped" in signals.trigger._title.text()
     signals.tools.trigger.click()
     assert signals.scene.frozen is None
 

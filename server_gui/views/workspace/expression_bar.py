@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QFontDatabase
-from PySide6.QtWidgets import QCompleter, QHBoxLayout, QLineEdit, QPushButton
+from PySide6.QtWidgets import QCompleter, QHBoxLayout, QLineEdit, QPushButton, QSizePolicy
 
 from server_gui.core.workspace.expressions import FUNCTIONS
 from server_gui.core.workspace.grammar import LONGEST
@@ -37,12 +37,12 @@ class ExpressionBar(Card):
         self.add = QPushButton("Add")
         self.add.setAccessibleName("Add the expression")
         self.add.clicked.connect(self._add)
+        self.place = PlainLabel()
+        self.place.setFont(fixed)
+        self.place.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self.words = PlainLabel(HELP)
         self.words.setObjectName("dim")
         self.words.setWordWrap(True)
-        self.place = PlainLabel()
-        self.place.setFont(fixed)
-        self.place.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         row = QHBoxLayout()
         row.addWidget(self.field, 1)
         row.addWidget(self.add)
@@ -68,7 +68,8 @@ class ExpressionBar(Card):
             return
         meant = self._meaning(text)
         self.add.setEnabled(not meant.problem)
-        set_text(self.place, meant.mark)
+        lines = meant.mark.splitlines()[:2]
+        set_text(self.place, "\n".join([*lines[:1], *(line[: line.rindex("^") + 1] for line in lines[1:])]))
         self.place.setVisible(bool(meant.mark))
         set_text(
             self.words, f"▲ {meant.problem}" if meant.problem else f"{meant.name}, in {said(meant.unit)}"

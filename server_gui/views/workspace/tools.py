@@ -56,11 +56,11 @@ class Tools(QWidget):
         self.said = ElidedLabel("dim")
         self._first = QBoxLayout(QBoxLayout.Direction.LeftToRight)
         self._first.addLayout(_row((self.span, self.pause, self.fit, self.box, self.cursors)))
-        self._first.addLayout(_row((self.before, self.next, self.as_csv, self.as_png)))
+        self._events = _row((self.before, self.next, self.as_csv, self.as_png))
+        self._first.addLayout(self._events)
         self._first.addStretch(1)
-        self._second = QBoxLayout(QBoxLayout.Direction.LeftToRight)
-        self._second.addLayout(_row((*menus, self.expression, self.trigger, self.note)))
-        self._second.addWidget(self.said, 1)
+        self._second = _row((*menus, self.expression, self.trigger, self.note))
+        self._second.addWidget(self.said, 100)
         self.rows = QVBoxLayout()
         self.rows.addLayout(self._first)
         self.rows.addLayout(self._second)
@@ -69,8 +69,10 @@ class Tools(QWidget):
     def be_narrow(self, narrow: bool) -> None:
         """Stand in more rows."""
         direction = QBoxLayout.Direction
-        for row in (self._first, self._second):
-            row.setDirection(direction.TopToBottom if narrow else direction.LeftToRight)
+        self._first.setDirection(direction.TopToBottom if narrow else direction.LeftToRight)
+        for row in (self._events, self._second):
+            row.removeWidget(self.said)
+        (self._events if narrow else self._second).addWidget(self.said, 100)
 
     def _keys(self, page: QWidget) -> None:
         """Keys of this page; the sheet of keys tells them."""

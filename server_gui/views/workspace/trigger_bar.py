@@ -1,18 +1,17 @@
 """The trigger of the signals: what is waited for, what then, and how it is."""
 
+import math
 from collections.abc import Sequence
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QBoxLayout, QComboBox, QDoubleSpinBox, QHBoxLayout, QPushButton
+from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLineEdit, QPushButton, QVBoxLayout
 
 from gateway.units import Unit
 from server_gui.core.workspace.scene import Scene
-from server_gui.core.workspace.trigger import LONGEST_HOLD_S, WINDOWS, Condition, Mode, On
+from server_gui.core.workspace.trigger import WINDOWS, Condition, Mode, On
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card
-from server_gui.views.widgets.elided import ElidedLabel
 
-MOST = 1e9
 NO_UNIT = Unit("", "")
 
 
@@ -32,14 +31,11 @@ class TriggerBar(Card):
         self.of.currentTextChanged.connect(self._show_unit)
         self.on = _choice("When it triggers", [one.value for one in On])
         self.on.currentTextChanged.connect(self._fit)
-        self.level, self.high = _number("Level, or lower end", -MOST, MOST), _number("Upper end", -MOST, MOST)
+        self.level, self.high = NumberField("Level, or lower end"), NumberField("Upper end")
         self.mode = _choice("What comes after", [one.value for one in Mode])
         self.mode.setCurrentText(Mode.NORMAL.value)
-        self.before = _number("Share of what is seen that is before it", 0, 100, " % before")
-        self.before.setDecimals(0)
-        self.before.setValue(50)
-        self.hold_off = _number("Hold-off", 0, LONGEST_HOLD_S, " s hold-off")
-        self.hold_off.setDecimals(1)
+        self.before = NumberField("Share of what is seen that is before it", 50.0, "% before")
+        self.hold_off = NumberField("Hold-off", 0.0, "s hold-off")
         self.arm = QPushButton("Arm")
         self.arm.setToolTip("Wait for it, from now on; data and recording go on whatever is shown")
         self.arm.clicked.connect(lambda: self.armed.emit(self.condition))
@@ -47,20 +43,20 @@ class TriggerBar(Card):
         self.live.setAccessibleName("Trigger off")
         self.live.setToolTip("Wait for nothing, and show what comes")
         self.live.clicked.connect(self.ended)
-        self.said = ElidedLabel()
-        self._rows = QBoxLayout(QBoxLayout.Direction.TopToBottom)
-        for widgets in (
-            (self.of, self.on, self.level, self.high),
-            (self.mode, self.before, self.hold_off, self.arm, self.live),
-        ):
+        rows = QVBoxLayout()
+        first, second = (self.of, self.on), (self.level, self.high, self.mode)
+        for widgets in (first, second, (self.before, self.hold_off, self.arm, self.live)):
             row = QHBoxLayout()
             for widget in widgets:
-                row.addWidget(widget, int(widget is self.of))
-            self._rows.addLayout(row)
-        self.body.addLayout(self._rows)
-        self.body.addWidget(self.said)
+                row.addWidget(widget, 1)
+            rows.addLayout(row)
+        self.body.addLayout(rows)
         self._fit()
         self.hide()
+
+    def say(self, text: str) -> None:
+        """Say how it is."""
+        self.set_title(f"Trigger, {text}")
 
     @property
     def condition(self) -> Condition:
@@ -69,11 +65,11 @@ class TriggerBar(Card):
         return Condition(
             On(self.on.currentText()),
             self.of.currentText(),
-            self.level.value() / scale,
-            self.high.value() / scale,
+            self.level.value / scale,
+            self.high.value / scale,
             Mode(self.mode.currentText()),
-            self.before.value() / 100,
-            self.hold_off.value(),
+            self.before.value / 100,
+            self.hold_off.value,
         )
 
     def show_choices(self, scene: Scene) -> None:
@@ -89,11 +85,11 @@ class TriggerBar(Card):
         if self.of.findText(condition.of) < 0:
             self.of.addItem(condition.of)
         self.of.setCurrentText(condition.of)
-        self.level.setValue(condition.level * self._unit.scale)
-        self.high.setValue(condition.high * self._unit.scale)
+        self.level.set_value(condition.level * self._unit.scale)
+        self.high.set_value(condition.high * self._unit.scale)
         self.mode.setCurrentText(condition.mode.value)
-        self.before.setValue(condition.before * 100)
-        self.hold_off.setValue(condition.hold_off_s)
+        self.before.set_value(condition.before * 100)
+        self.hold_off.set_value(condition.hold_off_s)
 
     def _fit(self) -> None:
         """Only what counts for what is waited for."""
@@ -113,7 +109,7 @@ class TriggerBar(Card):
     def _show_unit(self) -> None:
         self._unit = self._units.get(self.of.currentText(), NO_UNIT)
         for field in (self.level, self.high):
-            field.setSuffix(f" {self._unit.symbol}" if self._unit.symbol else "")
+            field.set_suffix(self._unit.symbol)
 
 
 def _choice(name: str, texts: Sequence[str] = ()) -> QComboBox:
@@ -121,17 +117,37 @@ def _choice(name: str, texts: Sequence[str] = ()) -> QComboBox:
     combo.addItems(list(texts))
     combo.setAccessibleName(name)
     combo.setToolTip(name)
-    combo.setMinimumContentsLength(9)
+    combo.setMinimumContentsLength(7)
     combo.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
     return combo
 
 
-def _number(name: str, least: float, most: float, suffix: str = "") -> QDoubleSpinBox:
-    field = QDoubleSpinBox()
-    field.setRange(least, most)
-    field.setDecimals(3)
-    field.setSuffix(suffix)
-    field.setAccessibleName(name)
-    field.setToolTip(name)
-    field.setMaximumWidth(130)
-    return field
+class NumberField(QLineEdit):
+    """A number with its unit behind it; what is no number is NaN, which no trigger takes."""
+
+    def __init__(self, name: str, value: float = 0.0, suffix: str = "") -> None:
+        super().__init__()
+        self._suffix = suffix
+        self.setAccessibleName(name)
+        self.setToolTip(name)
+        self.setMinimumWidth(50)
+        self.set_value(value)
+
+    @property
+    def value(self) -> float:
+        """The number that stands there."""
+        text = self.text().strip().removesuffix(self._suffix).replace("−", "-").strip()
+        try:
+            return float(text)
+        except ValueError:
+            return math.nan
+
+    def set_value(self, value: float) -> None:
+        """Have this number stand there."""
+        self.setText(f"{value:.6g} {self._suffix}".rstrip())
+
+    def set_suffix(self, suffix: str) -> None:
+        """Have another unit behind it."""
+        value, self._suffix = self.value, suffix
+        if math.isfinite(value):
+            self.set_value(value)

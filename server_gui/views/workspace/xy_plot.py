@@ -18,10 +18,10 @@ from server_gui.views.widgets.value_axis import ValueAxis
 from server_gui.views.widgets.wrapped import Wrapped
 
 Floats = npt.NDArray[np.float64]
-BANDS: Final = 6  # shades of age
+BANDS: Final = 5  # shades of age
 FAINTEST: Final = 0.15
-MOST_POINTS: Final = 3000  # of a curve: more are not to be seen apart
-EVERY: Final = 3  # frames between two drawings
+MOST_POINTS: Final = 1000  # of a curve: more are not to be seen apart
+EVERY: Final = 6  # frames between two drawings
 
 
 class XYPlot(TakesCurves):
@@ -46,7 +46,7 @@ class XYPlot(TakesCurves):
         self._colours = dict(zip(self.drawn, colours_of(self.drawn), strict=True))
         self._lines = {text: [self.plot.plot() for _ in range(BANDS)] for text in self.drawn}
         self._dots = {text: self.plot.plot(symbol="o", symbolSize=7) for text in self.drawn}
-        self.body.addLayout(legend_row(self._legend, self.menu, f"Plot {place + 1}: curves and kind"))
+        self.body.addLayout(legend_row(theme, self._legend, self.menu, f"Plot {place + 1}: curves and kind"))
         self.body.addWidget(self.plot, 1)
         self.setMinimumHeight(theme.px(160))
         self._restyle()
