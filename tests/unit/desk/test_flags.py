@@ -3,7 +3,6 @@
 import datetime
 
 import msgspec
-import pytest
 
 from server_gui.core.desk.flags import (
     Flag,
@@ -104,7 +103,8 @@ def test_a_station_flags_what_its_rows_tell_and_what_is_marked(bench: Bench) -> 
     for told in recording.on_mark:
         told("before that", (station.robot.age_s() or 0.0) + 0.005)
     newest = next(iter(station.flags))
-    assert (newest.text, newest.at_ns) == ("before that", pytest.approx(15 * MS, abs=5 * MS))
+    assert newest.text == "before that"
+    assert 10 * MS <= newest.at_ns <= 20 * MS
     assert station.rings.seconds(20 * MS) == 0.01
     assert station.rings.stamp_ns(0.01) == 20 * MS
     other = described().description
