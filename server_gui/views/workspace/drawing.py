@@ -59,7 +59,7 @@ def read(scene: Scene, cards: Sequence[AnyPlot], station: Station, at_s: float |
             continue
         values = [scene.read(text, at_s) for text in card.drawn]
         if isinstance(card, XYPlot):
-            card.show_values(scene.read(card.over.text, at_s), values, when)
+            card.show_values(scene.read(card.over.text, at_s), values, live=live, when=when)
             continue
         theirs = [] if scene.beside is None else [scene.read(text, at_s, beside=True) for text in card.drawn]
         card.show_values(values, theirs, live=live, when=when)

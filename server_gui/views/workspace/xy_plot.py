@@ -59,14 +59,22 @@ class XYPlot(TakesCurves):
         for text, ys in zip(self.drawn, columns, strict=True):
             self._draw(text, xs * self.x_unit.scale, ys * self.unit.scale, live=live)
 
-    def show_values(self, x: float | None, values: Sequence[float | None], when: str = "") -> None:
-        """Show where it is."""
+    def show_values(
+        self, x: float | None, values: Sequence[float | None], *, live: bool = True, when: str = ""
+    ) -> None:
+        """Show where it is; grey where not `live`."""
         by = {curve.text: curve.name for curve in self.curves}
         told = [
-            (css(self._theme, self._colours[text]), "━", f"{by[text]} {self.unit.text(value)}")
+            (
+                css(self._theme, self._colours[text] if live else "old"),
+                "━",
+                f"{by[text]} {self.unit.text(value)}",
+            )
             for text, value in zip(self.drawn, values, strict=True)
         ]
-        told.append((css(self._theme, "text"), "→", f"{self.over.name} {self.x_unit.text(x)}"))
+        told.append(
+            (css(self._theme, "text" if live else "old"), "→", f"{self.over.name} {self.x_unit.text(x)}")
+        )
         bad = css(self._theme, "bad")
         told += [(bad, "▲", f"{one.name}: {one.problem}") for one in self.curves if one.problem]
         self._legend.say(told)
