@@ -11,7 +11,7 @@ from server_gui.core.workspace.grammar import LONGEST
 from server_gui.core.workspace.meaning import Meaning
 from server_gui.core.workspace.workspace import said
 from server_gui.views.widgets.card import Card, set_text
-from server_gui.views.widgets.plain import PlainLabel
+from server_gui.views.widgets.plain import PlainLabel, set_tip
 
 EXAMPLE = "knee error = left_knee.position - left_knee.target"
 HELP = f"Channels, numbers such as 5 [°], + − * / ( ), and {', '.join(sorted(FUNCTIONS))}; a name before ="
@@ -29,7 +29,7 @@ class ExpressionBar(Card):
         self.field.setMaxLength(LONGEST)
         self.field.setPlaceholderText(EXAMPLE)
         self.field.setAccessibleName("Expression over channels")
-        self.field.setToolTip(HELP)
+        set_tip(self.field, HELP)
         fixed = QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont)
         self.field.setFont(fixed)  # so that a place below it is below its letter
         self.field.textChanged.connect(self._judge)

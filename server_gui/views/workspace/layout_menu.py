@@ -10,6 +10,7 @@ from gateway.plain import plain
 from server_gui.core.workspace.layouts import Layout, LayoutError, Layouts, read, write
 from server_gui.views.ask import ask
 from server_gui.views.widgets.files import ask_open, ask_save
+from server_gui.views.widgets.plain import set_tip
 
 UNNAMED: Final = "signals"
 
@@ -49,7 +50,7 @@ class LayoutMenu(QPushButton):
         for problem in self._layouts.damaged():
             action = menu.addAction("▲ cannot be read")
             action.setEnabled(False)
-            action.setToolTip(plain(problem))
+            set_tip(action, plain(problem))
         menu.addSeparator()
         menu.addAction("Save as …").triggered.connect(self._ask_name)
         for title, do in (("Rename", self._ask_rename), ("Delete", self._ask_delete)):

@@ -104,7 +104,7 @@ class Tools(QWidget):
 def _switch(text: str, tip: str) -> QPushButton:
     button = QPushButton(text)
     button.setCheckable(True)
-    button.setToolTip(tip)
+    set_tip(button, tip)
     return button
 
 

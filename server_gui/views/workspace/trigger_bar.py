@@ -11,6 +11,7 @@ from server_gui.core.workspace.scene import Scene
 from server_gui.core.workspace.trigger import WINDOWS, Condition, Mode, On
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card
+from server_gui.views.widgets.plain import set_tip
 
 NO_UNIT = Unit("", "")
 
@@ -116,7 +117,7 @@ def _choice(name: str, texts: Sequence[str] = ()) -> QComboBox:
     combo = QComboBox()
     combo.addItems(list(texts))
     combo.setAccessibleName(name)
-    combo.setToolTip(name)
+    set_tip(combo, name)
     combo.setMinimumContentsLength(7)
     combo.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
     return combo
@@ -129,7 +130,7 @@ class NumberField(QLineEdit):
         super().__init__()
         self._suffix = suffix
         self.setAccessibleName(name)
-        self.setToolTip(name)
+        set_tip(self, name)
         self.setMinimumWidth(50)
         self.set_value(value)
 
