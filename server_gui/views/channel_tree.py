@@ -4,28 +4,28 @@ import fnmatch
 from collections.abc import Sequence
 from typing import Final
 
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QTreeWidget, QTreeWidgetItem
+from PySide6.QtCore import QMimeData, QPoint, Qt, Signal
+from PySide6.QtGui import QContextMenuEvent
+from PySide6.QtWidgets import QAbstractItemView, QTreeWidget, QTreeWidgetItem
 
 from gateway.units import Units
 from gateway.wire.component import ChannelInfo
 from server_gui.core.desk.station import Station
+from server_gui.core.workspace.meaning import channels_of
+from server_gui.core.workspace.workspace import MOST_CURVES
+from server_gui.views.widgets.dragging import CURVES, dragged
 
-MOST_CURVES: Final = 24
 USUAL: Final = ("left_hip.position", "right_hip.position", "left_insole.force", "right_insole.force")
 NAME_ROLE: Final = Qt.ItemDataRole.UserRole + 1
 
 
-def channels_of(station: Station) -> list[ChannelInfo]:
-    """Return those that a robot's components have."""
-    description = station.robot.description
-    return (
-        [] if description is None else [info for info in description.channels if info.component != "resource"]
-    )
-
-
 class ChannelTree(QTreeWidget):
-    """`itemChanged` when somebody ticks a channel; not when it is ticked by `choose`."""
+    """`itemChanged` when somebody ticks a channel; not when it is ticked by `choose`.
+
+    `asked` brings a channel, and where the menu of what can be done with it is to open. They can be dragged.
+    """
+
+    asked = Signal(str, QPoint)
 
     def __init__(self) -> None:
         super().__init__()
@@ -34,6 +34,8 @@ class ChannelTree(QTreeWidget):
         self.setHeaderHidden(True)
         self.setObjectName("framed")
         self.setAccessibleName("Channels")
+        self.setDragEnabled(True)
+        self.setDragDropMode(QAbstractItemView.DragDropMode.DragOnly)
 
     @property
     def items(self) -> list[QTreeWidgetItem]:
@@ -81,6 +83,21 @@ class ChannelTree(QTreeWidget):
             item.setHidden(not all(word in name for word in wanted))
             if words and not item.isHidden():
                 _open_group(item)
+
+    def mimeTypes(self) -> list[str]:
+        return [CURVES]
+
+    def mimeData(self, items: Sequence[QTreeWidgetItem]) -> QMimeData:
+        return dragged([str(item.data(0, NAME_ROLE)) for item in items if item.data(0, NAME_ROLE)])
+
+    def contextMenuEvent(self, event: QContextMenuEvent) -> None:
+        """Of the channel under the mouse; by the keyboard, of the one that has it."""
+        by_mouse = event.reason() is QContextMenuEvent.Reason.Mouse
+        item = self.itemAt(event.pos()) if by_mouse else self.currentItem()
+        name = None if item is None else item.data(0, NAME_ROLE)
+        if item is not None and name:
+            at = event.pos() if by_mouse else self.visualItemRect(item).bottomLeft()
+            self.asked.emit(str(name), self.viewport().mapToGlobal(at))
 
     def _fill(self, infos: Sequence[ChannelInfo], units: Units) -> None:
         self.blockSignals(True)

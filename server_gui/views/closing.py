@@ -18,6 +18,10 @@ WIDTH: Final = 430
 KEPT: Final = (
     "What was recorded is on this computer's disk, and goes to the store at the next start at the latest."
 )
+COMMISSIONING: Final = (
+    "A robot is being commissioned. Closing the window ends the command; what was found is kept beside the "
+    "robot's file, and gone on with at the next start."
+)
 
 
 class Closing(QDialog):

@@ -43,6 +43,9 @@ KEYS: Final[dict[str, dict[str, str]]] = {
         "Ctrl+Up": "To the event before",
         "Ctrl+Down": "To the next event",
         "Ctrl+E": "Save as CSV",
+        "Ctrl+Shift+E": "Write an expression",
+        "Ctrl+Shift+T": "The trigger, or no more",
+        "Ctrl+Shift+N": "A note on the time axis",
     },
     "A recording": {
         "Space": "Play or pause",
@@ -56,6 +59,7 @@ KEYS: Final[dict[str, dict[str, str]]] = {
         "Arrows": "From row to row; in a tree → opens and ← closes",
         "Return": "On a table's titles, which Tab leads to: ← → chooses one, Return sorts by it",
         "Space": "Tick a channel; press a button",
+        "Menu": "What can be done with a channel: into which plot it goes",
     },
 }
 

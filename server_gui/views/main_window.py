@@ -37,6 +37,7 @@ from server_gui.views.alarms import AlarmStrip
 from server_gui.views.ask import ask
 from server_gui.views.audit import Audit
 from server_gui.views.bus_health import BusHealthView
+from server_gui.views.closing import COMMISSIONING
 from server_gui.views.cloud.panel import Cloud
 from server_gui.views.commissioning.page import CommissionPage
 from server_gui.views.docks import Area, Docks
@@ -64,15 +65,12 @@ from server_gui.views.signals import Signals
 from server_gui.views.status_bar import StatusBar
 from server_gui.views.theme import Look, Theme
 from server_gui.views.widgets.scrolled import Scrolled
+from server_gui.views.workspace.beside_menu import others_of
 
 OF_A_ROBOT: Final = ("&Overview", "&Signals", "&Resources", "&Bus", "Ob&jects", "&Audit", "&Edits")
 SCALES: Final = (80, 90, 100, 125, 150, 175, 200)
 # Quantities with more than one unit worth choosing.
 CHOICES: Final = ("rad", "rad/s", "m", "Pa", "m/s²", "s", "A")
-CLOSING: Final = (
-    "A robot is being commissioned. Closing the window ends the command; what was found is kept beside the "
-    "robot's file, and gone on with at the next start."
-)
 ROBOTS: Final = 9  # that have a key
 LEAST: Final = 240  # high, at text of 100 %
 USUAL: Final = QSize(1680, 1000)  # where the screen has room for that
@@ -145,8 +143,10 @@ class MainWindow(QMainWindow):
         self.experiment = ExperimentBar(desk)
         self.events = EventsPanel(desk, theme)
         self.events.shown.connect(self.show_around)
-        self.overview, self.signals = Overview(desk, theme), Signals(desk, theme)
+        step = None if archive is None else archive.playback.step
+        self.overview = Overview(desk, theme)
         self.overview.is_paced = False
+        self.signals = Signals(desk, theme, others=lambda: others_of(desk, archive), step=step)
         self.overview.opened.connect(self._open_in_signals)
         self.resources = Resources(desk, theme)
         self.buses = BusHealthView(desk, theme)
@@ -268,7 +268,7 @@ class MainWindow(QMainWindow):
             self._is_closing = True
             commissioning.interrupt()
 
-        ask(self, "A robot is being commissioned", CLOSING, "End it and close", end)
+        ask(self, "A robot is being commissioned", COMMISSIONING, "End it and close", end)
 
     def end(self) -> None:
         """Close without a question: nobody may be there to answer. Qt asks every window before it quits."""

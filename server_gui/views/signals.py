@@ -1,85 +1,88 @@
-"""Signals: chosen channels over time, one plot a unit; pause, zoom, measure, export while data go on."""
+"""Signals: curves in plots as somebody arranges them; pause, zoom, measure, compare while data go on."""
 
-import csv
 import datetime
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QKeySequence, QResizeEvent, QShortcut
-from PySide6.QtWidgets import (
-    QBoxLayout,
-    QComboBox,
-    QHBoxLayout,
-    QLineEdit,
-    QPushButton,
-    QSplitter,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QLineEdit, QSplitter, QTreeWidgetItem, QVBoxLayout, QWidget
 
-from gateway.units import Unit
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.measuring import measure, nearest, row_at
 from server_gui.core.desk.station import Station
-from server_gui.views.channel_tree import MOST_CURVES, ChannelTree, channels_of
-from server_gui.views.marks import age_text
+from server_gui.core.settings.server_file import default_file
+from server_gui.core.workspace.exporting import save_csv
+from server_gui.core.workspace.layouts import Layout, Layouts
+from server_gui.core.workspace.notes import LiveNotes, Notes
+from server_gui.core.workspace.scene import Scene, layout_of
+from server_gui.core.workspace.trigger import Condition
+from server_gui.core.workspace.workspace import MOST_CURVES
+from server_gui.views.channel_tree import NAME_ROLE, ChannelTree
+from server_gui.views.marks import old_text
 from server_gui.views.measuring import Measuring
 from server_gui.views.theme import Theme
 from server_gui.views.unit_plot import UnitPlot
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.elided import ElidedLabel
 from server_gui.views.widgets.files import ask_save, save_whole
-from server_gui.views.widgets.plain import PlainLabel, set_tip
-from server_gui.views.widgets.plot import PlacedFlag
+from server_gui.views.widgets.plain import set_tip
+from server_gui.views.workspace.beside_menu import BesideMenu, others_of
+from server_gui.views.workspace.drawing import AnyPlot, draw, flag, read
+from server_gui.views.workspace.expression_bar import ExpressionBar
+from server_gui.views.workspace.layout_menu import LayoutMenu
+from server_gui.views.workspace.note import ask_note
+from server_gui.views.workspace.plot_area import PlotArea
+from server_gui.views.workspace.tools import SPANS_S, Tools
+from server_gui.views.workspace.trigger_bar import TriggerBar
 
 Floats = npt.NDArray[np.float64]
-NARROW, LIST = 700, 150  # wide, at text of 100 %: tools in two rows; the channels at least
+NARROW, LIST = 700, 150  # wide, at text of 100 %: tools in more rows; the channels at least
 GONE: Final = "Live: that instant is gone from here, see Recordings"
 AROUND_S: Final = 5.0  # that are shown before and after an event
 SLOW: Final = 5  # frames between two looks at what people read
-SPANS_S: Final = (2, 5, 10, 30, 60, 100)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Frozen:
-    """What a paused view goes on showing."""
-
-    times: Floats
-    columns: dict[str, Floats]
-    newest_ns: int  # of its rows, on the robot's clock
-
-    def times_of(self, seconds: float) -> Floats:
-        """Return those of the last `seconds`."""
-        return (
-            self.times[np.searchsorted(self.times, self.times[-1] - seconds) :]
-            if len(self.times)
-            else self.times
-        )
 
 
 class Signals(QWidget):
-    """Channels at the left, their curves at the right."""
+    """Channels at the left, plots at the right. `others` can be shown beside; `step` plays a recording."""
 
-    def __init__(self, desk: Desk, theme: Theme) -> None:
+    def __init__(
+        self,
+        desk: Desk,
+        theme: Theme,
+        notes: Notes | None = None,
+        others: Callable[[], Sequence[Station]] | None = None,
+        step: Callable[[], None] | None = None,
+        layouts: Layouts | None = None,
+    ) -> None:
         super().__init__()
         self._desk = desk
         self._theme = theme
-        self.plots: list[UnitPlot] = []
-        self._frozen: Frozen | None = None
+        self._notes = notes or LiveNotes(desk)
+        self._others = others or (lambda: others_of(desk, None))
+        self._step_beside = step
+        self.scene = Scene(desk.shown)
+        self.area = PlotArea(self.scene, theme)
+        self.area.arranged.connect(self._looked_again)
+        self.area.zoomed.connect(self._zoomed)
+        self.area.moved.connect(self._move)
+        self.area.fitted.connect(self._follow)
+        self.area.hovered.connect(self._hovered)
+        self._begun = False
         self._frame = 0
         self._jumped_ns: int | None = None  # on the robot's clock
         self._is_gone = False  # the instant that was asked for last
-        self._exported = ""  # what came of the latest export
+        self._told = ""  # what came of what was done last
         self._at = [0.0, 0.0]  # the cursors, s until the newest row
         self._active = 0
+        self._hover: float | None = None
         self.setObjectName("page")
         self.channels = ChannelTree()
-        self.channels.itemChanged.connect(self._rebuild)
+        self.channels.itemChanged.connect(self._ticked)
+        self.channels.asked.connect(self.area.offer)
         self._words = QLineEdit()
         self._words.setPlaceholderText("Filter channels")
         self._words.setAccessibleName("Filter of the channels")
@@ -87,28 +90,20 @@ class Signals(QWidget):
         self.measuring = Measuring(theme)
         self.measuring.chosen.connect(lambda cursor: self._move(cursor, self._at[cursor]))
         self.measuring.stepped.connect(self._step)
-        self._stack = QVBoxLayout()
-        self.empty = PlainLabel("Tick channels at the left to see them here.")
-        self.empty.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        self.empty.setObjectName("dim")
-        self._stack.addWidget(self.empty)
-        left, right = QWidget(), QWidget()
-        left_box, right_box = QVBoxLayout(left), QVBoxLayout(right)
-        left_box.setContentsMargins(0, 0, 0, 8)
-        right_box.setContentsMargins(0, 0, 0, 8)
-        left_box.addWidget(self._words)
-        left_box.addWidget(self.channels, 1)
-        right_box.addLayout(self._stack, 1)
-        right_box.addWidget(self.measuring)
-        splitter = QSplitter()
-        splitter.addWidget(left)
-        splitter.addWidget(right)
-        splitter.setStretchFactor(1, 1)
-        splitter.setSizes([theme.px(190), theme.px(700)])
-        everything = QVBoxLayout(self)
-        everything.setContentsMargins(8, 8, 8, 0)
-        everything.addLayout(self._tools())
-        everything.addWidget(splitter, 1)
+        self.expression = ExpressionBar(self.scene.meaning)
+        self.expression.written.connect(self.area.put)
+        self.trigger = TriggerBar(theme)
+        self.trigger.armed.connect(self._arm)
+        self.trigger.ended.connect(self.scene.disarm)
+        folder = default_file().with_name("layouts")
+        self.layouts = LayoutMenu(layouts or Layouts(folder), self.layout_now, self.show_layout, self.tell)
+        self.beside = BesideMenu(self.scene, self._others, self.tell)
+        self.tools = Tools(self, (self.layouts, self.beside))
+        tools = self.tools
+        self.span, self.pause, self.fit, self.box = tools.span, tools.pause, tools.fit, tools.box
+        self.cursors, self.said = tools.cursors, tools.said
+        self._bind()
+        self._lay_out()
         self._restyle()
         theme.changed.connect(self._restyle)
 
@@ -116,30 +111,39 @@ class Signals(QWidget):
         """Let the next frame say also what is read: what stands beside it is said anew then."""
         self._frame = 0
 
+    @property
+    def cards(self) -> Sequence[AnyPlot]:
+        """Every plot."""
+        return self.area.cards
+
+    @property
+    def empty(self) -> QWidget:
+        """What says what to do while there is none."""
+        return self.area.empty
+
+    @property
+    def plots(self) -> list[UnitPlot]:
+        """Those over time."""
+        return [card for card in self.cards if isinstance(card, UnitPlot)]
+
     def refresh(self) -> None:
-        """Draw what is chosen; while paused, what was there then."""
+        """Draw what is arranged; while it stands still, what was there then."""
         station = self._desk.selected
         if station is None:
             return
-        if self.channels.show_channels(station, self._desk.shown.units, self._desk.shown.revision):
-            self._rebuild()
-        seconds = float(SPANS_S[self._span.currentIndex()])
-        frozen = self._frozen
-        times = station.rings.times(seconds) if frozen is None else frozen.times_of(seconds)
-        source = station.rings.source if frozen is None else frozen
-        for plot in self.plots:
-            found = [self._column(station, name, len(times)) for name in plot.channels]
-            paused = frozen is not None
-            live = paused or not station.robot.is_stale()
-            plot.plot.draw(source, times, found, live=live, scale=plot.unit.scale, paused=paused)
+        self._look_beside()
+        self._look(station)
+        self.scene.look_for_trigger(self._seconds)
+        draw(self.scene, self.cards, station, self._seconds, self._window)
         self._frame += 1
         if self._frame % SLOW == 1:
-            set_text(self.said, self._state(station) + self._exported)
+            set_text(self.said, self._state(station) + self._told)
+            set_tip(self.said, self.said.text())
+            self._say_more()
             self._flag(station)
-            for plot in self.plots:
-                plot.show_values([self._newest(station, name) for name in plot.channels])
+            read(self.scene, self.cards, station, self._hover)
             if self.cursors.isChecked():
-                self._measure(station)
+                self._measure()
 
     @property
     def chosen(self) -> list[str]:
@@ -147,9 +151,9 @@ class Signals(QWidget):
         return self.channels.chosen
 
     def choose(self, names: Sequence[str]) -> None:
-        """Tick exactly these."""
+        """Tick exactly these, and arrange them by their units."""
         self.channels.choose(names)
-        self._rebuild()
+        self._arrange()
 
     def show_around(self, names: Sequence[str], at_ns: int) -> None:
         """Choose these, and stand still with the seconds around an instant of the robot's clock in sight."""
@@ -161,159 +165,162 @@ class Signals(QWidget):
 
     def save_csv(self, path: Path) -> None:
         """Save what is on screen, in SI units, a row a time."""
-        station = self._desk.selected
-        if station is None:
-            return
-        times, (left, right) = self._times(station), self._window
-        sight = slice(int(np.searchsorted(times, left)), int(np.searchsorted(times, right, "right")))
-        names = [name for plot in self.plots for name in plot.channels]
-        columns = {name: self._column(station, name, len(times))[sight] for name in names}
-        si = {info.name: info.unit for info in channels_of(station)}
-        with path.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            writer.writerow(["time s", *(f"{name} {si.get(name, '')}".rstrip() for name in columns)])
-            for row, time_s in enumerate(times[sight]):
-                values = (column[row] for column in columns.values())
-                writer.writerow([f"{time_s:.6f}", *("" if np.isnan(value) else value for value in values)])
+        texts = list(dict.fromkeys(text for card in self.plots for text in card.drawn))
+        save_csv(self.scene, texts, self._seconds, self._window, path)
 
     def save_png(self, path: Path) -> None:
         """Save what is on screen, as a picture."""
         if not self.grab().save(str(path), "PNG"):
             raise OSError(f"the picture could not be written: is there room in {path.parent}, and may you?")
 
+    def layout_now(self) -> Layout:
+        """Return what is shown as a layout."""
+        return layout_of(self.scene, self.layouts.current, self._seconds)
+
+    def show_layout(self, layout: Layout) -> None:
+        """Show this one, whatever of it the robot lacks."""
+        self.scene.disarm()
+        self._begun = True
+        self.scene.workspace.show(layout.plots)
+        nearest_span = min(range(len(SPANS_S)), key=lambda place: abs(SPANS_S[place] - layout.span_s))
+        self.span.setCurrentIndex(nearest_span)
+        self._looked_again()
+        if layout.trigger is not None:
+            self.trigger.show_condition(layout.trigger.condition)
+            self.tools.trigger.setChecked(True)
+
+    def tell(self, text: str) -> None:
+        """Say what came of something."""
+        self._told, self._frame = f" · {text}", 0
+
     # --- how it is put together
 
-    def _tools(self) -> QBoxLayout:
-        self._span = QComboBox()
-        self._span.addItems([f"{seconds} s" for seconds in SPANS_S])
-        self._span.setCurrentIndex(SPANS_S.index(10))
-        self._span.setAccessibleName("How much of the past is shown")
-        self._span.currentIndexChanged.connect(self._span_changed)
-        self.pause = QPushButton("Pause view")
-        self.pause.setCheckable(True)
-        self.pause.setToolTip("The view stands still; data and recording go on")
+    def _lay_out(self) -> None:
+        left, right = QWidget(), QWidget()
+        left_box, right_box = QVBoxLayout(left), QVBoxLayout(right)
+        left_box.setContentsMargins(0, 0, 0, 8)
+        right_box.setContentsMargins(0, 0, 0, 8)
+        left_box.addWidget(self._words)
+        left_box.addWidget(self.channels, 1)
+        self.beside_said = ElidedLabel("dim")
+        for bar in (self.expression, self.trigger, self.beside_said):
+            right_box.addWidget(bar)
+        right_box.addWidget(self.area, 1)
+        right_box.addWidget(self.measuring)
+        splitter = QSplitter()
+        splitter.addWidget(left)
+        splitter.addWidget(right)
+        splitter.setStretchFactor(1, 1)
+        splitter.setSizes([self._theme.px(190), self._theme.px(700)])
+        everything = QVBoxLayout(self)
+        everything.setContentsMargins(8, 8, 8, 0)
+        everything.addLayout(self.tools.rows)
+        everything.addWidget(splitter, 1)
+
+    def _bind(self) -> None:
+        tools = self.tools
+        tools.looked.connect(self._look_wider)
+        tools.turned.connect(self._turn)
+        tools.noted.connect(self._note)
+        self.span.currentIndexChanged.connect(self._span_changed)
         self.pause.toggled.connect(self._paused)
-        self.fit = QPushButton("Fit")
-        self.fit.setToolTip("Undo zoom: the range follows the data again")
         self.fit.clicked.connect(self._follow)
-        self.box = QPushButton("Box zoom")
-        self.box.setCheckable(True)
-        self.box.setToolTip("Drag a box around what is to be seen; else a drag moves, and the wheel zooms")
         self.box.toggled.connect(self._choose_by_box)
-        self.cursors = QPushButton("Cursors")
-        self.cursors.setCheckable(True)
-        self.cursors.setToolTip("Two cursors with their difference, and every curve over what is in sight")
         self.cursors.toggled.connect(self._show_cursors)
-        as_csv, as_png = QPushButton("CSV …"), QPushButton("PNG …")
-        as_csv.setAccessibleName("Save what is on screen as CSV")
-        as_png.setAccessibleName("Save what is on screen as a picture")
-        self._before, self._next = QPushButton("◀"), QPushButton("▶")
-        for button, way, which in ((self._before, -1, "before"), (self._next, 1, "after")):
-            button.setAccessibleName(f"To the event {which}")
-            set_tip(button, f"To the event {which}: a stop, fault, write, trial or mark")
-            button.clicked.connect(lambda _=False, way=way: self._turn(way))
-        self._keys(as_csv)
-        as_csv.clicked.connect(lambda: self._ask("csv", self.save_csv))
-        as_png.clicked.connect(lambda: self._ask("png", self.save_png))
-        self.said = ElidedLabel("dim")
-        self._rows = QBoxLayout(QBoxLayout.Direction.LeftToRight)
-        often = (self._span, self.pause, self.fit, self.box, self.cursors)
-        for widgets in (often, (self._before, self._next, as_csv, as_png, self.said)):
-            row = QHBoxLayout()
-            for widget in widgets:
-                row.addWidget(widget, int(widget is self.said))
-            if widgets is often:
-                row.addStretch(1)
-            self._rows.addLayout(row, int(widgets is not often))
-        return self._rows
+        tools.expression.toggled.connect(self.expression.setVisible)
+        tools.trigger.toggled.connect(self._show_trigger)
+        tools.as_csv.clicked.connect(lambda: self._ask("csv", self.save_csv))
+        tools.as_png.clicked.connect(lambda: self._ask("png", self.save_png))
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        direction, is_narrow = QBoxLayout.Direction, self.width() < self._theme.px(NARROW)
-        self._rows.setDirection(direction.TopToBottom if is_narrow else direction.LeftToRight)
+        self.tools.be_narrow(self.width() < self._theme.px(NARROW))
 
-    def _keys(self, as_csv: QPushButton) -> None:
-        """Keys of this page; the sheet of keys tells them."""
-        buttons = {
-            "Ctrl+Shift+P": self.pause,
-            "Ctrl+0": self.fit,
-            "Ctrl+D": self.cursors,
-            "Ctrl+E": as_csv,
-            "Ctrl+Up": self._before,
-            "Ctrl+Down": self._next,
-        }
-        for key, button in buttons.items():
-            button.setShortcut(key)
-            button.setToolTip(" ".join(filter(None, (button.toolTip(), f"({key})"))))
-        moves: dict[str, Callable[[], None]] = {
-            "Ctrl++": lambda: self._look(0.5),
-            "Ctrl+-": lambda: self._look(2.0),
-            "Ctrl+Left": lambda: self._look(1.0, -0.25),
-            "Ctrl+Right": lambda: self._look(1.0, 0.25),
-        }
-        for key, move in moves.items():
-            shortcut = QShortcut(QKeySequence(key), self, move)
-            shortcut.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
-
-    def _look(self, wider: float, later: float = 0.0) -> None:
-        """See so many times of the time, moved by a share of it."""
-        left, right = self._window
-        span = min((right - left) * wider, float(SPANS_S[self._span.currentIndex()]))
-        end = min(right + later * span, 0.0)
-        begin = max(end - span, -float(SPANS_S[self._span.currentIndex()]))
-        self._zoomed(begin, min(begin + span, 0.0))
-
-    def _rebuild(self) -> None:
-        """A plot for each unit of the chosen channels."""
-        for plot in self.plots:
-            self._stack.removeWidget(plot)
-            plot.hide()
-            plot.deleteLater()
-        station = self._desk.selected
-        chosen = self.chosen[:MOST_CURVES]
-        by_unit: dict[Unit, list[str]] = {}
-        for info in () if station is None else channels_of(station):
-            if info.name in chosen:
-                by_unit.setdefault(self._desk.shown.units.unit(info.quantity, info.unit), []).append(
-                    info.name
-                )
-        seconds = float(SPANS_S[self._span.currentIndex()])
-        self.plots = [UnitPlot(self._theme, unit, names, seconds) for unit, names in by_unit.items()]
-        for plot in self.plots:
-            self._stack.addWidget(plot, 1)
-            plot.plot.zoomed.connect(self._zoomed)
-            plot.plot.moved.connect(self._move)
-            plot.plot.fitted.connect(self._follow)
+    def _build(self) -> None:
+        """Make the plots anew; what part of the time is in sight stays."""
+        self.area.build(self._seconds, self._window if self.plots else None)
         self._choose_by_box(self.box.isChecked())
         self._mark()
-        self.empty.setVisible(not self.plots)
-        if self._frozen is not None and station is not None:
-            self._freeze(station)
+        self.scene.keep_more()
+        self.trigger.show_choices(self.scene)
+        self._frame = 0
 
     def _restyle(self) -> None:
         self.channels.setIndentation(self._theme.px(10))
         self.channels.setMinimumWidth(self._theme.px(LIST))
-        self._rebuild()
+        self._build()
+
+    # --- curves
+
+    def _look(self, station: Station) -> None:
+        """Notice another robot, other channels or units, and what has been arranged."""
+        if self.channels.show_channels(station, self._desk.shown.units, self._desk.shown.revision):
+            self.scene.look(station)
+            if not self._begun:
+                self._begun = bool(self.channels.items)
+                self._arrange()
+            self.channels.choose(self.scene.workspace.curves)
+            self.expression.show_channels([*self.scene.channels])
+            self._build()
+        elif self.scene.look(station) or self.area.built != self.scene.workspace.revision:
+            self._build()
+
+    def _looked_again(self, refused: str = "") -> None:
+        """After something was arranged, or refused."""
+        if refused:
+            self.tell(f"▲ {refused}")
+        if self._desk.selected is not None:
+            self.scene.look(self._desk.selected)
+        self.channels.choose(self.scene.workspace.curves)
+        self._build()
+
+    def _arrange(self) -> None:
+        if self._desk.selected is not None:
+            self.scene.look(self._desk.selected)
+            self.scene.workspace.arrange(map(self.scene.meaning, self.chosen))
+            self.scene.look(self._desk.selected)
+        self._build()
+
+    def _ticked(self, item: QTreeWidgetItem) -> None:
+        text, workspace = str(item.data(0, NAME_ROLE)), self.scene.workspace
+        if item.checkState(0) is Qt.CheckState.Checked:
+            self.area.put(text)
+        else:
+            self.area.do(lambda: workspace.remove(text))
 
     # --- what people do
 
-    def _span_changed(self, place: int) -> None:
+    @property
+    def _seconds(self) -> float:
+        return float(SPANS_S[self.span.currentIndex()])
+
+    @property
+    def _window(self) -> tuple[float, float]:
+        """What part of the past is in sight, s until the newest row."""
+        return self.plots[0].plot.window_s if self.plots else (-self._seconds, 0.0)
+
+    def _look_wider(self, wider: float, later: float) -> None:
+        """See so many times of the time, moved by a share of it."""
+        left, right = self._window
+        span = min((right - left) * wider, self._seconds)
+        end = min(right + later * span, 0.0)
+        begin = max(end - span, -self._seconds)
+        self._zoomed(begin, min(begin + span, 0.0))
+
+    def _span_changed(self, _place: int = 0) -> None:
         for plot in self.plots:
-            plot.plot.set_seconds(float(SPANS_S[place]))
+            plot.plot.set_seconds(self._seconds)
 
     def _paused(self, on: bool) -> None:
-        self._frozen, self._jumped_ns, self._is_gone = None, None, False
-        if on and self._desk.selected is not None:
-            self._freeze(self._desk.selected)
-
-    def _freeze(self, station: Station) -> None:
-        times, columns = self._live(station, float(SPANS_S[-1]))
-        self._frozen = Frozen(times, columns, station.rings.newest_ns or 0)
+        self._jumped_ns, self._is_gone = None, False
+        self.scene.go_on()
+        if on:
+            self.scene.freeze()
 
     def _follow(self) -> None:
         for plot in self.plots:
             plot.plot.follow_again()
-        self._span_changed(self._span.currentIndex())
+        self._span_changed()
 
     def _zoomed(self, left: float, right: float) -> None:
         """Every plot shows the same time."""
@@ -324,22 +331,70 @@ class Signals(QWidget):
         for plot in self.plots:
             plot.plot.choose_by_box(on)
 
+    def _hovered(self, at_s: float | None) -> None:
+        """All plots are read at one time."""
+        self._hover = at_s
+        for plot in self.plots:
+            plot.plot.show_hover(at_s)
+        if self._desk.selected is not None:
+            read(self.scene, self.cards, self._desk.selected, at_s)
+
+    def _note(self) -> None:
+        """Ask for a note of the instant at the active cursor, else of the newest row."""
+        problem, newest_ns = self._notes.problem, self.scene.newest_ns
+        if problem or newest_ns is None:
+            self.tell(f"▲ no note: {problem or 'no row has come yet'}")
+            return
+        at_s = self._at[self._active] if self.cursors.isChecked() else 0.0
+        at_ns = newest_ns + round(at_s * 1e9)
+        ask_note(self, at_s, lambda text: self._notes.add(text, at_ns))
+
+    # --- the trigger, and what is beside
+
+    def _show_trigger(self, on: bool) -> None:
+        self.trigger.setVisible(on)
+        if not on:
+            self.scene.disarm()
+
+    def _arm(self, condition: Condition) -> None:
+        if problem := self.scene.trigger_problem(condition):
+            self.tell(f"▲ {problem}")
+            return
+        self.pause.setChecked(False)
+        self.scene.arm(condition)
+        self._frame = 0
+
+    def _look_beside(self) -> None:
+        beside = self.scene.beside
+        if beside is None:
+            return
+        if beside.station not in self._others():
+            self.scene.put_beside(None)
+            self.tell("what was beside is gone")
+        elif beside.station.robot.is_recording and self._step_beside is not None:
+            self._step_beside()
+
+    def _say_more(self) -> None:
+        scene = self.scene
+        set_text(self.beside_said, scene.beside_text())
+        self.beside_said.setVisible(scene.beside is not None)
+        self.trigger.say(scene.trigger_text() or "off: what comes is shown")
+
     # --- what happened
 
     def show_at(self, stamp_ns: int, around_s: float = AROUND_S) -> bool:
         """Stand still with this instant of the robot's clock in the middle; False where it is gone by now."""
-        station = self._desk.selected
-        if station is None:
+        if self._desk.selected is None:
             return False
         self.pause.setChecked(True)
-        frozen = self._frozen
+        frozen = self.scene.frozen
         if frozen is None or not len(frozen.times):
             return False
         at = (stamp_ns - frozen.newest_ns) / 1e9
         if not frozen.times[0] - frozen.times[-1] <= at <= 0.0:
             return False
         wanted = next((place for place, span in enumerate(SPANS_S) if span >= around_s - at), -1)
-        self._span.setCurrentIndex(wanted % len(SPANS_S))
+        self.span.setCurrentIndex(wanted % len(SPANS_S))
         self._zoomed(max(at - around_s, -float(SPANS_S[wanted])), min(at + around_s, 0.0))
         self._jumped_ns = stamp_ns
         self._frame = 0
@@ -352,23 +407,22 @@ class Signals(QWidget):
             return
         newest_ns = station.rings.newest_ns or 0
         here_ns = newest_ns + 1 if self._jumped_ns is None else self._jumped_ns
-        flags = [flag for flag in station.flags if (flag.at_ns - here_ns) * way > 0]
+        flags = [one for one in station.flags if (one.at_ns - here_ns) * way > 0]
         if flags:
-            flag = flags[0] if way > 0 else flags[-1]
-            found = self.show_at(flag.at_ns)
-            self._exported = f" · {flag.kind.value}: {flag.text}" if found else " · that is too long ago"
+            one = flags[0] if way > 0 else flags[-1]
+            found = self.show_at(one.at_ns)
+            self.tell(f"{one.kind.value}: {one.text}" if found else "that is too long ago")
 
     def _flag(self, station: Station) -> None:
         """Every plot shows what happened in its time."""
-        newest_ns = station.rings.newest_ns if self._frozen is None else self._frozen.newest_ns
+        newest_ns, triggered = self.scene.newest_ns, self.scene.trigger_flag()
         if newest_ns is None:
             return
         begin_ns = newest_ns - round(SPANS_S[-1] * 1e9)
-        found = station.flags.between(begin_ns, newest_ns + 1)
-        placed = [PlacedFlag((flag.at_ns - newest_ns) / 1e9, flag.kind, flag.text) for flag in found]
-        for plot in self.plots:
-            plot.plot.show_flags(placed)
-        for button in (self._before, self._next):
+        noted = [one for one in self._notes.flags() if begin_ns <= one.at_ns <= newest_ns]
+        found = [*station.flags.between(begin_ns, newest_ns + 1), *noted]
+        flag(self.scene, self.cards, [*found, *([] if triggered is None else [triggered])], newest_ns)
+        for button in (self.tools.before, self.tools.next):
             button.setEnabled(bool(len(station.flags)))
 
     # --- cursors
@@ -389,8 +443,7 @@ class Signals(QWidget):
 
     def _step(self, samples: int) -> None:
         """Move the active cursor by so many samples."""
-        station = self._desk.selected
-        times = np.zeros(0) if station is None else self._times(station)
+        times = self._times()
         row = nearest(times, self._at[self._active])
         if row is not None:
             self._move(self._active, float(times[min(max(row + samples, 0), len(times) - 1)]))
@@ -400,21 +453,32 @@ class Signals(QWidget):
         for plot in self.plots:
             plot.plot.show_cursors(at, self._active)
 
-    def _measure(self, station: Station) -> None:
+    def _measure(self) -> None:
         """Read every curve at the cursors, where there are samples, and over what is in sight."""
-        times, (left, right) = self._times(station), self._window
+        times, (left, right) = self._times(), self._window
         if not len(times):
             return
         a, b = (row_at(times, cursor) for cursor in self._at)
         first, last = np.searchsorted(times, left), np.searchsorted(times, right, "right")
         rows = [
-            (name, plot.unit, measure(self._column(station, name, len(times)), a, b, int(first), int(last)))
+            (
+                self.scene.meaning(text).name,
+                plot.unit,
+                measure(self.scene.values(text, len(times)), a, b, int(first), int(last)),
+            )
             for plot in self.plots
-            for name in plot.channels
+            for text in plot.drawn
         ]
         a_s, b_s = self._at
         a_s, b_s = (a_s if a is None else float(times[a])), (b_s if b is None else float(times[b]))
         self.measuring.show_readings(a_s, b_s, self._active, rows)
+
+    def _times(self) -> Floats:
+        """Of the rows of the chosen span, s until the newest."""
+        times = self.scene.times(self._seconds)
+        return times - times[-1] if len(times) else times
+
+    # --- what is said
 
     def _ask(self, kind: str, save: Callable[[Path], None]) -> None:
         station = self._desk.selected
@@ -424,49 +488,14 @@ class Signals(QWidget):
 
     def export(self, save: Callable[[Path], None], path: Path) -> None:
         """Save what is on screen, and say what came of it."""
-        self._exported = f" · {save_whole(save, path)}"
-
-    # --- data
-
-    @property
-    def _window(self) -> tuple[float, float]:
-        """What part of the past is in sight, s until the newest row."""
-        return (
-            self.plots[0].plot.window_s if self.plots else (-float(SPANS_S[self._span.currentIndex()]), 0.0)
-        )
-
-    def _times(self, station: Station) -> Floats:
-        """Of the rows of the chosen span, s until the newest."""
-        seconds = float(SPANS_S[self._span.currentIndex()])
-        times = station.rings.times(seconds) if self._frozen is None else self._frozen.times_of(seconds)
-        return times - times[-1] if len(times) else times
-
-    def _column(self, station: Station, name: str, rows: int) -> Floats:
-        """The newest values of a channel; not to be kept."""
-        if self._frozen is None:
-            return station.rings.values(name, rows)
-        return self._frozen.columns[name][-rows:]
-
-    def _live(self, station: Station, seconds: float) -> tuple[Floats, dict[str, Floats]]:
-        times = station.rings.times(seconds).copy()
-        names = [name for plot in self.plots for name in plot.channels]
-        return times, {name: station.rings.values(name, len(times)).copy() for name in names}
-
-    def _newest(self, station: Station, name: str) -> float | None:
-        column = None if self._frozen is None else self._frozen.columns[name]
-        if column is None:
-            return station.robot.values.get(name)
-        return None if not len(column) or np.isnan(column[-1]) else float(column[-1])
+        self.tell(save_whole(save, path))
 
     def _state(self, station: Station) -> str:
-        more = len(self.chosen) - MOST_CURVES
+        more = len([name for name in self.chosen if name not in self.scene.workspace.curves])
         many = f" · {more} more are not drawn: {MOST_CURVES} at a time" if more > 0 else ""
-        if self._frozen is not None:
-            return f"Paused, data go on{many}"
+        if self.pause.isChecked() or self.scene.frozen is not None:
+            return f"{'Paused' if self.pause.isChecked() else 'Kept by the trigger'}, data go on{many}"
         if self._is_gone:
             return GONE
-        if station.robot.age_s() is None:
-            return f"no data yet{many}"
-        if station.robot.is_stale():
-            return f"STALE, {age_text(station.robot.age_s())} old{many}"
-        return f"{station.robot.rate_hz():.0f} rows/s{many}"
+        is_old = station.robot.is_stale()
+        return f"{old_text(station)[0] if is_old else f'{station.robot.rate_hz():.0f} rows/s'}{many}"

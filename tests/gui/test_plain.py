@@ -13,7 +13,7 @@ from gateway.units import Units
 from gateway.wire.resource import ProcessUse
 from server_gui.views.processes import ProcessModel
 from server_gui.views.theme import Theme
-from server_gui.views.unit_plot import UnitPlot
+from server_gui.views.unit_plot import Drawn, UnitPlot
 from server_gui.views.widgets.elided import ElidedLabel
 from server_gui.views.widgets.files import _unless_there
 from server_gui.views.widgets.plain import PlainLabel, rich, set_tip, tip
@@ -45,7 +45,7 @@ def test_a_tool_tip_shows_html_as_text(qt: QApplication) -> None:
 
 
 def test_a_legend_shows_the_name_of_a_channel_as_it_is(theme: Theme) -> None:
-    plot = UnitPlot(theme, Units().choices("rad")[0], [BAD], 10.0)
+    plot = UnitPlot(theme, 0, Units().choices("rad")[0], [Drawn(BAD, BAD)], 10.0)
     plot.show_values([1.0])
     assert SHOWN in read(plot._legend.text()).replace("\xa0", " ")
     assert read(f"<b>{rich(BAD)}</b>") == SHOWN

@@ -82,7 +82,7 @@ class FakeKeeper:
     def report(self) -> "Future[CollectorReport]":
         return settled(self.answer)
 
-    def mark(self, text: str) -> "Future[int]":
+    def mark(self, text: str, ago_s: float = 0.0) -> "Future[int]":
         self.asked.append(f"mark {text}")
         return settled(2)
 

@@ -50,9 +50,9 @@ class Desk:
         self._recording = recording
         recording.on_mark.append(self._marked)
 
-    def _marked(self, text: str) -> None:
+    def _marked(self, text: str, ago_s: float) -> None:
         for station in self.stations:
-            station.flag(text)
+            station.flag(text, ago_s)
 
     def add(self, station: Station) -> None:
         """Another robot; the first is selected."""

@@ -22,6 +22,7 @@ class FlagKind(Enum):
     WRITE = "write"
     TRIAL = "trial"
     MARK = "mark"
+    TRIGGER = "trigger"  # of the signals, and nowhere else
 
 
 @dataclass(frozen=True, slots=True, order=True)

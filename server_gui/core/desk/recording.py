@@ -37,8 +37,8 @@ class Keeper(Protocol):
         """Return how everything goes."""
         ...
 
-    def mark(self, text: str) -> "Future[int]":
-        """Mark this instant in the recording of every robot; how many there are."""
+    def mark(self, text: str, ago_s: float = 0.0) -> "Future[int]":
+        """Mark this instant, or one before, in the recording of every robot; how many there are."""
         ...
 
     def upload(self) -> "Future[int]":
@@ -100,7 +100,7 @@ class Recording:
         self.why = why
         self.report: CollectorReport | None = None
         self.problem: str | None = None  # why nobody can be asked
-        self.on_mark: list[Callable[[str], None]] = []  # told when an instant was marked
+        self.on_mark: list[Callable[[str, float], None]] = []  # told what was marked, and how many s ago
         self._keeper = keeper
         self._pausing = pausing
         self._alarms = Alarms()
@@ -190,14 +190,16 @@ class Recording:
             future, self._deliver, done, lambda error: self._news.add(NewsKind.WARNING, WHO, str(error))
         )
 
-    def mark(self, text: str) -> None:
-        """Mark this instant in every robot's recording."""
+    def mark(self, text: str, ago_s: float = 0.0) -> None:
+        """Mark this instant, or the one `ago_s` before it, in every robot's recording."""
         if self.is_paused:
             self._news.add(NewsKind.WARNING, WHO, "not marked: nothing is recorded, it was stopped here")
             return
         for told in self.on_mark if self._keeper is not None else ():
-            told(text)
-        self._ask(lambda keeper: keeper.mark(text), lambda count: f"marked in {_robots(count)}: {text}")
+            told(text, ago_s)
+        self._ask(
+            lambda keeper: keeper.mark(text, ago_s), lambda count: f"marked in {_robots(count)}: {text}"
+        )
 
     def upload(self) -> None:
         """Bring what was recorded until now into the store."""

@@ -27,6 +27,7 @@ class Rings:
     def clear(self) -> None:
         """Forget everything: the robot's clock has begun anew."""
         self.source = object()
+        self.written = 0  # rows of this source, also those that are forgotten by now
         self.newest_ns: int | None = None
         self._values: Floats = np.full((0, 2 * self.rows), np.nan)
         self._times: Floats = np.full(2 * self.rows, np.nan)
@@ -79,6 +80,7 @@ class Rings:
     def _write(self, stamps_ns: Sequence[int], columns: Mapping[str, Sequence[float | None]]) -> None:
         self._make_room(columns)
         count = len(stamps_ns)
+        self.written += count
         block = np.full((1 + len(self._places), count), np.nan)
         block[0] = (np.array(stamps_ns, np.int64) - self._base_ns) / 1e9
         if columns:

@@ -175,10 +175,11 @@ class Station:
         """Note something about this robot."""
         self.news.add(kind, self.title, text)
 
-    def flag(self, text: str) -> None:
-        """Flag this instant, which somebody has marked."""
+    def flag(self, text: str, ago_s: float = 0.0) -> None:
+        """Flag this instant, or the one `ago_s` before it, which somebody has marked."""
         if self.rings.newest_ns is not None:
-            self.flags.add(Flag(self.rings.newest_ns, text or "mark", FlagKind.MARK))
+            before_ns = max(round((ago_s - (self.robot.age_s() or 0.0)) * 1e9), 0) if ago_s else 0
+            self.flags.add(Flag(self.rings.newest_ns - before_ns, text or "mark", FlagKind.MARK))
 
     # --- what has come
 

@@ -52,6 +52,13 @@ BREAK_OFF_S: Final = 5.0  # for an upload under way
 HURRIED_S: Final = 0.3  # likewise, where nobody waits
 
 
+class Note(Struct, frozen=True):
+    """A mark of an instant that was `ago_s` before."""
+
+    text: str
+    ago_s: float
+
+
 class CollectorReport(Struct, frozen=True):
     """Everything that `gwrms collect --status` tells; seconds, UTC."""
 
@@ -185,9 +192,9 @@ class Collector:
         """Follow a robot no more; its recording ends."""
         return self._do(lambda: self._fleet.leave(robot))
 
-    def mark(self, text: str) -> "concurrent.futures.Future[int]":
-        """Mark this instant in the recording of every robot; in how many that is on the disk."""
-        return self.network.run(self._mark(text))
+    def mark(self, text: str, ago_s: float = 0.0) -> "concurrent.futures.Future[int]":
+        """Mark this instant, or one before, in every robot's recording; in how many it is on the disk."""
+        return self.network.run(self._mark(text, ago_s))
 
     def upload(self) -> "concurrent.futures.Future[int]":
         """Bring everything that was recorded until now into the store; how many batches waited."""
@@ -218,6 +225,7 @@ class Collector:
             "status": self._report,
             "upload": self._upload,
             "mark": self._mark,
+            "note": self._note,
             "keep": self._keep,
         }
         for name, robot in self._settings.robots.items():
@@ -237,11 +245,15 @@ class Collector:
                 quiet = newest_ns is None or time.monotonic_ns() - newest_ns > QUIET_S * 1e9
                 return quiet or self._uploader.state.backlog_bytes > MOST_BACKLOG_BYTES
 
-    async def _mark(self, text: str) -> int:
+    async def _note(self, text: str) -> int:
+        note = msgspec.json.decode(text, type=Note)
+        return await self._mark(note.text, note.ago_s)
+
+    async def _mark(self, text: str, ago_s: float = 0.0) -> int:
         lost = self._recorder.state.lost
         robots = [] if self._fleet.is_paused else list(self._fleet.robots)
         for name in robots:
-            self._recorder.mark(name, text)
+            self._recorder.mark(name, text, ago_s)
         return len(robots) if await self._on_disk(lost) else 0
 
     async def _keep(self, text: str) -> bool:

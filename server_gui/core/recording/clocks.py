@@ -28,6 +28,10 @@ class Moment(NamedTuple):
                 break
         return min(found)[1]
 
+    def before(self, ago_s: float) -> Self:
+        """Return the instant so many seconds before; none after."""
+        return self._replace(utc_ns=self.utc_ns - max(round(ago_s * 1e9), 0))
+
 
 class Reading(NamedTuple):
     """How the clocks stood when a notification came."""

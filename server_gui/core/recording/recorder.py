@@ -197,13 +197,15 @@ class Recorder:
         """Keep that the robot sent what cannot be kept, once for each `what`."""
         return self._put(robot, 1, functools.partial(self._robots.refused, robot, what, why))
 
-    def mark(self, robot: str, text: str, **data: Any) -> int:
-        """Mark this instant."""
-        return self.event(robot, EventKind.MARKER, text, **data)
+    def mark(self, robot: str, text: str, ago_s: float = 0.0, **data: Any) -> int:
+        """Mark this instant, or the one `ago_s` before it."""
+        return self._event(robot, EventKind.MARKER, text, Moment.now().before(ago_s), data)
 
     def event(self, robot: str, kind: EventKind, text: str, **data: Any) -> int:
         """Keep that something happened to the robot now."""
-        moment = Moment.now()
+        return self._event(robot, kind, text, Moment.now(), data)
+
+    def _event(self, robot: str, kind: EventKind, text: str, moment: Moment, data: Mapping[str, Any]) -> int:
         return self._put(
             robot, 1, lambda: [self._robots.known(robot).now(kind, text, moment, **data)], control=True
         )

@@ -20,6 +20,7 @@ from PySide6.QtWidgets import (
 from gateway.plain import plain
 from server_gui.core.archive.archive import Archive
 from server_gui.core.archive.playback import SPEEDS
+from server_gui.core.archive.recorded_notes import RecordedNotes
 from server_gui.core.cloud.actions import FORMATS, export
 from server_gui.core.cloud.selection import Choice
 from server_gui.core.cloud.tape import Tape, as_time
@@ -52,7 +53,9 @@ class Player(QWidget):
         self._frame = 0
         self._told: object = None  # which recording and journal have been told of
         self.overview = Overview(self._playback.desk, theme)
-        self._views = (self.overview, Signals(self._playback.desk, theme))
+        notes = RecordedNotes(self._playback, archive.labels)
+        self.signals = Signals(self._playback.desk, theme, notes)
+        self._views = (self.overview, self.signals)
         self._stack = QStackedWidget()
         for view in self._views:
             self._stack.addWidget(Scrolled(view))

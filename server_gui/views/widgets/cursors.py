@@ -20,8 +20,16 @@ FLAGS: Final = {
     FlagKind.WRITE: Mark("disc", "accent", "write"),
     FlagKind.TRIAL: Mark("half", "accent", "trial"),
     FlagKind.MARK: Mark("diamond", "text", "mark"),
+    FlagKind.TRIGGER: Mark("ring", "accent", "trigger"),
 }
-FIRST: Final = (FlagKind.FAULT, FlagKind.STOP, FlagKind.MARK, FlagKind.TRIAL, FlagKind.WRITE)
+FIRST: Final = (
+    FlagKind.FAULT,
+    FlagKind.STOP,
+    FlagKind.MARK,
+    FlagKind.TRIAL,
+    FlagKind.WRITE,
+    FlagKind.TRIGGER,
+)
 
 
 @dataclass(frozen=True, slots=True)

@@ -226,6 +226,10 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
         self.getPlotItem().getAxis("bottom").set_end(PAUSED if paused else NOW if live else LAST)
         self._mark()
 
+    def draw_anew(self) -> None:
+        """Draw all of it the next time: what was drawn has become other than it was."""
+        self._lines.strip.forget()
+
     def follow_again(self) -> None:
         """Let the range follow the data again."""
         self.follows, self._frames = True, 0
@@ -298,7 +302,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
             return
         super().mouseMoveEvent(event)
         self._tell_flag(event)
-        if self._mouse is Mouse.TIME:
+        if self._mouse is not Mouse.NOTHING:
             self.hovered.emit(self._time_at(event.position()))
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
@@ -319,7 +323,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
 
     def leaveEvent(self, event: QEvent) -> None:
         super().leaveEvent(event)
-        if self._mouse is Mouse.TIME:
+        if self._mouse is not Mouse.NOTHING:
             self.hovered.emit(None)
 
     def wheelEvent(self, event: QWheelEvent) -> None:

@@ -81,6 +81,10 @@ class Strip:
             self._draw_from(first, view, times, curves, inks, sampled=sampled)
         return True
 
+    def forget(self) -> None:
+        """Draw everything the next time."""
+        self._key = ()
+
     def _begin(self, key: tuple[object, ...], view: View, inks: Inks) -> None:
         self._key = key
         if self.pixels.shape != (view.height, view.width):

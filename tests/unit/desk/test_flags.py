@@ -95,11 +95,16 @@ def test_a_station_flags_what_its_rows_tell_and_what_is_marked(bench: Bench) -> 
     recording = Recording(By.WINDOW, None, lambda call: call(), bench.desk.news)
     bench.desk.recording = recording
     for told in recording.on_mark:
-        told("turns")
+        told("turns", 0.0)
     assert [(flag.at_ns // MS, flag.kind) for flag in station.flags] == [
         (20, FlagKind.FAULT),
         (20, FlagKind.MARK),
     ]
+    for told in recording.on_mark:
+        told("before that", (station.robot.age_s() or 0.0) + 0.005)
+    newest = next(iter(station.flags))
+    assert newest.text == "before that"
+    assert 10 * MS <= newest.at_ns <= 20 * MS
     assert station.rings.seconds(20 * MS) == 0.01
     assert station.rings.stamp_ns(0.01) == 20 * MS
     other = described().description

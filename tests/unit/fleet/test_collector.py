@@ -117,9 +117,15 @@ def test_a_robot_that_joins_later_is_recorded_marked_and_shown(settings: ServerS
         collector.follow("exo-other", Address.parse(other.address)).result(WAIT_S)
         until(collector, lambda: collector.report().result(WAIT_S).robots["exo-other"].rows > 5)
         assert collector.mark("stairs").result(WAIT_S) == 2
+        assert collector.mark("earlier", 60.0).result(WAIT_S) == 2
+        note = '{"text": "at the door", "ago_s": 30.0}'
+        assert ask(settings.recorder.spool, "note", note) == b"2\n"
     assert set(shown) == {"exo-fake", "exo-other"}
-    events = Store(settings.store.url).dataset("events").to_table(columns=["robot", "text"]).to_pylist()
-    assert {"robot": "exo-other", "text": "stairs"} in events
+    columns = ["robot", "text", "utc"]
+    events = Store(settings.store.url).dataset("events").to_table(columns=columns).to_pylist()
+    at = {event["text"]: event["utc"] for event in events if event["robot"] == "exo-other"}
+    for text, before_s in (("earlier", 60.0), ("at the door", 30.0)):
+        assert before_s - WAIT_S < (at["stairs"] - at[text]).total_seconds() < before_s + WAIT_S
 
 
 def test_uploading_now_takes_what_came_this_second(settings: ServerSettings) -> None:

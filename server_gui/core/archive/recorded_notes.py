@@ -1,0 +1,45 @@
+"""Notes on the time axis of a recording that is played: short labels of its session."""
+
+from collections.abc import Sequence
+from typing import Final
+
+from server_gui.core.archive.labels import SessionLabels
+from server_gui.core.archive.playback import Playback, PlayedRobot
+from server_gui.core.desk.flags import Flag, FlagKind
+
+NOTE_NS: Final = 1_000_000  # a label has a length
+
+
+class RecordedNotes:
+    """Of what `playback` shows; they are taken back as labels are."""
+
+    def __init__(self, playback: Playback, labels: SessionLabels) -> None:
+        self._playback = playback
+        self._labels = labels
+
+    @property
+    def problem(self) -> str:
+        """Why no note can be kept now; empty where one can."""
+        return "" if self._behind_ns() is not None else "no row is shown yet"
+
+    def add(self, text: str, at_ns: int) -> None:
+        """Label the instant `at_ns` of the robot's clock."""
+        behind_ns = self._behind_ns()
+        if behind_ns is not None:
+            self._labels.add(text, at_ns - behind_ns, at_ns - behind_ns + NOTE_NS)
+
+    def flags(self) -> Sequence[Flag]:
+        """Return every note of the session."""
+        behind_ns = self._behind_ns()
+        short = (one for one in self._labels.labels if one.ended_utc_ns - one.began_utc_ns <= NOTE_NS)
+        if behind_ns is None:
+            return ()
+        return [Flag(one.began_utc_ns + behind_ns, one.label, FlagKind.MARK) for one in short]
+
+    def _behind_ns(self) -> int | None:
+        """How much more the robot's clock says than UTC, by the newest row that is shown."""
+        station = self._playback.desk.selected
+        robot = None if station is None else station.robot
+        if not isinstance(robot, PlayedRobot) or robot.row_ns is None or robot.stamp_ns is None:
+            return None
+        return robot.stamp_ns - robot.row_ns

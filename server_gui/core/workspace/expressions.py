@@ -1,0 +1,289 @@
+"""Expressions, units checked, computed for new rows only; what a missing sample is part of is missing."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from server_gui.core.workspace.dimensions import Dimension, literal
+from server_gui.core.workspace.grammar import ExpressionError, Node, Written
+
+Floats = npt.NDArray[np.float64]
+
+LONGEST_S: Final = 60.0  # that `rms` and `mean` may go over
+NONE: Final = Dimension()
+ANGLE: Final = Dimension.of("rad")
+HERTZ, SECOND = Dimension.of("Hz"), Dimension.of("s")
+WORDS: Final = {"+": "added", "-": "subtracted"}
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """Rows that follow those of the block before: their times (s, rising), and a column a channel."""
+
+    times: Floats
+    columns: Mapping[str, Floats]
+
+
+Step = Callable[[Block], Floats]  # the value of each row, or one for all
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A part of an expression that can be computed, and its unit."""
+
+    step: Step
+    dimension: Dimension
+
+
+class Program:
+    """An expression over one run of rows: `take` brings block after block, and remembers what it needs."""
+
+    def __init__(self, written: Written, text: str, units: Mapping[str, str]) -> None:
+        """`units` has the SI unit of every channel of `written`.
+
+        Raises:
+            ExpressionError: its units do not fit, or a function is not used as it can be.
+
+        """
+        self.channels = tuple(sorted(written.channels))
+        part = _Compiler(text, units).part(written.tree)
+        self.unit = part.dimension.symbol
+        self._step = part.step
+
+    def take(self, block: Block) -> Floats:
+        """Return a value for each of these rows; NaN where there is none."""
+        with np.errstate(all="ignore"):
+            found = np.array(np.broadcast_to(self._step(block), len(block.times)), np.float64)
+        found[~np.isfinite(found)] = np.nan
+        return found
+
+
+class _Compiler:
+    def __init__(self, text: str, units: Mapping[str, str]) -> None:
+        self._text = text
+        self._units = units
+
+    def part(self, node: Node) -> Part:
+        match node.kind:
+            case "number":
+                return self._number(node)
+            case "channel":
+                return _channel(node.text, self._units[node.text])
+            case "negative":
+                inner = self.part(node.parts[0])
+                return Part(lambda block: -inner.step(block), inner.dimension)
+            case "call":
+                return self._call(node)
+        return self._sign(node, *(self.part(each) for each in node.parts))
+
+    def _number(self, node: Node) -> Part:
+        factor, dimension = 1.0, NONE
+        if node.unit is not None:
+            found = literal(node.unit)
+            if found is None:
+                raise self._error(
+                    f"nobody here knows the unit {node.unit!r}: write such as [rad], [°], [N·m]", node
+                )
+            factor, dimension = found
+        value = np.float64(float(node.text) * factor)
+        return Part(lambda _block: np.asarray(value), dimension)
+
+    def _sign(self, node: Node, left: Part, right: Part) -> Part:
+        one, other = left.step, right.step
+        if node.kind in WORDS:
+            self._same(node, WORDS[node.kind], left, right)
+            if node.kind == "+":
+                return Part(lambda block: one(block) + other(block), left.dimension)
+            return Part(lambda block: one(block) - other(block), left.dimension)
+        if node.kind == "*":
+            return Part(lambda block: one(block) * other(block), left.dimension.times(right.dimension))
+        return Part(lambda block: one(block) / other(block), left.dimension.times(right.dimension, -1))
+
+    def _call(self, node: Node) -> Part:
+        if node.text not in FUNCTIONS:
+            raise self._error(
+                f"there is no function {node.text}: there are {', '.join(sorted(FUNCTIONS))}", node
+            )
+        least, most, make = FUNCTIONS[node.text]
+        if not least <= len(node.parts) <= most:
+            many = f"{least} argument{'s' * (least > 1)}" if least == most else f"{least} arguments or more"
+            raise self._error(f"{node.text} takes {many}, not {len(node.parts)}", node)
+        return make(self, node, [self.part(each) for each in node.parts])
+
+    def _same(self, node: Node, done: str, *parts: Part) -> None:
+        for other in parts[1:]:
+            if other.dimension != parts[0].dimension:
+                both = f"{parts[0].dimension.said} and {other.dimension.said}"
+                hint = (
+                    ": give the number a unit, as 5 [°]"
+                    if NONE in (parts[0].dimension, other.dimension)
+                    else ""
+                )
+                raise self._error(f"{both} cannot be {done}{hint}", node)
+
+    def _is(self, node: Node, part: Part, wanted: Dimension) -> None:
+        if part.dimension != wanted:
+            raise self._error(f"{node.text} is of {wanted.said}, not of {part.dimension.said}", node)
+
+    def _constant(self, node: Node, wanted: Dimension, most: float) -> float:
+        """The second argument: a number above 0 and up to `most`, in this unit or none."""
+        told = node.parts[1]
+        if told.kind != "number":
+            raise self._error(f"the second argument of {node.text} is a number in {wanted.said}", told)
+        part = self._number(told)
+        value = float(part.step(Block(np.zeros(0), {})))
+        if part.dimension not in (wanted, NONE):
+            raise self._error(f"it is in {wanted.said}, not in {part.dimension.said}", told)
+        if not 0.0 < value <= most:
+            raise self._error(f"it is above 0 and at most {most:g} {wanted.said}", told)
+        return value
+
+    def _error(self, problem: str, node: Node) -> ExpressionError:
+        return ExpressionError(problem, self._text, node.place, node.length)
+
+    # --- functions
+
+    def plain(self, _node: Node, parts: Sequence[Part]) -> Part:
+        """`abs`."""
+        return Part(lambda block: np.abs(parts[0].step(block)), parts[0].dimension)
+
+    def least(self, node: Node, parts: Sequence[Part]) -> Part:
+        """`min` of what is at one time."""
+        return self._extreme(node, parts, np.minimum)
+
+    def most(self, node: Node, parts: Sequence[Part]) -> Part:
+        """`max` of what is at one time."""
+        return self._extreme(node, parts, np.maximum)
+
+    def _extreme(self, node: Node, parts: Sequence[Part], better: Callable[[Floats, Floats], Floats]) -> Part:
+        self._same(node, "compared", *parts)
+
+        def step(block: Block) -> Floats:
+            found = parts[0].step(block)
+            for part in parts[1:]:
+                found = better(found, part.step(block))
+            return found
+
+        return Part(step, parts[0].dimension)
+
+    def root(self, node: Node, parts: Sequence[Part]) -> Part:
+        """`sqrt`."""
+        dimension = parts[0].dimension.root()
+        if dimension is None:
+            raise self._error(f"{parts[0].dimension.said} has no square root", node)
+        return Part(lambda block: np.sqrt(parts[0].step(block)), dimension)
+
+    def angle(self, node: Node, parts: Sequence[Part]) -> Part:
+        """`sin`, `cos`."""
+        self._is(node, parts[0], ANGLE)
+        wave = np.sin if node.text == "sin" else np.cos
+        return Part(lambda block: wave(parts[0].step(block)), NONE)
+
+    def degrees(self, node: Node, parts: Sequence[Part]) -> Part:
+        """`deg`: an angle as a plain number of degrees."""
+        self._is(node, parts[0], ANGLE)
+        return Part(lambda block: np.degrees(parts[0].step(block)), NONE)
+
+    def slope(self, _node: Node, parts: Sequence[Part]) -> Part:
+        """`diff`: by time, from row to row."""
+        return Part(_Slope(parts[0].step), parts[0].dimension.times(SECOND, -1))
+
+    def smooth(self, node: Node, parts: Sequence[Part]) -> Part:
+        """`lowpass`: of first order."""
+        return Part(_LowPass(parts[0].step, self._constant(node, HERTZ, 1e4)), parts[0].dimension)
+
+    def over(self, node: Node, parts: Sequence[Part]) -> Part:
+        """`rms`, `mean`: over the last seconds."""
+        seconds = self._constant(node, SECOND, LONGEST_S)
+        return Part(_Window(parts[0].step, seconds, squared=node.text == "rms"), parts[0].dimension)
+
+
+def _channel(name: str, unit: str) -> Part:
+    return Part(lambda block: block.columns[name], Dimension.of(unit))
+
+
+def _column(step: Step, block: Block) -> Floats:
+    return np.asarray(np.broadcast_to(step(block), len(block.times)), np.float64)
+
+
+class _Slope:
+    def __init__(self, step: Step) -> None:
+        self._step = step
+        self._last = (math.nan, math.nan)  # time, value
+
+    def __call__(self, block: Block) -> Floats:
+        values = _column(self._step, block)
+        if not len(values):
+            return values
+        time_s, value = self._last
+        self._last = float(block.times[-1]), float(values[-1])
+        return np.diff(values, prepend=value) / np.diff(block.times, prepend=time_s)
+
+
+class _LowPass:
+    """Begins anew after whatever is missing, with what comes then."""
+
+    def __init__(self, step: Step, cutoff_hz: float) -> None:
+        self._step = step
+        self._cutoff = 2 * math.pi * cutoff_hz
+        self._time_s = self._value = math.nan
+
+    def __call__(self, block: Block) -> Floats:
+        values = _column(self._step, block)
+        if not len(values):
+            return values
+        shares = 1.0 - np.exp(-self._cutoff * np.diff(block.times, prepend=self._time_s))
+        value, found = self._value, []
+        for new, share in zip(values.tolist(), shares.tolist(), strict=True):
+            value = new if value != value or new != new else value + share * (new - value)
+            found.append(value)
+        self._time_s, self._value = float(block.times[-1]), value
+        return np.array(found)
+
+
+class _Window:
+    """Missing until the window is full, and where anything in it is missing."""
+
+    def __init__(self, step: Step, seconds: float, *, squared: bool) -> None:
+        self._step = step
+        self._seconds = seconds
+        self._squared = squared
+        self._times: Floats = np.zeros(0)
+        self._values: Floats = np.zeros(0)
+
+    def __call__(self, block: Block) -> Floats:
+        new = _column(self._step, block)
+        before = len(self._times)
+        times, values = np.concatenate((self._times, block.times)), np.concatenate((self._values, new))
+        missing = np.isnan(values)
+        known = np.where(missing, 0.0, values * values if self._squared else values)
+        sums, gaps = (np.concatenate(([0.0], np.cumsum(column))) for column in (known, missing))
+        ends = np.arange(before, len(times))
+        begins = np.searchsorted(times, times[before:] - self._seconds + 1e-9, "left")
+        whole = (begins > 0) & (gaps[ends + 1] == gaps[np.maximum(begins - 1, 0)])
+        found = (sums[ends + 1] - sums[begins]) / (ends + 1 - begins)
+        keep = max(int(begins[-1]) - 1, 0) if len(begins) else 0
+        self._times, self._values = times[keep:].copy(), values[keep:].copy()
+        if self._squared:
+            found = np.sqrt(np.maximum(found, 0.0))
+        return np.where(whole, found, np.nan)
+
+
+Make = Callable[[_Compiler, Node, Sequence[Part]], Part]
+FUNCTIONS: Final[Mapping[str, tuple[int, int, Make]]] = {
+    "abs": (1, 1, _Compiler.plain),
+    "min": (2, 99, _Compiler.least),
+    "max": (2, 99, _Compiler.most),
+    "sqrt": (1, 1, _Compiler.root),
+    "sin": (1, 1, _Compiler.angle),
+    "cos": (1, 1, _Compiler.angle),
+    "deg": (1, 1, _Compiler.degrees),
+    "diff": (1, 1, _Compiler.slope),
+    "lowpass": (2, 2, _Compiler.smooth),
+    "rms": (2, 2, _Compiler.over),
+    "mean": (2, 2, _Compiler.over),
+}

@@ -1,0 +1,1 @@
+"""The signals' workspace: plots that take curves, layouts, the trigger."""

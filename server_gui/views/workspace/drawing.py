@@ -1,0 +1,90 @@
+"""Draws what a scene shows into its cards, and says what they show."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from server_gui.core.desk.flags import Flag
+from server_gui.core.desk.station import Station
+from server_gui.core.workspace.meaning import BESIDE
+from server_gui.core.workspace.scene import Scene
+from server_gui.core.workspace.series import Floats
+from server_gui.core.workspace.trigger import WINDOWS, On, State
+from server_gui.views.unit_plot import EmptyPlot, UnitPlot
+from server_gui.views.widgets.plot import PlacedFlag
+from server_gui.views.widgets.time_axis import time_text
+from server_gui.views.workspace.xy_plot import XYPlot
+
+AnyPlot = UnitPlot | XYPlot | EmptyPlot
+Window = tuple[float, float]
+
+
+def draw(scene: Scene, cards: Sequence[AnyPlot], station: Station, seconds: float, window: Window) -> None:
+    """Draw the last `seconds`; XY plots what is in the `window` of them (s until the newest row)."""
+    times = scene.times(seconds)
+    paused = scene.frozen is not None
+    live = paused or not station.robot.is_stale()
+    for card in cards:
+        if isinstance(card, UnitPlot):
+            _draw_plot(scene, card, station, times, live=live)
+        elif isinstance(card, XYPlot):
+            sight = _sight(times, window)
+            xs, *columns = (scene.values(text, len(times))[sight] for text in (card.over.text, *card.drawn))
+            card.draw(xs, columns, live=live)
+
+
+def _draw_plot(scene: Scene, card: UnitPlot, station: Station, times: Floats, *, live: bool) -> None:
+    columns = [scene.values(text, len(times)) for text in card.drawn]
+    if scene.beside is not None:
+        columns += [scene.values_beside(text, times) for text in card.drawn]
+    if scene.frozen is None and _comes_late(scene, card):
+        card.plot.draw_anew()
+    source = station.rings.source if scene.frozen is None else scene.frozen
+    paused = scene.frozen is not None
+    card.plot.draw(source, times, columns, live=live, scale=card.unit.scale, paused=paused)
+
+
+def _comes_late(scene: Scene, card: UnitPlot) -> bool:
+    """Whether values come for rows that were drawn already."""
+    needed = (name for text in card.drawn for name in scene.meaning(text).needs)
+    return scene.beside is not None or any(name.startswith(BESIDE) for name in needed)
+
+
+def read(scene: Scene, cards: Sequence[AnyPlot], station: Station, at_s: float | None) -> None:
+    """Say the values at a time (s until the newest row), None: the newest."""
+    live = scene.frozen is not None or not station.robot.is_stale()
+    when = "" if at_s is None else time_text(round(at_s, 2))
+    for card in cards:
+        if isinstance(card, EmptyPlot):
+            continue
+        values = [scene.read(text, at_s) for text in card.drawn]
+        if isinstance(card, XYPlot):
+            card.show_values(scene.read(card.over.text, at_s), values, live=live, when=when)
+            continue
+        theirs = [] if scene.beside is None else [scene.read(text, at_s, beside=True) for text in card.drawn]
+        card.show_values(values, theirs, live=live, when=when)
+
+
+def flag(scene: Scene, cards: Sequence[AnyPlot], found: Sequence[Flag], newest_ns: int) -> None:
+    """Every plot over time shows what happened in its time, and the levels of a trigger by its curves."""
+    placed = [PlacedFlag((one.at_ns - newest_ns) / 1e9, one.kind, one.text) for one in found]
+    for card in cards:
+        if isinstance(card, UnitPlot):
+            card.plot.show_flags(placed)
+            card.plot.show_limits(_levels(scene, card))
+
+
+def _levels(scene: Scene, card: UnitPlot) -> list[float]:
+    trigger = scene.trigger
+    condition = trigger.condition
+    if trigger.state is State.OFF or condition.on is On.EMCY or condition.of not in card.drawn:
+        return []
+    levels = (condition.level, condition.high) if condition.on in WINDOWS else (condition.level,)
+    return [level * card.unit.scale for level in levels]
+
+
+def _sight(times: Floats, window: Window) -> slice:
+    if not len(times):
+        return slice(0, 0)
+    ends = np.searchsorted(times, (times[-1] + window[0], times[-1] + window[1] + 1e-9))
+    return slice(int(ends[0]), int(ends[1]))

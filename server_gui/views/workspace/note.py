@@ -1,0 +1,25 @@
+"""Asks for a note on the time axis."""
+
+from collections.abc import Callable
+
+from PySide6.QtWidgets import QLineEdit, QWidget
+
+from server_gui.core.workspace.notes import LONGEST_NOTE
+from server_gui.views.ask import ask
+from server_gui.views.widgets.time_axis import time_text
+
+
+def ask_note(parent: QWidget, at_s: float, keep: Callable[[str], None]) -> None:
+    """Ask for a note of an instant (s until the newest row); `keep` gets its words, where there are any."""
+    field = QLineEdit()
+    field.setMaxLength(LONGEST_NOTE)
+    field.setAccessibleName("Note")
+    where = f"{time_text(round(at_s, 2))}, where the cursor is" if at_s else "the newest row"
+    text = f"Kept with the recording at {where}, and shown on every axis of time."
+
+    def done() -> None:
+        told = " ".join(field.text().split())
+        if told:
+            keep(told)
+
+    ask(parent, "Note", text, "Keep", done, field)

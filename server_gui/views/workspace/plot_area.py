@@ -1,0 +1,136 @@
+"""The plots of a workspace below each other, and all by which curves come into them and out."""
+
+from collections.abc import Callable, Sequence
+
+from PySide6.QtCore import QPoint, Qt, Signal
+from PySide6.QtGui import QDragEnterEvent, QDragMoveEvent, QDropEvent
+from PySide6.QtWidgets import QFrame, QMenu, QVBoxLayout
+
+from server_gui.core.workspace.scene import Scene
+from server_gui.core.workspace.workspace import Refused
+from server_gui.views.theme import Theme
+from server_gui.views.unit_plot import Drawn, EmptyPlot, UnitPlot
+from server_gui.views.widgets.dragging import dropped
+from server_gui.views.widgets.plain import PlainLabel
+from server_gui.views.workspace.curve_menus import channel_menu, plot_menu
+from server_gui.views.workspace.drawing import AnyPlot
+from server_gui.views.workspace.xy_plot import XYPlot
+
+
+class PlotArea(QFrame):
+    """`arranged` says that something was, or why not; the other signals are those of the plots over time."""
+
+    arranged = Signal(str)
+    zoomed = Signal(float, float)
+    moved = Signal(int, float)
+    hovered = Signal(object)
+    fitted = Signal()
+
+    def __init__(self, scene: Scene, theme: Theme) -> None:
+        super().__init__()
+        self._scene = scene
+        self._theme = theme
+        self.cards: list[AnyPlot] = []
+        self.built = -1  # revision of the workspace that the plots are of
+        self.empty = PlainLabel(
+            "Tick channels at the left to see them here, or drag them to where they are to be."
+        )
+        self.empty.setWordWrap(True)
+        self.empty.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self.empty.setObjectName("dim")
+        self._stack = QVBoxLayout(self)
+        self._stack.setContentsMargins(0, 0, 0, 0)
+        self._stack.addWidget(self.empty)
+        self.setAcceptDrops(True)
+
+    def build(self, seconds: float, window: tuple[float, float] | None) -> None:
+        """Make a card for each plot, of the last `seconds`, of which the `window` is in sight."""
+        for card in self.cards:
+            self._stack.removeWidget(card)
+            card.hide()
+            card.deleteLater()
+        self.cards = [self._card(place, seconds) for place in range(len(self._scene.workspace.plots))]
+        for place, card in enumerate(self.cards):
+            self._stack.addWidget(card, 1)
+            self._bind(card, place)
+            if isinstance(card, UnitPlot):
+                for signal, mine in (
+                    (card.plot.zoomed, self.zoomed),
+                    (card.plot.moved, self.moved),
+                    (card.plot.hovered, self.hovered),
+                    (card.plot.fitted, self.fitted),
+                ):
+                    signal.connect(mine)
+                if window is not None and window[0] >= -seconds:
+                    card.plot.show_window(*window)
+        self.built = self._scene.workspace.revision
+        self.empty.setVisible(not self.cards)
+
+    def _bind(self, card: AnyPlot, place: int) -> None:
+        card.taken.connect(lambda texts: self._drop(texts, place))
+        card.menu.aboutToShow.connect(lambda: plot_menu(card.menu, self._scene, place, self.do))
+
+    def _card(self, place: int, seconds: float) -> AnyPlot:
+        scene = self._scene
+        spec, unit = scene.workspace.plots[place], scene.unit(place)
+        curves = [Drawn(text, scene.meaning(text).name, scene.drawn(text, unit)) for text in spec.curves]
+        x = scene.meaning(spec.x) if spec.is_xy else None
+        if unit is None or (x is not None and x.unit is None):
+            lacks = [] if x is None or not x.problem else [Drawn(x.text, x.name, x.problem)]
+            return EmptyPlot(self._theme, place, [*lacks, *(one for one in curves if one.problem)])
+        if x is not None and x.unit is not None:
+            return XYPlot(self._theme, place, Drawn(x.text, x.name), (x.unit, unit), curves)
+        beside = "" if scene.beside is None else scene.beside.station.title
+        return UnitPlot(self._theme, place, unit, curves, seconds, beside)
+
+    # --- curves
+
+    def do(self, do: Callable[[], object]) -> None:
+        """Change what is arranged, or say why not."""
+        refused = ""
+        try:
+            do()
+        except Refused as why:
+            refused = str(why)
+        self.arranged.emit(refused)
+
+    def put(self, text: str) -> None:
+        """Draw a curve where its like is, else in a plot of its own."""
+        self.do(lambda: self._scene.workspace.put(self._scene.meaning(text), self._scene.units()))
+
+    def offer(self, text: str, at: QPoint) -> QMenu:
+        """Open the menu of what can be done with a channel."""
+        menu = QMenu(self)
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        channel_menu(menu, self._scene, text, self.do)
+        menu.popup(at)
+        return menu
+
+    def _drop(self, texts: Sequence[str], place: int) -> None:
+        scene = self._scene
+
+        def all_of_them() -> None:
+            for text in texts:
+                scene.workspace.add(scene.meaning(text), place, scene.unit(place))
+
+        self.do(all_of_them)
+
+    # --- what is dropped between the plots, or below them
+
+    def dragEnterEvent(self, event: QDragEnterEvent) -> None:
+        if dropped(event.mimeData()):
+            event.acceptProposedAction()
+
+    def dragMoveEvent(self, event: QDragMoveEvent) -> None:
+        event.acceptProposedAction()
+
+    def dropEvent(self, event: QDropEvent) -> None:
+        event.acceptProposedAction()
+        scene, texts, y = self._scene, dropped(event.mimeData()), event.position().y()
+        place = sum(card.geometry().center().y() < y for card in self.cards)
+
+        def all_of_them() -> None:
+            for number, text in enumerate(texts):
+                scene.workspace.new_plot(scene.meaning(text), place=place + number)
+
+        self.do(all_of_them)

@@ -1,0 +1,116 @@
+"""The tools above the signals: span, pause and zoom, events, exports; what arranges; what is said."""
+
+from collections.abc import Callable, Sequence
+from typing import Final
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QKeySequence, QShortcut
+from PySide6.QtWidgets import QBoxLayout, QComboBox, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
+
+from server_gui.views.widgets.elided import ElidedLabel
+from server_gui.views.widgets.plain import set_tip
+
+SPANS_S: Final = (2, 5, 10, 30, 60, 100)
+
+
+class Tools(QWidget):
+    """Never shown itself: `rows` go into `page`, where the keys hold.
+
+    `looked` asks to see so many times of the time, moved by a share of it; `turned` for the event before (−1)
+    or after (1); `noted` for a note.
+    """
+
+    looked = Signal(float, float)
+    turned = Signal(int)
+    noted = Signal()
+
+    def __init__(self, page: QWidget, menus: Sequence[QPushButton]) -> None:
+        super().__init__(page)
+        self.hide()
+        self.span = QComboBox()
+        self.span.addItems([f"{seconds} s" for seconds in SPANS_S])
+        self.span.setCurrentIndex(SPANS_S.index(10))
+        self.span.setAccessibleName("How much of the past is shown")
+        self.pause = _switch("Pause view", "The view stands still; data and recording go on")
+        self.fit = QPushButton("Fit")
+        self.fit.setToolTip("Undo zoom: the range follows the data again")
+        self.box = _switch(
+            "Box zoom", "Drag a box around what is to be seen; else a drag moves, and the wheel zooms"
+        )
+        self.cursors = _switch(
+            "Cursors", "Two cursors with their difference, and every curve over what is in sight"
+        )
+        self.as_csv, self.as_png = QPushButton("CSV …"), QPushButton("PNG …")
+        self.as_csv.setAccessibleName("Save what is on screen as CSV")
+        self.as_png.setAccessibleName("Save what is on screen as a picture")
+        self.before, self.next = QPushButton("◀"), QPushButton("▶")
+        for button, way, which in ((self.before, -1, "before"), (self.next, 1, "after")):
+            button.setAccessibleName(f"To the event {which}")
+            set_tip(button, f"To the event {which}: a stop, fault, write, trial or mark")
+            button.clicked.connect(lambda _=False, way=way: self.turned.emit(way))
+        self.expression = _switch("Expression", "A curve that is computed, such as target minus position")
+        self.trigger = _switch("Trigger", "Stand still when a curve does something, as an oscilloscope does")
+        self.note = QPushButton("Note …")
+        self.note.setToolTip("A note on the time axis, kept in the recording: at the active cursor, or now")
+        self.note.clicked.connect(self.noted)
+        self.said = ElidedLabel("dim")
+        self._first = QBoxLayout(QBoxLayout.Direction.LeftToRight)
+        self._first.addLayout(_row((self.span, self.pause, self.fit, self.box, self.cursors)))
+        self._events = _row((self.before, self.next, self.as_csv, self.as_png))
+        self._first.addLayout(self._events)
+        self._first.addStretch(1)
+        self._second = _row((*menus, self.expression, self.trigger, self.note))
+        self._second.addWidget(self.said, 100)
+        self.rows = QVBoxLayout()
+        self.rows.addLayout(self._first)
+        self.rows.addLayout(self._second)
+        self._keys(page)
+
+    def be_narrow(self, narrow: bool) -> None:
+        """Stand in more rows."""
+        direction = QBoxLayout.Direction
+        self._first.setDirection(direction.TopToBottom if narrow else direction.LeftToRight)
+        for row in (self._events, self._second):
+            row.removeWidget(self.said)
+        (self._events if narrow else self._second).addWidget(self.said, 100)
+
+    def _keys(self, page: QWidget) -> None:
+        """Keys of this page; the sheet of keys tells them."""
+        buttons = {
+            "Ctrl+Shift+P": self.pause,
+            "Ctrl+0": self.fit,
+            "Ctrl+D": self.cursors,
+            "Ctrl+E": self.as_csv,
+            "Ctrl+Up": self.before,
+            "Ctrl+Down": self.next,
+            "Ctrl+Shift+E": self.expression,
+            "Ctrl+Shift+T": self.trigger,
+            "Ctrl+Shift+N": self.note,
+        }
+        for key, button in buttons.items():
+            button.setShortcut(key)
+            button.setToolTip(" ".join(filter(None, (button.toolTip(), f"({key})"))))
+        moves: dict[str, Callable[[], None]] = {
+            "Ctrl++": lambda: self.looked.emit(0.5, 0.0),
+            "Ctrl+-": lambda: self.looked.emit(2.0, 0.0),
+            "Ctrl+Left": lambda: self.looked.emit(1.0, -0.25),
+            "Ctrl+Right": lambda: self.looked.emit(1.0, 0.25),
+        }
+        for key, move in moves.items():
+            shortcut = QShortcut(QKeySequence(key), page, move)
+            shortcut.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
+
+
+def _switch(text: str, tip: str) -> QPushButton:
+    button = QPushButton(text)
+    button.setCheckable(True)
+    set_tip(button, tip)
+    return button
+
+
+def _row(widgets: Sequence[QWidget]) -> QHBoxLayout:
+    row = QHBoxLayout()
+    for widget in widgets:
+        row.addWidget(widget)
+    row.addStretch(1)
+    return row

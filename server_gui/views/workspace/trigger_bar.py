@@ -1,0 +1,154 @@
+"""The trigger of the signals: what is waited for, what then, and how it is."""
+
+import math
+from collections.abc import Sequence
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLineEdit, QPushButton, QVBoxLayout
+
+from gateway.units import Unit
+from server_gui.core.workspace.scene import Scene
+from server_gui.core.workspace.trigger import WINDOWS, Condition, Mode, On
+from server_gui.views.theme import Theme
+from server_gui.views.widgets.card import Card
+from server_gui.views.widgets.plain import set_tip
+
+NO_UNIT = Unit("", "")
+
+
+class TriggerBar(Card):
+    """`armed` brings a condition, `ended` when somebody wants to see what comes."""
+
+    armed = Signal(object)
+    ended = Signal()
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__("Trigger")
+        self._theme = theme
+        self._units: dict[str, Unit] = {}
+        self._components: Sequence[str] = ()
+        self._unit = NO_UNIT
+        self.of = _choice("What triggers: a curve, or a drive for EMCY")
+        self.of.currentTextChanged.connect(self._show_unit)
+        self.on = _choice("When it triggers", [one.value for one in On])
+        self.on.currentTextChanged.connect(self._fit)
+        self.level, self.high = NumberField("Level, or lower end"), NumberField("Upper end")
+        self.mode = _choice("What comes after", [one.value for one in Mode])
+        self.mode.setCurrentText(Mode.NORMAL.value)
+        self.before = NumberField("Share of what is seen that is before it", 50.0, "% before")
+        self.hold_off = NumberField("Hold-off", 0.0, "s hold-off")
+        self.arm = QPushButton("Arm")
+        self.arm.setToolTip("Wait for it, from now on; data and recording go on whatever is shown")
+        self.arm.clicked.connect(lambda: self.armed.emit(self.condition))
+        self.live = QPushButton("Off")
+        self.live.setAccessibleName("Trigger off")
+        self.live.setToolTip("Wait for nothing, and show what comes")
+        self.live.clicked.connect(self.ended)
+        rows = QVBoxLayout()
+        first, second = (self.of, self.on), (self.level, self.high, self.mode)
+        for widgets in (first, second, (self.before, self.hold_off, self.arm, self.live)):
+            row = QHBoxLayout()
+            for widget in widgets:
+                row.addWidget(widget, 1)
+            rows.addLayout(row)
+        self.body.addLayout(rows)
+        self._fit()
+        self.hide()
+
+    def say(self, text: str) -> None:
+        """Say how it is."""
+        self.set_title(f"Trigger, {text}")
+
+    @property
+    def condition(self) -> Condition:
+        """What is asked for."""
+        scale = self._unit.scale
+        return Condition(
+            On(self.on.currentText()),
+            self.of.currentText(),
+            self.level.value / scale,
+            self.high.value / scale,
+            Mode(self.mode.currentText()),
+            self.before.value / 100,
+            self.hold_off.value,
+        )
+
+    def show_choices(self, scene: Scene) -> None:
+        """What there is to trigger by: curves that are drawn, with their units, and drives."""
+        meant = map(scene.meaning, scene.workspace.curves)
+        self._units = {one.text: one.unit for one in meant if one.unit is not None}
+        self._components = scene.drives
+        self._fit()
+
+    def show_condition(self, condition: Condition) -> None:
+        """Have all fields say this."""
+        self.on.setCurrentText(condition.on.value)
+        if self.of.findText(condition.of) < 0:
+            self.of.addItem(condition.of)
+        self.of.setCurrentText(condition.of)
+        self.level.set_value(condition.level * self._unit.scale)
+        self.high.set_value(condition.high * self._unit.scale)
+        self.mode.setCurrentText(condition.mode.value)
+        self.before.set_value(condition.before * 100)
+        self.hold_off.set_value(condition.hold_off_s)
+
+    def _fit(self) -> None:
+        """Only what counts for what is waited for."""
+        on = On(self.on.currentText())
+        choices = list(self._components if on is On.EMCY else self._units)
+        known = [self.of.itemText(place) for place in range(self.of.count())]
+        if choices != known:
+            before = self.of.currentText()
+            self.of.clear()
+            self.of.addItems(choices)
+            if before in choices:
+                self.of.setCurrentText(before)
+        self.level.setVisible(on is not On.EMCY)
+        self.high.setVisible(on in WINDOWS)
+        self._show_unit()
+
+    def _show_unit(self) -> None:
+        self._unit = self._units.get(self.of.currentText(), NO_UNIT)
+        for field in (self.level, self.high):
+            field.set_suffix(self._unit.symbol)
+
+
+def _choice(name: str, texts: Sequence[str] = ()) -> QComboBox:
+    combo = QComboBox()
+    combo.addItems(list(texts))
+    combo.setAccessibleName(name)
+    set_tip(combo, name)
+    combo.setMinimumContentsLength(7)
+    combo.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
+    return combo
+
+
+class NumberField(QLineEdit):
+    """A number with its unit behind it; what is no number is NaN, which no trigger takes."""
+
+    def __init__(self, name: str, value: float = 0.0, suffix: str = "") -> None:
+        super().__init__()
+        self._suffix = suffix
+        self.setAccessibleName(name)
+        set_tip(self, name)
+        self.setMinimumWidth(50)
+        self.set_value(value)
+
+    @property
+    def value(self) -> float:
+        """The number that stands there."""
+        text = self.text().strip().removesuffix(self._suffix).replace("−", "-").strip()
+        try:
+            return float(text)
+        except ValueError:
+            return math.nan
+
+    def set_value(self, value: float) -> None:
+        """Have this number stand there."""
+        self.setText(f"{value:.6g} {self._suffix}".rstrip())
+
+    def set_suffix(self, suffix: str) -> None:
+        """Have another unit behind it."""
+        value, self._suffix = self.value, suffix
+        if math.isfinite(value):
+            self.set_value(value)

@@ -1,0 +1,1 @@
+"""Tests of the server's core and the terminal dashboard."""
