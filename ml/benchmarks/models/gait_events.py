@@ -36,12 +36,12 @@ class EventModel:
         """Learn from moments of which `offset` (n,) is samples to the event that is meant, or NONE.
 
         Raises:
-            UnusableData: all are events, or none is.
+            UnusableData: none of them is an event.
 
         """
         tuned, near = self.settings, offset != NONE
-        if len(np.unique(near)) < 2:
-            raise UnusableData("too few feet step, or too few rest: some have nobody to learn from")
+        if not near.any():
+            raise UnusableData("too few feet step: some have nobody to learn from")
         common: dict[str, Any] = {
             "max_iter": tuned.rounds,
             "max_leaf_nodes": tuned.leaves,
@@ -51,7 +51,8 @@ class EventModel:
             "early_stopping": False,
             "random_state": 0,
         }
-        self.whether_ = HistGradientBoostingClassifier(**common).fit(x, near)
+        # Where every moment is an event there is nothing to tell apart.
+        self.whether_ = None if near.all() else HistGradientBoostingClassifier(**common).fit(x, near)
         when = HistGradientBoostingRegressor(loss="absolute_error", **common)
         self.when_ = when.fit(x[near], offset[near])
         return self
@@ -60,7 +61,7 @@ class EventModel:
         """The samples of one foot's events, in time's order, of moments at the samples `at`."""
         if not len(at):
             return at
-        probability = self.whether_.predict_proba(x)[:, 1]
+        probability = np.ones(len(at)) if self.whether_ is None else self.whether_.predict_proba(x)[:, 1]
         moment = np.rint(at + self.when_.predict(x)).astype(np.int_)
         found: list[int] = []
         for place in np.argsort(-probability, kind="stable").tolist():
