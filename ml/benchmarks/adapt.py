@@ -120,7 +120,9 @@ def _outcome(judged: list[Decisions], every: list[Pairs], settings: str) -> Outc
         "accuracy": float((np.abs(adapted) <= WITHIN).mean()),
     }
     for share in losses.SHARES:
-        general, personal = (float(np.mean([percent(one[share][which]) for one in every])) for which in (0, 1))
+        general, personal = (
+            float(np.mean([percent(one[share][which]) for one in every])) for which in (0, 1)
+        )
         figures[losses.at("adapted_rmse_percent", share)] = personal
         figures[losses.at("adaptation_cut", share)] = 1.0 - personal / general
     return Outcome(figures, len(by_subject), by_subject, settings=settings, notes=(WHY,))

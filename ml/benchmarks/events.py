@@ -57,8 +57,8 @@ class Foot:
 def evaluate(path: Path, search: Search) -> Outcome:
     """Leave one subject out, and judge all events of each kind together."""
     trials = ipol.read(path)
-    feet = {0.0: _feet(trials)}
-    feet |= {share: _feet(ipol.lossy(trials, share)) for share in losses.SHARES}
+    feet = {0.0: feet_of(trials)}
+    feet |= {share: feet_of(ipol.lossy(trials, share)) for share in losses.SHARES}
     people = sorted({trial.subject for trial in trials})
     work = folds.over(lambda person: _fold(feet, person, search), people)
     counts = {person: one for person, (one, _) in zip(people, work, strict=True)}
@@ -70,7 +70,8 @@ Counts = Mapping[Key, int]
 Feet = Mapping[str, Sequence[Foot]]  # by kind
 
 
-def _feet(trials: Sequence[ipol.Trial]) -> Feet:
+def feet_of(trials: Sequence[ipol.Trial]) -> Feet:
+    """Both feet of every trial, by kind of event."""
     every: dict[str, list[Foot]] = {kind: [] for kind in KINDS}
     for trial in trials:
         for (recipe, pitch), in_air in zip(FEET, trial.in_air, strict=True):
