@@ -117,7 +117,8 @@ def _median_ms(predict: Predict, x: npt.NDArray[np.float32]) -> float:
 
 def _classes(x: npt.NDArray[np.float32], count: int) -> npt.NDArray[np.intp]:
     """Something that can be learned, with an error: two features together, in classes of one size."""
-    told = x[:, :2].sum(axis=1) + 0.3 * x.std() * np.random.default_rng(0).normal(size=len(x))
+    told = x[:, :2].sum(axis=1)
+    told += 0.1 * told.std() * np.random.default_rng(0).normal(size=len(x))
     classes: npt.NDArray[np.intp] = np.digitize(told, np.quantile(told, np.arange(1, count) / count))
     return classes
 
