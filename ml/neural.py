@@ -16,7 +16,7 @@ FAR: Final = 5.0  # standard deviations, beyond which a feature says no more
 
 def scaled(*steps: Any) -> Pipeline:
     """Features in standard deviations, none far out; then `steps`."""
-    return make_pipeline(StandardScaler(), FunctionTransformer(_within), *steps)
+    return make_pipeline(StandardScaler(), FunctionTransformer(within), *steps)
 
 
 @contextmanager
@@ -30,6 +30,7 @@ def fixed_epochs() -> Iterator[None]:
         yield
 
 
-def _within(x: npt.NDArray[Any]) -> npt.NDArray[Any]:
+def within(x: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """None farther out than FAR."""
     near: npt.NDArray[Any] = np.clip(x, -FAR, FAR)
     return near

@@ -680,7 +680,7 @@ complete -c gwrms -n '_shtab_gwrms_using gui' -l look -xka "dark light" -d 'colo
 complete -c gwrms -n '_shtab_gwrms_using gui' -l scale -xka "80 81 82 83 84 85 86 87 88 89 90 91 92 93 94 95 96 97 98 99 100 101 102 103 104 105 106 107 108 109 110 111 112 113 114 115 116 117 118 119 120 121 122 123 124 125 126 127 128 129 130 131 132 133 134 135 136 137 138 139 140 141 142 143 144 145 146 147 148 149 150 151 152 153 154 155 156 157 158 159 160 161 162 163 164 165 166 167 168 169 170 171 172 173 174 175 176 177 178 179 180 181 182 183 184 185 186 187 188 189 190 191 192 193 194 195 196 197 198 199 200" -d 'size of all text, %'
 complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a evaluate -d 'How well predictions hold for people, real or simulated, whom no model has seen.'
 complete -c gwrms -n '_shtab_gwrms_using evaluate' -s h -l help -d 'show this help message and exit'
-complete -c gwrms -n '_shtab_gwrms_using evaluate' -l benchmark -xka "ipol-status ipol-phase ipol-adapt sisfall-prefall aust-mode sim-activity sim-phase sim-falling" -d 'one of those below'
+complete -c gwrms -n '_shtab_gwrms_using evaluate' -l benchmark -xka "ipol-status ipol-phase ipol-adapt ipol-events sisfall-prefall aust-mode sim-activity sim-phase sim-falling" -d 'one of those below'
 complete -c gwrms -n '_shtab_gwrms_using evaluate' -l data -xka "(__fish_complete_path (commandline -ct))" -d 'the recordings'
 complete -c gwrms -n '_shtab_gwrms_using evaluate' -l json -d 'the figures as one JSON object, in the last line'
 complete -c gwrms -n '_shtab_gwrms_using evaluate' -l report -xka "(__fish_complete_path (commandline -ct))" -d 'also write a page with tables and pictures'

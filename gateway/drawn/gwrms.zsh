@@ -571,7 +571,7 @@ _shtab_gwrms_enable_defaults_added=0
 
 _shtab_gwrms_evaluate_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--benchmark[one of those below]:NAME:(ipol-status ipol-phase ipol-adapt sisfall-prefall aust-mode sim-activity sim-phase sim-falling)"
+  "--benchmark[one of those below]:NAME:(ipol-status ipol-phase ipol-adapt ipol-events sisfall-prefall aust-mode sim-activity sim-phase sim-falling)"
   "--data[the recordings]:FILE:_files"
   "--json[the figures as one JSON object, in the last line]"
   "--report[also write a page with tables and pictures]:FILE.html:_files"

@@ -1,13 +1,14 @@
 """`ipol-adapt`: what a minute of a new wearer's walking does for the gait phase in the later trials."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
-from ml.benchmarks import folds, ipol, metrics
-from ml.benchmarks.models.gait_phase import PhaseSettings
+from ml.benchmarks import folds, ipol, losses, metrics
+from ml.benchmarks.models.gait_phase import PhaseModel, PhaseSettings
 from ml.benchmarks.outcome import Outcome
 from ml.benchmarks.phase import WHY, WITHIN, errors_of, fitted, percent
 from ml.benchmarks.search import Search, chosen, told
@@ -25,6 +26,7 @@ GRID: Final = (
 )
 
 Pair = tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]  # errors without and with adaptation
+Pairs = dict[float, Pair]  # by the share of packets that are lost, in the minute too
 
 
 def evaluate(path: Path, search: Search) -> Outcome:
@@ -39,9 +41,15 @@ def evaluate(path: Path, search: Search) -> Outcome:
     ]
     if not people:
         raise UnusableData(f"{path}: nobody walks on in a later trial after {MINUTE_S:.0f} s of walking")
-    work = folds.over(lambda person: _fold(taught, minute, data.of(data.subject == person), search), people)
+    every = {0.0: data} | {share: decisions(ipol.lossy(trials, share)) for share in losses.SHARES}
+
+    def work_of(person: int) -> tuple[Pairs, PhaseSettings]:
+        own = {share: one.of(one.subject == person) for share, one in every.items()}
+        return _fold(taught, minute, own, search)
+
+    work = folds.over(work_of, people)
     judged = [data.of((data.subject == person) & late) for person in people]
-    return _outcome(judged, [pair for pair, _ in work], told([one for _, one in work], search))
+    return _outcome(judged, [pairs for pairs, _ in work], told([one for _, one in work], search))
 
 
 def _late(data: Decisions, minute: dict[int, int]) -> npt.NDArray[np.bool_]:
@@ -63,9 +71,9 @@ def _minutes(trials: list[ipol.Trial]) -> dict[int, int]:
 
 
 def _fold(
-    taught: Decisions, minute: dict[int, int], own: Decisions, search: Search
-) -> tuple[Pair, PhaseSettings]:
-    others = taught.of(taught.subject != own.subject[0])
+    taught: Decisions, minute: dict[int, int], own: Mapping[float, Decisions], search: Search
+) -> tuple[Pairs, PhaseSettings]:
+    others = taught.of(taught.subject != own[0.0].subject[0])
     settings = chosen(
         SETTINGS,
         GRID,
@@ -73,11 +81,11 @@ def _fold(
         search,
         lambda one, rows, judge: _cut(others.of(rows), minute, others.of(judge), one),
     )
-    return _both(others, minute, own, settings), settings
-
-
-def _both(others: Decisions, minute: dict[int, int], own: Decisions, settings: PhaseSettings) -> Pair:
     model = fitted(others, settings)
+    return {share: _both(model, minute, one) for share, one in own.items()}, settings
+
+
+def _both(model: PhaseModel, minute: dict[int, int], own: Decisions) -> Pair:
     late = _late(own, minute)
     early, later = own.of(~late), own.of(late)
     personal = model.personal(early.features, early.phase, early.stride)
@@ -87,12 +95,14 @@ def _both(others: Decisions, minute: dict[int, int], own: Decisions, settings: P
 def _cut(others: Decisions, minute: dict[int, int], judge: Decisions, settings: PhaseSettings) -> float:
     """For a search: how much of the error adaptation takes away, over these people."""
     people = [judge.of(judge.subject == person) for person in np.unique(judge.subject)]
-    pairs = [_both(others, minute, own, settings) for own in people if _late(own, minute).any()]
+    model = fitted(others, settings)
+    pairs = [_both(model, minute, own) for own in people if _late(own, minute).any()]
     before, after = (np.mean([metrics.rms(pair[which]) for pair in pairs]) for which in (0, 1))
     return float(1.0 - after / before)
 
 
-def _outcome(judged: list[Decisions], pairs: list[Pair], settings: str) -> Outcome:
+def _outcome(judged: list[Decisions], every: list[Pairs], settings: str) -> Outcome:
+    pairs = [one[0.0] for one in every]
     by_subject = {}
     for own, (before, after) in zip(judged, pairs, strict=True):
         by_subject[str(own.subject[0])] = {
@@ -109,4 +119,10 @@ def _outcome(judged: list[Decisions], pairs: list[Pair], settings: str) -> Outco
         "in_step_adaptation_cut": 1.0 - mean["in_step_adapted_rmse_percent"] / mean["in_step_rmse_percent"],
         "accuracy": float((np.abs(adapted) <= WITHIN).mean()),
     }
+    for share in losses.SHARES:
+        general, personal = (
+            float(np.mean([percent(one[share][which]) for one in every])) for which in (0, 1)
+        )
+        figures[losses.at("adapted_rmse_percent", share)] = personal
+        figures[losses.at("adaptation_cut", share)] = 1.0 - personal / general
     return Outcome(figures, len(by_subject), by_subject, settings=settings, notes=(WHY,))

@@ -80,6 +80,21 @@ class Arrays:
         self.finite(samples)
         return samples
 
+    def flags(self, name: str, shape: tuple[int, ...]) -> npt.NDArray[np.bool_]:
+        """The array `name` of this shape as yes or no; no everywhere where the file does not say.
+
+        Raises:
+            UnusableData: it has another shape.
+
+        """
+        if name not in self._arrays:
+            return np.zeros(shape, dtype=bool)
+        flags = self._arrays[name]
+        if flags.shape != shape:
+            raise self.problem(f"{name!r} has the shape {flags.shape}; expected is {shape}")
+        said: npt.NDArray[np.bool_] = flags != 0
+        return said
+
     def finite(self, samples: npt.NDArray[np.float64]) -> None:
         """Refuse what is not a number."""
         if not len(samples):

@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from ml.benchmarks import folds, sisfall
+from ml.benchmarks import folds, losses, sisfall
 from ml.benchmarks.models.falling import FAR, FallDetector, FallSettings
 from ml.benchmarks.outcome import Outcome
 from ml.benchmarks.search import Search, chosen, told
@@ -20,6 +20,7 @@ STEP: Final = 2  # samples between decisions: 40 ms
 FIRST: Final = 25  # samples of a recording before its first decision
 IN_TIME: Final = 75  # samples: an alarm up to 1.5 s before the impact is of this fall
 FOLDS: Final = 5
+LOST: Final = ("sensitivity", "false_alarm_fraction")  # figures told with packets lost too
 NEVER: Final = -1
 MS: Final = 1000 // RATE_HZ
 SETTINGS: Final = FallSettings()
@@ -98,11 +99,12 @@ def evaluate(path: Path, search: Search) -> Outcome:
     recordings = sisfall.read(path)
     data = decisions(recordings)
     splits = list(grouped(recordings, data))
-    work = folds.over(lambda split: _fold(data, split, search), splits)
-    first = np.full(len(recordings), NEVER)
-    for (_, held_out), (alarms, _) in zip(splits, work, strict=True):
-        rows = held_out[alarms][::-1]  # the earliest of each recording is written last
-        first[data.recording[rows]] = data.at[rows]
+    work = folds.over(lambda split: _fold(recordings, data, split, search), splits)
+    first = {share: np.full(len(recordings), NEVER) for share in (0.0, *losses.SHARES)}
+    for (_, held_out), (found, _) in zip(splits, work, strict=True):
+        for share, alarms in found.items():
+            rows = held_out[alarms][::-1]  # the earliest of each recording is written last
+            first[share][data.recording[rows]] = data.at[rows]
     return _outcome(recordings, first, told([settings for _, settings in work], search))
 
 
@@ -115,7 +117,12 @@ def grouped(recordings: list[sisfall.Recording], data: Decisions) -> Iterator[fo
         )
 
 
-def _fold(data: Decisions, split: folds.Split, search: Search) -> tuple[npt.NDArray[np.bool_], FallSettings]:
+Alarms = dict[float, npt.NDArray[np.bool_]]  # by the share of packets that are lost
+
+
+def _fold(
+    recordings: list[sisfall.Recording], data: Decisions, split: folds.Split, search: Search
+) -> tuple[Alarms, FallSettings]:
     """Which of the held-out decisions are alarms."""
     train, held_out = split
     train = train[~data.stumble[train]]
@@ -126,26 +133,48 @@ def _fold(data: Decisions, split: folds.Split, search: Search) -> tuple[npt.NDAr
         search,
         lambda one, rows, judge: _score(data, train[rows], train[judge], one),
     )
-    return _alarms(data, train, held_out, settings), settings
+    model = _fitted(data, train, settings)
+    found = {0.0: model.alarms(data.features, data.recording, held_out)}
+    for share in losses.SHARES:
+        found[share] = _lossy_alarms(model, recordings, data, held_out, share)
+    return found, settings
 
 
-def _alarms(
-    data: Decisions, train: folds.Rows, judge: folds.Rows, settings: FallSettings
+def _fitted(data: Decisions, train: folds.Rows, settings: FallSettings) -> FallDetector:
+    return FallDetector(settings).fit(data.features, data.to_impact, data.recording, data.subject, train)
+
+
+def _lossy_alarms(
+    model: FallDetector, recordings: list[sisfall.Recording], data: Decisions, rows: folds.Rows, share: float
 ) -> npt.NDArray[np.bool_]:
-    model = FallDetector(settings).fit(data.features, data.to_impact, data.recording, data.subject, train)
-    return model.alarms(data.features, data.recording, judge)
+    """The alarms at `rows` where so many packets are lost; recording by recording, to need little memory."""
+    number = data.recording[rows]
+    alarms = np.zeros(len(rows), dtype=bool)
+    for one in np.unique(number).tolist():
+        own = number == one
+        samples = recordings[one].samples
+        lost = losses.lossy(samples, (samples.shape[1],), share, one)
+        lost[0] = samples[0]
+        alarms[own] = model.alarms(features(FALLING, lost, data.at[rows[own]]), number[own])
+    return alarms
 
 
 def _score(data: Decisions, train: folds.Rows, judge: folds.Rows, settings: FallSettings) -> float:
     """For a search: falls alarmed in time, at about the same false alarms."""
-    alarmed = judge[_alarms(data, train, judge, settings)]
+    alarmed = judge[_fitted(data, train, settings).alarms(data.features, data.recording, judge)]
     in_time = alarmed[data.to_impact[alarmed] <= IN_TIME]
     falls = judge[data.to_impact[judge] < FAR]
     return len(np.unique(data.recording[in_time])) / max(len(np.unique(data.recording[falls])), 1)
 
 
-def _outcome(recordings: list[sisfall.Recording], first: npt.NDArray[np.int_], settings: str) -> Outcome:
-    rows = [Alarm.of(recording, int(at)) for recording, at in zip(recordings, first, strict=True)]
+def _outcome(
+    recordings: list[sisfall.Recording], by_share: dict[float, npt.NDArray[np.int_]], settings: str
+) -> Outcome:
+    every = {
+        share: [Alarm.of(recording, int(at)) for recording, at in zip(recordings, first, strict=True)]
+        for share, first in by_share.items()
+    }
+    rows = every[0.0]
     subjects = sorted({recording.subject for recording in recordings})
     by_subject = {
         one: _figures(
@@ -153,7 +182,11 @@ def _outcome(recordings: list[sisfall.Recording], first: npt.NDArray[np.int_], s
         )
         for one in subjects
     }
-    return Outcome(_figures(rows), len(subjects), by_subject, settings=settings)
+    figures = _figures(rows)
+    for share in losses.SHARES:
+        found = _figures(every[share])
+        figures |= {losses.at(name, share): found[name] for name in LOST}
+    return Outcome(figures, len(subjects), by_subject, settings=settings)
 
 
 def _figures(alarms: list["Alarm"]) -> dict[str, float]:

@@ -1,15 +1,18 @@
 """The format of IPOL 2023/497: IMUs at the low back and on both feet, walked there and back, labelled."""
 
 import itertools
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
+from ml.benchmarks import losses
 from ml.benchmarks.arrays import Arrays
 from ml.features.gait_status import RATE_HZ
+from ml.features.gaps import mended
 
 STATUSES: Final = ("stand", "walk", "turn")
 WALK: Final = STATUSES.index("walk")
@@ -19,7 +22,10 @@ CHANNELS: Final = tuple(
     for quantity in ("acc", "gyr")
     for axis in "xyz"
 )
+TURN: Final = STATUSES.index("turn")
 RATES: Final = [at for at, channel in enumerate(CHANNELS) if "_gyr_" in channel]
+SENSORS: Final = (6, 6, 6)  # channels of low back, left and right foot
+LONGEST: Final = 50  # rows: what is held for longer is taken as the file has it
 STRIDE_S: Final = (0.7, 2.0)  # shorter and longer ones are no strides of a walk
 
 
@@ -29,7 +35,7 @@ class Trial:
 
     subject: int
     number: int
-    samples: npt.NDArray[np.float64]  # (rows, 18), m/s² and rad/s
+    samples: npt.NDArray[np.float64]  # (rows, 18), m/s² and rad/s; NaN where a packet was lost
     status: npt.NDArray[np.int_]  # index into STATUSES
     in_air: tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]  # left and right foot
 
@@ -55,6 +61,7 @@ def read(path: Path) -> list[Trial]:
     if not np.isin(status, range(len(STATUSES))).all():
         raise file.problem(f"has states other than 0 to {len(STATUSES) - 1}")
     left, right = (file.of(f"{side}_event", 1, rows) == 1 for side in ("left", "right"))
+    samples = _without(samples, file.flags("held", (rows, len(SENSORS))), subject, trial)
     trials = []
     for person in np.unique(subject):
         for number in np.unique(trial[subject == person]):
@@ -65,13 +72,42 @@ def read(path: Path) -> list[Trial]:
     return trials
 
 
+def _without(
+    samples: npt.NDArray[np.float64],
+    held: npt.NDArray[np.bool_],
+    subject: npt.NDArray[np.int_],
+    trial: npt.NDArray[np.int_],
+) -> npt.NDArray[np.float64]:
+    """NaN where a row only holds the one before it; what is held for longer than LONGEST stays."""
+    known = samples.copy()
+    begins = np.flatnonzero((np.diff(subject) != 0) | (np.diff(trial) != 0)) + 1
+    held = held.copy()
+    held[[0, *begins]] = False  # there is nothing before a trial's first row
+    row = np.arange(len(held))[:, None]
+    age = row - np.maximum.accumulate(np.where(held, 0, row), axis=0)
+    known[np.repeat((age > 0) & (age <= LONGEST), SENSORS, axis=1)] = np.nan
+    return known
+
+
+def lossy(trials: Sequence[Trial], share: float) -> list[Trial]:
+    """The same walks with so many more of each sensor's packets lost; the first of each is there."""
+    made = []
+    for number, one in enumerate(trials):
+        samples = losses.lossy(one.samples, SENSORS, share, number)
+        samples[0] = one.samples[0]
+        made.append(replace(one, samples=samples))
+    return made
+
+
 def stretched(trial: Trial, factor: float) -> Trial:
     """The same walk as somebody `factor` times as slow would have walked it."""
     rows = np.arange(int(len(trial.samples) * factor)) / factor
     whole = np.arange(len(trial.samples))
-    samples = np.stack([np.interp(rows, whole, channel) for channel in trial.samples.T], axis=1)
+    filled = mended(trial.samples.T)
+    samples = np.stack([np.interp(rows, whole, channel) for channel in filled], axis=1)
     samples[:, RATES] /= factor
     nearest = np.minimum(np.rint(rows).astype(np.intp), len(whole) - 1)
+    samples[np.isnan(trial.samples[nearest])] = np.nan
     left, right = (in_air[nearest] for in_air in trial.in_air)
     return Trial(trial.subject, trial.number, samples, trial.status[nearest], (left, right))
 

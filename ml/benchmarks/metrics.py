@@ -32,6 +32,17 @@ def accuracy(truth: Integers, predicted: Integers) -> float:
     return float((truth == predicted).mean())
 
 
+def matches(true: Integers, found: Integers, within: int) -> int:
+    """How many found events (sorted) are within so many samples of a true one (sorted), one to one."""
+    place = other = hits = 0
+    while place < len(true) and other < len(found):
+        apart = found[other] - true[place]
+        hits += abs(apart) <= within
+        place += apart >= -within
+        other += apart <= within
+    return hits
+
+
 def circular_error(phase: Floats, truth: Floats) -> Floats:
     """The shorter way round from `truth` to `phase`, both in cycles: −0.5 up to 0.5."""
     error: Floats = (phase - truth + 0.5) % 1.0 - 0.5

@@ -23,13 +23,24 @@ class Outcome:
 
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """What a figure should reach."""
+    """What a figure should reach, and what would be better still."""
 
     limit: float
     at_most: bool = False
+    stretch: float | None = None
 
     def reached(self, value: float) -> bool:
-        return value <= self.limit if self.at_most else value >= self.limit
+        return self._within(self.limit, value)
+
+    def verdict(self, value: float) -> str:
+        """In a word, for a person."""
+        if self.stretch is not None and self._within(self.stretch, value):
+            return "stretch reached"
+        return "reached" if self.reached(value) else "missed"
+
+    def _within(self, limit: float, value: float) -> bool:
+        return value <= limit if self.at_most else value >= limit
 
     def __str__(self) -> str:
-        return f"{'≤' if self.at_most else '≥'} {self.limit:g}"
+        better = "" if self.stretch is None else f" (stretch {self.stretch:g})"
+        return f"{'≤' if self.at_most else '≥'} {self.limit:g}{better}"

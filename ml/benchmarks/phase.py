@@ -1,12 +1,13 @@
 """`ipol-phase`: the gait phase of both feet, of people never seen before."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
-from ml.benchmarks import folds, ipol, metrics
+from ml.benchmarks import folds, ipol, losses, metrics
 from ml.benchmarks.models.gait_phase import PhaseModel, PhaseSettings
 from ml.benchmarks.outcome import Outcome
 from ml.benchmarks.search import Search, chosen, told
@@ -31,17 +32,22 @@ def evaluate(path: Path, search: Search) -> Outcome:
     """Leave one subject out, and judge by subjects."""
     trials = ipol.read(path)
     taught, data = lessons(trials), decisions(trials)
+    every = {0.0: data} | {share: decisions(ipol.lossy(trials, share)) for share in losses.SHARES}
     people = np.unique(data.subject).tolist()
-    work = folds.over(lambda person: _fold(taught, data, person, search), people)
-    error = np.empty(len(data.phase))
-    for person, (errors, _) in zip(people, work, strict=True):
-        error[data.subject == person] = errors
+    work = folds.over(lambda person: _fold(taught, every, person, search), people)
+    error = {share: np.empty(len(data.phase)) for share in every}
+    for person, (found, _) in zip(people, work, strict=True):
+        for share, errors in found.items():
+            error[share][data.subject == person] = errors
     return _outcome(data, error, told([settings for _, settings in work], search))
 
 
+Errors = dict[float, npt.NDArray[np.float64]]  # by the share of packets that are lost
+
+
 def _fold(
-    taught: Decisions, data: Decisions, person: int, search: Search
-) -> tuple[npt.NDArray[np.float64], PhaseSettings]:
+    taught: Decisions, every: Mapping[float, Decisions], person: int, search: Search
+) -> tuple[Errors, PhaseSettings]:
     others = taught.of(taught.subject != person)
     settings = chosen(
         SETTINGS,
@@ -50,7 +56,10 @@ def _fold(
         search,
         lambda one, rows, judge: -metrics.rms(errors_of(fitted(others.of(rows), one), others.of(judge))),
     )
-    return errors_of(fitted(others, settings), data.of(data.subject == person)), settings
+    model = fitted(others, settings)
+    return {
+        share: errors_of(model, data.of(data.subject == person)) for share, data in every.items()
+    }, settings
 
 
 def fitted(data: Decisions, settings: PhaseSettings) -> PhaseModel:
@@ -61,7 +70,8 @@ def errors_of(model: PhaseModel, data: Decisions) -> npt.NDArray[np.float64]:
     return metrics.circular_error(model.predict(data.features), data.phase)
 
 
-def _outcome(data: Decisions, error: npt.NDArray[np.float64], settings: str) -> Outcome:
+def _outcome(data: Decisions, by_share: Errors, settings: str) -> Outcome:
+    error = by_share[0.0]
     hindsight = metrics.circular_error(data.hindsight, data.phase)
     by_subject = {}
     for subject in np.unique(data.subject):
@@ -80,6 +90,9 @@ def _outcome(data: Decisions, error: npt.NDArray[np.float64], settings: str) -> 
         "in_step_fraction": float(data.in_step.mean()),
         "accuracy": float((np.abs(error) <= WITHIN).mean()),
     }
+    for share in losses.SHARES:
+        of_people = [percent(by_share[share][data.subject == one]) for one in np.unique(data.subject)]
+        figures[losses.at("rmse_percent", share)] = float(np.mean(of_people))
     return Outcome(figures, len(by_subject), by_subject, settings=settings, notes=(WHY,))
 
 

@@ -56,9 +56,14 @@ def _figures(benchmark: Benchmark, outcome: Outcome) -> str:
     rows = []
     for name, value in outcome.figures.items():
         goal = benchmark.goals.get(name)
-        verdict = "" if goal is None else ("reached" if goal.reached(value) else "missed")
+        verdict = "" if goal is None else goal.verdict(value)
         rows.append(
-            (html.escape(name), number(value), str(goal or ""), f"<span class='{verdict}'>{verdict}</span>")
+            (
+                html.escape(name),
+                number(value),
+                str(goal or ""),
+                f"<span class='{verdict.rpartition(' ')[2]}'>{verdict}</span>",
+            )
         )
     return _table(("figure", "value", "goal", ""), rows)
 

@@ -1,6 +1,6 @@
 """`ipol-status`: standing, walking or turning, 200 ms late, of people never seen before."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from ml.benchmarks import folds, ipol, metrics
+from ml.benchmarks import folds, ipol, losses, metrics
 from ml.benchmarks.models.gait_status import StatusSettings, status_model
 from ml.benchmarks.outcome import Outcome
 from ml.benchmarks.search import Search, chosen, told
@@ -26,6 +26,7 @@ GRID: Final = (
     StatusSettings(rounds=100),
     StatusSettings(leaves=31),
     StatusSettings(penalty=0.1),
+    StatusSettings(turn_weight=1.0),
 )
 
 
@@ -60,18 +61,26 @@ def _of_trial(trial: ipol.Trial) -> tuple[Any, ...]:
 
 def evaluate(path: Path, search: Search) -> Outcome:
     """Leave one subject out, and judge by subjects."""
-    data = decisions(ipol.read(path))
+    trials = ipol.read(path)
+    data = decisions(trials)
     if len(np.unique(data.truth)) < 2:
         raise UnusableData(f"{path} has one state alone: there is nothing to tell apart")
     splits = list(folds.one_left_out(data.subject))
-    work = folds.over(lambda split: _fold(data, split, search), splits)
-    predicted = np.empty_like(data.truth)
-    for (_, held_out), (labels, _) in zip(splits, work, strict=True):
-        predicted[held_out] = labels
+    rows = {0.0: data.features}
+    rows |= {share: decisions(ipol.lossy(trials, share)).features for share in losses.SHARES}
+    work = folds.over(lambda split: _fold(data, rows, split, search), splits)
+    predicted = {share: np.empty_like(data.truth) for share in rows}
+    for (_, held_out), (found, _) in zip(splits, work, strict=True):
+        for share, labels in found.items():
+            predicted[share][held_out] = labels
     return _outcome(data, predicted, told([settings for _, settings in work], search))
 
 
-def _fold(data: Decisions, split: folds.Split, search: Search) -> tuple[npt.NDArray[Any], StatusSettings]:
+Rows = Mapping[float, npt.NDArray[np.float32]]  # features by the share of packets that are lost
+Labels = dict[float, npt.NDArray[np.int_]]
+
+
+def _fold(data: Decisions, every: Rows, split: folds.Split, search: Search) -> tuple[Labels, StatusSettings]:
     train, held_out = split
     settings = chosen(
         SETTINGS,
@@ -80,18 +89,22 @@ def _fold(data: Decisions, split: folds.Split, search: Search) -> tuple[npt.NDAr
         search,
         lambda one, rows, judge: _score(data, one, train[rows], train[judge]),
     )
-    return _predict(data, settings, train, held_out), settings
+    model = _fitted(data, settings, train)
+    return {share: _predict(model, rows[held_out], settings) for share, rows in every.items()}, settings
 
 
-def _predict(
-    data: Decisions, settings: StatusSettings, train: folds.Rows, judge: folds.Rows
-) -> npt.NDArray[np.int_]:
-    model = status_model(settings).fit(data.features[train], data.truth[train])
-    return np.asarray(model.predict(data.features[judge]), dtype=np.int_)
+def _fitted(data: Decisions, settings: StatusSettings, train: folds.Rows) -> Any:
+    return status_model(settings).fit(data.features[train], data.truth[train])
+
+
+def _predict(model: Any, features: npt.NDArray[np.float32], settings: StatusSettings) -> npt.NDArray[np.int_]:
+    """The class that is likeliest, turns weighted."""
+    weights = np.where(model.classes_ == ipol.TURN, settings.turn_weight, 1.0)
+    return np.asarray(model.classes_[(model.predict_proba(features) * weights).argmax(axis=1)], dtype=np.int_)
 
 
 def _score(data: Decisions, settings: StatusSettings, train: folds.Rows, judge: folds.Rows) -> float:
-    predicted = _predict(data, settings, train, judge)
+    predicted = _predict(_fitted(data, settings, train), data.features[judge], settings)
     return _mean_f1(data.truth[judge], predicted, data.subject[judge])
 
 
@@ -105,7 +118,8 @@ def _f1(truth: npt.NDArray[np.int_], predicted: npt.NDArray[np.int_], rows: npt.
     return metrics.macro_f1(truth[rows], predicted[rows], len(ipol.STATUSES))
 
 
-def _outcome(data: Decisions, predicted: npt.NDArray[np.int_], settings: str) -> Outcome:
+def _outcome(data: Decisions, by_share: Labels, settings: str) -> Outcome:
+    predicted = by_share[0.0]
     by_subject = {}
     for subject in np.unique(data.subject):
         own = data.subject == subject
@@ -120,5 +134,7 @@ def _outcome(data: Decisions, predicted: npt.NDArray[np.int_], settings: str) ->
         "steady_macro_f1": float(np.mean([one["steady_macro_f1"] for one in by_subject.values()])),
         "accuracy": metrics.accuracy(data.truth, predicted),
     }
+    for share in losses.SHARES:
+        figures[losses.at("macro_f1", share)] = _mean_f1(data.truth, by_share[share], data.subject)
     counts = metrics.confusion(data.truth, predicted, len(ipol.STATUSES))
     return Outcome(figures, len(by_subject), by_subject, "subject", ipol.STATUSES, counts, settings)

@@ -12,6 +12,7 @@ from ml.errors import UnusableData
 from ml.features import Recipe, features
 from ml.features.gait_phase import LEFT_PHASE, RIGHT_PHASE
 from ml.features.gait_status import CHANNELS
+from ml.features.gaps import mended
 
 STEP: Final = 10  # samples between decisions: 100 ms
 PACES: Final = (0.8, 1.25)  # of duration: people are slower and faster than the few who were recorded
@@ -75,7 +76,7 @@ def _apart(numbers: Sequence[npt.NDArray[np.int_]]) -> npt.NDArray[np.int_]:
 
 def _of_trial(trial: ipol.Trial, step: int) -> Iterator[tuple[Any, ...]]:
     for (recipe, pitch), in_air in zip(FEET, trial.in_air, strict=True):
-        yield _of_foot(trial, recipe, trial.samples[:, pitch], in_air, step)
+        yield _of_foot(trial, recipe, mended(trial.samples[:, pitch]), in_air, step)
 
 
 def _of_foot(

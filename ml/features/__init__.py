@@ -3,6 +3,7 @@
 windows.py    the samples before each decision of a recording
 stream.py     the same, live
 recipe.py     what a model wants to know: rate, look-back, channels, and how its features are computed
+gaps.py       samples that never came
 signals.py    signals that do not depend on how a sensor is worn
 blocks.py     signals of windows → columns
 gait_status.py, gait_phase.py, falling.py, terrain.py    the recipes

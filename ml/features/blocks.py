@@ -20,9 +20,18 @@ def bins(signals: Samples, width: int, count: int) -> Samples:
 def moments(signals: Samples, length: int) -> Samples:
     """(n, signals, samples) → mean, standard deviation, largest, smallest over the newest `length`."""
     newest = signals[..., -length:]
+    mean = newest.mean(axis=-1)
     return np.concatenate(
-        [newest.mean(axis=-1), newest.std(axis=-1), newest.max(axis=-1), newest.min(axis=-1)], axis=1
+        [mean, deviation(newest, mean[..., None]), newest.max(axis=-1), newest.min(axis=-1)], axis=1
     )
+
+
+def deviation(signals: Samples, mean: Samples) -> Samples:
+    """The standard deviation over the last axis, of which the mean is known: numpy would compute it again."""
+    apart = signals - mean
+    np.multiply(apart, apart, out=apart)
+    spread: Samples = np.sqrt(apart.mean(axis=-1))
+    return spread
 
 
 def since(condition: npt.NDArray[np.bool_]) -> Samples:

@@ -8,7 +8,9 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from ml.features.blocks import deviation, flat
 from ml.features.gait_status import QUANTITIES
+from ml.features.gaps import mended
 from ml.features.recipe import Features, Recipe
 from ml.features.signals import GRAVITY, TINY, along, length
 from ml.features.windows import Samples
@@ -22,72 +24,106 @@ STRETCH: Final = 5  # samples in which a rotation is taken as even
 TILT_FROM: Final = 15  # samples into the window: the middle of its beginning
 TIPPED: Final = (1, 2, 5)  # stretches over which the growing tilt is compared
 PER_LENGTH: Final = 17  # columns for each of LENGTHS
+NEXT, LAST = [1, 2, 0], [2, 0, 1]  # of x, y, z
 MOVING: Final = 1.0  # m/s² of deviation, or rad/s
 
 
 def _compute(windows: Samples) -> Features:
+    windows = mended(windows)
     acceleration, spin = windows[:, :3], windows[:, 3:]
     weight, turning = length(acceleration), length(spin)
-    before = _direction(acceleration[..., :BEFORE].mean(axis=-1))
-    overall = _direction(acceleration.mean(axis=-1))
-    speed = np.cumsum((weight - GRAVITY)[:, ::-1], axis=1) / RATE_HZ  # m/s gained upwards since …
-    columns: list[Samples] = []
-    for samples in LENGTHS:
-        columns += _moments(weight[:, -samples:]) + _moments(turning[:, -samples:])
-        columns += [speed[:, samples - 1], np.abs(np.diff(acceleration[..., -samples:])).mean(axis=(1, 2))]
-        posture = acceleration[..., -samples:].mean(axis=-1)
-        columns += [_long(posture), _angle(_direction(posture), before), _angle(_direction(posture), overall)]
-        drift = spin[..., -samples:].mean(axis=-1)
-        columns += [*np.abs(drift).T, _long(drift)]
-    columns += _tipping(acceleration, spin, before)
-    columns += [weight[:, -1], turning[:, -1], *acceleration[..., -5:].mean(axis=-1).T]
-    columns += [*acceleration[..., :BEFORE].mean(axis=-1).T]
-    columns += [(weight[:, -25:] < LIGHT).sum(axis=1), (weight[:, -10:] < LIGHTER).sum(axis=1)]
-    columns += [(weight > HEAVY).sum(axis=1)]
-    return np.stack(columns, axis=1).astype(np.float32)
+    before = acceleration[..., :BEFORE].mean(axis=-1)
+    upright = _direction(before)
+    by_length, newest = _by_length(acceleration, spin, np.stack([weight, turning], axis=1), upright)
+    counts = (
+        (weight[:, -25:] < LIGHT).sum(axis=1),
+        (weight[:, -10:] < LIGHTER).sum(axis=1),
+        (weight > HEAVY).sum(axis=1),
+    )
+    columns = [
+        by_length,
+        _tipping(acceleration, spin, upright),
+        weight[:, -1:],
+        turning[:, -1:],
+        newest,
+        before,
+        np.stack(counts, axis=1),
+    ]
+    return np.concatenate(columns, axis=1, dtype=np.float32)
 
 
-def _moments(signal: Samples) -> list[Samples]:
-    return [signal.mean(axis=1), signal.min(axis=1), signal.max(axis=1), signal.std(axis=1)]
+def _by_length(
+    acceleration: Samples, spin: Samples, signals: Samples, upright: Samples
+) -> tuple[Samples, Samples]:
+    """PER_LENGTH columns over each of LENGTHS, (n, columns); and the mean acceleration over the first.
+
+    `signals` (n, 2, samples): weight and turning. What takes many calls for few numbers is done for all
+    lengths at once.
+    """
+    columns = np.empty((len(signals), len(LENGTHS), PER_LENGTH))
+    posture, drift = (np.empty((len(signals), len(LENGTHS), 3)) for _ in range(2))
+    jolts = np.abs(acceleration[..., 1:] - acceleration[..., :-1])
+    for at, samples in enumerate(LENGTHS):
+        newest = signals[..., -samples:]
+        moments = columns[:, at, :8].reshape(len(signals), 2, 4)
+        moments[..., 0] = newest.mean(axis=-1)
+        moments[..., 1], moments[..., 2] = newest.min(axis=-1), newest.max(axis=-1)
+        moments[..., 3] = deviation(newest, moments[..., :1])
+        columns[:, at, :8] = moments.reshape(len(signals), 8)
+        columns[:, at, 9] = np.ascontiguousarray(jolts[..., 1 - samples :]).mean(axis=(1, 2))
+        posture[:, at] = acceleration[..., -samples:].mean(axis=-1)
+        drift[:, at] = spin[..., -samples:].mean(axis=-1)
+    speed = np.cumsum((signals[:, 0] - GRAVITY)[:, ::-1], axis=1) / RATE_HZ  # m/s gained upwards since …
+    columns[..., 8] = speed[:, [samples - 1 for samples in LENGTHS]]
+    overall = _direction(posture[:, -1:])
+    columns[..., 10] = _long(posture)
+    columns[..., 11] = _angle(_direction(posture), upright[:, None])
+    columns[..., 12] = _angle(_direction(posture), overall)
+    columns[..., 13:16] = np.abs(drift)
+    columns[..., 16] = _long(drift)
+    return flat(columns), posture[:, 0]
 
 
 def _long(vectors: Samples) -> Samples:
-    """(n, 3) → (n,)."""
-    lengths: Samples = np.sqrt((vectors * vectors).sum(axis=1))
+    """(…, 3) → (…)."""
+    lengths: Samples = np.sqrt((vectors * vectors).sum(axis=-1))
     return lengths
 
 
 def _direction(vectors: Samples) -> Samples:
-    return vectors / np.maximum(_long(vectors), TINY)[:, None]
+    return vectors / np.maximum(_long(vectors), TINY)[..., None]
 
 
 def _angle(one: Samples, other: Samples) -> Samples:
-    """Between unit vectors (n, 3), rad."""
-    angle: Samples = np.arccos(np.clip((one * other).sum(axis=1), -1.0, 1.0))
+    """Between unit vectors (…, 3), rad."""
+    cosine = (one * other).sum(axis=-1)
+    angle: Samples = np.arccos(np.minimum(np.maximum(cosine, -1.0), 1.0))
     return angle
 
 
-def _tipping(acceleration: Samples, spin: Samples, before: Samples) -> list[Samples]:
+def _tipping(acceleration: Samples, spin: Samples, upright: Samples) -> Samples:
     """The tilt that the gyroscope has seen since the window's beginning, how fast it grew, and the lift."""
     rates = spin[..., TILT_FROM:].reshape(*spin.shape[:2], -1, STRETCH).mean(axis=-1)
-    vertical, tilts = before, []
-    for at in range(rates.shape[-1]):
-        vertical = _turned(vertical, rates[..., at] * (-STRETCH / RATE_HZ))
-        tilts.append(_angle(_direction(vertical), before))
-    grown = [tilts[-1] - tilts[-1 - stretches] for stretches in TIPPED]
-    return [tilts[-1], *grown, along(acceleration[..., -1:], vertical[..., None])[:, 0]]
+    verticals = _turned(upright, rates.transpose(0, 2, 1) * (-STRETCH / RATE_HZ))
+    tilts = _angle(_direction(verticals), upright[:, None])
+    grown = [tilts[:, -1] - tilts[:, -1 - stretches] for stretches in TIPPED]
+    lift = along(acceleration[..., -1:], verticals[:, -1, :, None])
+    return np.concatenate([tilts[:, -1:], np.stack(grown, axis=1), lift], axis=1)
 
 
-def _turned(vectors: Samples, rotation: Samples) -> Samples:
-    """Vectors (n, 3) turned about an axis by its length in rad (Rodrigues)."""
-    angle = _long(rotation)[:, None]
-    axis = rotation / np.maximum(angle, TINY)
-    a, b, c = axis.T
-    x, y, z = vectors.T
-    crossed = np.stack([b * z - c * y, c * x - a * z, a * y - b * x], axis=1)
-    cosine = np.cos(angle)
-    aligned = (axis * vectors).sum(axis=1)[:, None]
-    turned: Samples = vectors * cosine + crossed * np.sin(angle) + axis * (aligned * (1.0 - cosine))
+def _turned(vector: Samples, rotations: Samples) -> Samples:
+    """A vector (n, 3) after each of rotations (n, steps, 3) about an axis by its length, rad (Rodrigues)."""
+    angle = _long(rotations)[..., None]
+    axis = rotations / np.maximum(angle, TINY)
+    next_axis, last_axis = axis[..., NEXT], axis[..., LAST]
+    cosine, sine = np.cos(angle), np.sin(angle)
+    rest = 1.0 - cosine
+    turned = np.empty_like(axis)
+    for at in range(axis.shape[1]):
+        crossed = next_axis[:, at] * vector[:, LAST] - last_axis[:, at] * vector[:, NEXT]
+        aligned = (axis[:, at] * vector).sum(axis=1)[:, None]
+        vector = vector * cosine[:, at] + crossed * sine[:, at] + axis[:, at] * (aligned * rest[:, at])
+        turned[:, at] = vector
     return turned
 
 

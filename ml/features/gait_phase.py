@@ -10,6 +10,7 @@ import numpy as np
 
 from ml.features.blocks import bins, falls
 from ml.features.gait_status import CHANNELS, LOOK_BACK, RATE_HZ
+from ml.features.gaps import mended
 from ml.features.recipe import Features, Recipe
 from ml.features.signals import GRAVITY, along, length, up
 from ml.features.windows import Samples
@@ -30,7 +31,7 @@ def mirrored(windows: Samples) -> Samples:
 
 
 def _compute(windows: Samples) -> Features:
-    trunk, spin, foot, foot_spin, other, other_spin = np.split(windows, 6, axis=1)
+    trunk, spin, foot, foot_spin, other, other_spin = np.split(mended(windows), 6, axis=1)
     vertical = up(trunk)
     lift, yaw = along(trunk, vertical) - GRAVITY, along(spin, vertical)
     this = np.stack([foot_spin[:, 1], foot[:, 0], foot[:, 2], length(foot_spin)], axis=1)

@@ -7,7 +7,8 @@ from typing import Final
 
 import numpy as np
 
-from ml.features.blocks import bins, flat, moments, since
+from ml.features.blocks import bins, deviation, flat, moments, since
+from ml.features.gaps import mended
 from ml.features.recipe import Features, Recipe
 from ml.features.signals import GRAVITY, across, along, length, up
 from ml.features.windows import Samples
@@ -27,7 +28,7 @@ SOFTEN: Final = 0.05  # added before a logarithm: the noise of a sensor at rest
 
 
 def _compute(windows: Samples) -> Features:
-    trunk, spin, left, left_spin, right, right_spin = np.split(windows, 6, axis=1)
+    trunk, spin, left, left_spin, right, right_spin = np.split(mended(windows), 6, axis=1)
     vertical = up(trunk)
     lift, yaw = along(trunk, vertical), along(spin, vertical)
     motion = _motion(trunk, spin, lift, yaw, (left, right), (left_spin, right_spin))
@@ -86,7 +87,8 @@ def _turned(heading: Samples) -> Samples:
 
 
 def _turning(heading: Samples) -> Samples:
-    return np.concatenate([heading.std(axis=-1), np.abs(heading).max(axis=-1)], axis=1)
+    spread = deviation(heading, heading.mean(axis=-1, keepdims=True))
+    return np.concatenate([spread, np.abs(heading).max(axis=-1)], axis=1)
 
 
 def _rest(left: Samples, right: Samples) -> Samples:

@@ -15,7 +15,7 @@ TINY: Final = 1e-9
 
 def length(vectors: Samples) -> Samples:
     """(n, axes, samples) → (n, samples)."""
-    lengths: Samples = np.sqrt((vectors * vectors).sum(axis=1))
+    lengths: Samples = np.sqrt(_dot(vectors, vectors))
     return lengths
 
 
@@ -28,11 +28,18 @@ def up(acceleration: Samples) -> Samples:
 
 def along(vectors: Samples, axis: Samples) -> Samples:
     """The part of (n, 3, samples) along unit vectors (n, 3, 1): (n, samples)."""
-    part: Samples = (vectors * axis).sum(axis=1)
-    return part
+    return _dot(vectors, axis)
 
 
 def across(vectors: Samples, part: Samples) -> Samples:
     """How long (n, 3, samples) are across an axis along which they have this part: (n, samples)."""
-    rest: Samples = np.sqrt(np.maximum((vectors * vectors).sum(axis=1) - part * part, 0.0))
+    rest: Samples = np.sqrt(np.maximum(_dot(vectors, vectors) - part * part, 0.0))
     return rest
+
+
+def _dot(one: Samples, other: Samples) -> Samples:
+    """(n, axes, samples) of each → (n, samples): the bits of `(one * other).sum(axis=1)`, in less time."""
+    dot: Samples = one[:, 0] * other[:, 0]
+    for axis in range(1, one.shape[1]):
+        dot += one[:, axis] * other[:, axis]
+    return dot

@@ -9,6 +9,7 @@ import numpy as np
 
 from ml.features.blocks import flat, moments
 from ml.features.gait_status import QUANTITIES
+from ml.features.gaps import mended
 from ml.features.recipe import Features, Recipe
 from ml.features.signals import length
 from ml.features.windows import Samples
@@ -25,6 +26,7 @@ CHANNELS: Final = (
 
 
 def _compute(windows: Samples) -> Features:
+    windows = mended(windows)
     both = _both_legs(windows)
     columns = [
         moments(windows, LOOK_BACK),

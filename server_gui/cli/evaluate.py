@@ -49,7 +49,7 @@ def _text(benchmark: Benchmark, outcome: Outcome, seconds: float) -> str:
     rows = []
     for name, value in outcome.figures.items():
         goal = benchmark.goals.get(name)
-        verdict = "" if goal is None else ("reached" if goal.reached(value) else "missed")
+        verdict = "" if goal is None else goal.verdict(value)
         rows.append((name, number(value), str(goal or ""), verdict))
     columns = list(next(iter(outcome.by_group.values()), ()))
     groups = [

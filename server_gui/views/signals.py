@@ -474,8 +474,7 @@ class Signals(QWidget):
         self.measuring.show_readings(a_s, b_s, self._active, rows)
 
     def _times(self) -> Floats:
-        """Of the rows of the chosen span, s until the newest."""
-        times = self.scene.times(self._seconds)
+        times = self.scene.times(self._seconds)  # of the rows of the chosen span, s until the newest
         return times - times[-1] if len(times) else times
 
     # --- what is said
@@ -497,5 +496,5 @@ class Signals(QWidget):
             return f"{'Paused' if self.pause.isChecked() else 'Kept by the trigger'}, data go on{many}"
         if self._is_gone:
             return GONE
-        is_old = station.robot.is_stale()
-        return f"{old_text(station)[0] if is_old else f'{station.robot.rate_hz():.0f} rows/s'}{many}"
+        live = f"{station.robot.rate_hz():.0f} rows/s"
+        return f"{old_text(station)[0] if station.robot.is_stale() else live}{many}"

@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ml.benchmarks import fall, ipol, status, strides
+from ml.benchmarks import events, fall, ipol, status, strides
+from ml.benchmarks.models.gait_events import NONE
 from ml.benchmarks.sisfall import Recording
 from ml.errors import UnusableData
 
@@ -58,6 +59,19 @@ def test_walks_of_any_length_are_cut_into_strides(walks: list[ipol.Trial]) -> No
 def test_walks_of_any_length_are_decided_upon(walks: list[ipol.Trial]) -> None:
     data = status.decisions(walks)
     assert len(data.truth) == sum(len(range(status.FIRST, len(one.samples), status.STEP)) for one in walks)
+
+
+@given(trials())
+def test_feet_of_walks_of_any_length_have_their_moments_also_with_packets_lost(
+    walks: list[ipol.Trial],
+) -> None:
+    for some in (walks, ipol.lossy(walks, 0.2)):
+        for feet in events.feet_of(some).values():
+            assert len(feet) == 2 * len(walks)
+            for foot in feet:
+                assert len(foot.features) == len(foot.at) == len(foot.offset)
+                assert np.isfinite(foot.features).all()
+                assert (foot.offset != NONE).sum() <= len(foot.true)
 
 
 @given(ROWS, st.integers(min_value=0, max_value=419))

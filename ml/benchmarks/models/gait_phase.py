@@ -10,6 +10,7 @@ from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.neural_network import MLPRegressor
 from sklearn.pipeline import Pipeline
 
+from ml.benchmarks.models.quick import outputs, scaled_rows
 from ml.neural import scaled
 
 Features = npt.NDArray[np.float32]
@@ -55,8 +56,8 @@ class PhaseModel(RegressorMixin, BaseEstimator):  # type: ignore[misc]  # scikit
 
     def predict(self, x: Features) -> Phases:
         """Phases from 0 up to 1."""
-        inputs = self.scale_.transform(x)
-        cosine, sine = np.sum([network.predict(inputs) for network in self.networks_], axis=0).T
+        inputs = scaled_rows(self.scale_, x)
+        cosine, sine = np.sum([outputs(network, inputs) for network in self.networks_], axis=0).T
         phase: Phases = np.arctan2(sine, cosine) / (2 * np.pi) % 1.0
         return phase
 

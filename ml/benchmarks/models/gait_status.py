@@ -17,6 +17,7 @@ class StatusSettings:
     leaves: int = 15
     penalty: float = 1.0
     epochs: int = 12
+    turn_weight: float = 2.0  # of a turn's probability: they are rare, and count as much in a macro-F1
 
 
 def status_model(settings: StatusSettings | None = None) -> VotingClassifier:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ml.benchmarks import BENCHMARKS, adapt, fall, ipol, metrics, phase, strides
+from ml.benchmarks import BENCHMARKS, adapt, fall, ipol, losses, metrics, phase, strides
 from ml.benchmarks.models.falling import FallSettings
 from ml.benchmarks.models.gait_phase import PhaseSettings
 from ml.benchmarks.sisfall import Recording
@@ -44,6 +44,7 @@ def test_status_of_clockwork_people_is_known(tmp_path: Path, capsys: pytest.Capt
     assert found["macro_f1"] > 0.85
     assert found["worst_subject_macro_f1"] <= found["macro_f1"] <= found["steady_macro_f1"] + 0.05
     assert found["accuracy"] > 0.9
+    assert found[losses.at("macro_f1", 0.2)] > 0.7
     assert found["seconds"] > 0
     page = report.read_text()
     assert page.count("<svg") == 2
@@ -57,11 +58,13 @@ def test_phase_and_adaptation_of_clockwork_people(tmp_path: Path, capsys: pytest
     assert found["rmse_percent"] < 10.0
     assert found["rmse_percent"] <= found["worst_subject_rmse_percent"]
     assert found["in_step_fraction"] > 0.9
+    assert found["rmse_percent"] - 1.0 < found[losses.at("rmse_percent", 0.2)] < 15.0
     assert found["hindsight_rmse_percent"] < 10.0
     adapted = figures(capsys, "--benchmark", "ipol-adapt", "--data", str(file))
     assert adapted["subjects"] == 2
     cut = 1 - adapted["adapted_rmse_percent"] / adapted["rmse_percent"]
     assert adapted["adaptation_cut"] == pytest.approx(cut)
+    assert losses.at("adaptation_cut", 0.05) in adapted
 
 
 def test_labels_that_drift_away_are_told_by_the_feet_themselves(tmp_path: Path) -> None:
@@ -89,6 +92,7 @@ def test_falls_are_foreseen_and_daily_life_is_not_a_fall(
     assert found["false_alarm_fraction"] <= 0.1
     assert found["early_alarm_fraction"] == 0.0
     assert found["stumble_alarm_fraction"] is not None
+    assert found[losses.at("sensitivity", 0.2)] > 0.8
 
 
 def test_ground_of_clockwork_people_is_known(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -96,6 +100,7 @@ def test_ground_of_clockwork_people_is_known(tmp_path: Path, capsys: pytest.Capt
     found = figures(capsys, "--benchmark", "aust-mode", "--data", str(file))
     assert found["macro_f1"] > 0.9
     assert found["sector_macro_f1"] > 0.9
+    assert found[losses.at("macro_f1", 0.05)] > 0.9
     assert found["subjects"] is None
 
 

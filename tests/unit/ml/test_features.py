@@ -7,12 +7,15 @@ import pytest
 from ml.features import FeatureStream, Recipe, features
 from ml.features.blocks import bins, falls, moments, since
 from ml.features.falling import FALLING, moving
+from ml.features.gait_events import LEFT_EVENTS, RIGHT_EVENTS
 from ml.features.gait_phase import LEFT_PHASE, RIGHT_PHASE, SWAPPED, mirrored
 from ml.features.gait_status import GAIT_STATUS
+from ml.features.gaps import mended
+from ml.features.signals import along, length, up
 from ml.features.terrain import TERRAIN
-from tests.unit.ml import recordings
+from tests.unit.ml import plain_falling, recordings
 
-RECIPES = (GAIT_STATUS, LEFT_PHASE, RIGHT_PHASE, FALLING, TERRAIN)
+RECIPES = (GAIT_STATUS, LEFT_PHASE, RIGHT_PHASE, LEFT_EVENTS, RIGHT_EVENTS, FALLING, TERRAIN)
 Samples = npt.NDArray[np.float64]
 
 
@@ -21,6 +24,39 @@ def walk(recipe: Recipe, rows: int) -> Samples:
     random = np.random.default_rng(3)
     shape = (rows, len(recipe.channels))
     return random.normal(0, 3, (1, shape[1])) + random.normal(0, 1, shape).cumsum(axis=0) * 0.1
+
+
+def test_quick_features_of_a_fall_have_the_bits_of_plain_ones() -> None:
+    random = np.random.default_rng(7)
+    windows = 3.0 + random.normal(size=(60, 6, FALLING.look_back)).cumsum(axis=2) * 0.3
+    windows[::7] = 0.0
+    windows[1::7, :, :40] = windows[1::7, :, :1]
+    for some in (windows, windows[3:4]):
+        assert FALLING.compute(some).tobytes() == plain_falling.compute(some).tobytes()
+
+
+def test_quick_moments_and_lengths_have_the_bits_of_numpys_own() -> None:
+    signals = np.random.default_rng(8).normal(1.0, 3.0, (9, 3, 200))
+    signals[0] = 0.0
+    newest = signals[..., -50:]
+    plain = [newest.mean(axis=-1), newest.std(axis=-1), newest.max(axis=-1), newest.min(axis=-1)]
+    assert moments(signals, 50).tobytes() == np.concatenate(plain, axis=1).tobytes()
+    assert length(signals).tobytes() == np.sqrt((signals * signals).sum(axis=1)).tobytes()
+    vertical = up(signals)
+    assert along(signals, vertical).tobytes() == (signals * vertical).sum(axis=1).tobytes()
+
+
+@pytest.mark.parametrize("recipe", RECIPES, ids=lambda recipe: recipe.name)
+def test_what_is_missing_is_mended_and_without_a_gap_nothing_changes(recipe: Recipe) -> None:
+    whole = walk(recipe, recipe.look_back).T[None]
+    torn = whole.copy()
+    torn[..., 3:6] = torn[..., -2:] = np.nan
+    assert np.isfinite(recipe.compute(torn)).all()
+    assert np.array_equal(recipe.compute(torn), recipe.compute(mended(torn)))
+    straight = np.repeat(whole[..., :1], recipe.look_back, axis=2)
+    torn = straight.copy()
+    torn[..., 4:8] = np.nan
+    assert np.array_equal(recipe.compute(torn), recipe.compute(straight))
 
 
 @pytest.mark.parametrize("recipe", RECIPES, ids=lambda recipe: recipe.name)

@@ -6,14 +6,17 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from sklearn.ensemble import HistGradientBoostingClassifier
+from sklearn.neural_network import MLPClassifier
 from threadpoolctl import threadpool_limits
 
 from ml.benchmarks.models.falling import FAR, FallDetector, FallSettings, trailing_mean
 from ml.benchmarks.models.gait_phase import PhaseModel, PhaseSettings
 from ml.benchmarks.models.gait_status import status_model
+from ml.benchmarks.models.quick import QuickTerrain, probabilities, scaled_rows
+from ml.benchmarks.models.terrain import TerrainSettings, terrain_model
 from ml.benchmarks.models.trees import QuickTrees
 from ml.errors import UnusableData
-from ml.neural import fixed_epochs
+from ml.neural import fixed_epochs, scaled
 
 Floats = npt.NDArray[np.float32]
 SMALL = PhaseSettings(hidden=(16, 8), networks=1, first_epochs=15, epochs=15)
@@ -31,8 +34,32 @@ def test_quick_trees_say_what_scikit_learns_trees_say(classes: int) -> None:
     x = random.normal(size=(400, 6)).astype(np.float32)
     truth = np.digitize(x[:, 0] + x[:, 1] * x[:, 2], np.linspace(-1, 1, classes - 1))
     model = HistGradientBoostingClassifier(max_iter=12, early_stopping=False).fit(x, truth)
-    assert np.allclose(QuickTrees(model).predict_proba(x), model.predict_proba(x), atol=1e-12)
-    assert np.allclose(QuickTrees(model).predict_proba(x[:1]), model.predict_proba(x[:1]), atol=1e-12)
+    other = HistGradientBoostingClassifier(max_iter=5, max_depth=2, early_stopping=False).fit(x, truth)
+    quick = QuickTrees([model, other])
+    for rows in (x, x[:1]):
+        for said, plain in zip(quick.predict_proba(rows), (model, other), strict=True):
+            assert np.allclose(said, plain.predict_proba(rows), atol=1e-12)
+
+
+@pytest.mark.parametrize("classes", [2, 3])
+def test_a_quick_network_says_what_scikit_learns_network_says_bit_for_bit(classes: int) -> None:
+    random = np.random.default_rng(0)
+    x = (3.0 * random.normal(size=(300, 7)) + 100.0).astype(np.float32)
+    truth = np.digitize(x[:, 0], np.linspace(99, 101, classes - 1))
+    network = scaled(MLPClassifier((12,), max_iter=5, random_state=0)).fit(x, truth)
+    for rows in (x, x[:1]):
+        said = probabilities(network[-1], scaled_rows(network, rows))
+        assert np.array_equal(said, network.predict_proba(rows))
+
+
+def test_a_quick_support_vector_machine_says_what_scikit_learns_says() -> None:
+    random = np.random.default_rng(1)
+    x = random.normal(size=(300, 6)).astype(np.float32)
+    truth = np.digitize(x[:, 0] + 0.5 * x[:, 1], [-1.0, 0.0, 1.0])
+    model = terrain_model().fit(x[:200], truth[:200])
+    quick = QuickTerrain(model, TerrainSettings().sharpness)
+    assert np.array_equal(quick.predict(x), model.predict(x))
+    assert np.array_equal(quick.predict(x[:1]), model.predict(x[:1]))
 
 
 def test_status_is_learned_and_repeats_itself() -> None:
