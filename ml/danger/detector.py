@@ -1,0 +1,31 @@
+"""What a detector of danger is: it measures what is unusual where the danger would show, and says it in words."""
+
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from ml.danger.now import Now
+
+Floats = npt.NDArray[np.float64]
+
+
+class Detector(Protocol):
+    """One way to see danger coming; it knows one robot alone.
+
+    `measure` gives a number for each of `keys`, larger where it looks more dangerous, NaN where what it needs
+    is missing. `needs` says in words what that is. How large is usual is learned by `ml.danger.usual`, from this
+    robot's own healthy time; `least` is what a number has to differ from that to count at all, in its unit.
+    """
+
+    name: str
+    keys: Sequence[str]
+    least: Floats
+    needs: str
+
+    def measure(self, now: Now, *, learn: bool) -> Floats:
+        """Take the next sample; models of what is usual follow it where they may `learn`."""
+
+    def words(self, key: str) -> str:
+        """Say what is wrong where this key is the worst."""
