@@ -59,7 +59,9 @@ def joints_reported(robot: Exoskeleton) -> list[float]:
     """Return the values of `JOINT_UNITS` now, in their order."""
     drives = list(zip(robot.drives.values(), robot.mountings.values(), strict=True))
     torques = [
-        mounting.seen(drive.servo.settings.rated_torque * drive.dictionary[objects.TORQUE_ACTUAL].number() / 1e3)
+        mounting.seen(
+            drive.servo.settings.rated_torque * drive.dictionary[objects.TORQUE_ACTUAL].number() / 1e3
+        )
         for drive, mounting in drives
     ]
     errors = [

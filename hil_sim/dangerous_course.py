@@ -1,4 +1,4 @@
-"""A wearer's way through every danger: healthy walking first, then one after the other, with rests between."""
+"""A wearer's way through every danger, one after the other, with healthy walking before and between."""
 
 import random
 from collections.abc import Iterator, Sequence

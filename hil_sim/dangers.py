@@ -145,7 +145,8 @@ DANGERS: Final[Mapping[str, Danger]] = {
         "imu_slips", ("trunk",), {"deg_per_s": (1.0, 3.0)}, _told_wrong, "the trunk's tilt is told 10° wrong"
     ),
     "insole_dying": Danger(
-        "insole_cells_die", FEET, {"every_s": (0.4, 1.0)}, _half_felt, "a foot that bears 200 N tells less than half"
+        "insole_cells_die", FEET, {"every_s": (0.4, 1.0)}, _half_felt,
+        "a foot that bears 200 N tells less than half",
     ),
     "fatigue": Danger(
         "fatigue", WEARER, {"percent_per_s": (7.0, 14.0), "asymmetry": (0.15, 0.5)}, _dropped,

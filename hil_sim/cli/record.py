@@ -39,7 +39,7 @@ what is written
 scenarios
   practice         rounds of everything, each in another order, at every step length, cycle time, toe height
                    and trunk angle that the controller allows; with stumbles and falls (default)
-  dangers          healthy walking, a fifth of the time, then every danger of gwrms docs explanation/danger; the
+  dangers          healthy walking, a fifth of the time, then every danger of explanation/danger; the
                    robot has no bus, and torque, following error and temperature of each joint are written
                    too, and `danger`: 0 none, -1 one is over, else its number in `dangers`, and .5 more once
                    it has done harm
@@ -57,7 +57,15 @@ DANGEROUS: Final = "dangers"
 DANGER_COLUMNS: Final = {**JOINT_UNITS, "danger": ""}
 HEALTHY_SHARE: Final = 0.2  # of a dangerous session's time, before the first danger
 COLUMNS: Final = {"time": "ns", "label": "", "left_phase": "stride", "right_phase": "stride", **UNITS}
-_DIGITS: Final = {"N": 2, "N·m": 2, "°C": 1, "m": 5, "rad": 6, "rad/s": 5, "m/s²": 5}  # finer than any sensor's resolution
+_DIGITS: Final = {
+    "N": 2,
+    "N·m": 2,
+    "°C": 1,
+    "m": 5,
+    "rad": 6,
+    "rad/s": 5,
+    "m/s²": 5,
+}  # finer than any sensor's resolution
 _ROUNDED: Final = tuple(_DIGITS[unit] for unit in UNITS.values())
 
 

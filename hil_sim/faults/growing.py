@@ -63,9 +63,7 @@ def _torque_fades(site: Site) -> Iterator[None]:
 
 @contextmanager
 def _oscillation(site: Site) -> Iterator[None]:
-    gain, damping = (
-        site.drive.dictionary[key] for key in (objects.POSITION_GAIN, objects.POSITION_DAMPING)
-    )
+    gain, damping = (site.drive.dictionary[key] for key in (objects.POSITION_GAIN, objects.POSITION_DAMPING))
     before = gain.number(), damping.number()
 
     def grow(since_s: float) -> None:
@@ -125,7 +123,7 @@ FAULTS = {
         Target.DRIVE,
         _friction_grows,
         "Torque grows with speed from stride to stride, then 60F4h; at last as following_error.",
-        {"times_per_s": Number(0.4, 0.01, 100.0, "1/s", "of the usual friction that comes to it each second")},
+        {"times_per_s": Number(0.4, 0.01, 100.0, "1/s", "of the usual friction, more each second")},
     ),
     "encoder_slips": Fault(
         Target.DRIVE,

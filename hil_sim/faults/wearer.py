@@ -60,9 +60,7 @@ def _falls(pitch: float, roll: float, *, slipping: bool = False) -> Act:
 def _trip_and_fall(site: Site) -> Iterator[None]:
     generator = site.robot.controller.generator
     generator.trip(site.random.choice((LEFT, RIGHT)))
-    falling = site.robot.clock.after(
-        round(site.number("after_s") * 1e9), lambda: generator.fall.start(0.0)
-    )
+    falling = site.robot.clock.after(round(site.number("after_s") * 1e9), lambda: generator.fall.start(0.0))
     yield
     falling.cancel()
 

@@ -98,7 +98,7 @@ _THEN = {
 
 
 class Fall:
-    """Falls to a trunk's `pitch` (rad, forward), to the side by `roll` (rad), lies, and gets up when told to."""
+    """Falls to a trunk's `pitch` (rad, forward) and `roll` (rad), lies, and gets up when told to."""
 
     def __init__(self) -> None:
         self.state = FallState.UPRIGHT

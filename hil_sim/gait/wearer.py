@@ -117,7 +117,9 @@ class Wearer:
         walking = generator.walking
         step = self._step(side) if walking > 0.0 else _STANDING
         return _Contact(
-            (_STANDING.load + walking * (step.load - _STANDING.load)) * generator.stumble.load * generator.fall.load,
+            (_STANDING.load + walking * (step.load - _STANDING.load))
+            * generator.stumble.load
+            * generator.fall.load,
             walking * step.shear,
             _STANDING.cop_x + walking * (step.cop_x - _STANDING.cop_x),
             outside * (walking * step.cop_y + generator.wearer.foot_roll),

@@ -1,4 +1,4 @@
-"""(g) Sensors that contradict each other: angle against velocity, tilt against rate, insoles against the IMU."""
+"""(g) Sensors that contradict each other: angle and velocity, tilt and rate, insoles and IMU."""
 
 import math
 from typing import Final

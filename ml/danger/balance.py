@@ -33,7 +33,9 @@ class Balance:
         if not np.isfinite(now.trunk[:6]).all():
             return np.full(5, np.nan)
         forward, right = rate[1], rate[0]  # about y (left): forward; about x: the right side down
-        felt = np.array([math.atan2(-acceleration[0], acceleration[2]), math.atan2(acceleration[1], acceleration[2])])
+        felt = np.array(
+            [math.atan2(-acceleration[0], acceleration[2]), math.atan2(acceleration[1], acceleration[2])]
+        )
         if np.isfinite(told).all():
             self._tilt = np.array([told[0], -told[1]])
         elif np.isfinite(self._tilt).all():

@@ -1,7 +1,7 @@
-"""Thresholds from budgets: the lowest odds that cost so many false alarms an hour of healthy walking, and no more.
+"""Thresholds from budgets: the lowest odds that cost no more false alarms an hour of healthy walking.
 
-Where the budget is smaller than what was recorded can show, the tail of the healthy maxima is prolonged as an
-exponential, the limit of most tails (Coles 2001, §4): an estimate, which says nothing of what was never recorded.
+Where the budget is smaller than what was recorded can show, the tail of the healthy maxima is prolonged as
+an exponential, the limit of most tails (Coles 2001, §4): an estimate, blind to what was never recorded.
 """
 
 from collections.abc import Mapping
@@ -15,7 +15,12 @@ from ml.danger.levels import URGENT, Level
 
 Floats = npt.NDArray[np.float64]
 
-BUDGETS: Final[Mapping[Level, float]] = {Level.EARLY: 6.0, Level.ADVICE: 1.0, Level.ALARM: 0.1, Level.STOP: 0.01}
+BUDGETS: Final[Mapping[Level, float]] = {
+    Level.EARLY: 6.0,
+    Level.ADVICE: 1.0,
+    Level.ALARM: 0.1,
+    Level.STOP: 0.01,
+}
 BLOCK_S: Final = 10.0  # an alarm in this time is one alarm
 TAIL: Final = 0.1  # share of the blocks whose maxima are its tail
 APART: Final = 0.1  # log odds between two levels at least

@@ -1,4 +1,4 @@
-"""One number out of all detectors: calibrated log odds, in which no evidence of danger ever speaks against it."""
+"""One number out of all detectors: calibrated log odds, against which no evidence of danger ever speaks."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -14,17 +14,21 @@ from ml.errors import UnusableModel
 Floats = npt.NDArray[np.float64]
 
 SHIPPED: Final = Path(__file__).with_name("calibration.json")
+RARE: Final = 0.1  # of the healthy blocks
+LEAST_SCALE: Final = 0.1
 BALANCED: Final = 0.1  # regularisation of the weights
 
 
 class Calibration(msgspec.Struct, frozen=True):
     """What was learned from simulated wearers.
 
-    `weights` are of the evidence (`evidence`), `bias` makes log odds of it; `odds` → `share` is what came true.
-    `thresholds` are log odds by level's name, `budgets` the false alarms an hour that they were set for.
+    `floor` and `scale` of each detector make evidence of its spreads, `weights` are of the evidence, `bias` makes log odds of it; `odds` → `share` is what came true.
+    `thresholds` are log odds by level's name, `budgets` the false alarms an hour that they are set for.
     """
 
     detectors: tuple[str, ...]
+    floor: tuple[float, ...]
+    scale: tuple[float, ...]
     weights: tuple[float, ...]
     bias: float
     odds: tuple[float, ...]
@@ -35,7 +39,7 @@ class Calibration(msgspec.Struct, frozen=True):
 
     def log_odds(self, above: Floats) -> Floats:
         """Of spreads above what is usual, (…, detectors), NaN where a detector says nothing: (…,)."""
-        odds: Floats = evidence(above) @ np.array(self.weights) + self.bias
+        odds: Floats = evidence(above, self.floor, self.scale) @ np.array(self.weights) + self.bias
         return odds
 
     def probability(self, odds: Floats | float) -> Floats:
@@ -48,20 +52,32 @@ class Calibration(msgspec.Struct, frozen=True):
         return {level: self.thresholds[level.word] for level in URGENT}
 
 
-def evidence(above: Floats) -> Floats:
-    """(…, n) → (…, n + 2): each detector's, then the worst and the second worst; what is unknown says nothing."""
-    logs = np.log1p(np.nan_to_num(above))
+def evidence(above: Floats, floor: Sequence[float], scale: Sequence[float]) -> Floats:
+    """(…, n) → (…, n + 2): how rare each detector's spreads are, then the worst two; unknown says nothing.
+
+    Below `floor`, which the tenth of all healthy blocks exceeds, nothing is said; from there on it is counted in
+    `scale`, the mean by which these blocks exceed it: one number means the same of each detector.
+    """
+    logs = np.maximum((np.log1p(np.nan_to_num(above)) - np.array(floor)) / np.array(scale), 0.0)
     worst = np.partition(logs, -2, axis=-1)[..., :-3:-1]
     both: Floats = np.concatenate([logs, worst], axis=-1)
     return both
 
 
-def fit(above: Floats, danger: npt.NDArray[np.bool_]) -> tuple[Floats, float]:
-    """Weights and bias of a logistic regression whose weights are never negative; both classes count alike."""
+def tails(maxima: Floats) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Floor and scale of each detector from the maxima of healthy blocks, (blocks, detectors)."""
+    logs = np.log1p(np.nan_to_num(maxima))
+    floor = np.quantile(logs, 1.0 - RARE, axis=0)
+    beyond = [column[column >= low] - low for column, low in zip(logs.T, floor, strict=True)]
+    scale = [max(float(part.mean()), LEAST_SCALE) for part in beyond]
+    return tuple(floor.tolist()), tuple(scale)
+
+
+def fit(x: Floats, danger: npt.NDArray[np.bool_], counts: Floats) -> tuple[Floats, float]:
+    """Weights, never negative, and bias of a logistic regression on evidence in which each row `counts`."""
     from scipy.optimize import minimize  # here: who serves needs none of it
 
-    x = evidence(above)
-    weight = np.where(danger, 0.5 / max(danger.sum(), 1), 0.5 / max((~danger).sum(), 1))
+    weight = counts / counts.sum()
     sign = np.where(danger, 1.0, -1.0)
 
     def loss(theta: Floats) -> tuple[float, Floats]:

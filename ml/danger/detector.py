@@ -1,4 +1,4 @@
-"""What a detector of danger is: it measures what is unusual where the danger would show, and says it in words."""
+"""What a detector of danger is: it measures what is unusual, and says it in words."""
 
 from collections.abc import Sequence
 from typing import Protocol
@@ -15,8 +15,8 @@ class Detector(Protocol):
     """One way to see danger coming; it knows one robot alone.
 
     `measure` gives a number for each of `keys`, larger where it looks more dangerous, NaN where what it needs
-    is missing. `needs` says in words what that is. How large is usual is learned by `ml.danger.usual`, from this
-    robot's own healthy time; `least` is what a number has to differ from that to count at all, in its unit.
+    is missing. `needs` says in words what that is. How large is usual is learned by `ml.danger.usual`, from
+    this robot's own healthy time; `least` is what a number has to differ from that at least, in its unit.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""The four levels of danger, and when one begins and ends: at thresholds that come from budgets, with hysteresis."""
+"""The four levels of danger, and when one begins and ends: thresholds from budgets, with hysteresis."""
 
 from collections.abc import Mapping
 from enum import IntEnum
@@ -21,7 +21,7 @@ class Level(IntEnum):
 
     @property
     def word(self) -> str:
-        """Return it as people and rules call it."""
+        """Return it as people call it."""
         return _WORDS[self]
 
 

@@ -95,7 +95,11 @@ class Now:
         passed = at_s - self.at_s
         self.step_s = passed if 0.0 < passed < 0.15 else 0.0
         self.at_s = at_s
-        self.joint, self.foot, self.trunk = values[:30].reshape(5, 6), values[30:36].reshape(3, 2), values[36:]
+        self.joint, self.foot, self.trunk = (
+            values[:30].reshape(5, 6),
+            values[30:36].reshape(3, 2),
+            values[36:],
+        )
         for leg, force in zip(self.legs, self.foot[0].tolist(), strict=True):
             leg.take(at_s, force)
         self.walking = all(at_s - leg.strike_s < STANDS_S for leg in self.legs)

@@ -1,7 +1,7 @@
-"""(c) Each stride against the most alike of this wearer's own: asymmetry, bending, loads, lean and torque that grow.
+"""(c) Each stride against those most alike of this wearer's own: asymmetry, loads, lean and torque.
 
-Stairs, ramps and turns have strides of their own; so a part of a stride is compared with what that part was in
-those healthy strides whose other parts were alike.
+Stairs, ramps and turns have strides of their own; so a part of a stride is compared with that part of those
+healthy strides whose other parts were alike.
 """
 
 import math
@@ -19,7 +19,7 @@ FARTHEST: Final = 9.0  # squared spreads: more apart in one number says no more
 STALE_S: Final = 3.0
 MEASURES: Final = 34
 KILO: Final = 1000.0  # loads in kilonewtons are of the size of angles
-# Which numbers of a stride are which part, and what a part has to differ by at least (rad, N·m, shares, m, s).
+# What each number has to differ by at least (rad, N·m, shares, m), and which numbers are which part.
 _LEAST: Final = np.array([0.02] * 18 + [0.5] * 6 + [0.03] * 4 + [0.003] * 2 + [0.01] * 2 + [0.03] * 2)
 PARTS: Final = (
     *((f"{joint}.angle", [at, at + 6, at + 12]) for at, joint in enumerate(JOINTS)),
@@ -30,7 +30,9 @@ PARTS: Final = (
     ("lean", [30, 31]),
     ("asymmetry", [32, 33]),
 )
-_IN_PART: Final = np.array([[at in numbers for at in range(MEASURES)] for _, numbers in PARTS], dtype=np.float64)
+_IN_PART: Final = np.array(
+    [[at in numbers for at in range(MEASURES)] for _, numbers in PARTS], dtype=np.float64
+)
 
 
 class _Side:
@@ -70,7 +72,10 @@ class _Side:
         reach = self._high - self._low
         load = sums[12:14] / count
         knees = self._high[[1, 4]]
-        apart = [(reach[0] - reach[3]) / max(reach[0] + reach[3], 0.1), (knees[0] - knees[1]) / max(knees.sum(), 0.2)]
+        apart = [
+            (reach[0] - reach[3]) / max(reach[0] + reach[3], 0.1),
+            (knees[0] - knees[1]) / max(knees.sum(), 0.2),
+        ]
         return np.concatenate(
             [
                 self._low,
@@ -86,7 +91,7 @@ class _Side:
         )
 
     def compare(self, stride: Floats) -> Floats:
-        """How many spreads each part is from what it was in the strides most alike; NaN where it is not known."""
+        """Spreads of each part from what it was in the strides most alike; NaN where it is not known."""
         if self.count < FEWEST:
             return np.full(len(PARTS), np.nan)
         kept = self.kept[: min(self.count, KEPT)]
@@ -105,7 +110,7 @@ class _Side:
         if self._before is not None:
             step = np.abs(stride - self._before)
             first = np.isnan(self.spread)
-            # A fast way down and a slow one up: towards the lower half, which changes of activity do not touch.
+            # Quicker down than up: towards the lower half, which changes of activity do not touch.
             rate = np.where(step > self.spread, 0.02, 0.04)
             self.spread = np.where(first, step, self.spread + rate * (step - self.spread))
         self._before = stride
@@ -114,7 +119,7 @@ class _Side:
 
 
 class Strides:
-    """Every stride of both sides; the smaller of its last two comparisons, so that one odd stride is nothing."""
+    """Every stride of both sides; of the last two the smaller number, so that one odd stride is nothing."""
 
     name = "strides"
     keys = tuple(name for name, _ in PARTS)

@@ -1,4 +1,4 @@
-"""(d) Support: the centre of pressure leaves the part of the sole where it usually is; a foot bears too little."""
+"""(d) Support: the centre of pressure leaves its usual part of the sole; the feet bear too little."""
 
 import math
 from typing import Final

@@ -1,4 +1,4 @@
-"""(a) Tracking: each joint's following error and angle against what it does at this phase of its own strides."""
+"""(a) Tracking: each joint's following error and angle against its own at this phase of the stride."""
 
 from typing import Final
 

@@ -1,7 +1,7 @@
 """How large each number usually is on this robot: the largest of each second, its mean and spread.
 
-What is learned waits until some seconds later nothing was wrong, so that a danger does not become usual while it
-grows. Nothing of another robot or wearer comes in.
+What is learned waits until some seconds later nothing was wrong, so that a danger does not become usual while
+it grows. Nothing of another robot or wearer comes in.
 """
 
 import collections

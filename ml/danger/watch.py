@@ -74,7 +74,7 @@ class Evidence:
         self.keys = np.full(self._parts[-1].stop, np.nan)
 
     def take(self, at_s: float, values: Floats) -> Floats:
-        """Take values in the order of `CHANNELS`, NaN where missing; spreads (detectors,), NaN where unknown."""
+        """Take values in the order of `CHANNELS`, NaN where missing; spreads (detectors,), likewise."""
         self._now.take(at_s, values)
         learn = self._worst < LEARNS_BELOW
         with np.errstate(invalid="ignore"):
