@@ -80,7 +80,7 @@ Parts = tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...], float]
 
 
 def _fit(seen: Sequence[Seen]) -> Parts:
-    """Floors, scales, weights and bias. Each danger counts alike, however long it lasts; so does each class."""
+    """Floors, scales, weights and bias. Each danger counts alike, however long; so does each class."""
     blocks = [_maxima(one, one.above[:, at]) for one in seen for at in range(len(DETECTORS))]
     maxima = np.concatenate(
         [np.stack(blocks[at : at + len(DETECTORS)], axis=1) for at in range(0, len(blocks), len(DETECTORS))]

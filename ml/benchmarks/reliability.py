@@ -21,12 +21,13 @@ Table = Sequence[tuple[float, float, int]]
 
 
 def drawn(table: Table) -> str:
-    """A picture of what was said (mean of each tenth) against what came true; larger points are more moments."""
+    """A picture of what was said, by tenths, against what came true; larger points are more moments."""
     most = max(count for *_, count in table)
+    way = "L".join(f"{_x(said):.1f} {_y(true):.1f}" for said, true, _ in table)
     shapes = [
         f"<rect x='{EDGE}' y='10' width='{SIZE}' height='{SIZE}' fill='none' stroke='{LINE}'/>",
         f"<path d='M{_x(0)} {_y(0)}L{_x(1)} {_y(1)}' stroke='{LINE}' stroke-dasharray='4 4'/>",
-        f"<path d='M{'L'.join(f'{_x(a):.1f} {_y(b):.1f}' for a, b, _ in table)}' fill='none' stroke='{POINT}'/>",
+        f"<path d='M{way}' fill='none' stroke='{POINT}'/>",
     ]
     for said, true, count in table:
         radius = 3.0 + 6.0 * (count / most) ** 0.5

@@ -22,7 +22,8 @@ BALANCED: Final = 0.1  # regularisation of the weights
 class Calibration(msgspec.Struct, frozen=True):
     """What was learned from simulated wearers.
 
-    `floor` and `scale` of each detector make evidence of its spreads, `weights` are of the evidence, `bias` makes log odds of it; `odds` → `share` is what came true.
+    `floor` and `scale` of each detector make evidence of its spreads, `weights` are of the evidence, `bias`
+    makes log odds of it; `odds` → `share` is what came true.
     `thresholds` are log odds by level's name, `budgets` the false alarms an hour that they are set for.
     """
 
@@ -53,10 +54,10 @@ class Calibration(msgspec.Struct, frozen=True):
 
 
 def evidence(above: Floats, floor: Sequence[float], scale: Sequence[float]) -> Floats:
-    """(…, n) → (…, n + 2): how rare each detector's spreads are, then the worst two; unknown says nothing.
+    """(…, n) → (…, n + 2): how rare each detector's spreads are, then the worst two; NaN says nothing.
 
-    Below `floor`, which the tenth of all healthy blocks exceeds, nothing is said; from there on it is counted in
-    `scale`, the mean by which these blocks exceed it: one number means the same of each detector.
+    Below `floor`, which a tenth of all healthy blocks exceeds, nothing is said; from there on it is counted
+    in `scale`, the mean by which these blocks exceed it: one number means the same of each detector.
     """
     logs = np.maximum((np.log1p(np.nan_to_num(above)) - np.array(floor)) / np.array(scale), 0.0)
     worst = np.partition(logs, -2, axis=-1)[..., :-3:-1]

@@ -31,7 +31,7 @@ class Predicted:
 
 @dataclass(frozen=True, slots=True)
 class Endangered:
-    """What is foreseen of a robot now; times as in `Predicted`. `prediction` is the verdict as rules take it."""
+    """What is foreseen of a robot now; times as in `Predicted`. Rules take the verdict as `prediction`."""
 
     robot: str
     verdict: Verdict

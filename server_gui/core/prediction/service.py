@@ -115,7 +115,7 @@ class PredictionService:
 
     def _run(self) -> None:
         try:
-            self._calibration = load()
+            self._calibration = load() if self._settings.prediction.danger else None
         except UnusableModel as error:
             log.warning("danger is not foreseen: %s", error)
         with threadpool_limits(limits=1):  # small batches gain nothing from more, and the cores are others'

@@ -22,6 +22,7 @@ class PredictionSettings(Struct, frozen=True, forbid_unknown_fields=True):
     """`[prediction]`: whether robots' status is predicted live, and how often."""
 
     enabled: bool = True
+    danger: bool = False  # whether danger is foreseen too: docs explanation/danger
     every_ms: dict[str, Annotated[int, Meta(ge=STEP_MS, le=10_000, multiple_of=STEP_MS)]] = {}
     poll_s: Annotated[float, Meta(ge=1, le=3600)] = 10.0  # between looks which models serve
 
