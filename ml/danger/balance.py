@@ -49,7 +49,8 @@ class Balance:
         ahead, aside = (self._tilt - self._lean) + np.array([forward, right]) / OMEGA
         light = max(1.0 - float(np.linalg.norm(acceleration)) / GRAVITY, 0.0)
         self._light += SMOOTH * (light - self._light)
-        return np.maximum(np.array([ahead, -ahead, -aside, aside, self._light]), 0.0)
+        found: Floats = np.maximum(np.array([ahead, -ahead, -aside, aside, self._light]), 0.0)
+        return found
 
     def words(self, key: str) -> str:
         if key == "falls free":

@@ -45,7 +45,8 @@ class Calibration(msgspec.Struct, frozen=True):
 
     def probability(self, odds: Floats | float) -> Floats:
         """What share of moments with such odds ended in harm."""
-        return np.interp(odds, self.odds, self.share)
+        share: Floats = np.asarray(np.interp(odds, self.odds, self.share))
+        return share
 
     @property
     def by_level(self) -> Mapping[Level, float]:

@@ -19,10 +19,17 @@ class Detector(Protocol):
     this robot's own healthy time; `least` is what a number has to differ from that at least, in its unit.
     """
 
-    name: str
-    keys: Sequence[str]
-    least: Floats
-    needs: str
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def keys(self) -> Sequence[str]: ...
+
+    @property
+    def least(self) -> Floats: ...
+
+    @property
+    def needs(self) -> str: ...
 
     def measure(self, now: Now, *, learn: bool) -> Floats:
         """Take the next sample; models of what is usual follow it where they may `learn`."""

@@ -90,7 +90,7 @@ class Torque:
         self._until -= 1
         if self._until <= 0:
             self._until = SOLVE_EVERY
-            self._weights = np.linalg.solve(self._gram, self._moment[:, :, None])[:, :, 0]
+            self._weights[:] = np.linalg.solve(self._gram, self._moment[:, :, None])[:, :, 0]
 
     def words(self, key: str) -> str:
         joint, _, what = key.partition(".")

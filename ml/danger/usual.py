@@ -52,7 +52,8 @@ class Usual:
         with np.errstate(invalid="ignore"):
             above = (numbers - self._mean) / self._spread
         above[self._blocks < FEWEST] = np.nan
-        return np.clip(above, 0.0, BEYOND)
+        found: Floats = np.clip(above, 0.0, BEYOND)
+        return found
 
     def _learn(self, block: Floats) -> None:
         told = np.isfinite(block)
