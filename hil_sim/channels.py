@@ -29,6 +29,12 @@ UNITS = {
     f"{TRUNK}.tilt_side": "rad",
 }
 
+JOINT_UNITS = {  # what a joint tells beside its motion
+    f"{joint}.{name}": unit
+    for name, unit in (("torque", "N·m"), ("following_error", "rad"), ("temperature", "°C"))
+    for joint in JOINTS
+}
+
 Values = list[float | None]
 
 
@@ -47,6 +53,23 @@ def reported(robot: Exoskeleton) -> Values:
         *(value for side, pressures in enumerate(sensors.pressures) for value in _load(side, pressures)),
         *_trunk(sensors.motion),
     ]
+
+
+def joints_reported(robot: Exoskeleton) -> list[float]:
+    """Return the values of `JOINT_UNITS` now, in their order."""
+    drives = list(zip(robot.drives.values(), robot.mountings.values(), strict=True))
+    torques = [
+        mounting.seen(
+            drive.servo.settings.rated_torque * drive.dictionary[objects.TORQUE_ACTUAL].number() / 1e3
+        )
+        for drive, mounting in drives
+    ]
+    errors = [
+        mounting.seen(drive.dictionary[objects.FOLLOWING_ERROR_ACTUAL].number() / drive.counts_per_radian)
+        for drive, mounting in drives
+    ]
+    heat = [drive.dictionary[objects.MOTOR_TEMPERATURE].number() / 10.0 for drive, _ in drives]
+    return [*torques, *errors, *heat]
 
 
 def _load(side: int, pressures: Pressures) -> Values:

@@ -571,7 +571,7 @@ _shtab_gwrms_enable_defaults_added=0
 
 _shtab_gwrms_evaluate_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--benchmark[one of those below]:NAME:(ipol-status ipol-phase ipol-adapt ipol-events sisfall-prefall aust-mode sim-activity sim-phase sim-falling)"
+  "--benchmark[one of those below]:NAME:(ipol-status ipol-phase ipol-adapt ipol-events sisfall-prefall aust-mode sim-activity sim-phase sim-falling sim-danger)"
   "--data[the recordings]:FILE:_files"
   "--json[the figures as one JSON object, in the last line]"
   "--report[also write a page with tables and pictures]:FILE.html:_files"
@@ -1265,13 +1265,13 @@ _shtab_gwrms_sim_fault_options=(
   "--for[end it after S simulated seconds]:S:"
   "--list[explain every fault]"
   "--active[show what is on]"
-  "--clear[end a fault, or all]:NAME:(all node_lost reboot late_boot node_stopped emcy heartbeat_missing tpdo_silent bus_off sdo_duplicate sdo_late sdo_silent sdo_abort frame_loss error_frames bus_load bus_cut gateway_bus_off sync_lost overcurrent overtemperature undervoltage encoder_jump encoder_stuck gear_slip following_error sto limit_switch drift runaway sensor_unplugged sensor_garbage sensor_wrong_baud sensor_frozen sensor_dropout insole_stuck_cell insole_drift insole_saturated imu_drift imu_saturated swapped_feet swapped_ports gait_asymmetry cpu_hog memory_hog slow_disk)"
+  "--clear[end a fault, or all]:NAME:(all node_lost reboot late_boot node_stopped emcy heartbeat_missing tpdo_silent bus_off sdo_duplicate sdo_late sdo_silent sdo_abort frame_loss error_frames bus_load bus_cut gateway_bus_off sync_lost overcurrent overtemperature undervoltage encoder_jump encoder_stuck gear_slip following_error sto limit_switch drift runaway sensor_unplugged sensor_garbage sensor_wrong_baud sensor_frozen sensor_dropout insole_stuck_cell insole_drift insole_saturated imu_drift imu_saturated swapped_feet swapped_ports friction_grows encoder_slips torque_fades oscillation wearer_resists insole_cells_die imu_slips fatigue fall_sideways fall_backward foot_slips trip_and_fall gait_asymmetry cpu_hog memory_hog slow_disk)"
   "--activity[what the wearer does from now on]:WHAT:(stand walk sit stairs_up stairs_down ramp_up ramp_down turn_left turn_right stumble fall)"
   "--controller[start or stop the gait controller]:WHAT:(start stop)"
   "--hand[move a joint without power by hand]:JOINT=DEGREES:"
   "--lean[lean the trunk, in degrees]:('FORWARD', 'LEFT'):"
   "--stamp[stamp with the left or right foot, or nobody]:FOOT:"
-  ":the fault:(node_lost reboot late_boot node_stopped emcy heartbeat_missing tpdo_silent bus_off sdo_duplicate sdo_late sdo_silent sdo_abort frame_loss error_frames bus_load bus_cut gateway_bus_off sync_lost overcurrent overtemperature undervoltage encoder_jump encoder_stuck gear_slip following_error sto limit_switch drift runaway sensor_unplugged sensor_garbage sensor_wrong_baud sensor_frozen sensor_dropout insole_stuck_cell insole_drift insole_saturated imu_drift imu_saturated swapped_feet swapped_ports gait_asymmetry cpu_hog memory_hog slow_disk)"
+  ":the fault:(node_lost reboot late_boot node_stopped emcy heartbeat_missing tpdo_silent bus_off sdo_duplicate sdo_late sdo_silent sdo_abort frame_loss error_frames bus_load bus_cut gateway_bus_off sync_lost overcurrent overtemperature undervoltage encoder_jump encoder_stuck gear_slip following_error sto limit_switch drift runaway sensor_unplugged sensor_garbage sensor_wrong_baud sensor_frozen sensor_dropout insole_stuck_cell insole_drift insole_saturated imu_drift imu_saturated swapped_feet swapped_ports friction_grows encoder_slips torque_fades oscillation wearer_resists insole_cells_die imu_slips fatigue fall_sideways fall_backward foot_slips trip_and_fall gait_asymmetry cpu_hog memory_hog slow_disk)"
   "(*)::its parameters:"
 )
 
@@ -1283,7 +1283,7 @@ _shtab_gwrms_sim_record_options=(
   "--out[what is written\; replaced]:FILE:_files"
   "--minutes[of each wearer (default\: 6)]:M:"
   "--subjects[who wears the robot (default\: 0)]:N[-N]:"
-  "--scenario[default\: practice]:scenario:(practice walk stand sit sit_to_stand stairs_up stairs_down ramp_up ramp_down turn_left turn_right stumble fall day)"
+  "--scenario[default\: practice]:scenario:(practice dangers walk stand sit sit_to_stand stairs_up stairs_down ramp_up ramp_down turn_left turn_right stumble fall day)"
   "--seed[same seed, same recording (default\: 0)]:S:"
 )
 

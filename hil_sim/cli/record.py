@@ -9,10 +9,13 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import BinaryIO, Final
 
-from hil_sim.channels import UNITS, reported
+from hil_sim.bare import BareExoskeleton
+from hil_sim.channels import JOINT_UNITS, UNITS, joints_reported, reported
 from hil_sim.cli.arguments import number
 from hil_sim.clock import SECOND_NS
 from hil_sim.controller.objects import ControllerState
+from hil_sim.dangerous_course import Course
+from hil_sim.dangers import DANGERS
 from hil_sim.errors import SimulatorError
 from hil_sim.exoskeleton import Exoskeleton, Scenario
 from hil_sim.practice import practice
@@ -36,6 +39,10 @@ what is written
 scenarios
   practice         rounds of everything, each in another order, at every step length, cycle time, toe height
                    and trunk angle that the controller allows; with stumbles and falls (default)
+  dangers          healthy walking, a fifth of the time, then every danger of explanation/danger; the
+                   robot has no bus, and torque, following error and temperature of each joint are written
+                   too, and `danger`: 0 none, -1 one is over, else its number in `dangers`, and .5 more once
+                   it has done harm
   and those of `gwrms sim`.
 
 exit status
@@ -46,8 +53,19 @@ example
 """
 
 PRACTICE: Final = "practice"
+DANGEROUS: Final = "dangers"
+DANGER_COLUMNS: Final = {**JOINT_UNITS, "danger": ""}
+HEALTHY_SHARE: Final = 0.2  # of a dangerous session's time, before the first danger
 COLUMNS: Final = {"time": "ns", "label": "", "left_phase": "stride", "right_phase": "stride", **UNITS}
-_DIGITS: Final = {"N": 2, "m": 5, "rad": 6, "rad/s": 5, "m/s²": 5}  # finer than any sensor's resolution
+_DIGITS: Final = {
+    "N": 2,
+    "N·m": 2,
+    "°C": 1,
+    "m": 5,
+    "rad": 6,
+    "rad/s": 5,
+    "m/s²": 5,
+}  # finer than any sensor's resolution
 _ROUNDED: Final = tuple(_DIGITS[unit] for unit in UNITS.values())
 
 
@@ -58,9 +76,13 @@ class Recording:
         # Every wearer has strides, noise and an order of things of their own.
         own = seed * 1000 + person
         self._file = file
-        self._robot = Exoskeleton(
-            Scenario.STAND if scenario == PRACTICE else Scenario(scenario), own, person=person
+        self._dangerous = scenario == DANGEROUS
+        self._seed = own
+        self._robot = (BareExoskeleton if self._dangerous else Exoskeleton)(
+            Scenario.STAND if scenario in (PRACTICE, DANGEROUS) else Scenario(scenario), own, person=person
         )
+        self._course: Course | None = None
+        columns = {**COLUMNS, **(DANGER_COLUMNS if self._dangerous else {})}
         self._entries = practice(self._robot, own) if scenario == PRACTICE else None
         self._write(
             {
@@ -69,8 +91,9 @@ class Recording:
                 "seed": seed,
                 "scenario": scenario,
                 "period_s": PERIOD_NS / SECOND_NS,
-                "columns": list(COLUMNS),
-                "units": list(COLUMNS.values()),
+                "columns": list(columns),
+                "units": list(columns.values()),
+                **({"dangers": list(DANGERS)} if self._dangerous else {}),
                 "wearer": asdict(self._robot.controller.generator.wearer),
             }
         )
@@ -79,19 +102,29 @@ class Recording:
     def run(self, seconds: float) -> None:
         """Let so much simulated time pass from switching on."""
         self._robot.power_on()
+        if self._dangerous:
+            self._course = Course(self._robot, self._seed, HEALTHY_SHARE * seconds, list(DANGERS))
         if self._entries is not None:
             self._robot.follow(self._entries)
         self._robot.clock.run_until(round(seconds * SECOND_NS))
 
     def _record(self) -> None:
         robot = self._robot
-        if robot.controller.controller_state is not ControllerState.RUNNING:
+        if robot.controller.controller_state is not ControllerState.RUNNING and not self._dangerous:
             return
         values = zip(reported(robot), _ROUNDED, strict=True)
         rounded = (None if value is None else round(value, digits) for value, digits in values)
         generator = robot.controller.generator
         stepping = (None if phase is None else round(phase, 5) for phase in phases(generator))
-        self._write([robot.clock.now_ns, generator.label, *stepping, *rounded])
+        self._write([robot.clock.now_ns, generator.label, *stepping, *rounded, *self._danger()])
+
+    def _danger(self) -> list[float]:
+        """What is written of dangers, in the order of `DANGER_COLUMNS`."""
+        if self._course is None:
+            return []
+        units = zip(joints_reported(self._robot), JOINT_UNITS.values(), strict=True)
+        values = [round(value, _DIGITS[unit]) for value, unit in units]
+        return [*values, self._course.now + 0.5 * self._course.harmed]
 
     def _write(self, content: object) -> None:
         self._file.write(json.dumps(content, separators=(",", ":"), ensure_ascii=False).encode() + b"\n")
@@ -144,7 +177,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--scenario",
-        choices=[PRACTICE, *map(str, Scenario)],
+        choices=[PRACTICE, DANGEROUS, *map(str, Scenario)],
         default=PRACTICE,
         help="default: %(default)s",
     )

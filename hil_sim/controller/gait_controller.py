@@ -226,13 +226,23 @@ class GaitController(Node):
 
     def _move(self) -> None:
         dt = self._period_s()
+        self.step_motion(dt)
+        for number, target in enumerate(self.set_points(), 1):
+            self._set(number, ENABLE_OPERATION, target)
+
+    def step_motion(self, dt: float) -> None:
+        """Move the wearer's motion on by `dt` seconds."""
         self._taken_over_s = min(self._taken_over_s + dt, _TAKE_OVER_S)
         self.generator.step(dt, Activity(self.dictionary[objects.ACTIVITY].number()), self._shape())
+
+    def set_points(self) -> list[int]:
+        """What each joint is to follow now (counts)."""
         left = 1.0 - smooth(self._taken_over_s / _TAKE_OVER_S)
         parts = zip(self._joints, self._angles(), self._offsets, self.strays, strict=True)
-        for number, (joint, angle, offset, stray) in enumerate(parts, 1):
-            target = joint.counts(angle + left * offset + stray, self._counts_per_radian)
-            self._set(number, ENABLE_OPERATION, target)
+        return [
+            joint.counts(angle + left * offset + stray, self._counts_per_radian)
+            for joint, angle, offset, stray in parts
+        ]
 
     def _command_where_they_are(self) -> None:
         """A drive that moves when nobody leads it is slowed down; only ENABLING brings one up."""

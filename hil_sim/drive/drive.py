@@ -15,7 +15,7 @@ from hil_sim.drive.modes.searching import METHODS
 from hil_sim.drive.objects import Objects
 from hil_sim.drive.options import Ramp
 from hil_sim.drive.power import Power
-from hil_sim.drive.power_state import LIVE, Command, PowerState, command_of
+from hil_sim.drive.power_state import ENABLING, LIVE, Command, PowerState, command_of
 from hil_sim.drive.servo import Servo
 from hil_sim.drive.settings import Parameters
 from hil_sim.node.abort import AbortCode, SdoAbort
@@ -245,6 +245,16 @@ class JointDrive(Node):
             self.fault(supervision.COMMUNICATION)
         else:
             self.power.do(command)
+
+    def lead(self, target: int) -> None:
+        """Follow a position (counts) that comes by no bus; a motor that is off is switched on."""
+        if not self.power.follows:
+            for command in (Command.BOOTED, *ENABLING):
+                self.power.do(command)
+        self.dictionary[od.TARGET_POSITION].take(target)
+        self.advance()
+        if self.power.follows:
+            self._mode.synchronise()
 
     def _on_sync(self) -> None:
         self.advance()

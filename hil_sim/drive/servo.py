@@ -37,6 +37,7 @@ class Servo:
         self.motion: Motion = Hold()
         self.torque = 0.0  # of the motor, from the current that really flows
         self.demand = 0.0  # the torque that the control asks for, within the limits
+        self.strength = 1.0  # share of the torque that the current makes: less where the magnets are weak
         self.limited = False  # the control asks for more than the limits allow
         self.origin = 0.0
         self.homed = False
@@ -134,7 +135,7 @@ class Servo:
         # What the supply leaves after the back EMF falls with the speed; a speed limit acts like less supply.
         droop = settings.torque_per_volt * settings.back_emf
         top_speed = min(settings.top_speed, supply_v / settings.back_emf)
-        joint = self.joint
+        joint, strength = self.joint, self.strength
         turning = 0.0 if self.encoder.stuck else 1.0  # whether the encoder shows what moves
         shift = self.position - turning * joint.position
         blend = STEP_S / (STEP_S + settings.velocity_filter_s)
@@ -142,7 +143,7 @@ class Servo:
         wanted = demand
         for _ in range(steps):
             actual += gain * (demand - actual)  # what the last step has computed
-            joint.step(actual)
+            joint.step(strength * actual)
             motion.step(reference, STEP_S)
             speed = joint.velocity
             seen += blend * (turning * speed - seen)

@@ -7,7 +7,7 @@ from hil_sim.gait import posture
 from hil_sim.gait.activity import Activity, Label
 from hil_sim.gait.curves import Leg
 from hil_sim.gait.gaits import GAITS, LEFT, RIGHT
-from hil_sim.gait.mishaps import LYING_PITCH, TRIP_PHASE, Fall, FallState, Stumble, side_of_fall
+from hil_sim.gait.mishaps import TRIP_PHASE, Fall, FallState, Stumble, side_of_fall
 from hil_sim.gait.posture import LYING, SITTING, STANDING
 from hil_sim.gait.profiles import Ramp, mix
 from hil_sim.gait.rhythm import Lag, Rhythm
@@ -49,6 +49,10 @@ class Generator:
         self._activity = Activity.STAND
         self._mishap: Activity | None = None
         self._show()
+
+    def trip(self, side: int) -> None:
+        """Begin a stumble of this leg, wherever in its stride it is."""
+        self.stumble.start(side, self.shape.cycle_time)
 
     # -- moving on ---------------------------------------------------------------------------------------
 
@@ -196,7 +200,7 @@ class Generator:
         upright = (
             self.shape.trunk_angle + self.wearer.lean + gait + posture.lean(self.seating) + self.stumble.pitch
         )
-        return upright + self.fall.share * (LYING_PITCH - upright)
+        return upright + self.fall.share * (self.fall.pitch - upright)
 
     @property
     def acceleration(self) -> tuple[float, float]:

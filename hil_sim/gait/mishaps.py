@@ -98,15 +98,25 @@ _THEN = {
 
 
 class Fall:
-    """Falls forward, to the side by `roll` (rad), lies, and gets up when told to."""
+    """Falls to a trunk's `pitch` (rad, forward) and `roll` (rad), lies, and gets up when told to."""
 
     def __init__(self) -> None:
         self.state = FallState.UPRIGHT
+        self.pitch = LYING_PITCH
         self._since = 0.0
         self._roll = 0.0
+        self._slipping = False
 
-    def start(self, roll: float) -> None:
+    def start(self, roll: float, pitch: float = LYING_PITCH, *, slipping: bool = False) -> None:
+        """Begin; a foot that is `slipping` bears less at first."""
         self.state, self._since, self._roll = FallState.FALLING, 0.0, roll
+        self.pitch, self._slipping = pitch, slipping
+
+    @property
+    def load(self) -> float:
+        """What the feet's load is multiplied with: a foot that slips bears less for a moment."""
+        slips = self._slipping and self.state is FallState.FALLING
+        return 1.0 - 0.4 * bump(self._since, 0.0, 0.10, 0.30) if slips else 1.0
 
     def step(self, dt: float, get_up: bool) -> None:
         if self.state is FallState.UPRIGHT:
@@ -133,7 +143,8 @@ class Fall:
     @property
     def acceleration(self) -> float:
         """Of the trunk, forward (m/s²); getting up is slow and takes nobody back."""
-        return _AHEAD * self._motion()[1] if self.state is FallState.FALLING else 0.0
+        ahead = _AHEAD * self.pitch / LYING_PITCH
+        return ahead * self._motion()[1] if self.state is FallState.FALLING else 0.0
 
     @property
     def on_ground(self) -> float:

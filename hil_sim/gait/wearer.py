@@ -73,6 +73,7 @@ class Wearer:
         self._generator = generator
         self.mass = generator.wearer.mass
         self.weight = self.mass * GRAVITY
+        self.resists: dict[int, float] = {}  # N·m more than its load, by the joint's place in `joint_loads`
         self._moment, self._both = -1, (_STANDING, _STANDING)
 
     # -- forces -----------------------------------------------------------------------------------------
@@ -116,7 +117,9 @@ class Wearer:
         walking = generator.walking
         step = self._step(side) if walking > 0.0 else _STANDING
         return _Contact(
-            (_STANDING.load + walking * (step.load - _STANDING.load)) * generator.stumble.load,
+            (_STANDING.load + walking * (step.load - _STANDING.load))
+            * generator.stumble.load
+            * generator.fall.load,
             walking * step.shear,
             _STANDING.cop_x + walking * (step.cop_x - _STANDING.cop_x),
             outside * (walking * step.cop_y + generator.wearer.foot_roll),
@@ -174,4 +177,4 @@ class Wearer:
                 -25.0 * share * math.sin(leg.knee),  # body weight bends the knee
                 -120.0 * share * max(foot.cop_x - 0.06, 0.0),  # ground reaction before the ankle's axis
             ]
-        return tuple(loads)
+        return tuple(load + self.resists.get(joint, 0.0) for joint, load in enumerate(loads))

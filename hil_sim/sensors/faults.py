@@ -1,7 +1,7 @@
 """What can be wrong with a sensor and its line: plain switches, all off, to be set while the robot runs."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 
 @dataclass(slots=True)
@@ -26,6 +26,7 @@ class InsoleFaults(LineFaults):
     saturated: bool = False  # its amplifier ends far too low, and it says so where its format can
     drift: float = 0.0  # Pa/s by which every cell reads more and more; 0 again takes all of it away
     swapped: bool = False  # it lies in the other shoe
+    dead_cells: set[int] = field(default_factory=set)  # numbers of cells that say nothing
     scale: float = 1.0  # by which each cell is told wrong
 
 
@@ -34,4 +35,5 @@ class ImuFaults(LineFaults):
     """What else can be wrong with an IMU."""
 
     drift: float = 0.0  # rad/s that its gyro about y reads too much, and its pitch with it; 0 takes it away
+    slipped: float = 0.0  # rad about y by which it sits on the trunk otherwise than it was built in
     clipped_at: float = math.inf  # m/s² at which each axis of its accelerometer ends

@@ -74,6 +74,8 @@ class Sole:
         noise = self._random.gauss(0.0, 1.0)
         if number == self._faults.stuck_cell:
             return _STUCK_PA
+        if number in self._faults.dead_cells:
+            return 0.0
         felt = truth * (1.0 + _NOISE_SHARE * noise) + _NOISE_PA * noise + self._drifted
         return max(felt, 0.0) * self._faults.scale
 

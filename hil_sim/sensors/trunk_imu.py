@@ -61,6 +61,7 @@ class TrunkImu:
     def measure(self, trunk: Trunk, dt: float) -> Motion:
         """Return the trunk, `dt` seconds after the last measurement."""
         drift = self._faults.drift
+        trunk = replace(trunk, pitch=trunk.pitch + self._faults.slipped) if self._faults.slipped else trunk
         self._drifted = self._drifted + drift * dt if drift else 0.0
         if self._last is None or not self._faults.frozen:
             roll, pitch, yaw = angular_rate(self._before or trunk, trunk, dt)

@@ -5,7 +5,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from ml.benchmarks import adapt, events, fall, phase, sim_activity, sim_falling, sim_phase, status, terrain
+from ml.benchmarks import (
+    adapt,
+    danger,
+    events,
+    fall,
+    phase,
+    sim_activity,
+    sim_falling,
+    sim_phase,
+    status,
+    terrain,
+)
 from ml.benchmarks.outcome import Goal, Outcome
 from ml.benchmarks.sim import WHOLE, recipe_of
 from ml.features import Recipe
@@ -105,6 +116,17 @@ BENCHMARKS: Final = {
             recipe_of(FALLING_TASK, WHOLE),
             sim_falling.evaluate,
             {},
+        ),
+        Benchmark(
+            "sim-danger",
+            "synthetic: dangers foreseen 0.3 s before harm, and false alarms; folds of people",
+            danger.DANGER,
+            danger.evaluate,
+            {
+                "foreseen": Goal(0.95),
+                "advice_per_hour": Goal(1.0, at_most=True),
+                "stops_per_100_h_upper": Goal(1.0, at_most=True),
+            },
         ),
     )
 }

@@ -22,9 +22,10 @@ from ml.store.sessions import Session
 from server_gui.cli.cloud_options import parser
 from server_gui.cli.rehearse import rehearse
 from server_gui.core.prediction.live import Live
-from server_gui.core.prediction.news import Predicted, PredictionNews, Ruled, Serves
+from server_gui.core.prediction.news import Endangered, Predicted, PredictionNews, Ruled, Serves
 from server_gui.core.prediction.rehearsals import BENCHMARKS
 from server_gui.core.prediction.replay import Replayed, replay
+from server_gui.core.settings.prediction import DANGER
 from server_gui.core.settings.server_file import ServerSettings, SettingsError, add_robots, load, name_of
 from server_gui.processes.ending import Ended, Ending
 from server_gui.terminal.predictions import link, replay_told, told
@@ -181,6 +182,11 @@ def _show_new(news: Sequence[PredictionNews], said: dict[tuple[str, str], str]) 
                     said[key] = prediction.label
                     said_now = f"{prediction.label} {prediction.probability:.2f}"
                     say(f"{one.robot} {prediction.task}: {said_now}, {prediction.model}\n")
+            case Endangered():
+                key = (one.robot, DANGER)
+                if said.get(key) != one.verdict.level.word:
+                    said[key] = one.verdict.level.word
+                    say(f"{one.robot} danger: {one.text}\n")
             case Ruled():
                 say(f"{one.robot} {one.text}\n")
             case Serves():
@@ -201,6 +207,10 @@ def fields(one: PredictionNews) -> dict[str, Any]:
             took = {"utc_ns": one.utc_ns, "took_s": None if one.took_ns is None else one.took_ns / 1e9}
             quality = {"quality": one.quality}
             return {"robot": one.robot} | dataclasses.asdict(one.prediction) | trust | made | took | quality
+        case Endangered(verdict=verdict):
+            levels = {"level": verdict.level.word, "number": verdict.number, "why": verdict.why}
+            silent = {"speaking": verdict.speaking, "silent": verdict.silent}
+            return {"robot": one.robot, "danger": levels | silent, "utc_ns": one.utc_ns}
         case Ruled():
             return {"robot": one.robot, "rule": one.rule, "holds": one.began, "text": one.text}
         case Serves():

@@ -4,13 +4,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Final
 
+from ml.danger.levels import Level as DangerLevel
+from ml.danger.watch import DETECTORS
 from ml.robot.task import ABNORMAL, UNKNOWN
 from ml.serving.trust import Level
 from server_gui.core.desk.belief import belief, blind, not_judged
 from server_gui.core.desk.leg_phase import LegPhase, apart, leg_phase, phase_at
 from server_gui.core.desk.station import Station
 from server_gui.core.models.names import model_name, told_name
-from server_gui.core.prediction.current import STALE_S, Recalled, Told
+from server_gui.core.prediction.current import STALE_S, Recalled, ShownDanger, Told
 from server_gui.core.processing.gait_events import Leg
 from server_gui.views.marks import Mark
 
@@ -122,6 +124,8 @@ def lines(station: Station) -> Iterator[Line]:
         yield Line(
             Mark("ring", "old", "no model"), "Not predicted", predictions.problem, "", predictions.problem
         )
+    if predictions.danger is not None and not stopped:
+        yield _danger(predictions.danger)
     for rule in predictions.rules:
         yield Line(Mark("triangle", "warn", "rule"), f"Rule {rule.rule.action.value}", rule.text)
     told = {alarm.subject: alarm.mark for alarm in station.alarms.each}
@@ -130,6 +134,27 @@ def lines(station: Station) -> Iterator[Line]:
         name = part.name.replace("_", " ")
         mark = told.get(part.name) or Mark("square", "bad", part.state)  # the same as everywhere
         yield Line(mark, f"{name}: {mark.word}", why, "", why)
+
+
+def _danger(shown: ShownDanger) -> Line:
+    """What is foreseen: its level and number, then why; nothing old or unknown is called fine."""
+    verdict = shown.said.verdict
+    if shown.is_stale() or verdict.number is None or verdict.level is DangerLevel.UNKNOWN:
+        mark, text = Mark("ring", "old", "not known"), "Danger: not known"
+    else:
+        mark = _DANGERS[verdict.level]
+        text = f"Danger: {verdict.level.word} {100 * verdict.number:.0f} %"
+    speak = f"{verdict.speaking} of {len(DETECTORS)} detectors"
+    return Line(mark, text, "; ".join(verdict.why) or speak, speak, shown.text)
+
+
+_DANGERS: Final = {
+    DangerLevel.NONE: Mark("diamond", "dim", "none"),
+    DangerLevel.EARLY: Mark("triangle", "warn", "early"),
+    DangerLevel.ADVICE: Mark("triangle", "warn", "advice"),
+    DangerLevel.ALARM: Mark("square", "bad", "alarm"),
+    DangerLevel.STOP: Mark("square", "bad", "stop"),
+}
 
 
 def model_phases(station: Station) -> dict[Leg, LegPhase | None]:

@@ -6,7 +6,7 @@ looking      a thread that looks somewhere again and again
 serving      looks which models serve, and loads them
 comparing    what of predictions was right, as labels say
 track_record that of the last days, from the store; tracking: looks whether there is more
-following    one robot: its rows, windows, trust and rules
+following    one robot: its rows, windows, trust and rules; danger: what is foreseen of it, where that is on
 rules        when a rule on predictions begins and ends to hold
 predicting   the thread that judges all robots together, and tells
 news, state  what it tells; how it goes

@@ -7,7 +7,7 @@ from typing import Final
 
 from ml.serving.predictor import Prediction
 from server_gui.core.follow import moment
-from server_gui.core.prediction.news import Predicted, PredictionNews, Ruled, Serves
+from server_gui.core.prediction.news import Endangered, Predicted, PredictionNews, Ruled, Serves
 from server_gui.core.settings.prediction import RuleSettings
 
 STALE_S: Final = 2.0  # what is older is no longer so
@@ -35,6 +35,24 @@ class Shown:
     def is_stale(self, now_ns: int | None = None) -> bool:
         """Return whether it is too old to be called live."""
         return self.age_s(now_ns) > STALE_S
+
+
+@dataclass(frozen=True, slots=True)
+class ShownDanger:
+    """What was foreseen last, and when that came."""
+
+    said: Endangered
+    came_ns: int  # our monotonic clock
+
+    def is_stale(self, now_ns: int | None = None) -> bool:
+        """Return whether it is too old to be called live: nothing is known then."""
+        now_ns = time.monotonic_ns() if now_ns is None else now_ns
+        return now_ns - self.came_ns + (self.said.took_ns or 0) > STALE_S * 1e9
+
+    @property
+    def text(self) -> str:
+        """In words; of what is old that nobody knows."""
+        return "unknown: nothing has been said for some seconds" if self.is_stale() else self.said.text
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +84,7 @@ class StationPredictions:
 
     by_task: dict[str, Shown] = field(default_factory=dict)
     recalled: dict[str, Recalled] = field(default_factory=dict)
+    danger: ShownDanger | None = None
     why: dict[str, str] = field(default_factory=dict)
     off: bool = False
     revision: int = 0
@@ -97,6 +116,8 @@ class StationPredictions:
         match news:
             case Predicted():
                 self.by_task[news.prediction.task] = Shown(news, time.monotonic_ns())
+            case Endangered():
+                self.danger = ShownDanger(news, time.monotonic_ns())
             case Ruled(began=True):
                 self._rules[news.rule] = news
             case Ruled():
@@ -110,4 +131,5 @@ class StationPredictions:
         """The link has dropped, or the robot has booted: nothing is known of it now."""
         self.revision += 1
         self.by_task.clear()
+        self.danger = None
         self._rules.clear()

@@ -8,6 +8,7 @@ from typing import Final, Self
 
 from gateway.client import Address
 from gateway.wire.resource import ResourceSnapshotParams
+from ml.danger.now import CHANNELS
 from ml.robot.groups import GROUPS
 from server_gui.core.follow.events import LinkChanged
 from server_gui.core.follow.feed import ONCE, Feed, FollowSettings, Tell
@@ -38,7 +39,7 @@ class Live:
         self._addresses = robots
         self._following = FollowSettings(
             "gwrms predict",
-            channels=tuple(name for group in GROUPS.values() for name in group),
+            channels=tuple({name for group in GROUPS.values() for name in group} | {*CHANNELS}),
             parameters=(),
             rate_hz=settings.recorder.rate_hz,
             look_s=1.0,

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from ml.danger.watch import DETECTORS, Verdict
 from ml.registry.card import Card
 from ml.serving.predictor import Prediction
 from ml.serving.trust import Trust
@@ -29,13 +30,33 @@ class Predicted:
 
 
 @dataclass(frozen=True, slots=True)
+class Endangered:
+    """What is foreseen of a robot now; times as in `Predicted`. Rules take the verdict as `prediction`."""
+
+    robot: str
+    verdict: Verdict
+    prediction: Prediction
+    utc_ns: int
+    took_ns: int | None
+
+    @property
+    def text(self) -> str:
+        """In words: the level, the number, who speaks, and why."""
+        verdict = self.verdict
+        if verdict.number is None:
+            return "unknown: no detector has what it needs"
+        speak = f"{verdict.speaking} of {len(DETECTORS)} detectors speak"
+        return "; ".join([f"{verdict.level.word}, {verdict.number:.2f}, {speak}", *verdict.why])
+
+
+@dataclass(frozen=True, slots=True)
 class Ruled:
     """A rule begins (or ends) to hold with this prediction; `objection` says why it stops no robot."""
 
     robot: str
     rule: RuleSettings
     began: bool
-    cause: Predicted
+    cause: Predicted | Endangered
     objection: str | None = None
 
     @property
@@ -68,4 +89,4 @@ class Serves:
     why: Mapping[str, str]
 
 
-PredictionNews = Predicted | Ruled | Serves
+PredictionNews = Predicted | Endangered | Ruled | Serves

@@ -1,14 +1,16 @@
 """One robot as prediction follows it: its rows become windows, its predictions trust, rules and news."""
 
-import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Final
 
-from gateway.client import Batch, ClockOffset
+from gateway.client import Batch
+from ml.danger.combine import Calibration
 from ml.serving.predictor import Prediction, Row, Window, Windows
 from ml.serving.trust import Trusting
 from server_gui.core.follow.events import Described, Event, Telemetry
+from server_gui.core.prediction.clock import Clock
+from server_gui.core.prediction.danger import DangerWatch
+from server_gui.core.prediction.danger import News as DangerNews
 from server_gui.core.prediction.model_loading import Model
 from server_gui.core.prediction.news import Predicted, PredictionNews, Ruled, Serves
 from server_gui.core.prediction.rules import Rule
@@ -54,7 +56,7 @@ class Watched:
         self._windows = Windows(self.model.learned.recipe, self._every_ns)
 
     def predicted(
-        self, robot: str, clock: "Clock", quality: Quality | None, predictions: Sequence[Prediction]
+        self, robot: str, clock: Clock, quality: Quality | None, predictions: Sequence[Prediction]
     ) -> Iterator[PredictionNews]:
         """Return what these predictions say of what was due; `quality` is how right the model was of late."""
         samples = [window.samples[0, :, -1] for window in self.due]
@@ -77,38 +79,25 @@ class Watched:
             yield self.newest
 
 
-@dataclass(frozen=True, slots=True)
-class Clock:
-    """A robot's clock against ours; where nobody knows it, the newest row is taken to have come at once."""
-
-    offset_ns: int = 0
-    known: bool = False
-
-    @classmethod
-    def of(cls, batch: Batch, clock: ClockOffset | None) -> "Clock":
-        if clock is not None:
-            return cls(clock.offset_ns, known=True)
-        return cls(batch.stamps_ns[-1] - batch.received_ns if batch.stamps_ns else 0)
-
-    def utc_ns(self, stamp_ns: int) -> int:
-        """Return a moment of the robot's clock."""
-        return stamp_ns - self.offset_ns + time.time_ns() - time.monotonic_ns()
-
-    def age_ns(self, stamp_ns: int) -> int | None:
-        """Return how long ago that was."""
-        return time.monotonic_ns() + self.offset_ns - stamp_ns if self.known else None
-
-
 class RobotPredictor:
     """One robot, for the thread that predicts."""
 
-    def __init__(self, robot: str, settings: PredictionSettings, rules: Iterable[RuleSettings]) -> None:
+    def __init__(
+        self,
+        robot: str,
+        settings: PredictionSettings,
+        rules: Iterable[RuleSettings],
+        calibration: Calibration | None = None,
+    ) -> None:
+        """Without a `calibration` nothing is said of danger."""
         self.robot = robot
+        self.danger_news: list[DangerNews] = []
         self.tasks: dict[str, Watched] = {}
         self.clock = Clock()
         self.units: dict[str, str] = {}
         self._settings = settings
         self._rules = [rule for rule in rules if rule.concerns(robot)]
+        self._danger = None if calibration is None else DangerWatch(robot, calibration, self._rules)
         self._boot_id: str | None = None
         self._served: Serves | None = None
 
@@ -131,6 +120,8 @@ class RobotPredictor:
         """From now on nothing has been seen."""
         for task in self.tasks.values():
             task.restart()
+        if self._danger is not None:
+            self._danger.restart()
 
     def take(self, events: Iterable[Event]) -> None:
         """Take what the robot's feed has told, in order."""
@@ -140,6 +131,8 @@ class RobotPredictor:
                     self.clock = Clock.of(event.batch, event.clock)
                     for task in self.tasks.values():
                         task.take(event.batch)
+                    if self._danger is not None:
+                        self.danger_news += self._danger.take(event.batch, self.clock)
                 case Described():
                     self.units = {channel.name: channel.unit for channel in event.description.channels}
                     if event.description.boot_id != self._boot_id:

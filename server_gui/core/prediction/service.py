@@ -7,6 +7,8 @@ from typing import Final, Self, TypeVar
 
 from threadpoolctl import threadpool_limits
 
+from ml.danger.combine import Calibration, load
+from ml.errors import UnusableModel
 from ml.robot.task import TASKS
 from ml.serving.predictor import judged
 from server_gui.core.follow.events import Event
@@ -51,6 +53,7 @@ class PredictionService:
         )
         self._inbox = Inbox[Event]()
         self._robots: dict[str, RobotPredictor] = {}
+        self._calibration: Calibration | None = None
         self._broken: dict[str, str] = {}  # models, and why
         self._judged = 0
         self._skipped = 0
@@ -111,6 +114,10 @@ class PredictionService:
     # --- the thread that predicts
 
     def _run(self) -> None:
+        try:
+            self._calibration = load() if self._settings.prediction.danger else None
+        except UnusableModel as error:
+            log.warning("danger is not foreseen: %s", error)
         with threadpool_limits(limits=1):  # small batches gain nothing from more, and the cores are others'
             while (taken := self._inbox.take(BEAT_S)) is not None:
                 self._worker.beat()
@@ -122,19 +129,25 @@ class PredictionService:
     def _turn(self, taken: "Mapping[str, collections.deque[Event]]") -> None:
         for robot, events in taken.items():
             self._follow(robot, events)
+            known = self._robots[robot]
+            news, known.danger_news = known.danger_news, []
+            self._pass_on(news)
         for model, due in self._due():
             self._worker.beat()
-            news = self._judge(model, due)
-            for one in news:
-                if self._stop and isinstance(one, Ruled) and one.stops:
-                    self._stop(one)
-            if news:
-                self._tell(news)
+            self._pass_on(self._judge(model, due))
+
+    def _pass_on(self, news: Sequence[PredictionNews]) -> None:
+        """Stop what a rule wants stopped, then tell."""
+        for one in news:
+            if self._stop and isinstance(one, Ruled) and one.stops:
+                self._stop(one)
+        if news:
+            self._tell(news)
 
     def _follow(self, robot: str, events: "collections.deque[Event]") -> None:
         known = self._robots.get(robot)
         if known is None:
-            known = RobotPredictor(robot, self._settings.prediction, self._settings.rules)
+            known = RobotPredictor(robot, self._settings.prediction, self._settings.rules, self._calibration)
             self._robots[robot] = known
         self._serve(known)
         try:

@@ -12,6 +12,8 @@ from gateway.tables.finding import unknown
 from ml.robot.classes import ABNORMAL, CLASSES
 
 EVERY_MS: Final[Mapping[str, int]] = MappingProxyType({"activity": 100, "gait_phase": 40, "falling": 40})
+DANGER: Final = "danger"  # no model's task: rules may speak of it as of one
+DANGER_LEVELS: Final = ("early_warning", "advice", "alarm", "stop")
 STEP_MS: Final = 20  # decisions are made at points of the models' grid
 RELEASE: Final = 0.8  # of `at_least`, where a rule does not say it
 
@@ -20,6 +22,7 @@ class PredictionSettings(Struct, frozen=True, forbid_unknown_fields=True):
     """`[prediction]`: whether robots' status is predicted live, and how often."""
 
     enabled: bool = True
+    danger: bool = False  # whether danger is foreseen too: docs explanation/danger
     every_ms: dict[str, Annotated[int, Meta(ge=STEP_MS, le=10_000, multiple_of=STEP_MS)]] = {}
     poll_s: Annotated[float, Meta(ge=1, le=3600)] = 10.0  # between looks which models serve
 
@@ -54,8 +57,9 @@ class RuleSettings(Struct, frozen=True, forbid_unknown_fields=True):
     action: Action = Action.ALARM
 
     def __post_init__(self) -> None:
-        labels = [*CLASSES[self.task], ABNORMAL] if self.task in CLASSES else [self.label]
-        wrong = [*_strange("task", [self.task], CLASSES), *_strange("label", [self.label], labels)]
+        classes = {**{task: (*labels, ABNORMAL) for task, labels in CLASSES.items()}, DANGER: DANGER_LEVELS}
+        labels = classes.get(self.task, (self.label,))
+        wrong = [*_strange("task", [self.task], classes), *_strange("label", [self.label], labels)]
         if self.release is not None and self.release > self.at_least:
             wrong.append(f"release {self.release:g} is above at_least {self.at_least:g}")
         _refuse(wrong)

@@ -35,7 +35,7 @@ from gateway.tables.finding import Finding, Told, in_order, lines, mistakes, tol
 from gateway.tables.reading import Unreadable, read
 from ml.store import StoreError
 from ml.store.url import checked_url, default_url
-from server_gui.core.settings.prediction import Action, PredictionSettings, RuleSettings
+from server_gui.core.settings.prediction import DANGER, Action, PredictionSettings, RuleSettings
 
 Table = TypeVar("Table", bound=Struct)
 _LIKELY: Final = 0.5  # that something is so rather than not
@@ -298,6 +298,9 @@ def _unlikely(settings: ServerSettings) -> Iterator[Finding]:
         )
     for number, rule in enumerate(settings.rules, 1):
         where = f"[[rules]] number {number}"
+        if rule.task == DANGER and not settings.prediction.danger:
+            text = "is danger, which is not foreseen before [prediction] has danger = true"
+            yield warning(where, "task", text)
         if settings.robots and not any(map(rule.concerns, settings.robots)):
             known = ", ".join(settings.robots)
             yield warning(where, "robot", f"{rule.robot!r} is none of [robots], which are {known}")

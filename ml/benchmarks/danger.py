@@ -1,0 +1,293 @@
+"""`sim-danger`: dangers foreseen on simulated wearers never seen, and what that costs in false alarms."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from ml.benchmarks.danger_data import SUDDEN, WALKS, Seen, read
+from ml.benchmarks.outcome import Outcome
+from ml.danger.budget import BLOCK_S, BUDGETS, rate_interval, rule_of_three, share_interval, thresholds
+from ml.danger.combine import Calibration, calibrated, evidence, fit, tails
+from ml.danger.levels import Level, Levels
+from ml.danger.now import CHANNELS
+from ml.danger.watch import DETECTORS
+from ml.features.recipe import Features, Recipe
+from ml.features.windows import Samples
+
+Floats = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
+
+FOLDS: Final = 4
+LEAD_S: Final = 0.3  # before harm: what is said later is not foreseen
+PERIOD_S: Final = 0.04
+BINS: Final = 10  # of the reliability diagram
+WHY: Final = (
+    "synthetic: wearers of gwrms sim-record --scenario dangers, judged by weights and thresholds of others."
+    " Foreseen: advice at least 0.3 s before harm in the simulator's truth. …_low and …_high: 95 % intervals;"
+    " stops_per_100_h_upper is the one-sided 95 % bound (3 / hours where none was seen)."
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """One danger: how long before harm advice came, None where it did not."""
+
+    name: str
+    subject: str
+    lead_s: float | None
+
+    @property
+    def foreseen(self) -> bool:
+        """Whether that was soon enough."""
+        return self.lead_s is not None and self.lead_s >= LEAD_S
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Judged:
+    """One wearer as others' calibration judges it."""
+
+    seen: Seen
+    probability: Floats
+    level: npt.NDArray[np.int_]
+
+
+def learn(seen: Sequence[Seen], told: str) -> Calibration:
+    """Weights by all; the curve and thresholds by each wearer as the others' weights judge it."""
+    odds = _out_of_fold(seen)
+    parts = _fit(seen)
+    known = [one.healthy | one.coming for one in seen]
+    said = np.concatenate([each[rows] for each, rows in zip(odds, known, strict=True)])
+    true = np.concatenate([one.coming[rows] for one, rows in zip(seen, known, strict=True)])
+    knots, share = calibrated(said, true)
+    maxima = np.concatenate([_maxima(one, each) for one, each in zip(seen, odds, strict=True)])
+    levels = thresholds(maxima, _hours(seen))
+    return Calibration(
+        DETECTORS,
+        *parts,
+        tuple(knots),
+        tuple(share),
+        {level.word: value for level, value in levels.items()},
+        {level.word: budget for level, budget in BUDGETS.items()},
+        told,
+    )
+
+
+Parts = tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...], float]
+
+
+def _fit(seen: Sequence[Seen]) -> Parts:
+    """Floors, scales, weights and bias. Each danger counts alike, however long; so does each class."""
+    blocks = [_maxima(one, one.above[:, at]) for one in seen for at in range(len(DETECTORS))]
+    maxima = np.concatenate(
+        [np.stack(blocks[at : at + len(DETECTORS)], axis=1) for at in range(0, len(blocks), len(DETECTORS))]
+    )
+    floor, scale = tails(maxima)
+    known = [walking(one) | one.coming for one in seen]
+    above = np.concatenate([one.above[rows] for one, rows in zip(seen, known, strict=True)])
+    coming = np.concatenate([one.coming[rows] for one, rows in zip(seen, known, strict=True)])
+    counts = np.concatenate([_counts(one)[rows] for one, rows in zip(seen, known, strict=True)])
+    counts[~coming] = counts[coming].sum() / max((~coming).sum(), 1)
+    weights, bias = fit(evidence(above, floor, scale), coming, counts)
+    return floor, scale, tuple(weights.tolist()), bias
+
+
+def _counts(one: Seen) -> Floats:
+    """How much each moment of a danger counts: its later half, one in all."""
+    counts = np.zeros(len(one.danger))
+    bounds = np.flatnonzero(np.diff(one.danger)) + 1
+    for begin, end in zip(bounds, [*bounds[1:], len(counts)], strict=True):
+        if one.coming[begin] and one.danger[begin] in _foreseeable(one):
+            middle = (begin + end) // 2
+            counts[middle:end] = 1.0 / (end - middle)
+    return counts
+
+
+def _foreseeable(one: Seen) -> set[float]:
+    """The numbers of dangers that something shows before."""
+    return {1.0 + at for at, name in enumerate(one.names) if name not in SUDDEN}
+
+
+def _out_of_fold(seen: Sequence[Seen]) -> list[Floats]:
+    odds = []
+    for at, one in enumerate(seen):
+        others = [other for number, other in enumerate(seen) if number % FOLDS != at % FOLDS]
+        odds.append(Calibration(DETECTORS, *_fit(others or seen), (), (), {}, {}, "").log_odds(one.above))
+    return odds
+
+
+def walking(one: Seen) -> Flags:
+    """Healthy moments on level ground: standing, walking, turning."""
+    flags: Flags = one.healthy & np.isin(one.label, list(WALKS))
+    return flags
+
+
+def _maxima(one: Seen, odds: Floats) -> Floats:
+    """The largest odds of each block of healthy walking."""
+    rows = walking(one)
+    block = (one.at_s[rows] // BLOCK_S).astype(np.int_)
+    said = np.nan_to_num(odds[rows])
+    return np.array([said[block == number].max() for number in np.unique(block)])
+
+
+def _hours(seen: Sequence[Seen]) -> float:
+    return sum(float(walking(one).sum()) for one in seen) * PERIOD_S / 3600.0
+
+
+def judge(one: Seen, calibration: Calibration) -> Judged:
+    """What was said of a wearer, moment by moment; after harm the levels begin anew."""
+    odds = calibration.log_odds(one.above)
+    levels, level = Levels(calibration.by_level), np.zeros(len(odds), dtype=np.int_)
+    over = False
+    for at, (now, value, danger) in enumerate(
+        zip(one.at_s.tolist(), odds.tolist(), one.danger.tolist(), strict=True)
+    ):
+        if over and danger == 0.0:
+            levels = Levels(calibration.by_level)
+        over = danger < 0.0
+        level[at] = levels.take(now, value)
+    return Judged(one, calibration.probability(odds), level)
+
+
+def events(judged: Judged, least: Level) -> Iterator[Event]:
+    """Every danger that did harm, and when its level was first reached."""
+    danger = judged.seen.danger
+    bounds = np.flatnonzero(np.diff(danger)) + 1
+    for begin, end in zip(bounds, [*bounds[1:], len(danger)], strict=True):
+        number = danger[begin]
+        if number < 1.0 or number % 1.0 or end >= len(danger) or danger[end] != number + 0.5:
+            continue
+        reached = np.flatnonzero(judged.level[begin:end] >= least)
+        lead = float(judged.seen.at_s[end] - judged.seen.at_s[begin + reached[0]]) if len(reached) else None
+        yield Event(judged.seen.names[int(number) - 1], judged.seen.subject, lead)
+
+
+def false_alarms(judged: Judged, least: Level, rows: Flags) -> int:
+    """How often a level was reached anew in these moments; several within a block are one."""
+    rises = np.flatnonzero((judged.level >= least) & (np.roll(judged.level, 1) < least) & rows)
+    count, last = 0, -np.inf
+    for at in judged.seen.at_s[rises]:
+        if at - last >= BLOCK_S:
+            count, last = count + 1, at
+    return count
+
+
+def _looked_at(windows: Samples) -> Features:
+    """What a robot's channels are: the detectors make their own of them, row by row."""
+    return windows[:, :, -1].astype(np.float32)
+
+
+DANGER: Final = Recipe("danger/all", 25.0, 1, CHANNELS, _looked_at)
+
+
+def evaluate(path: Path, search: bool) -> Outcome:  # noqa: ARG001 - there is nothing to choose
+    """Folds of wearers; weights, curve and thresholds by the others alone."""
+    seen = read(path)
+    return outcome(cross_judged(seen))
+
+
+def cross_judged(seen: Sequence[Seen]) -> list[Judged]:
+    """Each wearer as the calibration of others judges it."""
+    subjects = sorted({one.subject for one in seen}, key=int)
+    folds = min(FOLDS, len(subjects))
+    found = []
+    for fold in range(folds):
+        held = set(subjects[fold::folds])
+        calibration = learn([one for one in seen if one.subject not in held], "")
+        found += [judge(one, calibration) for one in seen if one.subject in held]
+    return found
+
+
+def outcome(judged: Sequence[Judged]) -> Outcome:
+    """Every figure."""
+    found = [event for one in judged for event in events(one, Level.ADVICE)]
+    seen = [event for event in found if event.name not in SUDDEN]
+    figures = _shares("foreseen", [event.foreseen for event in seen])
+    leads = [event.lead_s for event in seen if event.lead_s is not None]
+    figures |= {
+        "events": float(len(seen)),
+        "median_lead_s": float(np.median(leads)) if leads else float("nan"),
+        "foreseen_sudden": _mean([event.foreseen for event in found if event.name in SUDDEN]),
+        "told_before_harm": _mean([event.lead_s is not None for event in seen]),
+    }
+    figures |= _rates(judged) | _reliability(judged)
+    names = sorted({event.name for event in found})
+    groups = {name: _of_danger([event for event in found if event.name == name]) for name in names}
+    people = len({one.seen.subject for one in judged})
+    return Outcome(
+        figures,
+        people,
+        groups,
+        "danger",
+        settings="fixed in ml/danger; thresholds from budgets",
+        notes=(WHY,),
+    )
+
+
+def _of_danger(found: Sequence[Event]) -> dict[str, float]:
+    leads = [event.lead_s for event in found if event.lead_s is not None]
+    low, high = share_interval(sum(event.foreseen for event in found), len(found))
+    return {
+        "foreseen": _mean([event.foreseen for event in found]),
+        "low": low,
+        "high": high,
+        "median_lead_s": float(np.median(leads)) if leads else float("nan"),
+        "events": float(len(found)),
+    }
+
+
+def _rates(judged: Sequence[Judged]) -> dict[str, float]:
+    hours = _hours([one.seen for one in judged])
+    found = {"healthy_hours": hours}
+    for level, name in ((Level.EARLY, "early"), (Level.ADVICE, "advice"), (Level.ALARM, "alarm")):
+        count = sum(false_alarms(one, level, walking(one.seen)) for one in judged)
+        low, high = rate_interval(count, hours)
+        found |= {f"{name}_per_hour": count / hours, f"{name}_low": low, f"{name}_high": high}
+    stops = sum(false_alarms(one, Level.STOP, walking(one.seen)) for one in judged)
+    found |= {"stops": float(stops), "stops_per_100_h_upper": 100.0 * rule_of_three(stops, hours)}
+    others = [one.seen.healthy & ~walking(one.seen) for one in judged]
+    count = sum(false_alarms(one, Level.ADVICE, rows) for one, rows in zip(judged, others, strict=True))
+    elsewhere = sum(float(rows.sum()) for rows in others) * PERIOD_S / 3600.0
+    found["advice_per_hour_stairs_ramps_seat"] = count / elsewhere if elsewhere else float("nan")
+    return found
+
+
+def _shares(name: str, flags: Sequence[bool]) -> dict[str, float]:
+    low, high = share_interval(sum(flags), len(flags)) if flags else (float("nan"), float("nan"))
+    return {name: _mean(flags), f"{name}_low": low, f"{name}_high": high}
+
+
+def _mean(flags: Sequence[bool]) -> float:
+    return float(np.mean(flags)) if flags else float("nan")
+
+
+def reliability(judged: Sequence[Judged]) -> list[tuple[float, float, int]]:
+    """By tenths of what was said: the mean of it, the share that came true, how many moments."""
+    said, true = _said(judged)
+    bins = np.minimum((BINS * said).astype(np.int_), BINS - 1)
+    return [
+        (float(said[bins == at].mean()), float(true[bins == at].mean()), int((bins == at).sum()))
+        for at in range(BINS)
+        if (bins == at).any()
+    ]
+
+
+def _said(judged: Sequence[Judged]) -> tuple[Floats, Floats]:
+    rows = [one.seen.healthy | one.seen.coming for one in judged]
+    said = np.concatenate([one.probability[each] for one, each in zip(judged, rows, strict=True)])
+    true = np.concatenate([one.seen.coming[each] for one, each in zip(judged, rows, strict=True)])
+    return said, true.astype(np.float64)
+
+
+def _reliability(judged: Sequence[Judged]) -> dict[str, float]:
+    said, true = _said(judged)
+    table = reliability(judged)
+    error = sum(count * abs(mean - share) for mean, share, count in table) / len(said)
+    return {
+        "brier": float(np.mean((said - true) ** 2)),
+        "calibration_error": float(error),
+        "share_in_danger": float(true.mean()),
+    }

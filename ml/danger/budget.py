@@ -1,0 +1,60 @@
+"""Thresholds from budgets: the lowest odds that cost no more false alarms an hour of healthy walking.
+
+Where the budget is smaller than what was recorded can show, the tail of the healthy maxima is prolonged as
+an exponential, the limit of most tails (Coles 2001, §4): an estimate, blind to what was never recorded.
+"""
+
+from collections.abc import Mapping
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+from scipy.stats import beta, chi2
+
+from ml.danger.levels import URGENT, Level
+
+Floats = npt.NDArray[np.float64]
+
+BUDGETS: Final[Mapping[Level, float]] = {
+    Level.EARLY: 6.0,
+    Level.ADVICE: 1.0,
+    Level.ALARM: 0.1,
+    Level.STOP: 0.01,
+}
+BLOCK_S: Final = 10.0  # an alarm in this time is one alarm
+TAIL: Final = 0.1  # share of the blocks whose maxima are its tail
+APART: Final = 0.1  # log odds between two levels at least
+
+
+def thresholds(maxima: Floats, hours: float) -> dict[Level, float]:
+    """Log odds by level, from the `maxima` of the blocks of so many healthy hours."""
+    ordered = np.sort(maxima)[::-1]
+    count = max(int(TAIL * len(ordered)), min(5, len(ordered)))
+    base = ordered[count - 1]
+    scale = max(float(np.mean(ordered[:count] - base)), APART)
+    found: dict[Level, float] = {}
+    least = -np.inf
+    for level in URGENT:
+        tail = base + scale * np.log(count / (BUDGETS[level] * hours))
+        # What was seen is never undercut: no more alarms on it than the budget allows.
+        allowed = int(BUDGETS[level] * hours)
+        seen = ordered[allowed] if allowed < len(ordered) else ordered[-1]
+        found[level] = least = float(max(tail, seen + 1e-6, least + APART))
+    return found
+
+
+def rate_interval(events: int, hours: float) -> tuple[float, float]:
+    """95 % interval of a rate an hour (Garwood 1936); with none seen, at most 3.7 / hours."""
+    low = chi2.ppf(0.025, 2 * events) / 2.0 / hours if events else 0.0
+    return float(low), float(chi2.ppf(0.975, 2 * (events + 1)) / 2.0 / hours)
+
+
+def rule_of_three(events: int, hours: float) -> float:
+    """95 % upper bound of a rate an hour, one-sided: 3 / hours where none was seen."""
+    return float(chi2.ppf(0.95, 2 * (events + 1)) / 2.0 / hours)
+
+
+def share_interval(hits: int, of: int) -> tuple[float, float]:
+    """95 % interval of a share (Clopper & Pearson 1934)."""
+    low = beta.ppf(0.025, hits, of - hits + 1) if hits else 0.0
+    return float(low), float(beta.ppf(0.975, hits + 1, of - hits) if hits < of else 1.0)

@@ -1,0 +1,112 @@
+"""One number out of all detectors: calibrated log odds, against which no evidence of danger ever speaks."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Final
+
+import msgspec
+import numpy as np
+import numpy.typing as npt
+
+from ml.danger.levels import URGENT, Level
+from ml.errors import UnusableModel
+
+Floats = npt.NDArray[np.float64]
+
+SHIPPED: Final = Path(__file__).with_name("calibration.json")
+RARE: Final = 0.1  # of the healthy blocks
+LEAST_SCALE: Final = 0.1
+BALANCED: Final = 0.1  # regularisation of the weights
+
+
+class Calibration(msgspec.Struct, frozen=True):
+    """What was learned from simulated wearers.
+
+    `floor` and `scale` of each detector make evidence of its spreads, `weights` are of the evidence, `bias`
+    makes log odds of it; `odds` → `share` is what came true.
+    `thresholds` are log odds by level's name, `budgets` the false alarms an hour that they are set for.
+    """
+
+    detectors: tuple[str, ...]
+    floor: tuple[float, ...]
+    scale: tuple[float, ...]
+    weights: tuple[float, ...]
+    bias: float
+    odds: tuple[float, ...]
+    share: tuple[float, ...]
+    thresholds: dict[str, float]
+    budgets: dict[str, float]
+    learned_from: str
+
+    def log_odds(self, above: Floats) -> Floats:
+        """Of spreads above what is usual, (…, detectors), NaN where a detector says nothing: (…,)."""
+        odds: Floats = evidence(above, self.floor, self.scale) @ np.array(self.weights) + self.bias
+        return odds
+
+    def probability(self, odds: Floats | float) -> Floats:
+        """What share of moments with such odds ended in harm."""
+        share: Floats = np.asarray(np.interp(odds, self.odds, self.share))
+        return share
+
+    @property
+    def by_level(self) -> Mapping[Level, float]:
+        """The thresholds by level."""
+        return {level: self.thresholds[level.word] for level in URGENT}
+
+
+def evidence(above: Floats, floor: Sequence[float], scale: Sequence[float]) -> Floats:
+    """(…, n) → (…, n + 2): how rare each detector's spreads are, then the worst two; NaN says nothing.
+
+    Below `floor`, which a tenth of all healthy blocks exceeds, nothing is said; from there on it is counted
+    in `scale`, the mean by which these blocks exceed it: one number means the same of each detector.
+    """
+    logs = np.maximum((np.log1p(np.nan_to_num(above)) - np.array(floor)) / np.array(scale), 0.0)
+    worst = np.partition(logs, -2, axis=-1)[..., :-3:-1]
+    both: Floats = np.concatenate([logs, worst], axis=-1)
+    return both
+
+
+def tails(maxima: Floats) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Floor and scale of each detector from the maxima of healthy blocks, (blocks, detectors)."""
+    logs = np.log1p(np.nan_to_num(maxima))
+    floor = np.quantile(logs, 1.0 - RARE, axis=0)
+    beyond = [column[column >= low] - low for column, low in zip(logs.T, floor, strict=True)]
+    scale = [max(float(part.mean()), LEAST_SCALE) for part in beyond]
+    return tuple(floor.tolist()), tuple(scale)
+
+
+def fit(x: Floats, danger: npt.NDArray[np.bool_], counts: Floats) -> tuple[Floats, float]:
+    """Weights, never negative, and bias of a logistic regression on evidence in which each row `counts`."""
+    from scipy.optimize import minimize  # here: who serves needs none of it
+
+    weight = counts / counts.sum()
+    sign = np.where(danger, 1.0, -1.0)
+
+    def loss(theta: Floats) -> tuple[float, Floats]:
+        margin = sign * (x @ theta[:-1] + theta[-1])
+        off = -sign * weight / (1.0 + np.exp(np.clip(margin, -50, 50)))
+        ridge = BALANCED * 1e-3 * theta[:-1]
+        value = float(weight @ np.logaddexp(0.0, -margin) + 0.5 * ridge @ theta[:-1])
+        return value, np.concatenate([x.T @ off + ridge, [off.sum()]])
+
+    bounds = [(0.0, None)] * x.shape[1] + [(None, None)]
+    found = minimize(loss, np.zeros(x.shape[1] + 1), jac=True, method="L-BFGS-B", bounds=bounds).x
+    return found[:-1], float(found[-1])
+
+
+def calibrated(odds: Floats, danger: npt.NDArray[np.bool_]) -> tuple[Sequence[float], Sequence[float]]:
+    """Knots of an isotonic regression from log odds to the share that ended in harm."""
+    from sklearn.isotonic import IsotonicRegression
+
+    low, high = np.quantile(odds, [0.0, 1.0])
+    grid = np.unique(np.concatenate([np.quantile(odds, np.linspace(0.0, 1.0, 60)), [low, high]]))
+    fitted = IsotonicRegression(y_min=0.0, y_max=1.0, out_of_bounds="clip").fit(odds, danger.astype(float))
+    return tuple(grid.tolist()), tuple(fitted.predict(grid).tolist())
+
+
+def load(path: Path = SHIPPED) -> Calibration:
+    """What ships; raises `UnusableModel` where the file is damaged."""
+    try:
+        return msgspec.json.decode(path.read_bytes(), type=Calibration)
+    except (OSError, msgspec.DecodeError) as error:
+        raise UnusableModel(f"{path}: the calibration of danger cannot be read: {error}") from error

@@ -1,0 +1,61 @@
+"""The four levels of danger, and when one begins and ends: thresholds from budgets, with hysteresis."""
+
+from collections.abc import Mapping
+from enum import IntEnum
+from typing import Final
+
+RELEASE: Final = 0.7  # below its threshold (log odds) a level ends …
+CALM_S: Final = 1.5  # … after so long
+HOLD: Final = 2  # samples one after the other at which a level begins
+
+
+class Level(IntEnum):
+    """How urgent it is; UNKNOWN is not fine: nobody can say."""
+
+    UNKNOWN = -1
+    NONE = 0
+    EARLY = 1  # worth a look when there is time
+    ADVICE = 2  # look now
+    ALARM = 3  # act now
+    STOP = 4  # stop the robot, where the user's file has a rule that says so
+
+    @property
+    def word(self) -> str:
+        """Return it as people call it."""
+        return _WORDS[self]
+
+
+_WORDS: Final = {
+    Level.UNKNOWN: "unknown",
+    Level.NONE: "none",
+    Level.EARLY: "early warning",
+    Level.ADVICE: "advice",
+    Level.ALARM: "alarm",
+    Level.STOP: "stop",
+}
+URGENT: Final = (Level.EARLY, Level.ADVICE, Level.ALARM, Level.STOP)
+
+
+class Levels:
+    """The level of one robot from moment to moment; `thresholds` rise with the level, in log odds."""
+
+    def __init__(self, thresholds: Mapping[Level, float]) -> None:
+        self.level = Level.NONE
+        self._thresholds = thresholds
+        self._above = dict.fromkeys(URGENT, 0)
+        self._calm_s: float | None = None  # since when it is below what its level needs
+
+    def take(self, at_s: float, odds: float) -> Level:
+        """Take the log odds of a moment."""
+        for level in URGENT:
+            self._above[level] = self._above[level] + 1 if odds >= self._thresholds[level] else 0
+        wanted = max((level for level in URGENT if self._above[level] >= HOLD), default=Level.NONE)
+        if wanted >= self.level:
+            self.level, self._calm_s = wanted, None
+        elif odds >= self._thresholds[self.level] - RELEASE:
+            self._calm_s = None
+        elif self._calm_s is None:
+            self._calm_s = at_s
+        elif at_s - self._calm_s >= CALM_S:
+            self.level, self._calm_s = wanted, None
+        return self.level

@@ -1,0 +1,134 @@
+"""Danger: unknown is never fine, evidence never speaks against danger, thresholds keep their budgets."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ml.danger.budget import BUDGETS, rate_interval, rule_of_three, share_interval, thresholds
+from ml.danger.combine import Calibration, load
+from ml.danger.levels import CALM_S, URGENT, Level, Levels
+from ml.danger.now import CHANNELS
+from ml.danger.usual import FEWEST, WAITS, Usual
+from ml.danger.watch import DETECTORS, Watch
+
+PERIOD_NS = 140_000_000  # as seldom as can be: it is learned from seconds, not from rows
+CALIBRATION = load()
+
+
+def rows(watch: Watch, count: int, start: int = 0, **values: float) -> None:
+    row = [values.get(name.replace(".", "_")) for name in CHANNELS]
+    for at in range(start, start + count):
+        watch.take(at * PERIOD_NS, row)
+
+
+def test_a_robot_without_any_channel_is_unknown_and_never_fine() -> None:
+    watch = Watch(CALIBRATION)
+    rows(watch, 50)
+    assert watch.verdict is not None
+    assert watch.verdict.level is Level.UNKNOWN
+    assert watch.verdict.number is None
+    assert watch.verdict.silent == DETECTORS
+
+
+def test_a_robot_of_whom_few_detectors_speak_is_not_called_fine() -> None:
+    watch = Watch(CALIBRATION)
+    rows(watch, 300, left_knee_temperature=30.0)
+    assert watch.verdict is not None
+    assert watch.verdict.number is not None
+    assert watch.verdict.speaking == 1
+    assert watch.verdict.level is Level.UNKNOWN
+
+
+def test_a_motor_that_grows_hot_is_told_with_its_joint() -> None:
+    watch = Watch(CALIBRATION)
+    rows(watch, 300, left_knee_temperature=30.0)
+    calm = watch.verdict
+    row: list[float | None] = [None] * len(CHANNELS)
+    for at in range(110):
+        row[CHANNELS.index("left_knee.temperature")] = 30.0 + 8.0 * at * PERIOD_NS / 1e9
+        watch.take((300 + at) * PERIOD_NS, row)
+    assert calm is not None
+    assert calm.number is not None
+    assert watch.verdict is not None
+    assert watch.verdict.number is not None
+    assert watch.verdict.number > calm.number
+    assert any("left knee" in why for why in watch.verdict.why)
+
+
+def test_a_value_that_has_gone_stale_silences_its_detector() -> None:
+    watch = Watch(CALIBRATION)
+    rows(watch, 300, left_knee_temperature=30.0)
+    rows(watch, 20, 300)
+    assert watch.verdict is not None
+    assert watch.verdict.level is Level.UNKNOWN
+    assert watch.verdict.number is None
+
+
+@given(st.lists(st.floats(0.0, 50.0), min_size=8, max_size=8), st.integers(0, 7), st.floats(0.0, 50.0))
+def test_more_evidence_never_lowers_the_number(above: list[float], at: int, more: float) -> None:
+    raised = list(above)
+    raised[at] = min(raised[at] + more, 50.0)
+    before, after = (CALIBRATION.log_odds(np.array(one)) for one in (above, raised))
+    assert after >= before - 1e-9
+    assert CALIBRATION.probability(after) >= CALIBRATION.probability(before) - 1e-9
+
+
+def test_what_is_unknown_says_nothing() -> None:
+    silent, calm = np.full(8, np.nan), np.zeros(8)
+    assert CALIBRATION.log_odds(silent) == CALIBRATION.log_odds(calm)
+
+
+def test_levels_rise_at_once_and_fall_after_a_calm_while() -> None:
+    levels = Levels({level: float(level) for level in URGENT})
+    assert [levels.take(0.04 * at, 2.5) for at in range(2)] == [Level.NONE, Level.ADVICE]
+    assert levels.take(0.1, -5.0) is Level.ADVICE
+    assert levels.take(0.1 + 0.5 * CALM_S, -5.0) is Level.ADVICE
+    assert levels.take(0.2 + CALM_S, -5.0) is Level.NONE
+
+
+def test_thresholds_rise_with_the_level_and_keep_the_budget_on_what_was_seen() -> None:
+    hours, source = 20.0, np.random.default_rng(0)
+    maxima = source.gumbel(0.0, 1.0, int(hours * 360))
+    found = thresholds(maxima, hours)
+    assert list(found.values()) == sorted(found.values())
+    for level, budget in BUDGETS.items():
+        assert (maxima >= found[level]).sum() <= max(budget * hours, 1)
+
+
+def test_intervals_of_rates_and_shares_are_the_known_ones() -> None:
+    assert rule_of_three(0, 100.0) == pytest.approx(0.02996, rel=1e-3)
+    assert list(rate_interval(0, 1.0)) == pytest.approx([0.0, 3.689], rel=1e-3)
+    assert list(share_interval(95, 100)) == pytest.approx([0.887, 0.984], abs=1e-3)
+
+
+def test_what_is_learned_waits_until_nothing_was_wrong() -> None:
+    usual = Usual(np.array([0.1]))
+    for at in range(FEWEST + WAITS + 2):
+        usual.take(float(at), np.array([1.0]), quiet=True)
+    assert usual.known.all()
+    for at in range(5):
+        usual.take(100.0 + at, np.array([9.0]), quiet=True)
+    usual.take(106.0, np.array([9.0]), quiet=False)  # it was a danger
+    assert float(usual.take(107.0, np.array([1.0]), quiet=True)[0]) == 0.0
+    assert float(usual.take(108.0, np.array([9.0]), quiet=True)[0]) > 5.0
+
+
+def test_robots_learn_nothing_of_each_other() -> None:
+    one, other = Watch(CALIBRATION), Watch(CALIBRATION)
+    rows(one, 300, left_knee_temperature=90.0)
+    rows(other, 300, left_knee_temperature=30.0)
+    alone = Watch(CALIBRATION)
+    rows(alone, 300, left_knee_temperature=30.0)
+    assert other.verdict == alone.verdict
+
+
+def test_the_shipped_calibration_names_its_detectors_levels_and_source() -> None:
+    assert isinstance(CALIBRATION, Calibration)
+    assert CALIBRATION.detectors == DETECTORS
+    assert min(CALIBRATION.weights) >= 0.0
+    assert set(CALIBRATION.thresholds) == {level.word for level in URGENT}
+    assert all(math.isfinite(one) for one in CALIBRATION.thresholds.values())
+    assert "simulated" in CALIBRATION.learned_from
