@@ -29,7 +29,7 @@ from server_gui.views.unit_plot import UnitPlot
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.elided import ElidedLabel
 from server_gui.views.widgets.files import ask_save, save_whole
-from server_gui.views.widgets.plain import set_tip
+from server_gui.views.widgets.plain import PlainLabel, set_tip
 from server_gui.views.workspace.beside_menu import BesideMenu, others_of
 from server_gui.views.workspace.drawing import AnyPlot, draw, flag, read
 from server_gui.views.workspace.expression_bar import ExpressionBar
@@ -117,7 +117,7 @@ class Signals(QWidget):
         return self.area.cards
 
     @property
-    def empty(self) -> QWidget:
+    def empty(self) -> PlainLabel:
         """What says what to do while there is none."""
         return self.area.empty
 
