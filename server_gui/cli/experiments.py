@@ -16,7 +16,7 @@ from gateway.cli.arguments import number
 from gateway.cli.connect import check_names, connect, parameter_names, parser
 from gateway.cli.set import change_of, value_of
 from gateway.cli.text import say, say_json, warn
-from gateway.client import ClientError
+from gateway.client import ClientError, Robot
 from gateway.units import Unit
 from gateway.wire.parameter import ParameterInfo
 from gateway.wire.robot import Description
@@ -191,7 +191,7 @@ def _run(command: str, arguments: argparse.Namespace, planned: Planner) -> int:
             return 1
         _follow(run, followed, ending_, arguments)
         # Its last words have their time: a lease that is given back ends what else may be on trial.
-    told = result(run, "", unit)
+    told = result(run, followed.station.who, unit)
     if told is not None:
         _keep(told, arguments, command)
     _say_result(run, told, arguments, command)
@@ -212,12 +212,22 @@ def _plan(command: str, arguments: argparse.Namespace, planned: Planner) -> tupl
         arguments.name = info.name
         if info.problem or info.read_only:
             raise BadPlan(f"{info.name}: {info.read_only or info.problem}")
-        held = robot.read(info.name).values[info.name]
-        if held.value is None:
-            raise BadPlan(f"{info.name} cannot be read: {held.problem}")
+        held = _held(robot, info.name)
         if any(info.name in trial.before for trial in description.trials):
             raise BadPlan(f"{info.name} is on trial: keep it, or take it back, first")
-        return planned(info, float(held.value), Unit(info.unit, info.unit, digits=4), description), info.unit
+        return planned(info, held, Unit(info.unit, info.unit, digits=4), description), info.unit
+
+
+def _held(robot: Robot, name: str) -> float:
+    """What the device holds; one that has been asked nothing for a while may not have answered yet."""
+    until_s = time.monotonic() + REACH_S
+    while True:
+        held = robot.read(name).values[name]
+        if held.value is not None:
+            return float(held.value)
+        if time.monotonic() > until_s:
+            raise BadPlan(f"{name} cannot be read: {held.problem}")
+        time.sleep(BEAT_S)
 
 
 def _begin(plan: Plan, followed: FollowedRobot, ending_: Ending) -> Run:

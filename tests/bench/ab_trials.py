@@ -20,7 +20,7 @@ import json
 import math
 import os
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from typing import Any, Final
 
@@ -213,18 +213,17 @@ def of_made_up(count: int) -> int:
     return int(max(share for shape, share in wrong.items() if not SHAPES[shape][1]) > 2 * MOST_WRONG)
 
 
-def main() -> int:
+def main(argv: Sequence[str] = ()) -> int:
     """Exit code: 1 where more is wrong than may be."""
-    made = argparse.ArgumentParser()
-    made.add_argument("--quick", action="store_true")
+    made = argparse.ArgumentParser("tests.bench ab_trials")
     made.add_argument("--walks", type=int, default=WALKS)
     made.add_argument("--from", dest="first", type=int, default=0)
     made.add_argument("--case", action="append", choices=list(CASES))
     made.add_argument("--made-up", type=int, default=0)
-    asked, _ = made.parse_known_args()
+    asked = made.parse_args(argv)
     if asked.made_up:
         return of_made_up(asked.made_up)
-    walks = 1 if asked.quick else asked.walks
+    walks = 1 if "--quick" in sys.argv else asked.walks
     numbers = range(asked.first, asked.first + walks)
     tasks = [(case, number) for number in numbers for case in (asked.case or CASES)]
     right: collections.Counter[str] = collections.Counter()
@@ -239,4 +238,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main([word for word in sys.argv[1:] if word != "--quick"]))

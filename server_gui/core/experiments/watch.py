@@ -5,12 +5,14 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 from server_gui.core.alarms.alarm import Alarm
+from server_gui.core.alarms.texts import Kind as AlarmKind
 from server_gui.core.experiments.plan import Bounds
 from server_gui.core.follow.events import Described, Event, Journalled, Looked, Telemetry
 
 AS_USUAL: Final = 2.0  # times the largest that was seen before: a bound where none was given
 SETTLES_NS: Final = 1_500_000_000  # after which what was read is what was written
 GUARD: Final = "guard"
+OWN_RULE: Final = AlarmKind.STALE  # shown after half a second, which a busy desk has; here it takes longer
 ENDING: Final = {
     "stop": "somebody has sent a STOP",
     "stop still held": "a stop is held",
@@ -71,7 +73,7 @@ class Watch:
         """Look at the alarms of now: whatever was not there at the beginning ends it."""
         if self._begun:
             for alarm in alarms:
-                if alarm.key not in self._alarms:
+                if alarm.key not in self._alarms and alarm.kind is not OWN_RULE:
                     self._ends(alarm.brief)
 
     def _ends(self, why: str) -> None:

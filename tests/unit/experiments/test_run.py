@@ -8,6 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gateway.wire.control import JournalEntries
+from server_gui.core.alarms.alarm import Alarm
+from server_gui.core.alarms.texts import Kind as AlarmKind
 from server_gui.core.experiments.machine import ENDS, TABLE, Action, State
 from server_gui.core.experiments.machine import Event as Step
 from server_gui.core.follow.events import Journalled
@@ -112,6 +114,15 @@ def test_each_rule_ends_it_at_once_with_its_reason(what: str, why: str) -> None:
     assert why in world.run.why
     assert len(world.wrote) <= wrote + (what in ("another desk has the lease", "nobody watches"))
     assert world.run.state is State.OVER
+
+
+def test_a_pause_shorter_than_the_rule_ends_nothing() -> None:
+    """The window says *stale* after half a second: on a busy desk that would end every long trial."""
+    world = World()
+    world.until(State.HOLDING)
+    world.alarms = [Alarm(AlarmKind.STALE, "", "nothing new comes")]
+    world.settle()
+    assert world.run.is_whole
 
 
 def test_what_another_master_has_written_is_never_called_back() -> None:
