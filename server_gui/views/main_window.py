@@ -129,7 +129,9 @@ class MainWindow(QMainWindow):
         self.header = Header(desk, theme, menu)
         self.header.stopped.connect(self.stopped)
         self.header.reset.connect(lambda station: ask_reset(self, station))
+        # Rooms before what is in them: Qt styles all of a widget anew wherever it is put into another.
         self._middle = QWidget()
+        self.setCentralWidget(self._middle)
         self.alarms = AlarmStrip(desk, theme, self._middle)
         self.alarms.cleared.connect(lambda station: ask_clear(self, station))
         self.alarms.shown.connect(self.show_around)
@@ -157,11 +159,17 @@ class MainWindow(QMainWindow):
         self.empty.pairing.connect(self.robots.begin_pairing)
         self.empty.simulator.connect(self.simulator)
         self.empty.recordings.connect(self._look_at_recordings)
-        self.tabs = QTabWidget()
+        self.tabs, self._pages = QTabWidget(), QStackedWidget()
         self.tabs.setAccessibleName("Views")
+        column = _column(self._middle)
+        column.addWidget(self._pages, 1)
+        nobody = Scrolled()
+        self._pages.addWidget(nobody)
+        nobody.setWidget(self.empty)
+        self._pages.addWidget(self.tabs)
         live = (self.overview, self.signals, self.resources, self.buses, self.objects, self.audit, self.edits)
         for title, view in zip(OF_A_ROBOT, live, strict=True):
-            self.tabs.addTab(Scrolled(view), title)
+            self._add_tab(view, title)
         self._views: tuple[View, ...] = live
         self._live = len(self._views)  # tabs that show the robot that is looked at
         if archive is not None:
@@ -170,8 +178,8 @@ class MainWindow(QMainWindow):
             self.models = ModelsPage(archive.models, theme)
             self._views += (self.recordings, self.cloud, self.models)
             self.tabs.addTab(self.recordings, "Re&cordings")
-            self.tabs.addTab(Scrolled(self.cloud), "C&loud")
-            self.tabs.addTab(Scrolled(self.models), "&Models")
+            self._add_tab(self.cloud, "C&loud")
+            self._add_tab(self.models, "&Models")
         self._commissioning = commissioning
         self._is_closing = self._is_ending = False
         if commissioning is not None:
@@ -181,10 +189,8 @@ class MainWindow(QMainWindow):
             self.empty.offer_commissioning(lambda: self.tabs.setCurrentWidget(self.commission))
         self._bar = StatusBar(desk, theme)
         self.setStatusBar(self._bar)
-        self._pages = QStackedWidget()
-        self._pages.addWidget(Scrolled(self.empty))
-        self._pages.addWidget(self.tabs)
         self.page_bar = PageBar(self.tabs, self._help_corner())
+        column.addWidget(self.trial)  # below: when it comes or goes, no tab moves
         self._build()
         self._bind_keys()
         menu.setMenu(self._view_menu())
@@ -328,18 +334,19 @@ class MainWindow(QMainWindow):
 
     # --- how it is put together
 
+    def _add_tab(self, view: QWidget, title: str) -> None:
+        room = Scrolled()
+        self.tabs.addTab(room, title)
+        room.setWidget(view)
+
     def _build(self) -> None:
-        column = _column(self._middle)
-        column.addWidget(self._pages, 1)
-        column.addWidget(self.trial)  # below: when it comes or goes, no tab moves
         self.keys = KeysSheet(self._theme, self._middle)
-        self.setCentralWidget(self._middle)
         above = QWidget()
+        self.setMenuWidget(above)
         top = _column(above)
         top.addWidget(self.header)
         top.addWidget(self.alarms)
         top.addWidget(self.page_bar)
-        self.setMenuWidget(above)
         left, right, below = Area.LeftDockWidgetArea, Area.RightDockWidgetArea, Area.BottomDockWidgetArea
         panels = {
             "Robots": (self.robots, left),

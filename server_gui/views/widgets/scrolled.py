@@ -8,15 +8,15 @@ from PySide6.QtWidgets import QScrollArea, QWidget
 class Scrolled(QScrollArea):
     """Has no focus of its own. Words that need more lines where they are narrow get them, also later ones."""
 
-    def __init__(self, view: QWidget) -> None:
+    def __init__(self, view: QWidget | None = None) -> None:
         super().__init__()
-        self._view = view
         self.setWidgetResizable(True)
-        self.setWidget(view)
+        if view is not None:
+            self.setWidget(view)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        if event.type() == QEvent.Type.LayoutRequest and watched is self._view:
+        if event.type() == QEvent.Type.LayoutRequest and watched is self.widget():
             self._grow()
         return super().eventFilter(watched, event)
 
@@ -25,7 +25,8 @@ class Scrolled(QScrollArea):
         self._grow()
 
     def _grow(self) -> None:
-        layout = self._view.layout()
-        if layout is not None and layout.hasHeightForWidth():
+        view = self.widget()
+        layout = None if view is None else view.layout()
+        if view is not None and layout is not None and layout.hasHeightForWidth():
             width = max(self.viewport().width(), layout.totalMinimumSize().width())
-            self._view.setMinimumHeight(layout.totalMinimumHeightForWidth(width))
+            view.setMinimumHeight(layout.totalMinimumHeightForWidth(width))
