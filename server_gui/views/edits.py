@@ -17,13 +17,14 @@ from PySide6.QtWidgets import (
 
 from gateway.amounts import counted
 from server_gui.core.desk.desk import Desk
+from server_gui.core.desk.station import Station
 from server_gui.core.evidence.comparison import Measured, Word
 from server_gui.core.evidence.cycles import DRAWN
 from server_gui.core.evidence.file import Told
 from server_gui.core.evidence.wording import changes, number, share
 from server_gui.core.experiments.plan import Kind
 from server_gui.core.experiments.wording import record, what, whole
-from server_gui.views.experiments.form import ExperimentForm
+from server_gui.views.experiments.form import ExperimentForm, Tried
 from server_gui.views.experiments.response_plot import ResponsePlot
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text, set_tone
@@ -102,8 +103,8 @@ class Edits(QWidget):
         self.ab, self.sweep = QPushButton("A/B trial…"), QPushButton("Sweep…")
         self.ab.setToolTip("Two values of a parameter against each other, several times in a drawn order")
         self.sweep.setToolTip("Values of a parameter upwards in small steps, while you watch")
-        self.ab.clicked.connect(lambda: self._ask(Kind.AB))
-        self.sweep.clicked.connect(lambda: self._ask(Kind.SWEEP))
+        self.ab.clicked.connect(lambda: self._ask(Kind.AB, self._desk.selected))
+        self.sweep.clicked.connect(lambda: self._ask(Kind.SWEEP, self._desk.selected))
         buttons, column = QHBoxLayout(), QVBoxLayout()
         buttons.addWidget(self.ab)
         buttons.addWidget(self.sweep)
@@ -111,9 +112,18 @@ class Edits(QWidget):
         column.addLayout(buttons)
         return column
 
-    def _ask(self, kind: Kind) -> None:
-        if self._desk.selected is not None:
-            self.form = ExperimentForm(self, self._desk, self._desk.selected, self._theme, kind)
+    def compare(self, station: Station) -> None:
+        """Take back what is on trial there, and ask about an A/B trial of its value and the one before."""
+        trial = station.writing.trial
+        if trial is None or len(trial.values) != 1:
+            return
+        ((name, value),) = trial.values.items()
+        station.end_trial()
+        self._ask(Kind.AB, station, Tried(name, float(trial.before[name]), float(value)))
+
+    def _ask(self, kind: Kind, station: Station | None, tried: Tried | None = None) -> None:
+        if station is not None:
+            self.form = ExperimentForm(self, self._desk, station, self._theme, kind, tried)
             self.form.show()
 
     def _grow(self, known: list[Told]) -> None:

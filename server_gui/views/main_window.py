@@ -157,6 +157,8 @@ class MainWindow(QMainWindow):
         self.objects.edited.connect(self._edit_parameter)
         self.audit = Audit(desk, theme, None if archive is None else archive.journals)
         self.edits = Edits(desk, theme)
+        for bar in (self.trial, self.parameters.trial):
+            bar.compare.connect(self.edits.compare)
         self.help, self.help_button = Help(theme), QPushButton("?")
         self.empty = EmptyView(theme)
         self.empty.added.connect(self.added)

@@ -11,6 +11,7 @@ from server_gui.core.experiments.machine import Event, State
 from server_gui.core.tuning.commands import ReadBack
 from server_gui.views.main_window import MainWindow
 from tests.gui.fakes import Bench
+from tests.gui.running import wait
 from tests.support.desk import looked
 from tests.unit.evidence.test_file import told
 
@@ -101,6 +102,36 @@ def test_stop_and_take_back_is_in_sight_until_it_was_read_back(bench: Bench, win
     assert not window.experiment.isVisible()
 
 
+def test_from_a_trials_bar_both_of_its_values_are_asked_about(bench: Bench, window: MainWindow) -> None:
+    bench.station.take([looked()])
+    bench.station.writing.done(Written(7, {NAME: 0.4}, {NAME: 0.42}, 40.0))
+    window.trial.refresh()
+    window.trial.ab.click()
+    form = window.edits.form
+    assert bench.first.named("revert") == [(7,)]
+    assert [field.text() for field in form.fields.values()] == ["400", "420"]
+    assert "on trial" in form.words.text()
+    assert not form.begin.isEnabled()
+    bench.first.answer(Reverted(7, {NAME: "taken back"}))
+    bench.station.take([looked({NAME: 0.4})])
+    wait(form.begin.isEnabled, "it may begin")
+    said = form.words.text()
+    form.begin.click()
+    run = bench.station.experiment
+    assert run is not None
+    assert f"seed {run.plan.seed}" in said, "what was said is what is begun"
+
+
+def test_a_trial_of_several_parameters_is_no_ab_trial(bench: Bench, window: MainWindow) -> None:
+    several = {NAME: 0.4, "gait.cycle_time": 2.0}
+    bench.station.writing.done(Written(7, several, several, 40.0))
+    window.trial.refresh()
+    assert window.trial.isVisible()
+    assert not window.trial.ab.isVisible()
+    window.edits.compare(bench.station)
+    assert not bench.first.named("revert")
+
+
 def test_a_second_one_is_refused_while_one_goes_on(bench: Bench, window: MainWindow) -> None:
     begun(bench, window)
     window.edits.ab.click()
@@ -128,4 +159,4 @@ def test_a_sweep_is_told_with_its_response_and_without_its_parts(
     assert ("NOT CONFIRMED" in window.edits.verdict.text()) is not is_back
     assert "proposal: 3200" in window.edits.words.text()
     assert "3200: 0.0041" in window.edits.response.accessibleDescription()
-    window.grab()
+    window.edits.response.grab()

@@ -146,7 +146,7 @@ class Run:
         """Look at the time, and at what was broken; call it some times a second."""
         if self.is_over:
             return
-        self.watch.see(alarms)
+        self.watch.see(alarms, self._clock())
         broken = self._broken()
         if broken is not None and self.state in (State.LOOKING, State.WRITING, State.HOLDING):
             self.halt(broken)

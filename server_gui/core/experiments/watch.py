@@ -12,7 +12,14 @@ from server_gui.core.follow.events import Described, Event, Journalled, Looked, 
 AS_USUAL: Final = 2.0  # times the largest that was seen before: a bound where none was given
 SETTLES_NS: Final = 1_500_000_000  # after which what was read is what was written
 GUARD: Final = "guard"
-OWN_RULE: Final = AlarmKind.STALE  # shown after half a second, which a busy desk has; here it takes longer
+# What a busy computer has for a moment, and the robot withstands: these count once they last.
+PASSING: Final = frozenset({AlarmKind.PART_STALE, AlarmKind.STALLED})
+PASSES_NS: Final = 2_000_000_000
+# Not of the robot's state, or looked at elsewhere: rows that do not come have a rule of their own (`STALE_S`
+# of a run), and what a troubled bus has lost is left out with its strides.
+NO_REASON: Final = frozenset(
+    {AlarmKind.STALE, AlarmKind.BUS, AlarmKind.NOT_RECORDED, AlarmKind.RECORDING, AlarmKind.UPLOAD}
+)
 ENDING: Final = {
     "stop": "somebody has sent a STOP",
     "stop still held": "a stop is held",
@@ -38,6 +45,7 @@ class Watch:
     why: str | None = None
     most: dict[str, float] = field(default_factory=dict)  # by quantity, before the beginning
     _alarms: frozenset[object] = frozenset()
+    _lasting: dict[object, int] = field(default_factory=dict)  # since when, on our clock
     _begun: bool = False
     _entry: int = 0  # of the journal: the newest that is known
     _boot_id: str | None = None
@@ -69,12 +77,15 @@ class Watch:
         for why in self._broken(event):
             self._ends(why)
 
-    def see(self, alarms: Iterable[Alarm]) -> None:
-        """Look at the alarms of now: whatever was not there at the beginning ends it."""
-        if self._begun:
-            for alarm in alarms:
-                if alarm.key not in self._alarms and alarm.kind is not OWN_RULE:
-                    self._ends(alarm.brief)
+    def see(self, alarms: Iterable[Alarm], now_ns: int) -> None:
+        """Look at the alarms of now (our clock): what was not there at the beginning ends it."""
+        if not self._begun:
+            return
+        new = [one for one in alarms if one.key not in self._alarms and one.kind not in NO_REASON]
+        self._lasting = {one.key: self._lasting.get(one.key, now_ns) for one in new}
+        for alarm in new:
+            if alarm.kind not in PASSING or now_ns - self._lasting[alarm.key] >= PASSES_NS:
+                self._ends(alarm.brief)
 
     def _ends(self, why: str) -> None:
         if self._begun and self.why is None:

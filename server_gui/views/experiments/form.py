@@ -1,8 +1,9 @@
 """What is to be tried: a parameter, its values, how long each is held; said whole before it begins."""
 
-from typing import Final
+import random
+from typing import Final, NamedTuple
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, QTimer
 from PySide6.QtWidgets import (
     QComboBox,
     QDialog,
@@ -36,21 +37,40 @@ from server_gui.core.experiments.plan import (
 )
 from server_gui.core.experiments.wording import stated
 from server_gui.core.tuning.edits import unit_of
+from server_gui.core.tuning.writing import WriteState
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.plain import PlainLabel
 
 WIDTH: Final = 460  # at text of 100 %
 FIELDS: Final = {Kind.AB: ("A", "B"), Kind.SWEEP: ("From", "To", "Step")}
+LOOK_MS: Final = 500
 USUAL: Final = "twice what is usual"
+
+
+class Tried(NamedTuple):
+    """What was on trial: a parameter, the value from before, and the one that was tried (SI)."""
+
+    parameter: str
+    before: float
+    value: float
 
 
 class ExperimentForm(QDialog):
     """Never modal: STOP stays in reach. It begins only what it has said, and only where that can be."""
 
-    def __init__(self, parent: QWidget, desk: Desk, station: Station, theme: Theme, kind: Kind) -> None:
+    def __init__(
+        self,
+        parent: QWidget,
+        desk: Desk,
+        station: Station,
+        theme: Theme,
+        kind: Kind,
+        tried: Tried | None = None,
+    ) -> None:
         super().__init__(parent)
-        self._desk, self._station, self._kind = desk, station, kind
+        self._desk, self._station, self._kind, self._tried = desk, station, kind, tried
+        self._seed = random.SystemRandom().randrange(2**31)  # what is said is what is begun
         self.setWindowTitle(f"{kind.value[0].upper()}{kind.value[1:]} · {station.title}")
         self.setModal(False)
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
@@ -88,8 +108,13 @@ class ExperimentForm(QDialog):
             spin.valueChanged.connect(lambda _: self._look())
         trial = station.writing.trial
         edited = next(iter(trial.values if trial else station.edits.staged), "")
+        edited = tried.parameter if tried else edited
         self.parameter.setCurrentIndex(max(0, self.parameter.findText(edited)))
         self._chosen()
+        # What is held may change while it is asked about: it does while a trial goes back.
+        self._clock = QTimer(self, interval=LOOK_MS)
+        self._clock.timeout.connect(self._look)
+        self._clock.start()
 
     @property
     def plan(self) -> Plan:
@@ -100,13 +125,15 @@ class ExperimentForm(QDialog):
             raise BadPlan(refused)
         if self._station.writing.trial is not None:
             raise BadPlan("something is on trial: keep it, or take it back, first")
+        if self._station.writing.state is WriteState.WRITING:
+            raise BadPlan(self._station.writing.text)
         values = [_number(field.text(), name, unit) for name, field in self.fields.items()]
         dwell = Dwell(self.cycles.value(), self.transient.value())
         bounds = Bounds(_bound(self.error, "tracking error"), _bound(self.current, "current"))
         if self._kind is Kind.AB:
             first, second = values
-            pairs = self.pairs.value()
-            return ab(info, held, (first, second), unit, pairs=pairs, dwell=dwell, bounds=bounds)
+            pairs, seed = self.pairs.value(), self._seed
+            return ab(info, held, (first, second), unit, pairs=pairs, dwell=dwell, bounds=bounds, seed=seed)
         first, last, step = values
         return sweep(info, held, (first, last, step), unit, dwell=dwell, bounds=bounds)
 
@@ -140,7 +167,16 @@ class ExperimentForm(QDialog):
         return info, float(held.value), unit_of(name, info.unit, self._desk.shown.units)
 
     def _chosen(self) -> None:
-        """Another parameter: begin with what is held, and what was typed for it."""
+        """Another parameter: begin with what was on trial; else with what is held, and was typed for it."""
+        tried = self._tried
+        if tried is not None and tried.parameter == self.parameter.currentText():
+            info = self._station.known[tried.parameter]
+            unit = unit_of(info.name, info.unit, self._desk.shown.units)
+            self.unit.setText(unit.symbol or "no unit")
+            for name, value in (("A", tried.before), ("B", tried.value)):
+                self.fields[name].setText(unit.editable(value))
+            self._look()
+            return
         try:
             info, held, unit = self._held()
         except BadPlan:

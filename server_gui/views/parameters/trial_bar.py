@@ -11,7 +11,8 @@ from server_gui.views.widgets.plain import PlainLabel
 
 
 class TrialBar(QFrame):
-    """Hidden while nothing is on trial. `keep` and `take_back` are what people decide.
+    """Hidden while nothing is on trial. `keep` and `take_back` are what people decide; `compare`: to try it
+    against the value from before, of this station.
 
     The window has one of the parameters' panel, and one above its tabs for when that is not in sight: the one
     above is `of_all` robots, `station` is the one whose trial it shows.
@@ -19,6 +20,7 @@ class TrialBar(QFrame):
 
     keep = Signal()
     take_back = Signal()
+    compare = Signal(object)
 
     def __init__(self, desk: Desk, *, of_all: bool = False) -> None:
         super().__init__()
@@ -38,8 +40,12 @@ class TrialBar(QFrame):
         keep.setObjectName("primary")
         keep.clicked.connect(self.keep)
         back.clicked.connect(self.take_back)
+        self.ab = QPushButton("A/B …")
+        self.ab.setToolTip("Take it back now, and ask about an A/B trial of both values")
+        self.ab.clicked.connect(lambda: self.compare.emit(self.station))
         row = QHBoxLayout()
         row.addWidget(back)
+        row.addWidget(self.ab)
         row.addWidget(keep)
         everything = QVBoxLayout(self)
         everything.addWidget(self.words)
@@ -54,6 +60,7 @@ class TrialBar(QFrame):
         self.setVisible(trial is not None)
         if station is None or trial is None:
             return
+        self.ab.setVisible(len(trial.values) == 1)
         left_s = trial.left_s()
         if (station.name, trial.write) != self._write:
             self._write = station.name, trial.write

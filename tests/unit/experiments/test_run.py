@@ -116,13 +116,30 @@ def test_each_rule_ends_it_at_once_with_its_reason(what: str, why: str) -> None:
     assert world.run.state is State.OVER
 
 
-def test_a_pause_shorter_than_the_rule_ends_nothing() -> None:
-    """The window says *stale* after half a second: on a busy desk that would end every long trial."""
+@pytest.mark.parametrize(
+    ("kind", "lasts_s", "ends"),
+    [
+        (AlarmKind.STALE, 4.0, False),
+        (AlarmKind.BUS, 4.0, False),
+        (AlarmKind.UPLOAD, 4.0, False),
+        (AlarmKind.PART_STALE, 1.0, False),
+        (AlarmKind.PART_STALE, 3.0, True),
+        (AlarmKind.BUS_FAILS, 0.5, True),
+        (AlarmKind.BLIND, 0.5, True),
+        (AlarmKind.REPORTS, 0.5, True),
+    ],
+)
+def test_what_a_busy_computer_has_for_a_moment_ends_nothing(
+    kind: AlarmKind, lasts_s: float, ends: bool
+) -> None:
     world = World()
     world.until(State.HOLDING)
-    world.alarms = [Alarm(AlarmKind.STALE, "", "nothing new comes")]
+    world.alarms = [Alarm(kind, "gait", "said of it")]
+    world.sleep(lasts_s)
+    world.alarms = []
     world.settle()
-    assert world.run.is_whole
+    assert world.run.is_whole is not ends
+    assert ("said of it" in world.run.why) is ends
 
 
 def test_what_another_master_has_written_is_never_called_back() -> None:
