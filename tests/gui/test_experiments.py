@@ -59,7 +59,7 @@ def begun(bench: Bench, window: MainWindow) -> None:
     form.parameter.setCurrentText(NAME)
     form.fields["B"].setText("420")
     assert form.begin.isEnabled(), form.words.text()
-    assert "10 pairs of 0.4 (A) and 0.42 (B)" in form.words.text()
+    assert "10 pairs of 400 mm (A) and 420 mm (B)" in form.words.text()
     form.begin.click()
 
 

@@ -94,6 +94,11 @@ class Plan:
     dwell: Dwell = field(default_factory=Dwell)
     bounds: Bounds = field(default_factory=Bounds)
     seed: int | None = None
+    unit: Unit = Unit("", "")  # in which people are told
+
+    def said(self, value: float) -> str:
+        """Return a value (SI) for people."""
+        return f"{self.unit.brief(value)} {self.unit.symbol}".rstrip()
 
     def expected_s(self, stride_s: float) -> float:
         """How long it takes at strides of so long."""
@@ -126,7 +131,7 @@ def ab(
     seed = random.SystemRandom().randrange(2**31) if seed is None else seed
     chosen = random.Random(seed).choice(orders(pairs).tolist())
     steps = [Step(one) for sign in chosen for one in (values if sign > 0 else values[::-1])]
-    return Plan(Kind.AB, info.name, held, values, tuple(steps), dwell, bounds, seed)
+    return Plan(Kind.AB, info.name, held, values, tuple(steps), dwell, bounds, seed, unit)
 
 
 def sweep(
@@ -155,7 +160,7 @@ def sweep(
     way = [held, *lead, *measured]
     _check(info, unit, [*itertools.pairwise(way), *((held, one) for one in measured)], dwell)
     steps = (*(Step(one, is_measured=False) for one in lead), *map(Step, measured))
-    return Plan(Kind.SWEEP, info.name, held, tuple(measured), steps, dwell, bounds)
+    return Plan(Kind.SWEEP, info.name, held, tuple(measured), steps, dwell, bounds, unit=unit)
 
 
 @functools.lru_cache(maxsize=16)

@@ -75,7 +75,7 @@ class Run:
         self.joints = self._walk.joints
         component = plan.name.partition(".")[0]
         self.edited = tuple(joint for joint in self.joints if joint == component)
-        self.watch = Watch(plan.name, self.edited or self.joints, plan.bounds)
+        self.watch = Watch(plan.name, self.edited or self.joints, plan.bounds, plan.said)
         self.watch.take(described)
         self.place = 0  # of the step
         self._write: int | None = None  # that is on trial
@@ -190,11 +190,11 @@ class Run:
 
     def _look(self, alarms: Iterable[Alarm]) -> None:
         """Begin once it is seen that somebody walks, on a robot that nothing is wrong with."""
-        problem = next((alarm.brief for alarm in alarms if alarm.kind in IN_THE_WAY), None)
+        problem, said = next((one.brief for one in alarms if one.kind in IN_THE_WAY), None), self.plan.said
         if problem is not None:
             self.halt(f"it does not begin: {problem}")
         elif self._held is not None and self._held != self.plan.original:
-            self.halt(f"{self.plan.name} is {self._held:g}, not {self.plan.original:g} any more: begin anew")
+            self.halt(f"{self.plan.name} is {said(self._held)}, not {said(self.plan.original)} any more: begin anew")
         elif self._held is not None and self._least() >= LOOKS_AT:
             self.watch.begin(alarms, self._walk.newest_ns)
             self._do(Event.READY)
@@ -230,7 +230,7 @@ class Run:
         self._cycles = {leg: [] for leg in Leg}
         self._do(Event.WRITTEN)
         if before != self.plan.original or len(written.before) != 1:
-            self.halt(f"the trial would go back to {before}, and not to {self.plan.original:g} alone")
+            self.halt(f"the trial would go back to {before} (SI), and not to {self.plan.said(self.plan.original)} alone")
 
     def _not_written(self, error: Exception) -> None:
         self.why = self.why or f"not written: {error}"
@@ -251,7 +251,7 @@ class Run:
         when_done(self._commands.read_back(self.plan.name), self._deliver, self._read, self._not_read)
 
     def _read(self, found: ReadBack) -> None:
-        self.back = f"{self.plan.name} = {'not known' if found.value is None else f'{found.value:g}'}"
+        self.back = f"{self.plan.name} = {'not known' if found.value is None else self.plan.said(found.value)}"
         if found.problem:
             self.back += f", {found.problem}"
         if found.on_trial:

@@ -1,6 +1,6 @@
 """The stop rules: what ends an experiment, each in words. Nothing here asks the robot anything."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -42,6 +42,7 @@ class Watch:
     name: str
     joints: tuple[str, ...]
     bounds: Bounds
+    said: Callable[[float], str] = "{:g}".format  # a value of it, for people
     why: str | None = None
     most: dict[str, float] = field(default_factory=dict)  # by quantity, before the beginning
     _alarms: frozenset[object] = frozenset()
@@ -154,7 +155,7 @@ class Watch:
             return
         else:
             self._differs += 1
-            found = f"{self.name} is {known.value:g} and not {self._value:g}: somebody else has written it"
+            found = f"{self.name} is {self.said(known.value)} and not {self.said(self._value)}: somebody else has written it"
         if self._differs > 1:
             yield found
 

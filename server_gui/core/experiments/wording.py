@@ -19,14 +19,15 @@ def stated(plan: Plan) -> Iterator[str]:
     dwell = plan.dwell
     each = counted(dwell.cycles, "gait cycle") if dwell.seconds is None else f"{dwell.seconds:g} s"
     left_out = counted(dwell.transient, "gait cycle")
-    yield f"{plan.kind.value} of {plan.name}, which is {number(plan.original)}"
+    yield f"{plan.kind.value} of {plan.name}, which is {plan.said(plan.original)}"
     if plan.kind is Kind.AB:
-        first, second = map(number, plan.values)
+        first, second = map(plan.said, plan.values)
         pairs = len(plan.steps) // 2
         yield f"  {pairs} pairs of {first} (A) and {second} (B), order drawn with seed {plan.seed}"
     else:
-        steps = [number(step.value) + ("" if step.is_measured else "*") for step in plan.steps]
-        yield f"  {', '.join(steps)}{'; * only on the way' if any('*' in one for one in steps) else ''}"
+        steps = [plan.unit.brief(step.value) + ("" if step.is_measured else "*") for step in plan.steps]
+        way = "; * only on the way" if any("*" in one for one in steps) else ""
+        yield f"  {', '.join(steps)} {plan.unit.symbol}".rstrip() + way
     yield f"  each for {each}, {left_out} after each change left out: about {minutes(plan.expected_s(1.2))}"
     yield (
         "  it ends at once, and the original value comes back, with any new alarm or warning of the guard, a "
@@ -57,7 +58,7 @@ def progress(run: Run) -> str:
         else (counted(run.cycles, "gait cycle"))
     )
     return (
-        f"{what}: {number(step.value)} ({run.place + 1} of {len(plan.steps)}), {held}; "
+        f"{what}: {plan.said(step.value)} ({run.place + 1} of {len(plan.steps)}), {held}; "
         f"about {minutes(run.left_s)} left; back by itself in {run.trial_left_s:.0f} s"
     )
 

@@ -150,7 +150,7 @@ def test_what_another_master_has_written_is_never_called_back() -> None:
     world.settle()
     assert world.run.state is State.NOT_CONFIRMED
     assert "somebody else has written it" in world.run.why
-    assert f"{NAME} = 0.55" in world.run.back
+    assert f"{NAME} = 550 mm" in world.run.back
 
 
 def test_a_robot_that_never_answers_again_is_not_confirmed() -> None:
