@@ -148,7 +148,8 @@ def shown(told: Told) -> Iterator[str]:
     yield from (f"not enough cycles for {counted(count, 'metric')}: {why}" for why, count in few.items())
     silent = [one for one in evidence.metrics if one.word is Word.NO_DATA]
     if silent:
-        yield "\nno data: " + ", ".join(one.title for one in silent)
+        titles = ", ".join(one.title for one in silent)
+        yield f"\nno data: {titles if judged else counted(len(silent), 'metric')}"
     if judged:
         yield (EXPLAINED if tried is None else EXPLAINED_AB).rstrip()
 

@@ -2,6 +2,7 @@
 
 import argparse
 import os
+import re
 import select
 import sys
 import time
@@ -50,6 +51,7 @@ from server_gui.terminal.followed_robot import FollowedRobot
 BEAT_S: Final = 0.1
 REACH_S: Final = 10.0  # until a robot has told what it is made of
 RATE_HZ: Final = 100.0
+NEGATIVE: Final = re.compile(r"-[\d.]")
 NOT_CONFIRMED: Final = 3  # exit status
 RULES: Final = """
 Each value is a trial: the robot takes it back by itself when its time is over, when this command, its
@@ -93,7 +95,7 @@ def ab_main(argv: list[str]) -> int:
     )
     made.add_argument("--seed", type=int, metavar="N", help="of the order (default: another each time)")
     _add_shared(made)
-    arguments = made.parse_args(argv)
+    arguments = made.parse_args(_spaced(argv))
 
     def plan(info: ParameterInfo, held: float, unit: Unit, description: Description) -> Plan:
         first, second = _values(arguments.name, arguments.values, description)
@@ -112,7 +114,7 @@ def sweep_main(argv: list[str]) -> int:
         "values", metavar=("FROM", "TO", "STEP"), nargs=3, help="in its own unit or another: 3deg"
     )
     _add_shared(made)
-    arguments = made.parse_args(argv)
+    arguments = made.parse_args(_spaced(argv))
 
     def plan(info: ParameterInfo, held: float, unit: Unit, description: Description) -> Plan:
         first, last, step = _values(arguments.name, arguments.values, description)
@@ -144,8 +146,14 @@ def _add_shared(made: argparse.ArgumentParser) -> None:
     made.add_argument("--config", type=Path, metavar="FILE", help="the server's file: where it is kept")
 
 
+def _spaced(argv: list[str]) -> list[str]:
+    """With a space before what is below zero: argparse would take -3deg for an option."""
+    return [f" {word}" if NEGATIVE.match(word) else word for word in argv]
+
+
 def _whole(least: int, most: int) -> Callable[[str], int]:
     def whole(text: str) -> int:
+        text = text.strip()
         if not (text.isascii() and text.isdigit() and least <= int(text) <= most):
             raise argparse.ArgumentTypeError(f"{text!r} is no whole number from {least} to {most}")
         return int(text)
@@ -154,9 +162,10 @@ def _whole(least: int, most: int) -> Callable[[str], int]:
 
 
 def _positive(text: str) -> float:
+    text = text.strip()
     value = number(text)
     if not 0.0 < value < 1e9:
-        raise argparse.ArgumentTypeError(f"{text!r} is no number above 0")
+        raise argparse.ArgumentTypeError(f"{text!r} is no number above 0 (and below 1e9)")
     return value
 
 
@@ -169,14 +178,19 @@ def _bounds(arguments: argparse.Namespace) -> Bounds:
 
 
 def _values(name: str, texts: list[str], description: Description) -> Iterator[float]:
-    return (float(value_of(change_of(f"{name}={text}"), description)) for text in texts)
+    for text in texts:
+        try:
+            change = change_of(f"{name}={text.strip()}")
+        except argparse.ArgumentTypeError:
+            raise BadPlan(f"{text!r} is no number, with a unit or without, as in 0.42 or 3deg") from None
+        yield float(value_of(change, description))
 
 
 def _run(command: str, arguments: argparse.Namespace, planned: Planner) -> int:
     private_files()
     try:
         plan, unit = _plan(command, arguments, planned)
-    except (BadPlan, argparse.ArgumentTypeError) as error:
+    except BadPlan as error:
         warn(command, str(error))
         return 1
     say_of(arguments, "\n".join(stated(plan)))
@@ -226,7 +240,7 @@ def _held(robot: Robot, name: str) -> float:
         if held.value is not None:
             return float(held.value)
         if time.monotonic() > until_s:
-            raise BadPlan(f"{name} cannot be read: {held.problem}")
+            raise BadPlan(f"{name} cannot be read: {(held.problem or '').removeprefix(f'{name}: ')}")
         time.sleep(BEAT_S)
 
 

@@ -29,6 +29,7 @@ LONGEST_STRIDE_S: Final = 3.0
 LONGEST_TRIAL_S: Final = 300.0  # that a robot takes
 SPARE_S: Final = 15.0  # of a trial, for what is slow
 MOST_S: Final = 240.0
+PLAIN: Final = Unit("", "")
 UNEVEN: Final = 2  # pairs at most that more begin with one value than with the other
 BENT: Final = 0.5  # of what that would be where all early ones begin with the one, all late with the other
 
@@ -94,7 +95,7 @@ class Plan:
     dwell: Dwell = field(default_factory=Dwell)
     bounds: Bounds = field(default_factory=Bounds)
     seed: int | None = None
-    unit: Unit = Unit("", "")  # in which people are told
+    unit: Unit = PLAIN  # in which people are told
 
     def said(self, value: float) -> str:
         """Return a value (SI) for people."""
@@ -187,7 +188,7 @@ def _check(info: ParameterInfo, unit: Unit, ways: list[tuple[float, float]], dwe
     for old, new in ways:
         problem = refusal(new, old, info, unit)
         if problem is not None:
-            raise BadPlan(f"{info.name}, {unit.editable(new)} {unit.symbol}: {problem}".replace(" :", ":"))
+            raise BadPlan(f"{info.name}, {unit.brief(new)} {unit.symbol}: {problem}".replace(" :", ":"))
     if not FEWEST_CYCLES <= dwell.cycles <= MOST_CYCLES or not 0 <= dwell.transient <= MOST_TRANSIENT:
         raise BadPlan(
             f"each value is held for {FEWEST_CYCLES} to {MOST_CYCLES} gait cycles, and 0 to {MOST_TRANSIENT} "

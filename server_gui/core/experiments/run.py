@@ -180,8 +180,9 @@ class Run:
         return limit_s is not None and self._clock() - self._since_ns > limit_s * SECOND
 
     def _late(self) -> str:
+        unread = f"{self.plan.name} could not be read"
         return {
-            State.LOOKING: "nobody walks: no three gait cycles were seen, or the parameter could not be read",
+            State.LOOKING: unread if self._held is None else "nobody walks: no three gait cycles were seen",
             State.WRITING: "the robot has not answered a write in time",
             State.HOLDING: "too few gait cycles came in the time that a value may be held",
         }.get(self.state, "the robot has not answered in time")
@@ -194,7 +195,8 @@ class Run:
         if problem is not None:
             self.halt(f"it does not begin: {problem}")
         elif self._held is not None and self._held != self.plan.original:
-            self.halt(f"{self.plan.name} is {said(self._held)}, not {said(self.plan.original)} any more: begin anew")
+            held, planned = said(self._held), said(self.plan.original)
+            self.halt(f"{self.plan.name} is {held}, not {planned} any more: begin anew")
         elif self._held is not None and self._least() >= LOOKS_AT:
             self.watch.begin(alarms, self._walk.newest_ns)
             self._do(Event.READY)
@@ -230,7 +232,8 @@ class Run:
         self._cycles = {leg: [] for leg in Leg}
         self._do(Event.WRITTEN)
         if before != self.plan.original or len(written.before) != 1:
-            self.halt(f"the trial would go back to {before} (SI), and not to {self.plan.said(self.plan.original)} alone")
+            original = self.plan.said(self.plan.original)
+            self.halt(f"the trial would go back to {before} (SI), and not to {original} alone")
 
     def _not_written(self, error: Exception) -> None:
         self.why = self.why or f"not written: {error}"
@@ -251,7 +254,8 @@ class Run:
         when_done(self._commands.read_back(self.plan.name), self._deliver, self._read, self._not_read)
 
     def _read(self, found: ReadBack) -> None:
-        self.back = f"{self.plan.name} = {'not known' if found.value is None else self.plan.said(found.value)}"
+        held = "not known" if found.value is None else self.plan.said(found.value)
+        self.back = f"{self.plan.name} = {held}"
         if found.problem:
             self.back += f", {found.problem}"
         if found.on_trial:

@@ -149,13 +149,15 @@ class Watch:
             return
         if known.value is None:
             self._differs += 1
-            found = f"{self.name} cannot be read: {known.problem}"
+            problem = (known.problem or "").removeprefix(f"{self.name}: ")
+            found = f"{self.name} cannot be read: {problem}"
         elif known.value == self._value:
             self._differs = 0
             return
         else:
             self._differs += 1
-            found = f"{self.name} is {self.said(known.value)} and not {self.said(self._value)}: somebody else has written it"
+            held, ours = self.said(known.value), self.said(self._value)
+            found = f"{self.name} is {held} and not {ours}: somebody else has written it"
         if self._differs > 1:
             yield found
 

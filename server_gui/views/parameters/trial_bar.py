@@ -11,11 +11,11 @@ from server_gui.views.widgets.plain import PlainLabel
 
 
 class TrialBar(QFrame):
-    """Hidden while nothing is on trial. `keep` and `take_back` are what people decide; `compare`: to try it
-    against the value from before, of this station.
+    """Hidden while nothing is on trial. `keep`, `take_back` and `compare` are what people decide.
 
-    The window has one of the parameters' panel, and one above its tabs for when that is not in sight: the one
-    above is `of_all` robots, `station` is the one whose trial it shows.
+    `compare` tells the station: its value is to be tried against the one from before. The window has one of
+    the parameters' panel, and one above its tabs for when that is not in sight: the one above is `of_all`
+    robots, `station` is the one whose trial it shows.
     """
 
     keep = Signal()
