@@ -88,7 +88,9 @@ class Edits(QWidget):
         station = self._desk.selected
         self.ab.setEnabled(station is not None)
         self.sweep.setEnabled(station is not None)
-        judged = [] if station is None else whole(tuple(station.judged.values()))
+        run = None if station is None else station.experiment
+        writes = () if run is None else run.writes
+        judged = [] if station is None else whole(tuple(station.judged.values()), writes)
         known = sorted(judged, key=lambda one: -one.edit.utc_ns)
         if known == self._shown:
             return

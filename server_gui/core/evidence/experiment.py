@@ -58,3 +58,4 @@ class Experiment(Struct, frozen=True):
     judged_by: str = ""
     proposal: float | None = None
     reason: str = ""
+    writes: tuple[int, ...] = ()  # of all its trials, also of those whose period was not whole

@@ -54,6 +54,7 @@ def result(run: Run, who: str, unit: str, session: str = "") -> Told | None:
         judged_by=swept.judged_by if swept else "",
         proposal=swept.proposal if swept else None,
         reason=swept.reason if swept else "",
+        writes=tuple(run.writes),
     )
     told = replace(evidence, left_out=counted)
     return Told(_edit(run, who), told, is_final=True, session=session, curves=drawn, experiment=kept)

@@ -66,6 +66,7 @@ class Run:
         self.utc_ns = time.time_ns()
         self.boot_id = described.description.boot_id
         self.periods: list[tuple[Period, Held]] = []
+        self.writes: list[int] = []  # its trials, in the robot's journal
         self.transients = 0  # cycles that were left out
         self._commands = commands
         self._deliver = deliver
@@ -184,7 +185,7 @@ class Run:
         return {
             State.LOOKING: unread if self._held is None else "nobody walks: no three gait cycles were seen",
             State.WRITING: "the robot has not answered a write in time",
-            State.HOLDING: "too few gait cycles came in the time that a value may be held",
+            State.HOLDING: f"too few gait cycles came in {self.plan.dwell.limit_s:.0f} s",
         }.get(self.state, "the robot has not answered in time")
 
     # --- what is done
@@ -226,6 +227,7 @@ class Run:
 
     def _written(self, written: Written) -> None:
         self._write = written.write
+        self.writes.append(written.write)
         before = written.before.get(self.plan.name)
         self.watch.holds(float(written.after.get(self.plan.name, 0.0)), self._clock())
         self._began_ns = self._walked_ns = self._walk.newest_ns

@@ -1,6 +1,6 @@
 """An experiment in words: the same in the terminal and in the window. Values are SI."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from typing import Final
 
 from gateway.amounts import counted
@@ -81,18 +81,19 @@ def what(told: Told) -> str:
     return f"{one.parameter} sweep {values[0]} … {values[-1]}"
 
 
-def whole(found: Sequence[Told]) -> list[Told]:
-    """Return the same without edits that are only a part of an experiment."""
+def whole(found: Sequence[Told], writes: Collection[int] = ()) -> list[Told]:
+    """Return the same without edits that are only a part of an experiment; of one that goes on: `writes`."""
     parts = {
-        (told.edit.robot, told.edit.boot_id, period.write)
+        (told.edit.robot, told.edit.boot_id, write)
         for told in found
         if told.experiment is not None
-        for period in told.experiment.periods
+        for write in (*told.experiment.writes, *(period.write for period in told.experiment.periods))
     }
     return [
         told
         for told in found
-        if told.experiment or (told.edit.robot, told.edit.boot_id, told.edit.write) not in parts
+        if told.experiment
+        or not (told.edit.write in writes or (told.edit.robot, told.edit.boot_id, told.edit.write) in parts)
     ]
 
 
