@@ -11,6 +11,7 @@ from server_gui.core.experiments.machine import Event, State
 from server_gui.core.tuning.commands import ReadBack
 from server_gui.views.main_window import MainWindow
 from tests.gui.fakes import Bench
+from tests.gui.rules import settle
 from tests.gui.running import wait
 from tests.support.desk import looked
 from tests.unit.evidence.test_file import told
@@ -120,6 +121,8 @@ def test_from_a_trials_bar_both_of_its_values_are_asked_about(bench: Bench, wind
     bench.station.take([looked({NAME: 0.4})])
     wait(form.begin.isEnabled, "it may begin")
     said = form.words.text()
+    settle()
+    assert form.parameter.height() >= form.parameter.sizeHint().height(), "fields are not pressed together"
     form.begin.click()
     run = bench.station.experiment
     assert run is not None

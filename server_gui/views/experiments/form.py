@@ -195,16 +195,23 @@ class ExperimentForm(QDialog):
             plan = self.plan
         except BadPlan as error:
             self.begin.setEnabled(False)
-            set_text(self.words, f"{str(error)[:1].upper()}{str(error)[1:]}.")
+            self._say(f"{str(error)[:1].upper()}{str(error)[1:]}.")
             return
         self.begin.setEnabled(True)
-        set_text(self.words, "\n".join(line.strip() for line in stated(plan)))
+        self._say("\n".join(line.strip() for line in stated(plan)))
+
+    def _say(self, text: str) -> None:
+        """What is longer makes the form higher: Qt would press the fields together for it."""
+        set_text(self.words, text)
+        needed = self.heightForWidth(self.width())
+        if self.isVisible() and needed > self.height():
+            self.resize(self.width(), needed)
 
     def _begin(self) -> None:
         try:
             self._station.begin(self.plan)
         except BadPlan as error:
-            set_text(self.words, str(error))
+            self._say(str(error))
             return
         self.accept()
 
