@@ -124,6 +124,8 @@ def test_each_rule_ends_it_at_once_with_its_reason(what: str, why: str) -> None:
         (AlarmKind.UPLOAD, 4.0, False),
         (AlarmKind.PART_STALE, 1.0, False),
         (AlarmKind.PART_STALE, 3.0, True),
+        (AlarmKind.FAULT, 0.5, True),
+        (AlarmKind.LOST, 0.5, True),
         (AlarmKind.BUS_FAILS, 0.5, True),
         (AlarmKind.BLIND, 0.5, True),
         (AlarmKind.REPORTS, 0.5, True),
