@@ -32,7 +32,8 @@ from server_gui.views.widgets.plain import PlainLabel
 from server_gui.views.widgets.stride_curves import StrideCurves
 
 LIST: Final = 240  # wide, at text of 100 %
-NARROW, ABOVE = 620, 84  # wide, likewise: then the list is above the strides, and so high
+# Wide, likewise: below that four strides have no room beside the list, which then is above them, and so high.
+NARROW, ABOVE = 780, 84
 MOST_PX: Final = 16_777_215  # what Qt takes for no end
 MOST: Final = 8  # metrics that are told one by one
 UNIT: Final = {"position": "rad", "following_error": "rad", "current": "A", "torque": "N·m"}

@@ -86,6 +86,8 @@ def test_stop_and_take_back_is_in_sight_until_it_was_read_back(bench: Bench, win
     window.experiment.refresh()
     assert window.experiment.isVisible()
     assert "back by itself in" in window.experiment.words.text()
+    window.parameters.refresh()
+    assert "a write of yours ends it" in window.parameters.banner.text()
     part = told(5)
     bench.station.take_evidence(replace(part, edit=replace(part.edit, boot_id=run.boot_id)))
     window.edits.refresh()

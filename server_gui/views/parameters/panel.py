@@ -386,6 +386,10 @@ def _banner(station: Station | None, staged: int, problem: str) -> tuple[str, st
         return f"{writing.state.value}: {writing.text}", "bad"
     if writing.state is WriteState.WRITING:
         return writing.text, "warn"
+    run = station.experiment
+    if run is not None and not run.is_over:
+        what = f"{run.plan.kind.value} of {run.plan.name}"
+        return f"{what[0].upper()}{what[1:]} goes on, and writes by itself: a write of yours ends it.", "warn"
     if staged:
         return f"{staged} staged · nothing of it has been sent to the robot", "warn"
     if not station.known:
