@@ -347,7 +347,7 @@ class Signals(QWidget):
             return
         at_s = self._at[self._active] if self.cursors.isChecked() else 0.0
         at_ns = newest_ns + round(at_s * 1e9)
-        ask_note(self, at_s, lambda text: self._notes.add(text, at_ns))
+        ask_note(self, self._desk, at_s, lambda text: self._notes.add(text, at_ns), self.tell)
 
     # --- the trigger, and what is beside
 

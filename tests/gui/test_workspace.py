@@ -347,6 +347,20 @@ def test_a_note_is_kept_at_the_cursor(signals: Signals, bench: Bench) -> None:
     assert notes.kept == [("slipped here", START_NS + 499 * 10_000_000 - 2_000_000_000)]
 
 
+def test_a_note_never_goes_to_another_robot_than_it_was_asked_for(signals: Signals, bench: Bench) -> None:
+    notes = signals._notes = Kept()
+    bench.add("exo-02", 7421).take([described("exo-02")])
+    signals.tools.note.click()
+    question = next(one for one in signals.findChildren(Question) if one.windowTitle() == "Note")
+    bench.desk.select(bench.desk.stations[1])  # while somebody types
+    assert isinstance(question.field, QLineEdit)
+    QTest.keyClicks(question.field, "slipped")
+    QTest.keyClick(question.field, Qt.Key.Key_Return)
+    assert notes.kept == []
+    bench.desk.select(bench.desk.stations[0])
+    assert "no note, other rows are looked at by now: slipped" in said(signals)
+
+
 def test_without_a_recorder_no_note_is_taken(signals: Signals) -> None:
     signals.tools.note.click()
     assert "no note: nobody records" in said(signals)

@@ -12,8 +12,10 @@ from server_gui.core.workspace.dimensions import Dimension, literal
 from server_gui.core.workspace.grammar import ExpressionError, Node, Written
 
 Floats = npt.NDArray[np.float64]
+Rows = npt.NDArray[np.int64]
 
 LONGEST_S: Final = 60.0  # that `rms` and `mean` may go over
+EXACT: Final = 1e-9  # of a sum: what rounding may take of it
 NONE: Final = Dimension()
 ANGLE: Final = Dimension.of("rad")
 HERTZ, SECOND = Dimension.of("Hz"), Dimension.of("s")
@@ -259,18 +261,30 @@ class _Window:
         new = _column(self._step, block)
         before = len(self._times)
         times, values = np.concatenate((self._times, block.times)), np.concatenate((self._values, new))
-        missing = np.isnan(values)
-        known = np.where(missing, 0.0, values * values if self._squared else values)
+        column = values * values if self._squared else values
+        missing = ~np.isfinite(column)
+        known = np.where(missing, 0.0, column)
         sums, gaps = (np.concatenate(([0.0], np.cumsum(column))) for column in (known, missing))
         ends = np.arange(before, len(times))
         begins = np.searchsorted(times, times[before:] - self._seconds + 1e-9, "left")
         whole = (begins > 0) & (gaps[ends + 1] == gaps[np.maximum(begins - 1, 0)])
-        found = (sums[ends + 1] - sums[begins]) / (ends + 1 - begins)
+        found = _differences(known, sums, begins, ends + 1) / (ends + 1 - begins)
         keep = max(int(begins[-1]) - 1, 0) if len(begins) else 0
         self._times, self._values = times[keep:].copy(), values[keep:].copy()
         if self._squared:
             found = np.sqrt(np.maximum(found, 0.0))
         return np.where(whole, found, np.nan)
+
+
+def _differences(known: Floats, sums: Floats, begins: Rows, ends: Rows) -> Floats:
+    """Return the sum from each begin to its end; by hand where it drowns in what came before."""
+    found = sums[ends] - sums[begins]
+    error = np.finfo(np.float64).eps * np.maximum.accumulate(np.abs(sums))[ends]
+    drowned = np.flatnonzero(error > EXACT * np.abs(found))
+    if len(drowned):
+        pairs = np.column_stack((begins[drowned], ends[drowned])).ravel()
+        found[drowned] = np.add.reduceat(np.append(known, 0.0), pairs)[::2]
+    return found
 
 
 Make = Callable[[_Compiler, Node, Sequence[Part]], Part]

@@ -102,7 +102,7 @@ def decoded(text: str) -> Layout:
     """Return the layout that a file's text tells; raises `LayoutError`, which names line and key."""
     try:
         found = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:  # a number of 5000 digits is a plain ValueError
         raise LayoutError(f"no TOML: {error}") from error
     if not isinstance(found.get("format"), int):
         raise LayoutError(f"key format: it is to be {FORMAT}, as the first line of a layout")
@@ -191,7 +191,7 @@ class Layouts:
 
     def _files(self) -> list[Path]:
         try:
-            return sorted(self.folder.glob(f"*{SUFFIX}"))
+            return sorted(path for path in self.folder.glob(f"*{SUFFIX}") if not path.is_fifo())
         except OSError:
             return []
 

@@ -133,6 +133,16 @@ def test_a_window_is_missing_until_it_is_full_and_after_a_gap() -> None:
     assert found[-1] == pytest.approx(3.0)
 
 
+@pytest.mark.parametrize("spike", [1e17, 1e200, math.inf])
+@pytest.mark.parametrize("text", ["mean(left_knee.position, 0.03)", "rms(left_knee.position, 0.03)"])
+def test_a_spike_that_has_left_the_window_leaves_nothing_behind(text: str, spike: float) -> None:
+    """Sums that go on would lose the small in the large: 0 was drawn where 1 was."""
+    values = [1.0] * 20
+    values[5] = spike
+    found = computed(text, position=values)
+    assert found[9:] == pytest.approx([1.0] * 11)
+
+
 def test_a_lowpass_reaches_63_percent_after_its_time_constant() -> None:
     cutoff_hz = 1 / (2 * math.pi * 0.1)
     found = computed(f"lowpass(left_knee.position, {cutoff_hz})", position=[0.0] + [1.0] * 40)

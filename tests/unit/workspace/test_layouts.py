@@ -1,5 +1,6 @@
 """Layouts: what is saved is loaded again, and what is no layout says where."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -131,6 +132,17 @@ def test_a_damaged_file_hides_no_other(layouts: Layouts, tmp_path: Path) -> None
     assert [name for name in ("bad", "huge", "deep") if any(f"{name}.toml" in text for text in damaged)] == [
         "bad", "huge", "deep",
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize("text", ["format = 1\nname = 'x'\nspan_s = {}", "format = {}"])
+def test_a_number_without_end_is_no_layout_and_hides_no_other(
+    layouts: Layouts, tmp_path: Path, text: str
+) -> None:
+    layouts.save(layout("good"))
+    (layouts.folder / "bad.toml").write_text(text.format("9" * 5000))
+    os.mkfifo(layouts.folder / "waits.toml")  # to open it would be to wait for ever
+    assert layouts.names() == ["good"]
+    assert len(layouts.damaged()) == 1
 
 
 def test_a_folder_that_cannot_be_written_says_so(tmp_path: Path) -> None:
