@@ -11,7 +11,7 @@ from msgspec.structs import replace
 from gateway.main import main
 from ml.store.sessions import Session
 from server_gui.core.cloud.changed import NOT_RECORDED, NOT_THERE, Changes, Kind, Told, changes
-from server_gui.core.cloud.moved import Walk, moved
+from server_gui.core.cloud.moved import DAYS, Walk, moved
 from server_gui.core.evidence.comparison import Word
 from server_gui.core.evidence.cycles import Cycle
 from tests.unit.cloud.recordings import record
@@ -120,6 +120,24 @@ def test_what_moved_is_said_in_the_words_of_edits_though_the_robot_has_booted() 
 def test_two_walks_alike_show_no_difference() -> None:
     found = moved(walked(cycles(seed=3)), walked(cycles(seed=4)))
     assert found.word is Word.SAME
+
+
+def test_the_day_alone_is_named_where_anything_moved() -> None:
+    """Nothing but the day: one metric a tenth off. That is sure of these two walks, and no more."""
+
+    def other_day(_: float, values: dict[str, float]) -> None:
+        values["left_knee.error_rms"] *= 1.1
+
+    found = moved(walked(cycles(seed=5)), walked(cycles(other_day, seed=6)))
+    assert found.word is not Word.SAME
+    assert DAYS in found.notes
+    assert DAYS not in moved(walked(cycles(seed=3)), walked(cycles(seed=4))).notes
+
+
+def test_numbers_that_differ_late_are_not_alike() -> None:
+    before = replace(OLD, parameters={"left_knee.gain": 1234567.0})
+    found = compared(replace(OLD, parameters={"left_knee.gain": 1234568.0}), before)
+    assert [(one.before, one.after) for one in found.differences] == [("1234567.0", "1234568.0")]
 
 
 def test_a_session_without_walking_has_no_verdict() -> None:
