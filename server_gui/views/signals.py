@@ -258,7 +258,8 @@ class Signals(QWidget):
             self.scene.look(station)
             if not self._begun:
                 self._begun = bool(self.channels.items)
-                self._arrange()
+                self.scene.workspace.arrange(map(self.scene.meaning, self.chosen))
+                self.scene.look(station)
             self.channels.choose(self.scene.workspace.curves)
             self.expression.show_channels([*self.scene.channels])
             self._build()

@@ -34,6 +34,7 @@ def signals(theme: Theme, bench: Bench, tmp_path: Path) -> Iterator[Signals]:
     feed(bench, 0, 500)
     made = Signals(bench.desk, theme, layouts=Layouts(tmp_path / "layouts"))
     made.resize(900, 700)
+    made._begun = True  # no plots of what a robot has at first: to make them is most of a test
     made.show()
     made.refresh()
     made.choose([KNEE, TORQUE])
