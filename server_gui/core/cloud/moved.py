@@ -31,7 +31,7 @@ APART_NS: Final = 10_000_000_000  # between the two walks, as they are laid one 
 ACTIVITY: Final = "activity"
 DAYS: Final = (
     "two walks of one set-up differ, too, by the day and by how the robot was put on: how much was not measured"
-    " here, so a small difference may be that alone"
+    " here, so a difference may be that alone"
 )
 
 Advance = Callable[[int], object]
