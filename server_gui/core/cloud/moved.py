@@ -30,8 +30,8 @@ ROWS: Final = 256  # at a time: what computer and models say is told between
 APART_NS: Final = 10_000_000_000  # between the two walks, as they are laid one after the other
 ACTIVITY: Final = "activity"
 DAYS: Final = (
-    "two walks of one set-up differ, too, by the day and by how the robot was put on: how much was not measured"
-    " here, so a difference may be that alone"
+    "two walks of one set-up differ, too, by the day and by how the robot was put on: how much was not "
+    "measured here, so a difference may be that alone"
 )
 
 Advance = Callable[[int], object]
