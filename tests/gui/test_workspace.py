@@ -10,6 +10,7 @@ from PySide6.QtGui import QContextMenuEvent, QDragEnterEvent, QDropEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLineEdit, QMenu, QWidget
 
+from gateway.units import Units
 from server_gui.core.desk.flags import FlagKind
 from server_gui.core.workspace.layouts import Layouts
 from server_gui.core.workspace.trigger import Condition, Mode, On, State
@@ -279,6 +280,25 @@ def test_a_trigger_keeps_what_was_before_and_after_it(signals: Signals, bench: B
     assert "stopped" in signals.trigger._title.text()
     signals.tools.trigger.click()
     assert signals.scene.frozen is None
+
+
+def test_what_is_waited_for_stays_the_same_in_other_units_and_layouts(signals: Signals, bench: Bench) -> None:
+    bar, layouts = signals.trigger, signals.layouts
+    bar.show_condition(Condition(On.RISE, KNEE, 0.5))
+    bar.arm.click()
+    layouts.save("Knees")
+    layouts.open("Knees")
+    layouts.save("Knees again")
+    kept = layouts._layouts.load("Knees again").trigger
+    assert kept is not None, "a layout that was opened and saved again has lost its trigger"
+    bench.desk.shown.change(Units({"rad": "rad"}))
+    signals.refresh()
+    assert bar.level.text() == "0.5 rad"
+    bar.show_condition(Condition(On.ABOVE, "left_toe.position", 2.0))  # as a layout of another robot has it
+    signals.choose([HIP])
+    assert (bar.condition.of, bar.condition.level) == ("left_toe.position", 2.0)
+    bar.on.setCurrentText(On.EMCY.value)
+    assert bar.condition.of == "left_hip"
 
 
 def test_an_emcy_is_waited_for_by_a_drives_state_where_it_tells_no_code(
