@@ -44,6 +44,7 @@ class Kind(StrEnum):
 SECTIONS: Final[Mapping[str, Kind]] = {
     "zero": Kind.CALIBRATION,
     "scale": Kind.CALIBRATION,
+    "calibration": Kind.CALIBRATION,
     "firmware": Kind.FIRMWARE,
     "hardware": Kind.DEVICE,
     "vendor": Kind.DEVICE,

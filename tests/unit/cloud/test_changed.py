@@ -20,6 +20,7 @@ from tests.unit.evidence.synthetic import cycles
 SETUP = {
     "component/left_knee": "joint",
     "zero/left_knee": 0.01,
+    "calibration/trunk": "no file",
     "firmware/left_knee": "1.2",
     "EDS/left_knee": "drive.eds 0011",
     "limits/left_knee.gain": "0 … 10",
@@ -51,7 +52,12 @@ def test_what_differs_is_told_in_order_the_wearer_first() -> None:
     after = replace(
         OLD,
         parameters={"left_knee.gain": 3.0, "gait.step_length": 0.41},
-        setup={**SETUP, "zero/left_knee": 0.02, "firmware/left_knee": "1.3"},
+        setup={
+            **SETUP,
+            "zero/left_knee": 0.02,
+            "calibration/trunk": "t.toml 5e",
+            "firmware/left_knee": "1.3",
+        },
         versions={"gateway": "0.2.0"},
     )
     found = compared(after, wearers="P02", models="m2")
@@ -60,6 +66,7 @@ def test_what_differs_is_told_in_order_the_wearer_first() -> None:
         (Kind.PARAMETER, "left_knee.gain", "2", "3"),
         (Kind.PARAMETER, "gait.step_length", "0.4", "0.41"),
         (Kind.CALIBRATION, "left_knee zero offset (rad)", "0.01", "0.02"),
+        (Kind.CALIBRATION, "trunk calibration", "no file", "t.toml 5e"),
         (Kind.FIRMWARE, "left_knee firmware", "1.2", "1.3"),
         (Kind.MODEL, "model of activity", "m1", "m2"),
         (Kind.SOFTWARE, "gateway", "0.1.0", "0.2.0"),
