@@ -286,7 +286,7 @@ def rows() -> Iterator[Row]:
         yield Row(f"the whole window with {name}, telemetry at 1 kHz", share, "of a core", MOST_OF_A_CORE)
     for name, written in (("curves", "{}"), ("expressions", "{0} - mean({0}, 0.5)")):
         share = signals_ms(theme, written) * FRAMES_PER_S / 1e3
-        yield Row(f"15 {name} in 8 plots of the signals, telemetry at 1 kHz", share, "of a core", MOST_OF_A_CORE)
+        yield Row(f"15 {name} in 8 plots of the signals, at 1 kHz", share, "of a core", MOST_OF_A_CORE)
 
 
 def main() -> int:
