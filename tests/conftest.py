@@ -1,5 +1,6 @@
 """Rules for every test: a leaked thread, child process, socket or terminal fails the test that leaked it."""
 
+import atexit
 import gc
 import os
 import re
@@ -75,11 +76,7 @@ def pytest_collection() -> Generator[None, object, object]:
     finally:
         gc.freeze()
         gc.enable()
-
-
-def pytest_unconfigure() -> None:
-    """What is gone with the interpreter is not told to have leaked."""
-    gc.unfreeze()
+        atexit.register(gc.unfreeze)  # else libraries tell at the end what they have leaked
 
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)
