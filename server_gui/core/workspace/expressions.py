@@ -300,7 +300,7 @@ class _Window:
 
     def _differences(self, begins: Rows, ends: Rows) -> Floats:
         """Return the sum from each begin to its end; by hand where it drowns in what came before."""
-        found = self._sums[0, ends] - self._sums[0, begins]
+        found: Floats = self._sums[0, ends] - self._sums[0, begins]
         error = np.finfo(np.float64).eps * self._sums[2, ends]
         drowned = np.flatnonzero(~(error <= EXACT * np.abs(found)) | np.isinf(error))
         if len(drowned):
