@@ -106,6 +106,10 @@ def done(answer: object) -> "Future[Any]":
     return future
 
 
+class EndedEarly(Exception):
+    """A stop rule has ended a trial: it says nothing, rightly or wrongly."""
+
+
 def tried(case: str, number: int, pairs: int = USUAL_PAIRS) -> Evidence:
     """Return what one A/B trial says."""
     parameter, value, each = CASES[case]
@@ -133,14 +137,18 @@ def tried(case: str, number: int, pairs: int = USUAL_PAIRS) -> Evidence:
             break
     told = result(run, "bench", "")
     assert told is not None, f"{case} {number}: {run.state} {run.why}"
-    assert run.is_whole, f"{case} {number}: {run.state} {run.why}"
+    if not run.is_whole:
+        raise EndedEarly(run.why)
     return told.evidence
 
 
-def said(task: tuple[str, int]) -> tuple[str, int, bool, str]:
-    """Return whether a case was judged rightly, and what was said."""
+def said(task: tuple[str, int]) -> tuple[str, int, bool | None, str]:
+    """Return whether a case was judged rightly, None where it ended early, and what was said."""
     case, number = task
-    words = {one.series: one.word for one in tried(case, number).metrics}
+    try:
+        words = {one.series: one.word for one in tried(case, number).metrics}
+    except EndedEarly as ended:
+        return case, number, None, str(ended)
     joint = JOINTS[number % len(JOINTS)]
     differing = [f"{series} {word}" for series, word in words.items() if word in DIFFER]
     right = {
@@ -232,13 +240,16 @@ def main(argv: Sequence[str] = ()) -> int:
     numbers = range(asked.first, asked.first + walks)
     tasks = [(case, number) for number in numbers for case in (asked.case or CASES)]
     right: collections.Counter[str] = collections.Counter()
+    whole: collections.Counter[str] = collections.Counter()
     with ProcessPoolExecutor(os.cpu_count()) as pool:
         for case, number, is_right, words in pool.map(said, tasks):
-            right[case] += is_right
-            sys.stdout.write(f"{case} {number}: {'right' if is_right else 'WRONG'}: {words or 'nothing'}\n")
+            right[case] += bool(is_right)
+            whole[case] += is_right is not None
+            word = {True: "right", False: "WRONG", None: "ended early"}[is_right]
+            sys.stdout.write(f"{case} {number}: {word}: {words or 'nothing'}\n")
             sys.stdout.flush()
-    shares = {case: round(right[case] / walks, 3) for case in (asked.case or CASES)}
-    sys.stdout.write(json.dumps({"walks": walks, "right": shares}) + "\n")
+    shares = {case: round(right[case] / max(1, whole[case]), 3) for case in (asked.case or CASES)}
+    sys.stdout.write(json.dumps({"walks": walks, "whole": whole, "right": shares}) + "\n")
     return int(min(shares.values()) < LEAST_RIGHT) or wrong
 
 
