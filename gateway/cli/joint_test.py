@@ -244,6 +244,7 @@ def _lead(
         folder / f"{config.robot.name}.{joint}.{kind}.{began}.jsonl",
         options.who,
     )
+    result = "nothing got power"
     benches = {name: CanBench(name, settings) for name, settings in config.can.items()}
     bench = benches[test.settings.bus]
     try:
@@ -252,39 +253,38 @@ def _lead(
             options.who, "joint test begun", joint=joint, test=kind, file=str(test.file)
         ).result()
         outcome = run(tested(bench, benches, test), face)
+        if outcome is None:
+            return 1
+        result = outcome.problem or "recorded"
+        return _told(test, outcome, as_json=options.json)
     except NotStopped as error:
         warn("joint-test", f"NOT STOPPED: {error}")
-        _put_down(records, test, str(error))
+        result = f"NOT STOPPED: {error}"
         return stop_drives(Draft(config.path, go_on=False), bench, as_json=options.json) or 1
     except Ended as end:
-        _put_down(records, test, "interrupted")
+        result = "interrupted"
         warn("joint-test", "interrupted; the drive is without power")
         return end.status
     except EOFError:
+        result = "nobody answered any more"
         warn("joint-test", "nobody answers any more; the drive is without power")
         return 1
     except (NotAllowed, DriverError, OSError) as error:
+        result = str(error)
         warn("joint-test", f"{joint}: {error}")
         return 1
     finally:
         for one in benches.values():
             one.close()
-    return _told(records, test, outcome, as_json=options.json)
+        records.journal.append(
+            test.who, "joint test ended", joint=test.joint, test=str(test.wish.kind), result=result
+        )
 
 
-def _told(records: Records, test: Test, outcome: Outcome | None, *, as_json: bool) -> int:
-    if outcome is None:
-        return 1
-    _put_down(records, test, outcome.problem or "recorded")
+def _told(test: Test, outcome: Outcome, *, as_json: bool) -> int:
     if as_json:
         say_json({"tested": {"file": str(test.file), "problem": outcome.problem, "off": outcome.off}})
     return 0 if outcome.problem is None else 1
-
-
-def _put_down(records: Records, test: Test, result: str) -> None:
-    records.journal.append(
-        test.who, "joint test ended", joint=test.joint, test=str(test.wish.kind), result=result
-    )
 
 
 def _stop(file: Path, joint: str, *, as_json: bool) -> int:

@@ -13,9 +13,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from drivers.bus.cycles import next_due
+from drivers.bus.fields import Linear
 from drivers.bus.master import SYNC
 from drivers.bus.sdo.channel import SdoChannel
 from drivers.bus.sender import always
+from drivers.joint.axis import POSITION_ACTUAL
 from drivers.joint.cia402 import DriveState, drive_state
 from drivers.joint.drive import JointDrive
 from drivers.joint.homing import MODE
@@ -46,6 +48,7 @@ class Plan:
 
     wish: Wish
     limits: Limits
+    angle: float  # rad, where it stood when that was agreed to
     period_s: float
     parameters: parameters.Parameters  # as they were before
 
@@ -144,11 +147,15 @@ class TestRun(PoweredRun):
     def _set_up(self) -> None:
         mode = TORQUE_MODE if self._by_torque else POSITION_MODE
         self._wait(self._power.drive.ask(lambda axis: axis.write(MODE, bytes([mode]))))
+        data = self._wait(self._power.drive.ask(lambda axis: axis.read(POSITION_ACTUAL, 4)))
+        linear = self._linear("position")
+        self._check_place(int.from_bytes(data, "little", signed=True) * linear.scale + linear.offset)
 
     def _act(self) -> None:
         make_urgent()
         began = time.monotonic()
         self._start = self._hold()
+        self._check_place(self._start)
         self.said = f"{self._plan.wish.kind} test"
         targets = motion(self._plan.wish, self._plan.period_s)
         target = next(targets)
@@ -198,11 +205,7 @@ class TestRun(PoweredRun):
 
     def _aim(self, target: float) -> None:
         """The target of the next SYNC, in the drive's own units; the drive confirms that it has it."""
-        readings = self._reader.reading
-        linears = scalings(self._reader.settings, {} if readings is None else readings.scaling)
-        linear = linears["torque" if self._by_torque else "position"]
-        if linear is None:
-            raise Ended("the drive has come up anew, or nobody knows its units any more")
+        linear = self._linear("torque" if self._by_torque else "position")
         value = target if self._by_torque else self._start + target
         (index, size), counts = (
             TARGET_TORQUE if self._by_torque else TARGET_POSITION,
@@ -210,6 +213,14 @@ class TestRun(PoweredRun):
         )
         data = (counts & (1 << 8 * size) - 1).to_bytes(size, "little")
         self._wait(self._power.drive.ask(lambda axis: axis.write(index, data)))
+
+    def _linear(self, quantity: str) -> Linear:
+        readings = self._reader.reading
+        linears = scalings(self._reader.settings, {} if readings is None else readings.scaling)
+        linear = linears[quantity]
+        if linear is None:
+            raise Ended("the drive has come up anew, or nobody knows its units any more")
+        return linear
 
     def _keep(self, seen: Seen, target: float) -> None:
         self.moved = seen.position - self._start
@@ -228,6 +239,15 @@ class TestRun(PoweredRun):
         )
 
     # Whether all is as it must be.
+
+    def _check_place(self, angle: float) -> None:
+        """Whether it still stands where it was when somebody agreed to what will move."""
+        plan = self._plan
+        if abs(angle - plan.angle) > DRIFT:
+            raise Ended(
+                f"the joint was moved: it stood at {math.degrees(plan.angle):.1f}° when its motion was "
+                f"agreed to, and is at {math.degrees(angle):.1f}°. Begin again"
+            )
 
     def _objection(self) -> str | None:
         return super()._objection() or self._guarding.tripped

@@ -28,10 +28,9 @@ TRIES = 6  # a machine that is too busy ends a test, as it should
 BUSY = ("busy", "stay away", "beyond the limit", "behind its target", "is missing")
 
 
-@pytest.fixture(scope="module")
-def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SimulatedRobot]:
-    folder = tmp_path_factory.mktemp("joint-test")
-    with SimulatedRobot(folder / "sim", Scenario.STAND, without=["gait"]) as robot:
+@pytest.fixture
+def robot(tmp_path: Path) -> Iterator[SimulatedRobot]:
+    with SimulatedRobot(tmp_path / "sim", Scenario.STAND, without=["gait"]) as robot:
         text = robot.config.read_text(encoding="utf-8").replace('role = "observer"', 'role = "master"')
         robot.config.write_text(text, encoding="utf-8")
         yield robot
@@ -158,9 +157,9 @@ def stop_from_elsewhere(robot: SimulatedRobot, _process: Process) -> None:
     assert any("stopped" in one for one in said)
 
 
-def faults(name: str) -> Callable[[SimulatedRobot, Process], None]:
+def faults(name: str, **how: float) -> Callable[[SimulatedRobot, Process], None]:
     def make(robot: SimulatedRobot, _process: Process) -> None:
-        ask(robot.config.parent, {"fault": name, "on": KNEE, "for_s": 5.0})
+        ask(robot.config.parent, {"fault": name, "on": KNEE, **how})
 
     return make
 
