@@ -222,6 +222,15 @@ def _records(config: RobotConfig) -> Iterator[Records]:
         records.close()
 
 
+def _folder(folder: Path) -> Path:
+    """There, before anything is asked; raises `SettingsError`."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise SettingsError(f"{folder} is no folder to record into: {error.strerror}; give --out") from error
+    return folder
+
+
 def _lead(
     config: RobotConfig,
     joint: str,
@@ -231,7 +240,7 @@ def _lead(
     records: Records,
 ) -> int:
     began = datetime.datetime.now(datetime.UTC).strftime("%Y%m%dT%H%M%SZ")
-    folder = options.out or config.path.parent / FOLDER
+    folder = _folder(options.out or config.path.parent / FOLDER)
     test = Test(
         config,
         joint,
