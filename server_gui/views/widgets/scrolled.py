@@ -8,16 +8,16 @@ from PySide6.QtWidgets import QScrollArea, QWidget
 class Scrolled(QScrollArea):
     """Has no focus of its own. Words that need more lines where they are narrow get them, also later ones."""
 
-    def __init__(self, view: QWidget) -> None:
+    def __init__(self, view: QWidget | None = None) -> None:
         super().__init__()
-        self._view = view
         self._has_grown = False
         self.setWidgetResizable(True)
-        self.setWidget(view)
+        if view is not None:
+            self.setWidget(view)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        if event.type() == QEvent.Type.LayoutRequest and watched is self._view:
+        if event.type() == QEvent.Type.LayoutRequest and watched is self.widget():
             self._grow()
         return super().eventFilter(watched, event)
 
@@ -26,11 +26,12 @@ class Scrolled(QScrollArea):
         self._grow()
 
     def _grow(self) -> None:
-        layout = self._view.layout()
-        if layout is not None and layout.hasHeightForWidth():
+        view = self.widget()
+        layout = None if view is None else view.layout()
+        if view is not None and layout is not None and layout.hasHeightForWidth():
             width = max(self.viewport().width(), layout.totalMinimumSize().width())
             self._has_grown = True
-            self._view.setMinimumHeight(layout.totalMinimumHeightForWidth(width))
-        elif self._has_grown:  # what it needs is known without its width by now
+            view.setMinimumHeight(layout.totalMinimumHeightForWidth(width))
+        elif view is not None and self._has_grown:  # what it needs is known without its width by now
             self._has_grown = False
-            self._view.setMinimumHeight(0)
+            view.setMinimumHeight(0)
