@@ -7,7 +7,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ import pytest
 
 from drivers.bus.bus import CanBus
 from drivers.bus.settings import Role
+from drivers.errors import DeviceTimeout
 from gateway.commission.bench import CanBench
 from gateway.config.reading import load
 from hil_sim.control_socket import ask
@@ -165,10 +166,11 @@ def test_without_its_phrase_nothing_gets_power(robot: SimulatedRobot) -> None:
 
 def moved_by_hand(robot: SimulatedRobot) -> str:
     """Why a test ended whose joint was moved before the phrase was typed; it never had power."""
-    joint = robot.exoskeleton.drives[KNEE].joint
+    angle = robot.exoskeleton.drives[KNEE].joint.position * robot.exoskeleton.mountings[KNEE].direction
     with begun(robot, "step", *ROOM) as process:
         for one in heard(process):
-            joint.position += math.radians(3.0) if "Type  " in one.get("ask", "") else 0.0
+            if "Type  " in one.get("ask", ""):
+                ask(robot.config.parent, {"hand": KNEE, "degrees": math.degrees(angle) + 3.0})
             assert "step test" not in (one.get("moving") or "")
         assert process.wait() == 1
     found = recordings(robot)
@@ -196,13 +198,19 @@ def another_master(robot: SimulatedRobot) -> Iterator[CanBus]:
         bus.stop()
 
 
+def has_come_up(bench: CanBench, node: int) -> bool:
+    with suppress(DeviceTimeout):
+        return bench.read(node, 0x1400, 1) is not None
+    return False
+
+
 def test_process_data_to_another_drive_end_it_wherever_it_takes_them(robot: SimulatedRobot) -> None:
     config = load(robot.config)
     beside = config.joint["right_knee"]
-    bench = CanBench(beside.bus, config.can[beside.bus])
-    bench.write(beside.node_id, 0x1400, 1, (0x8000_0000 | 0x200 + beside.node_id).to_bytes(4, "little"))
-    bench.write(beside.node_id, 0x1400, 1, UNUSUAL.to_bytes(4, "little"))
-    bench.close()
+    with closing(CanBench(beside.bus, config.can[beside.bus])) as bench:
+        until(lambda: has_come_up(bench, beside.node_id))
+        bench.write(beside.node_id, 0x1400, 1, (0x8000_0000 | 0x200 + beside.node_id).to_bytes(4, "little"))
+        bench.write(beside.node_id, 0x1400, 1, UNUSUAL.to_bytes(4, "little"))
     with another_master(robot) as bus, begun(robot, *LONG) as process:
         for one in heard(process):
             if "are read" in (one.get("moving") or ""):
