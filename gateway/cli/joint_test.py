@@ -20,9 +20,11 @@ from gateway.commission.draft import Draft, alone
 from gateway.commission.powered_run import NotStopped, Outcome
 from gateway.config.reading import load
 from gateway.config.robot import RobotConfig
+from gateway.joint_test import left
 from gateway.joint_test.limits import LATE_S, Asked, NotAllowed
 from gateway.joint_test.motion import Kind, Wish
 from gateway.joint_test.talk import Test, tested
+from gateway.records.folder import RecordsFolder
 from gateway.records.records import Records
 from gateway.user_name import user_name
 
@@ -252,6 +254,7 @@ def _lead(
         ),
         folder / f"{config.robot.name}.{joint}.{kind}.{began}.jsonl",
         options.who,
+        records,
     )
     result = "nothing got power"
     benches = {name: CanBench(name, settings) for name, settings in config.can.items()}
@@ -299,4 +302,23 @@ def _told(test: Test, outcome: Outcome, *, as_json: bool) -> int:
 def _stop(file: Path, joint: str, *, as_json: bool) -> int:
     config = _load(file, joint)
     bus = config.joint[joint].bus
-    return stop_drives(Draft(file, go_on=False), CanBench(bus, config.can[bus]), as_json=as_json)
+    status = stop_drives(Draft(file, go_on=False), CanBench(bus, config.can[bus]), as_json=as_json)
+    if (words := _cut_off(config)) is not None:
+        warn("joint-test", f"{words}. The next gwrms joint-test puts it back before it asks for its phrase")
+    return status
+
+
+def _cut_off(config: RobotConfig) -> str | None:
+    """What a test has left that nobody leads any more, in words."""
+    folder = RecordsFolder(config.records)
+    try:
+        folder.open()
+    except OSError:
+        return None  # it is under way, or nobody can tell
+    try:
+        found = left.read(folder.joint_test)
+    except NotAllowed as error:
+        return str(error)
+    finally:
+        folder.close()
+    return None if found is None else found.words

@@ -123,6 +123,7 @@ class TestRun(PoweredRun):
     def __init__(self, power: Power, reader: JointDrive, guarding: Guarding, plan: Plan) -> None:
         super().__init__(power)
         self.moved = 0.0  # rad
+        self.restored = False  # whether all parameters were read, and are as before
         self._reader = reader
         self._guarding = guarding
         self._plan = plan
@@ -316,6 +317,7 @@ class TestRun(PoweredRun):
         left = self._asked(lambda: self._power.node.run(restore), READ_S)
         if left is None:
             return "its parameters could not be read again: nobody knows whether they are as before"
+        self.restored = not left
         words = ", ".join(f"{name} was {was}, is {now}" for name, (was, now) in left.items())
         return f"not all is as before: {words}" if left else None
 

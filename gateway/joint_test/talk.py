@@ -35,13 +35,14 @@ from gateway.commission.joints import words
 from gateway.commission.power import Power
 from gateway.commission.powered_run import NotStopped, Outcome
 from gateway.config.robot import JointTable, RobotConfig
+from gateway.joint_test import left, parameters
 from gateway.joint_test import limits as limiting
-from gateway.joint_test import parameters
 from gateway.joint_test.limits import Asked, Drive, Limits, NotAllowed
 from gateway.joint_test.motion import Wish, planned
 from gateway.joint_test.recording import Recording
 from gateway.joint_test.run import NEEDED, POSITION_MODE, READ_S, TORQUE_MODE, Plan, TestRun
 from gateway.joint_test.watching import Guarding
+from gateway.records.records import Records
 
 LEAST_PERIOD_S, MOST_PERIOD_S = 0.005, 0.02
 USUAL_PERIOD_S = 0.01
@@ -64,6 +65,7 @@ class Test:
     asked: Asked
     file: Path
     who: str
+    records: Records
 
     @property
     def settings(self) -> JointTable:
@@ -72,6 +74,20 @@ class Test:
     @property
     def axis(self) -> Axis:
         return Axis(self.settings.node_id, self.settings.axis)
+
+    @property
+    def mode(self) -> int:
+        """The mode of operation in which it is moved."""
+        return TORQUE_MODE if self.wish.kind.by_torque else POSITION_MODE
+
+    @property
+    def left(self) -> Path:
+        """What is to be put back where it is cut off."""
+        return self.records.folder.joint_test
+
+    def tell(self, what: str, **details: object) -> None:
+        """Write it into the journal; raises `OSError`."""
+        self.records.journal.append(self.who, what, **details).result()
 
     @property
     def phrase(self) -> str:
@@ -104,6 +120,8 @@ def tested(bench: Bench, others: Mapping[str, Bench], test: Test) -> Talk[Outcom
     _may_be_led(test)
     yield Say("Asking whether every other drive is off …")
     _all_off(bench, others, test)
+    benches = {**others, test.settings.bus: bench}
+    yield from left.put_right(test.left, benches, test.config.joint, test.tell)
     if why := (yield from armed(bench, test.axis)):
         raise NotAllowed(why)
     known = yield from answered(lambda: _known(bench, test))
@@ -178,10 +196,9 @@ def _signed(bench: Bench, axis: Axis, index: int, subindex: int) -> int | None:
 
 
 def _has_mode(bench: Bench, test: Test) -> None:
-    mode = TORQUE_MODE if test.wish.kind.by_torque else POSITION_MODE
     modes = number(bench, test.axis, MODES)
-    if modes is not None and not modes >> mode - 1 & 1:
-        raise NotAllowed(f"its drive has no mode {mode} (6502h), by which it is moved SYNC by SYNC")
+    if modes is not None and not modes >> test.mode - 1 & 1:
+        raise NotAllowed(f"its drive has no mode {test.mode} (6502h), by which it is moved SYNC by SYNC")
 
 
 def _period(bench: Bench, axis: Axis) -> float:
@@ -314,16 +331,27 @@ def _led(
     plan = Plan(test.wish, known.limits, known.angle, known.period_s, before)
     head = _head(test, known, before, guarding)
     with Recording(test.file, head, by_torque=test.wish.kind.by_torque) as recording:
+        _keep(test, before)
         run = TestRun(power, reader, guarding, plan)
         try:
             outcome = yield from _followed(run, test, recording)
         finally:
             run.finish()
+            if run.restored:
+                left.settled(test.left)
     result = (
         f"It is recorded in {test.file}" if outcome.problem is None else f"It was ended: {outcome.problem}"
     )
     yield Say(f"{result}; {outcome.text}.")
     return outcome
+
+
+def _keep(test: Test, before: parameters.Parameters) -> None:
+    """What it is about to change, so that it is put back also where nothing of this program is left."""
+    changes = left.changes(before, test.mode, test.settings.axis * AXIS_OFFSET)
+    if changes:
+        place = (test.joint, test.settings.bus, test.settings.node_id)
+        left.keep(test.left, left.Left(*place, _now(), test.who, changes))
 
 
 def _parameters(power: Power, known: Known) -> Talk[parameters.Parameters | None]:
@@ -376,13 +404,17 @@ def _close(recording: Recording, run: TestRun, outcome: Outcome) -> None:
         recording.end(problem=outcome.problem, off=outcome.off, state=outcome.state, late_s=run.late_s)
 
 
+def _now() -> str:
+    return datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+
+
 def _head(test: Test, known: Known, before: parameters.Parameters, guarding: Guarding) -> dict[str, Any]:
     settings = test.settings
     return {
         "robot": test.config.robot.name,
         "joint": test.joint,
         "test": str(test.wish.kind),
-        "began": datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
+        "began": _now(),
         "who": test.who,
         "wish": asdict(test.wish),
         "limits": asdict(known.limits),

@@ -25,7 +25,7 @@ from hil_sim.exoskeleton import Scenario
 from hil_sim.robot import SimulatedRobot
 from server_gui.core.joint_tests.comparing import analysed
 from server_gui.core.joint_tests.file import read
-from tests.support.waiting import until
+from tests.support.waiting import WAIT_S, until
 
 KNEE = "left_knee"
 Process = subprocess.Popen[str]
@@ -237,14 +237,6 @@ def faults(name: str) -> Callable[[SimulatedRobot, Process], None]:
     return make
 
 
-def twice(robot: SimulatedRobot, process: Process) -> None:
-    with begun(robot, "step") as other:
-        _, errors = other.communicate(timeout=30)
-        assert other.returncode == 1
-        assert "is at it" in errors
-    typed(process, "")  # the first one goes on, until it is stopped
-
-
 EVENTS: dict[str, Callable[[SimulatedRobot, Process], None]] = {
     "fault": faults("overcurrent"),
     "ctrl_c": ends(signal.SIGINT),
@@ -255,7 +247,6 @@ EVENTS: dict[str, Callable[[SimulatedRobot, Process], None]] = {
     "stop_from_elsewhere": stop_from_elsewhere,
     "silent": faults("node_lost"),
     "sto": faults("sto"),
-    "doubled": twice,
 }
 
 
@@ -275,8 +266,35 @@ def test_whatever_ends_it_leaves_the_joint_at_rest_and_without_power(
     ended_by(robot, event)
 
 
-def test_one_that_is_killed_leaves_the_joint_at_rest_and_without_power(robot: SimulatedRobot) -> None:
+def test_one_that_is_killed_leaves_the_joint_without_power_and_the_next_puts_back_what_it_had(
+    robot: SimulatedRobot,
+) -> None:
+    offset = robot.exoskeleton.drives[KNEE].dictionary[0x60B2, 0]
+    offset.value = 5
+    before = parameters(robot)
     ended_by(robot, ends(signal.SIGKILL))
+    assert offset.value == 0
+    assert "0x60B2:0 0 instead of 5" in stop_says(robot)
+    with begun(robot, "step") as process:
+        said = [one.get("say", "") for one in heard(process, phrase="no")]
+    assert "0x60B2:0: put back" in str(said)
+    assert (offset.value, parameters(robot)) == (5, before)
+    assert stop_says(robot) == ""
+
+
+def stop_says(robot: SimulatedRobot) -> str:
+    """What `stop` warns of."""
+    with begun(robot, "stop") as process:
+        return process.communicate(timeout=WAIT_S)[1]
+
+
+def test_two_at_once_are_one(robot: SimulatedRobot) -> None:
+    with begun(robot, "step") as process:
+        next(one for one in heard(process) if "ask" in one)
+        with begun(robot, "step") as other:
+            _, errors = other.communicate(timeout=WAIT_S)
+        assert (other.returncode, "is at it" in errors) == (1, True)
+        assert any("ask" in one for one in heard(process, phrase="no")), "the first one goes on"
 
 
 def test_a_rule_of_the_guard_ends_it(robot: SimulatedRobot) -> None:
