@@ -95,7 +95,11 @@ def limits(
             f"a relay of {wish.torque:g} N·m needs room for the load's torque: its limit, {torque:.3g} N·m, "
             "must be twice that"
         )
-    currents = [*_levels(rules, joint, "current"), *([drive.rated_current] if drive.rated_current else [])]
+    share = max(1.0, torque / drive.rated_torque)  # who asks for more torque asks for its current too
+    currents = [
+        *_levels(rules, joint, "current"),
+        *([share * drive.rated_current] if drive.rated_current else []),
+    ]
     lags = _levels(rules, joint, "following_error")
     return Limits(
         low=low,

@@ -195,7 +195,9 @@ class TestRun(PoweredRun):
         late_s = time.monotonic() - due
         self._late_s = max(self._late_s, late_s)
         if late_s > self._plan.limits.late_s:
-            raise Ended(f"a cycle came {late_s * 1000:.0f} ms after its time: this computer is too busy")
+            raise Ended(
+                f"a cycle came {late_s * 1000:.0f} ms after its time: this computer is too busy (--late)"
+            )
         sync_ns = time.monotonic_ns()
         self._power.bus.send(SYNC, b"")
         seen = self._watch.after(sync_ns, self._plan.limits.late_s)
@@ -277,14 +279,25 @@ class TestRun(PoweredRun):
             and target is not None
             and abs(self._start + target - seen.position) > limits.lag
         ):
-            raise Ended(f"the joint is more than {math.degrees(limits.lag):.1f}° behind its target")
+            raise Ended(
+                f"the joint is more than {math.degrees(limits.lag):.1f}° behind its target{self._jerk()}"
+            )
         self._judge_speed(seen)
         for what, value, most, unit in (
             ("torque", seen.torque, limits.torque, "N·m"),
             ("current", seen.current, limits.current, "A"),
         ):
             if value is not None and most is not None and abs(value) > most:
-                raise Ended(f"its {what} is {value:.3g} {unit}, beyond the limit of {most:.3g} {unit}")
+                raise Ended(
+                    f"its {what} is {value:.3g} {unit}, beyond the limit of {most:.3g} {unit} "
+                    f"(--max-torque){self._jerk()}"
+                )
+
+    def _jerk(self) -> str:
+        """In words, that a late cycle may be why."""
+        if self._late_s <= self._plan.period_s:
+            return ""
+        return f"; a cycle came {self._late_s * 1000:.0f} ms late, which jerks a joint"
 
     def _judge_speed(self, seen: Seen) -> None:
         """As the drive says it, and as its position goes: units that were misread show here."""
@@ -297,7 +310,7 @@ class TestRun(PoweredRun):
         if speed > self._plan.limits.speed:
             raise Ended(
                 f"the joint moves at {math.degrees(speed):.3g}°/s, beyond its limit of "
-                f"{math.degrees(self._plan.limits.speed):.3g}°/s"
+                f"{math.degrees(self._plan.limits.speed):.3g}°/s (--max-speed){self._jerk()}"
             )
 
     # Afterwards, without power.
