@@ -1,7 +1,6 @@
 """What a test changes in its drive beside targets, on disk before: one that is killed cannot put it back.
 
-The next test of any joint does that before anything gets power; until then `joint-test stop` and the doctor
-say so.
+The next test of any joint does that before anything gets power; until then `joint-test stop` says so.
 """
 
 from collections.abc import Callable, Iterator, Mapping
