@@ -305,6 +305,7 @@ def test_two_at_once_are_one(robot: SimulatedRobot) -> None:
         with begun(robot, "step") as other:
             _, errors = other.communicate(timeout=WAIT_S)
         assert (other.returncode, "is at it" in errors) == (1, True)
+        typed(process, "")
         assert any("ask" in one for one in heard(process, phrase="no")), "the first one goes on"
 
 
