@@ -128,6 +128,7 @@ class Header(QWidget):
         self._outcome.setVisible(has_outcome)
         self._outcome.setMinimumWidth(self._outcome.needs if has_outcome else 0)
         self._row.setStretchFactor(self._outcome, self._outcome.wants if has_outcome else 0)
+        self._row.activate()  # at once: what is wider now would lie over its neighbour until the next event
 
     @property
     def _has_outcome(self) -> bool:

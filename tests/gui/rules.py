@@ -19,7 +19,7 @@ from PySide6.QtWidgets import (
 
 from server_gui.views.robots_panel import RobotCard
 from server_gui.views.theme import Theme
-from server_gui.views.widgets.elided import ElidedLabel
+from server_gui.views.widgets.elided import ElidedLabel, PathLabel
 from server_gui.views.widgets.fitted import FittedLabel
 from server_gui.views.widgets.mark import MarkIcon
 from server_gui.views.widgets.stop_button import StopButton
@@ -106,7 +106,8 @@ def nameless(window: QWidget) -> list[str]:
 
 def _has_number(label: QLabel) -> bool:
     """Names may have digits, too, and are elided in their middle."""
-    is_name = isinstance(label.parentWidget(), RobotCard) and label.objectName() == "title"
+    of_card = isinstance(label.parentWidget(), RobotCard) and label.objectName() == "title"
+    is_name = of_card or isinstance(label, PathLabel)
     return bool(DIGIT.search(label.text())) and not is_name
 
 
