@@ -59,19 +59,21 @@ def table_of_marks() -> list[tuple[str, str]]:
 
 
 def _marks_of(item: pytest.Item, marks: list[tuple[str, str]]) -> Iterator[str]:
-    yield from (mark for name, mark in marks if item.nodeid.startswith(name))
+    node_id = item.nodeid
+    yield from (mark for name, mark in marks if node_id.startswith(name))
     callspec = getattr(item, "callspec", None)
-    if callspec is not None and callspec.params.get("backend") == "s3" and not item.nodeid.startswith(SMOKE):
+    if callspec is not None and callspec.params.get("backend") == "s3" and not node_id.startswith(SMOKE):
         yield "s3"
 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_collection() -> Generator[None, object, object]:
-    """All that is collected stays: to look through it for garbage meanwhile takes each worker seconds."""
+    """All that is collected stays: to look for garbage in it, now or later, takes each worker seconds."""
     gc.disable()
     try:
         return (yield)
     finally:
+        gc.freeze()
         gc.enable()
 
 

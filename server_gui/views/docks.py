@@ -120,9 +120,11 @@ class Docks(QObject):
     def _dock(self, title: str, widget: QWidget, area: Area) -> QDockWidget:
         dock = QDockWidget(title)
         dock.setObjectName(title)
-        dock.setWidget(_scrolled(widget))
-        dock.installEventFilter(self)
         self._window.addDockWidget(area, dock)
+        room = _room()
+        dock.setWidget(room)
+        room.setWidget(widget)
+        dock.installEventFilter(self)
         return dock
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
@@ -174,10 +176,9 @@ class Docks(QObject):
         self.restore(self._roomy)
 
 
-def _scrolled(widget: QWidget) -> QScrollArea:
-    """Where a panel has less room than it needs."""
+def _room() -> QScrollArea:
+    """For a panel, which may need more than there is."""
     area = QScrollArea()
     area.setWidgetResizable(True)
-    area.setWidget(widget)
     area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
     return area

@@ -65,6 +65,7 @@ from server_gui.views.signals import Signals
 from server_gui.views.status_bar import StatusBar
 from server_gui.views.theme import Look, Theme
 from server_gui.views.widgets.scrolled import Scrolled
+from server_gui.views.widgets.seen import has_focus_in, is_seen
 from server_gui.views.workspace.beside_menu import others_of
 
 OF_A_ROBOT: Final = ("&Overview", "&Signals", "&Resources", "&Bus", "Ob&jects", "&Audit", "&Edits")
@@ -128,7 +129,9 @@ class MainWindow(QMainWindow):
         self.header = Header(desk, theme, menu)
         self.header.stopped.connect(self.stopped)
         self.header.reset.connect(lambda station: ask_reset(self, station))
+        # Rooms before what is in them: Qt styles all of a widget anew wherever it is put into another.
         self._middle = QWidget()
+        self.setCentralWidget(self._middle)
         self.alarms = AlarmStrip(desk, theme, self._middle)
         self.alarms.cleared.connect(lambda station: ask_clear(self, station))
         self.alarms.shown.connect(self.show_around)
@@ -160,11 +163,17 @@ class MainWindow(QMainWindow):
         self.empty.pairing.connect(self.robots.begin_pairing)
         self.empty.simulator.connect(self.simulator)
         self.empty.recordings.connect(self._look_at_recordings)
-        self.tabs = QTabWidget()
+        self.tabs, self._pages = QTabWidget(), QStackedWidget()
         self.tabs.setAccessibleName("Views")
+        column = _column(self._middle)
+        column.addWidget(self._pages, 1)
+        nobody = Scrolled()
+        self._pages.addWidget(nobody)
+        nobody.setWidget(self.empty)
+        self._pages.addWidget(self.tabs)
         live = (self.overview, self.signals, self.resources, self.buses, self.objects, self.audit, self.edits)
         for title, view in zip(OF_A_ROBOT, live, strict=True):
-            self.tabs.addTab(Scrolled(view), title)
+            self._add_tab(view, title)
         self._views: tuple[View, ...] = live
         self._live = len(self._views)  # tabs that show the robot that is looked at
         if archive is not None:
@@ -173,8 +182,8 @@ class MainWindow(QMainWindow):
             self.models = ModelsPage(archive.models, theme)
             self._views += (self.recordings, self.cloud, self.models)
             self.tabs.addTab(self.recordings, "Re&cordings")
-            self.tabs.addTab(Scrolled(self.cloud), "C&loud")
-            self.tabs.addTab(Scrolled(self.models), "&Models")
+            self._add_tab(self.cloud, "C&loud")
+            self._add_tab(self.models, "&Models")
         self._commissioning = commissioning
         self._is_closing = self._is_ending = False
         if commissioning is not None:
@@ -184,10 +193,9 @@ class MainWindow(QMainWindow):
             self.empty.offer_commissioning(lambda: self.tabs.setCurrentWidget(self.commission))
         self._bar = StatusBar(desk, theme)
         self.setStatusBar(self._bar)
-        self._pages = QStackedWidget()
-        self._pages.addWidget(Scrolled(self.empty))
-        self._pages.addWidget(self.tabs)
         self.page_bar = PageBar(self.tabs, self._help_corner())
+        column.addWidget(self.experiment)
+        column.addWidget(self.trial)  # below: when it comes or goes, no tab moves
         self._build()
         self._bind_keys()
         menu.setMenu(self._view_menu())
@@ -221,9 +229,9 @@ class MainWindow(QMainWindow):
         self.robots.refresh()
         self.parameters.refresh()
         elsewhere = (self.parameters.trial, self.overview.now.trial)
-        self.overview.now.offer(not _is_seen(self.parameters.trial))
+        self.overview.now.offer(not is_seen(self.parameters.trial))
         self.experiment.refresh()
-        self.trial.refresh(shown=not any(_is_seen(one) for one in elsewhere))
+        self.trial.refresh(shown=not any(is_seen(one) for one in elsewhere))
         self.events.refresh()
         self._bar.refresh()
 
@@ -299,7 +307,7 @@ class MainWindow(QMainWindow):
     def show_help(self) -> None:
         """Show what the manual says of the panel that has the keyboard, or of the tab."""
         tab = self.tabs.tabText(self.tabs.currentIndex()).replace("&", "")
-        self.help.show_section("Parameters" if _within(self.parameters) else tab)
+        self.help.show_section("Parameters" if has_focus_in(self.parameters) else tab)
         self.bring(self._manual)
 
     def bring(self, dock: QDockWidget) -> None:
@@ -334,19 +342,19 @@ class MainWindow(QMainWindow):
 
     # --- how it is put together
 
+    def _add_tab(self, view: QWidget, title: str) -> None:
+        room = Scrolled()
+        self.tabs.addTab(room, title)
+        room.setWidget(view)
+
     def _build(self) -> None:
-        column = _column(self._middle)
-        column.addWidget(self._pages, 1)
-        column.addWidget(self.experiment)
-        column.addWidget(self.trial)  # below: when it comes or goes, no tab moves
         self.keys = KeysSheet(self._theme, self._middle)
-        self.setCentralWidget(self._middle)
         above = QWidget()
+        self.setMenuWidget(above)
         top = _column(above)
         top.addWidget(self.header)
         top.addWidget(self.alarms)
         top.addWidget(self.page_bar)
-        self.setMenuWidget(above)
         left, right, below = Area.LeftDockWidgetArea, Area.RightDockWidgetArea, Area.BottomDockWidgetArea
         panels = {
             "Robots": (self.robots, left),
@@ -477,17 +485,6 @@ def _column(widget: QWidget) -> QVBoxLayout:
     column.setContentsMargins(0, 0, 0, 0)
     column.setSpacing(0)
     return column
-
-
-def _within(panel: QWidget) -> bool:
-    """Whether the keyboard is in it."""
-    focused = QApplication.focusWidget()
-    return focused is not None and panel.isAncestorOf(focused)
-
-
-def _is_seen(widget: QWidget) -> bool:
-    """Whether any of it is on the screen: not behind another panel, and not scrolled away."""
-    return widget.isVisible() and not widget.visibleRegion().isEmpty()
 
 
 def _choices(menu: QMenu, texts: list[str], chosen: str, choose: Callable[[str], None]) -> None:

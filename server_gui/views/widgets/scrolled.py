@@ -12,24 +12,28 @@ class Scrolled(QScrollArea):
     where that has the focus.
     """
 
-    def __init__(self, view: QWidget) -> None:
+    def __init__(self, view: QWidget | None = None) -> None:
         super().__init__()
-        self._view = view
         self._has_grown = False
         self.setWidgetResizable(True)
-        self.setWidget(view)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        for field in (*view.findChildren(QComboBox), *view.findChildren(QAbstractSpinBox)):
+        if view is not None:
+            self.setWidget(view)
+
+    def setWidget(self, widget: QWidget) -> None:
+        super().setWidget(widget)
+        for field in (*widget.findChildren(QComboBox), *widget.findChildren(QAbstractSpinBox)):
             field.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
             field.installEventFilter(self)
 
     def show_part(self, part: QWidget) -> None:
         """Scroll to a part that has just come, once it has its place."""
-        layout = self._view.layout()
+        view = self.widget()
+        layout = view.layout()
         if layout is not None:
             layout.activate()
         self._grow()
-        QApplication.sendPostedEvents(self._view, QEvent.Type.LayoutRequest.value)
+        QApplication.sendPostedEvents(view, QEvent.Type.LayoutRequest.value)
         self.ensureWidgetVisible(part, 0, 0)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
@@ -38,7 +42,7 @@ class Scrolled(QScrollArea):
                 event.ignore()  # it goes to whoever is behind
                 return True
             return False
-        if event.type() == QEvent.Type.LayoutRequest and watched is self._view:
+        if event.type() == QEvent.Type.LayoutRequest and watched is self.widget():
             self._grow()
         return super().eventFilter(watched, event)
 
@@ -47,14 +51,15 @@ class Scrolled(QScrollArea):
         self._grow()
 
     def _grow(self) -> None:
-        layout = self._view.layout()
-        if layout is not None and layout.hasHeightForWidth():
+        view = self.widget()
+        layout = None if view is None else view.layout()
+        if view is not None and layout is not None and layout.hasHeightForWidth():
             width = max(self.viewport().width(), layout.totalMinimumSize().width())
             self._has_grown = True
-            self._view.setMinimumHeight(layout.totalMinimumHeightForWidth(width))
-        elif self._has_grown:  # what it needs is known without its width by now
+            view.setMinimumHeight(layout.totalMinimumHeightForWidth(width))
+        elif view is not None and self._has_grown:  # what it needs is known without its width by now
             self._has_grown = False
-            self._view.setMinimumHeight(0)
+            view.setMinimumHeight(0)
 
 
 def bring_into_sight(part: QWidget) -> None:

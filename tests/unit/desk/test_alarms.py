@@ -26,7 +26,9 @@ ALL = Stopped(dict.fromkeys(JOINTS, "confirmed"), held=True)
 
 
 @pytest.fixture
-def bench() -> Bench:
+def bench(monkeypatch: pytest.MonkeyPatch) -> Bench:
+    """A desk with a robot that walks; what it has said gets old in a minute, on a busy computer as well."""
+    monkeypatch.setattr("server_gui.core.follow.robot.STALE_NS", 60_000_000_000)
     made = Bench(Desk())
     made.add("exo-01").take([described(), walking(50), looked()])
     return made
@@ -125,7 +127,7 @@ def _no_data(bench: Bench) -> None:
 
 def _stale(bench: Bench) -> None:
     bench.desk.stations.clear()
-    bench.add("exo-03").take([described(), walking(5, age_s=3.0)])
+    bench.add("exo-03").take([described(), walking(5, age_s=90.0)])
 
 
 @pytest.mark.parametrize(

@@ -267,7 +267,7 @@ def test_one_can_end_the_look_for_the_newest_whatever_there_is(
     piece: bytes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """What is looked at without a pause is short."""
-    data = (piece * 4 * LINE_LIMIT)[: 4 * LINE_LIMIT]
+    data = (piece * 2 * LINE_LIMIT)[: 2 * LINE_LIMIT]
     fed: list[int] = []
     feed = StopSplitter.feed
 

@@ -1,0 +1,14 @@
+"""What of a widget is seen, and whether the keyboard is in it."""
+
+from PySide6.QtWidgets import QApplication, QWidget
+
+
+def has_focus_in(panel: QWidget) -> bool:
+    """Whether the keyboard is in it."""
+    focused = QApplication.focusWidget()
+    return focused is not None and panel.isAncestorOf(focused)
+
+
+def is_seen(widget: QWidget) -> bool:
+    """Whether any of it is on the screen: not behind another panel, and not scrolled away."""
+    return widget.isVisible() and not widget.visibleRegion().isEmpty()
