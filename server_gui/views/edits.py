@@ -128,6 +128,7 @@ class Edits(QWidget):
         buttons.addWidget(self.sweep)
         column.addWidget(self.list, 1)
         column.addLayout(buttons)
+        column.addStretch(0)  # while there is no list, they stand at the top
         return column
 
     def _ask(self, kind: Kind) -> None:

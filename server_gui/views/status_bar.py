@@ -73,6 +73,7 @@ class StatusBar(QStatusBar):
         self._refresh_recording(station)
         set_text(self._window, f"{self._rate():.0f} fps")
         set_tip(self._window, "frames that this window draws a second")
+        QApplication.sendPostedEvents(self, QEvent.Type.LayoutRequest)  # no number is drawn where it was
 
     def _refresh_recording(self, station: Station | None) -> None:
         address, is_live = (None, False) if station is None else (station.address, station.is_live)

@@ -155,13 +155,14 @@ QPushButton#page_name:focus, QPushButton#page_name:hover {{ color: {text}; backg
 QPushButton#stop {{ background: {stop}; color: white; border: 3px solid {stop_border}; border-radius: 6px;
     font-weight: bold; padding: 6px 14px; }}
 QPushButton#stop:pressed {{ background: #7d0a1d; }}
+QPushButton#stop:disabled {{ background: {card}; color: {old}; border-color: {border}; }}
 QPushButton#stop:focus {{ border-color: {text}; }}
 QPushButton#robot_stop {{ color: {bad}; border-color: {bad}; padding: 2px 8px; font-weight: bold; }}
 QLineEdit, QAbstractSpinBox, QComboBox, QPlainTextEdit {{ background: {field}; border: 1px solid {edge};
     border-radius: 4px; padding: 4px 6px; selection-background-color: {accent};
     selection-color: {on_accent}; }}
 QLineEdit:focus, QAbstractSpinBox:focus {{ border-color: {accent}; }}
-QAbstractSpinBox {{ padding-right: 16px; }}
+QAbstractSpinBox {{ padding: 3px 16px 3px 4px; }}
 QAbstractSpinBox::up-button, QAbstractSpinBox::down-button {{ background: transparent; border: none;
     width: 16px; }}
 QAbstractSpinBox::up-arrow, QAbstractSpinBox::down-arrow {{ image: none; width: 0; height: 0; }}

@@ -10,6 +10,7 @@ from PySide6.QtWidgets import (
     QAbstractItemView,
     QAbstractScrollArea,
     QApplication,
+    QHeaderView,
     QLabel,
     QScrollArea,
     QTabBar,
@@ -76,6 +77,31 @@ def halved_numbers(window: QWidget) -> list[str]:
     return found
 
 
+def cut_words(window: QWidget) -> list[str]:
+    """Every text of several lines of which some have no room."""
+    return [
+        f"{_path(label)}: {label.text()}"
+        for label in seen(window)
+        if isinstance(label, QLabel)
+        and label.wordWrap()
+        and label.text()
+        and label.heightForWidth(label.width()) > label.height() + label.fontMetrics().descent()
+    ]
+
+
+def cut_titles(window: QWidget) -> list[str]:
+    """Every title of a column of which letters have no room."""
+    found = []
+    for header in seen(window):
+        if isinstance(header, QHeaderView) and header.orientation() is Qt.Orientation.Horizontal:
+            for place in range(header.count()):
+                if not header.isSectionHidden(place) and header.sectionSize(place) < _title_wide(
+                    header, place
+                ):
+                    found.append(f"{_path(header)}: {header.model().headerData(place, header.orientation())}")
+    return found
+
+
 def out_of_reach(window: QWidget) -> list[str]:
     """Every control that is not whole on the screen, and to which nothing scrolls."""
     found = []
@@ -122,6 +148,11 @@ def _is_cut(label: QLabel) -> bool:
     return type(label).paintEvent is QLabel.paintEvent and widest > room
 
 
+def _title_wide(header: QHeaderView, place: int) -> int:
+    title = str(header.model().headerData(place, header.orientation()) or "")
+    return max(map(header.fontMetrics().horizontalAdvance, title.split("\n")))
+
+
 def _halved_cells(view: QTableView) -> Iterator[str]:
     for row, column in _cells(view):
         index = view.model().index(row, column)
@@ -129,7 +160,9 @@ def _halved_cells(view: QTableView) -> Iterator[str]:
         right = index.data(Qt.ItemDataRole.TextAlignmentRole)
         is_number = right is not None and bool(Qt.AlignmentFlag(right) & Qt.AlignmentFlag.AlignRight)
         metrics = view.fontMetrics() if font is None else QFontMetrics(font)
-        if is_number and metrics.horizontalAdvance(text) > view.columnWidth(column):
+        left, wide = view.columnViewportPosition(column), view.columnWidth(column)
+        is_cut_off = left < view.viewport().width() < left + wide and view.horizontalScrollBar().value() == 0
+        if is_number and (metrics.horizontalAdvance(text) > wide or is_cut_off):
             yield f"{_path(view)}: {text}"
 
 

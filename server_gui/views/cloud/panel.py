@@ -44,6 +44,7 @@ NO_STORE: Final = (
     "Nothing has been uploaded yet. What is recorded comes here by itself, a batch at a time; "
     "Upload now brings it at once."
 )
+NO_JOBS: Final = "Uploads, verifications and downloads that you begin here show how far they are."
 
 
 class Cloud(QWidget):
@@ -84,6 +85,10 @@ class Cloud(QWidget):
         self._cards["In the store"].body.addWidget(self.hint)
         self._cards["In the store"].body.addWidget(self.browser, 1)
         self._cards["In the store"].body.addLayout(self._actions())
+        self.no_jobs = PlainLabel(NO_JOBS)
+        self.no_jobs.setObjectName("dim")
+        self.no_jobs.setWordWrap(True)
+        self._cards["Jobs"].body.addWidget(self.no_jobs)
         self._cards["Jobs"].body.addWidget(self.jobs)
         self._top = QBoxLayout(QBoxLayout.Direction.LeftToRight)
         self._top.addWidget(self._cards["Store"], 3)
@@ -111,6 +116,7 @@ class Cloud(QWidget):
         self._refresh_waiting()
         self.browser.refresh()
         self.jobs.refresh()
+        self.no_jobs.setVisible(not self._archive.jobs.jobs)
         count = under_way(self._archive.jobs.jobs)
         self._cards["Jobs"].set_note(f"{count} under way" if count else "none under way")
 
@@ -208,7 +214,7 @@ class Cloud(QWidget):
         self.spool.say("spool", str(report.spool))
         uploader = report.uploader
         lines = [
-            f"{_waiting(uploader.waiting)}, {size(uploader.backlog_bytes)} with what is being recorded",
+            f"{_waiting(uploader.waiting)}, {size(uploader.backlog_bytes)} including what is being recorded",
             f"{uploader.uploaded} uploaded since recording began",
             f"{size(report.disk_free_bytes)} free on the disk of the spool",
         ]

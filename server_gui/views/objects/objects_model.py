@@ -135,7 +135,9 @@ def _name(shown: Shown, info: ObjectInfo) -> str:
 
 def _holds(shown: Shown, info: ObjectInfo) -> str:
     held = shown.held(info)
-    return "–" if held is None else held.told.problem or held.told.words
+    if held is None or held.told.problem is None:
+        return "–" if held is None else held.told.words
+    return held.told.problem.partition(f"{info.object}: ")[2] or held.told.problem  # whose, its row says
 
 
 def _age(shown: Shown, info: ObjectInfo) -> str:
