@@ -91,15 +91,14 @@ def cut_words(window: QWidget) -> list[str]:
 
 def cut_titles(window: QWidget) -> list[str]:
     """Every title of a column of which letters have no room."""
-    found = []
-    for header in seen(window):
-        if isinstance(header, QHeaderView) and header.orientation() is Qt.Orientation.Horizontal:
-            for place in range(header.count()):
-                if not header.isSectionHidden(place) and header.sectionSize(place) < _title_wide(
-                    header, place
-                ):
-                    found.append(f"{_path(header)}: {header.model().headerData(place, header.orientation())}")
-    return found
+    across = Qt.Orientation.Horizontal
+    return [
+        f"{_path(header)}: {header.model().headerData(place, across)}"
+        for header in seen(window)
+        if isinstance(header, QHeaderView) and header.orientation() is across
+        for place in range(header.count())
+        if not header.isSectionHidden(place) and header.sectionSize(place) < _title_wide(header, place)
+    ]
 
 
 def out_of_reach(window: QWidget) -> list[str]:
