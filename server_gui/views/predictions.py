@@ -119,6 +119,8 @@ def lines(station: Station) -> Iterator[Line]:
             line = said(shown, stopped=stopped, unseen=blind(station))
             if task == GAIT_PHASE and line.mark.colour == "accent":
                 line = _stride(station, line)
+            if not station.is_live and line.mark.colour != "bad":
+                line = Line(Mark("ring", "old", "not known"), "not known", "no live data")
             yield replace(line, text=f"{title}: {line.text}")
     if predictions.problem:
         yield Line(

@@ -53,10 +53,8 @@ class Resources(QWidget):
         self._taken: ResourceSnapshot | None = None
         self._frame = 0
         self.setObjectName("page")
-        self.cpu, self.memory = (
-            Trend(theme, "CPU", 20.0, symbol=" %"),
-            Trend(theme, "Memory", 0.25, 1 / GIB, symbol=" GiB", digits=2),
-        )
+        self.cpu = Trend(theme, "CPU", 20.0, symbol=" %")
+        self.memory = Trend(theme, "Memory", 0.25, 1 / GIB, symbol=" GiB", digits=2)
         self.top = Trend(theme, "CPU by process", 10.0, unit="% of a core")
         self.devices = Trend(theme, "Disk and network", 10.0, 1 / KIB, unit="KiB/s")
         self.temperature = Trend(theme, "Temperature", 10.0, symbol=" °C")

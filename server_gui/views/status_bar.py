@@ -102,4 +102,4 @@ def _computer(station: Station) -> tuple[str, ...]:
     most = busiest(station)
     short = f"CPU {cpu} · memory {share}"
     full = () if most is None else (f"{short} · most: {most.name} {most.percent:.0f} %",)
-    return *full, short
+    return *full, short, f"CPU {cpu}"

@@ -63,7 +63,11 @@ def halved_numbers(window: QWidget) -> list[str]:
     """Every number of which a digit is missing for want of room."""
     found = []
     for widget in seen(window):
-        if isinstance(widget, QLabel) and _has_number(widget) and _is_cut(widget):
+        if (
+            isinstance(widget, QLabel)
+            and _has_number(widget)
+            and (_is_cut(widget) or not (_is_inside(widget, window) or _is_scrolled(widget)))
+        ):
             found.append(f"{_path(widget)}: {widget.text()}")
         if isinstance(widget, FittedLabel) and DIGIT.search(widget.shown) and not widget.is_whole:
             found.append(f"{_path(widget)}: {widget.shown}")
@@ -107,10 +111,8 @@ def out_of_reach(window: QWidget) -> list[str]:
     for widget in window.findChildren(QWidget):
         if not widget.isVisible() or not widget.focusPolicy() & Qt.FocusPolicy.TabFocus:
             continue
-        corners = (widget.rect().topLeft(), widget.rect().bottomRight())
-        inside = all(window.rect().contains(widget.mapTo(window, corner)) for corner in corners)
-        if not inside and not _is_scrolled(widget) and not _is_behind(widget):
-            found.append(f"{_path(widget)} at {widget.mapTo(window, corners[0]).toTuple()}")
+        if not _is_inside(widget, window) and not _is_scrolled(widget) and not _is_behind(widget):
+            found.append(f"{_path(widget)} at {widget.mapTo(window, widget.rect().topLeft()).toTuple()}")
     return found
 
 
@@ -173,6 +175,11 @@ def _cells(view: QTableView) -> Iterator[tuple[int, int]]:
         for column in range(model.columnCount(QModelIndex())):
             if not view.isColumnHidden(column):
                 yield row, column
+
+
+def _is_inside(widget: QWidget, window: QWidget) -> bool:
+    corners = (widget.rect().topLeft(), widget.rect().bottomRight())
+    return all(window.rect().contains(widget.mapTo(window, corner)) for corner in corners)
 
 
 def _is_scrolled(widget: QWidget) -> bool:

@@ -313,6 +313,8 @@ class ParameterTree(QTreeView):
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self._show_columns()
+        if self.currentIndex().isValid():
+            self.scrollTo(self.currentIndex())  # what is told of it below takes room from here
 
     @property
     def _says(self) -> bool:
