@@ -195,7 +195,7 @@ def _stride(station: Station, line: Line) -> Line:
     if max(differences) <= AGREES:
         return replace(line, text="steps and model agree")
     mark = Mark("triangle", "warn", "differs")
-    return replace(line, mark=mark, text=f"steps, model {max(differences):.0f} % apart")
+    return replace(line, mark=mark, text=f"{max(differences):.0f} % apart")
 
 
 def _knows(shown: Told) -> bool:

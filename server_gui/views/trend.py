@@ -77,18 +77,18 @@ class Trend(Card):
             self._shown, self._rows = (source, tuple(curves)), object()
             self.plot.set_curves(curves)
         self.plot.draw(self._rows, times, columns, live=live, scale=self._scale)
-        self._say(curves, columns)
+        self._say(curves, columns, live=live)
 
     def _resize(self) -> None:
         if "plot" in self.__dict__:  # it has been shown
             self.plot.setMinimumHeight(self._theme.px(LEAST_HIGH))
 
-    def _say(self, curves: Sequence[Curve], columns: Sequence[Floats]) -> None:
+    def _say(self, curves: Sequence[Curve], columns: Sequence[Floats], *, live: bool) -> None:
         said = []
         for curve, values in zip(curves, columns, strict=True):
             known = values[~np.isnan(values)]
             value = f"{known[-1] * self._scale:.{self._digits}f}" if len(known) else "–"
-            said.append((css(self._theme, curve.colour), "━", f"{curve.channel} {value}{self._symbol}"))
+            said.append((css(self._theme, curve.colour if live else "old"), "━", f"{curve.channel} {value}{self._symbol}"))
         self.legend.say(said)
         self.plot.setAccessibleDescription(self.legend.accessibleDescription())
 
