@@ -1,5 +1,6 @@
 """Rules for every test: a leaked thread, child process, socket or terminal fails the test that leaked it."""
 
+import atexit
 import gc
 import os
 import re
@@ -75,6 +76,7 @@ def pytest_collection() -> Generator[None, object, object]:
     finally:
         gc.freeze()
         gc.enable()
+        atexit.register(gc.unfreeze)  # else libraries tell at the end what they have leaked
 
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)

@@ -161,6 +161,7 @@ _shtab_gwrms_sensor_commands() {
 
 _shtab_gwrms_sessions_commands() {
   local _commands=(
+    changed:'What changed from one session to another, and what moved with it.'
     compare:'Which programs take more in sessions than in earlier ones.'
     export:'A session, or a part of it, as a file.'
     gait:'Cadence, step times, symmetry and ranges of motion of a recording.'
@@ -1144,6 +1145,19 @@ _shtab_gwrms_sessions_options=(
 # guard to ensure default positional specs are added only once per session
 _shtab_gwrms_sessions_defaults_added=0
 
+_shtab_gwrms_sessions_changed_options=(
+  "(- : *)"{-h,--help}"[show this help message and exit]"
+  "--config[the server\'s file, which names the store]:FILE:_files"
+  "--json[for machines]"
+  "--facts[only what changed\: no telemetry is read]"
+  "--url[file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file)]:URL:"
+  ":the session in which it worked\; how its name begins:"
+  ":the other one:"
+)
+
+# guard to ensure default positional specs are added only once per session
+_shtab_gwrms_sessions_changed_defaults_added=0
+
 _shtab_gwrms_sessions_compare_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
@@ -1350,7 +1364,9 @@ _shtab_gwrms_sweep_options=(
   "--most-current[current that ends it]:A:"
   "--config[the server\'s file\: where it is kept]:FILE:_files"
   ":the parameter, as in left_knee.position_gain:"
-  ":in its own unit or another\: 3deg:"
+  ":first value, in its own unit or another\: 3deg:"
+  ":last value, above FROM:"
+  ":between two values:"
 )
 
 # guard to ensure default positional specs are added only once per session
@@ -1748,6 +1764,7 @@ _shtab_gwrms_sessions() {
       (( CURRENT += 1 ))
       curcontext="${curcontext%:*:*}:_shtab_gwrms_sessions-$line[1]:"
       case $line[1] in
+        changed) _arguments -C -s $_shtab_gwrms_sessions_changed_options ;;
         compare) _arguments -C -s $_shtab_gwrms_sessions_compare_options ;;
         export) _arguments -C -s $_shtab_gwrms_sessions_export_options ;;
         gait) _arguments -C -s $_shtab_gwrms_sessions_gait_options ;;

@@ -108,14 +108,15 @@ def sweep_main(argv: list[str]) -> int:
     """Run `gwrms sweep`."""
     made = parser("sweep", "Try values of a parameter upwards, in small steps, while you watch.", SWEEP)
     made.add_argument("name", metavar="NAME", help="the parameter, as in left_knee.position_gain")
-    made.add_argument(
-        "values", metavar=("FROM", "TO", "STEP"), nargs=3, help="in its own unit or another: 3deg"
-    )
+    made.add_argument("first", metavar="FROM", help="first value, in its own unit or another: 3deg")
+    made.add_argument("last", metavar="TO", help="last value, above FROM")
+    made.add_argument("step", metavar="STEP", help="between two values")
     _add_shared(made)
     arguments = made.parse_args(argv)
 
     def plan(info: ParameterInfo, held: float, unit: Unit, description: Description) -> Plan:
-        first, last, step = _values(arguments.name, arguments.values, description)
+        texts = [arguments.first, arguments.last, arguments.step]
+        first, last, step = _values(arguments.name, texts, description)
         return sweep(
             info, held, (first, last, step), unit, dwell=_dwell(arguments), bounds=_bounds(arguments)
         )

@@ -90,7 +90,7 @@ class Signals(QWidget):
         self.measuring = Measuring(theme)
         self.measuring.chosen.connect(lambda cursor: self._move(cursor, self._at[cursor]))
         self.measuring.stepped.connect(self._step)
-        self.expression = ExpressionBar(self.scene.meaning)
+        self.expression = ExpressionBar(theme, self.scene.meaning)
         self.expression.written.connect(self.area.put)
         self.trigger = TriggerBar(theme)
         self.trigger.armed.connect(self._arm)

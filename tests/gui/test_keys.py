@@ -155,7 +155,7 @@ def test_clearing_the_filter_leaves_groups_and_the_choice_as_they_were(
 
 def test_what_the_robot_would_refuse_is_marked_while_it_is_staged(window: MainWindow, bench: Bench) -> None:
     bench.look_again([looked()])
-    window.parameters.stage_text("left_knee.max_torque", "200")
+    window.parameters.stage("left_knee.max_torque", 200.0)  # as of a file; what is typed so is not staged
     bench.draw(window)
     row = window.parameters.tree._rows["left_knee.max_torque"]
     assert (row[NEW].text(), row[SAID].text()) == ("200", "✕ limit")

@@ -20,7 +20,7 @@ WORDS: Final[Mapping[str, tuple[str, ...]]] = {
     "keys": ("pair", "list", "push", "add", "revoke"),
     "sensor": ("record", "replay", "decode"),
     "calibrate": ("insole", "imu", "joint"),
-    "sessions": ("ls", "show", "gait", "resources", "compare", "export"),
+    "sessions": ("ls", "show", "gait", "resources", "compare", "changed", "export"),
     "cloud": (
         "ls",
         "du",

@@ -5,7 +5,7 @@ from PySide6.QtWidgets import QMenu, QWidget
 
 from server_gui.core.desk.desk import Desk
 from server_gui.core.tuning.several import Offer, offers
-from server_gui.views.widgets.plain import tip
+from server_gui.views.widgets.plain import set_tip
 
 
 class SeveralMenu(QMenu):
@@ -35,7 +35,7 @@ class SeveralMenu(QMenu):
         self.clear()
         for offer in self.offers:
             action = self.addAction(offer.title)
-            action.setToolTip(tip(offer.problem or f"Held now:\n{offer.held}"))
+            set_tip(action, offer.problem or f"Held now:\n{offer.held}")
             action.triggered.connect(lambda _=False, offer=offer: self.taken.emit(offer))
         if self.isEmpty():
             self.addAction("No other joint has one like it").setEnabled(False)

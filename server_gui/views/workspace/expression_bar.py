@@ -3,13 +3,13 @@
 from collections.abc import Callable, Sequence
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QFontDatabase
 from PySide6.QtWidgets import QCompleter, QHBoxLayout, QLineEdit, QPushButton, QSizePolicy
 
 from server_gui.core.workspace.expressions import FUNCTIONS
 from server_gui.core.workspace.grammar import LONGEST
 from server_gui.core.workspace.meaning import Meaning
 from server_gui.core.workspace.workspace import said
+from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_text
 from server_gui.views.widgets.plain import PlainLabel, set_tip
 
@@ -22,23 +22,21 @@ class ExpressionBar(Card):
 
     written = Signal(str)
 
-    def __init__(self, meaning: Callable[[str], Meaning]) -> None:
+    def __init__(self, theme: Theme, meaning: Callable[[str], Meaning]) -> None:
         super().__init__("Expression")
+        self._theme = theme
         self._meaning = meaning
         self.field = QLineEdit()
         self.field.setMaxLength(LONGEST)
         self.field.setPlaceholderText(EXAMPLE)
         self.field.setAccessibleName("Expression over channels")
         set_tip(self.field, HELP)
-        fixed = QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont)
-        self.field.setFont(fixed)  # so that a place below it is below its letter
         self.field.textChanged.connect(self._judge)
         self.field.returnPressed.connect(self._add)
         self.add = QPushButton("Add")
         self.add.setAccessibleName("Add the expression")
         self.add.clicked.connect(self._add)
         self.place = PlainLabel()
-        self.place.setFont(fixed)
         self.place.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self.words = PlainLabel(HELP)
         self.words.setObjectName("dim")
@@ -50,7 +48,13 @@ class ExpressionBar(Card):
         self.body.addWidget(self.place)
         self.body.addWidget(self.words)
         self._judge()
+        self._scale()
+        theme.changed.connect(self._scale)
         self.hide()
+
+    def _scale(self) -> None:
+        for part in (self.field, self.place):
+            part.setFont(self._theme.number_font())  # so that a place below it is below its letter
 
     def show_channels(self, names: Sequence[str]) -> None:
         """Offer these while one types the first."""
