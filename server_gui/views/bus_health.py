@@ -128,7 +128,7 @@ class BusCard(Card):
         self.table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         self.table.horizontalHeader().setSectionResizeMode(1, QHeaderView.ResizeMode.Stretch)
         self.table.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        theme.changed.connect(lambda: self.table.setRowCount(0))  # rows and letters of the old size
+        theme.changed.connect(self._forget)
         head = QGridLayout()
         head.setColumnStretch(2, 1)
         head.addWidget(self._icon, 0, 0)
@@ -138,6 +138,10 @@ class BusCard(Card):
         self.body.addWidget(self._counters)
         self.body.addWidget(self._kinds)
         self.body.addWidget(self.table)
+
+    def _forget(self) -> None:
+        """Rows and letters are of the size before."""
+        self.table.setRowCount(0)
 
     def show_bus(self, bus: BusInfo) -> None:
         """Show how it is now."""

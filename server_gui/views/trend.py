@@ -88,7 +88,13 @@ class Trend(Card):
         for curve, values in zip(curves, columns, strict=True):
             known = values[~np.isnan(values)]
             value = f"{known[-1] * self._scale:.{self._digits}f}" if len(known) else "–"
-            said.append((css(self._theme, curve.colour if live else "old"), "━", f"{curve.channel} {value}{self._symbol}"))
+            said.append(
+                (
+                    css(self._theme, curve.colour if live else "old"),
+                    "━",
+                    f"{curve.channel} {value}{self._symbol}",
+                )
+            )
         self.legend.say(said)
         self.plot.setAccessibleDescription(self.legend.accessibleDescription())
 

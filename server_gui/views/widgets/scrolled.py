@@ -29,9 +29,10 @@ class Scrolled(QScrollArea):
     def show_part(self, part: QWidget) -> None:
         """Scroll to a part that has just come, once it has its place."""
         view = self.widget()
-        layout = view.layout()
-        if layout is not None:
-            layout.activate()
+        layout = None if view is None else view.layout()
+        if view is None or layout is None:
+            return
+        layout.activate()
         self._grow()
         QApplication.sendPostedEvents(view, QEvent.Type.LayoutRequest.value)
         self.ensureWidgetVisible(part, 0, 0)
