@@ -8,10 +8,14 @@ they fall on one side where they rise on the other. So what a parameter is decid
   the other way the lower limit of one side is the upper one of the other.
 - Limits of torque in the drive's positive and its negative direction change places there likewise.
 - All else that can be negative is copied only where the counts of both run the same way.
+- What a drive takes in counts (a profile's speed, a following error) is copied only where a count is as much.
+- What a maker has put in objects of its own (2000h to 5FFFh) is copied only between devices of one kind.
+- What makes a joint's counts what they are (polarity, gear, homing) belongs to that joint alone.
 
 What cannot be carried over is refused with a reason, joint by joint.
 """
 
+import math
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
@@ -31,6 +35,7 @@ SIDES: Final = ("left", "right")
 JOINT: Final = "joint"
 UNSURE: Final = ("device_timeout", "mismatch")  # refusals of a store after which nobody knows
 FIRST_OF_PROFILE, AXIS, LAST_OF_PROFILE = 0x6000, 0x800, 0x9FFF  # CiA 402: axes of a drive lie so far apart
+OF_MAKER: Final = range(0x2000, 0x6000)  # CiA 301: what each maker fills as it likes
 
 # Pairs that change places where counts run the other way (CiA 402-2).
 _POSITIONS: Final[Mapping[Object, Object]] = {
@@ -47,7 +52,20 @@ _OWN: Final[Mapping[int, str]] = {
     0x607C: "a home offset belongs to where that joint's own encoder counts from",
     0x6064: "a position is no setting",
     0x607A: "a target is no setting",
+    0x6071: "a target is no setting",
+    0x60FF: "a target is no setting",
+    0x607E: "the polarity is what turns that drive's own counts",
+    0x6098: "a homing method names the end of that drive's own counts",
+    0x608F: "it says what a count of that drive is",
+    0x6090: "it says what a count of that drive is",
+    0x6091: "it says what a count of that drive is",
+    0x6092: "it says what a count of that drive is",
 }
+# In counts of position, or in counts a second or a second², unless the robot's file gives them a unit.
+_IN_COUNTS: Final = frozenset((
+    0x6065, 0x6067, 0x606D, 0x606F, 0x607F, 0x6081, 0x6082, 0x6083, 0x6084, 0x6085, 0x6099, 0x609A, 0x60A4,
+    0x60B0, 0x60B1, 0x60C5, 0x60C6,
+))  # fmt: skip
 _BROKEN: Final[Mapping[Limit, str]] = {
     Limit.MIN: "{value} is below the smallest allowed there, {limit}",
     Limit.MAX: "{value} is above the largest allowed there, {limit}",
@@ -146,8 +164,18 @@ class _Spreading:
                 self._check_way(source, target, turned)
         if target.unit != source.unit:
             raise _Refused(f"{target.name} is in {target.unit or 'counts'}, {source.name} is not")
+        if not source.unit and place[0] in _IN_COUNTS:
+            self._check_counts(source.component, joint)
         self._check(target, value)
         return target, value
+
+    def _check_counts(self, source: str, joint: str) -> None:
+        """Whether a count is as much of an angle at both."""
+        here, there = self._angle_of(source), self._angle_of(joint)
+        if here is None or there is None:
+            raise _Refused("it is in counts, and the robot does not tell how much a count is at both")
+        if not math.isclose(abs(here.rad_per_count), abs(there.rad_per_count), rel_tol=1e-6):
+            raise _Refused("it is in counts, and a count is another angle there")
 
     @staticmethod
     def _check_way(source: ParameterInfo, target: ParameterInfo, turned: bool | None) -> None:
@@ -177,13 +205,21 @@ class _Spreading:
             raise _Refused("the robot has no such joint")
         quantity = source.name.partition(".")[2]
         named = self.known.get(f"{joint}.{quantity}")
-        if named is not None and (_place(named.object) == place or _is_same_by_name(source, named)):
+        means_the_same = place[0] not in OF_MAKER or self._are_of_a_kind(source.component, joint)
+        if named is not None and (
+            (means_the_same and _place(named.object) == place) or _is_same_by_name(source, named)
+        ):
             return named
-        for one in self.known.values():
+        for one in self.known.values() if means_the_same else ():
             if one.component == joint and _place(one.object) == place:
                 return one
         if self._read_only.get(f"{joint}.{quantity}") is not None:
             raise _Refused(f"{joint}.{quantity} cannot be changed: {self._read_only[f'{joint}.{quantity}']}")
+        if not means_the_same:
+            raise _Refused(
+                f"{source.object} is its maker's own object, nothing tells that it means the same there, "
+                "and both have no unit and name in common"
+            )
         if named is not None:
             raise _Refused(
                 f"{named.name} is another object there ({named.object}, not {source.object}), without a unit"
@@ -211,11 +247,21 @@ class _Spreading:
         here, there = self._angle_of(one), self._angle_of(other)
         return None if here is None or there is None else here.rad_per_count * there.rad_per_count < 0.0
 
+    def _are_of_a_kind(self, *joints: str) -> bool:
+        """Whether what their makers filled as they liked is the same: one EDS, or one product."""
+        parts = (self._parts.get(joint) for joint in joints)
+        one, other = (
+            part.device if part is not None and isinstance(part.device, dict) else {} for part in parts
+        )
+        same = [bool(one.get(key)) and one.get(key) == other.get(key) for key in _KIND]
+        return same[0] or all(same[1:])
+
     def _angle_of(self, joint: str) -> AngleInfo | None:
         part = self._parts.get(joint)
         return None if part is None or part.angle is UNSET or not part.angle.rad_per_count else part.angle
 
 
+_KIND: Final = ("eds_digest", "vendor", "product")
 _UNKNOWN_WAY: Final = "it may be negative, and the robot does not tell which way that joint's counts run"
 _TURNED: Final = (
     "it may be negative, its counts run the other way, and nothing says whether its sign turns with them"

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from pathlib import Path
 
+from drivers.calibration_file import mark
 from drivers.component import Kind
 from drivers.freshness import Freshness, silence_text
 from drivers.imu import zero
@@ -48,7 +49,9 @@ class TrunkImu:
         self.channels = channels(name, self.channel_count)
         self.latest = Latest(name, self.channels, settings.stale_after_s)
         self.check = ImuCheck(name)
-        stored = IDENTITY if settings.zero is None else zero.load((beside or Path()) / settings.zero)
+        file = None if settings.zero is None else (beside or Path()) / settings.zero
+        stored = IDENTITY if file is None else zero.load(file)
+        self.calibration = "" if file is None else mark(file)
         self._motion = TrunkMotion(name, settings, conventions, attitude, stored)
         self._freshness = Freshness(settings.stale_after_s, settings.lost_after_s)
 

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
+from drivers.calibration_file import mark
 from drivers.component import Kind
 from drivers.errors import SettingsError
 from drivers.freshness import Freshness, silence_text
@@ -66,6 +67,7 @@ class Insole:
         self.latest = Latest(name, self.channels, settings.stale_after_s)
         self.other: Insole | None = None  # the other foot's, where there is one
         self._cells = _calibration(settings, layout, beside)
+        self.calibration = mark((beside or Path()) / settings.calibration) if settings.calibration else ""
         self.hip_velocity: Callable[[int], float | None] | None = None  # of the same leg, at a time
         self._stance = Stance(settings.force_threshold)
         self.check = FootCheck(name, len(layout.cells))

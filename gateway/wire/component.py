@@ -50,6 +50,7 @@ class ComponentInfo(Struct, frozen=True):
     findings: list[FindingInfo] | UnsetType = UNSET  # of what `problem` says, that which has a beginning
     emcy: EmcyInfo | UnsetType = UNSET
     angle: AngleInfo | UnsetType = UNSET  # of a joint
+    calibration: str | UnsetType = UNSET  # of an insole or IMU: file and digest; empty: it has none
 
 
 class ChannelInfo(Struct, frozen=True):

@@ -105,6 +105,11 @@ def wearer(label: str) -> str | None:
     return label.removeprefix(WEARER) if label.startswith(WEARER) else None
 
 
+def counts(label: str) -> bool:
+    """Whether a label is more than words: models learn from it, or it is of the whole session."""
+    return label in (*ACTIVITIES, *INSTANTS, REGRESSION) or wearer(label) is not None
+
+
 def person(name: str) -> str:
     """Return what all spellings of somebody's name have in common: `P01`, `p01 `, `P-01` and `P1` are `p1`.
 

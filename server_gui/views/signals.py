@@ -152,7 +152,9 @@ class Signals(QWidget):
     def choose(self, names: Sequence[str]) -> None:
         """Tick exactly these, and arrange them by their units."""
         self.channels.choose(names)
-        self._arrange()
+        if self._desk.selected is not None:
+            self._arrange(self._desk.selected)
+        self._build()
 
     def show_around(self, names: Sequence[str], at_ns: int) -> None:
         """Choose these, and stand still with the seconds around an instant of the robot's clock in sight."""
@@ -178,7 +180,7 @@ class Signals(QWidget):
 
     def show_layout(self, layout: Layout) -> None:
         """Show this one, whatever of it the robot lacks."""
-        self.scene.disarm()
+        self.scene.intend(None if layout.trigger is None else layout.trigger.condition)
         self._begun = True
         self.scene.workspace.show(layout.plots)
         nearest_span = min(range(len(SPANS_S)), key=lambda place: abs(SPANS_S[place] - layout.span_s))
@@ -257,7 +259,7 @@ class Signals(QWidget):
             self.scene.look(station)
             if not self._begun:
                 self._begun = bool(self.channels.items)
-                self._arrange()
+                self._arrange(station)
             self.channels.choose(self.scene.workspace.curves)
             self.expression.show_channels([*self.scene.channels])
             self._build()
@@ -273,12 +275,10 @@ class Signals(QWidget):
         self.channels.choose(self.scene.workspace.curves)
         self._build()
 
-    def _arrange(self) -> None:
-        if self._desk.selected is not None:
-            self.scene.look(self._desk.selected)
-            self.scene.workspace.arrange(map(self.scene.meaning, self.chosen))
-            self.scene.look(self._desk.selected)
-        self._build()
+    def _arrange(self, station: Station) -> None:
+        self.scene.look(station)
+        self.scene.workspace.arrange(map(self.scene.meaning, self.chosen))
+        self.scene.look(station)
 
     def _ticked(self, item: QTreeWidgetItem) -> None:
         text, workspace = str(item.data(0, NAME_ROLE)), self.scene.workspace
@@ -346,7 +346,7 @@ class Signals(QWidget):
             return
         at_s = self._at[self._active] if self.cursors.isChecked() else 0.0
         at_ns = newest_ns + round(at_s * 1e9)
-        ask_note(self, at_s, lambda text: self._notes.add(text, at_ns))
+        ask_note(self, self._desk, at_s, lambda text: self._notes.add(text, at_ns), self.tell)
 
     # --- the trigger, and what is beside
 

@@ -11,6 +11,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
@@ -26,7 +27,10 @@ from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.rings import Rings
 from server_gui.core.desk.soles import cells_of
 from server_gui.core.desk.station import Station
+from server_gui.core.workspace.layouts import Layouts
+from server_gui.core.workspace.workspace import PlotSpec
 from server_gui.views.main_window import MainWindow
+from server_gui.views.signals import Signals
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.figure import Pose, StickFigure
 from server_gui.views.widgets.plot import Curve, Plot
@@ -221,7 +225,33 @@ def whole_window(theme: Theme, tab: int) -> float:
     return statistics.mean(took[WARM_UP:])
 
 
-def _frame_ms(window: MainWindow, station: Station, frame: int) -> float:
+def signals_ms(theme: Theme, written: str) -> float:
+    """A frame of 15 curves in 8 plots of the signals, each `written` so: as `whole_window`, the mean, ms."""
+    bench = Bench(Desk())
+    station = bench.add("robot")
+    station.take([described(), looked(), walking(ROWS_A_FRAME, rate_hz=1000.0)])
+    units: dict[str, list[str]] = {}
+    for info in described().description.channels:
+        if info.component != "resource":
+            units.setdefault(info.unit, []).append(written.format(info.name))
+    pairs = [names[at : at + 2] for names in units.values() for at in range(0, len(names) - 1, 2)]
+    plots = [PlotSpec(pair) for pair in pairs[:8]]
+    del plots[-1].curves[1:]
+    with tempfile.TemporaryDirectory() as folder:
+        signals = Signals(bench.desk, theme, layouts=Layouts(Path(folder)))
+        signals.resize(1366, 768)
+        signals.show()
+        signals.refresh()
+        signals.scene.workspace.show(plots)
+        took = [_frame_ms(signals, station, frame) for frame in range(WARM_UP + FRAMES)]
+        if [len(card.drawn) for card in signals.plots] != [2] * 7 + [1]:
+            raise RuntimeError("these are not the curves that were to be drawn")
+        signals.close()
+        signals.deleteLater()
+    return statistics.mean(took[WARM_UP:])
+
+
+def _frame_ms(window: MainWindow | Signals, station: Station, frame: int) -> float:
     """Rows are stamped ahead of time, so that none is old; a frame begins when it would."""
     event = walking(ROWS_A_FRAME, -(frame + 1) / FRAMES_PER_S, rate_hz=1000.0)
     began, began_s = time.process_time(), time.monotonic()
@@ -254,6 +284,9 @@ def rows() -> Iterator[Row]:
     for tab, name in enumerate(("Overview", "Signals, 24 curves")):
         share = whole_window(theme, tab) * FRAMES_PER_S / 1e3
         yield Row(f"the whole window with {name}, telemetry at 1 kHz", share, "of a core", MOST_OF_A_CORE)
+    for name, written in (("curves", "{}"), ("expressions", "{0} - mean({0}, 0.5)")):
+        share = signals_ms(theme, written) * FRAMES_PER_S / 1e3
+        yield Row(f"15 {name} in 8 plots of the signals, at 1 kHz", share, "of a core", MOST_OF_A_CORE)
 
 
 def main() -> int:

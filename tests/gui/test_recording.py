@@ -25,7 +25,7 @@ from server_gui.core.desk.feeds import Record
 from server_gui.core.desk.recording import SOON, By, Recording, Tone
 from server_gui.core.fleet.collector import Collector, CollectorReport
 from server_gui.core.fleet.link_statistics import LinkStatistics
-from server_gui.core.follow.news import News
+from server_gui.core.follow.news import News, NewsKind
 from server_gui.core.recording.recorder import Alarm, AlarmKind, RecorderState
 from server_gui.core.recording.uploader import UploaderState
 from server_gui.core.settings.server_file import (
@@ -78,13 +78,14 @@ class FakeKeeper:
     def __init__(self, answer: CollectorReport | Exception) -> None:
         self.answer = answer
         self.asked: list[str] = []
+        self.marked = 2
 
     def report(self) -> "Future[CollectorReport]":
         return settled(self.answer)
 
     def mark(self, text: str, ago_s: float = 0.0) -> "Future[int]":
         self.asked.append(f"mark {text}")
-        return settled(2)
+        return settled(self.marked)
 
     def upload(self) -> "Future[int]":
         self.asked.append("upload")
@@ -225,6 +226,9 @@ def test_marks_and_uploads_are_asked_for_and_told() -> None:
     recording.upload()
     assert keeper.asked == ["mark stairs", "upload"]
     assert "marked in the recordings of 2 robots: stairs" in [item.text for item in news.items]
+    keeper.marked = 0
+    recording.mark("door", 90.0)
+    assert [item.kind for item in news.items if "NOT marked" in item.text] == [NewsKind.WARNING]
 
 
 # --- the whole window
@@ -359,6 +363,7 @@ def test_where_a_collector_records_the_window_shows_and_says_who_records(
         wait(lambda: app.desk.recording.report is not None, "asked the collector")
         assert app.desk.recording.by is By.OTHER
         assert app.desk.recording.said(station.address).text.startswith("Recording by process")
+        wait(lambda: rows(app, "exo-01") > 0, "recorded")
         app.desk.recording.mark("here")
         wait(lambda: any("marked" in item.text for item in app.desk.news.items), "marked")
         collector.wait(0.0)

@@ -13,14 +13,23 @@ from tests.gui import rules
 from tests.gui.fakes import destroy
 
 
+class Page(Scrolled):
+    """A choice and a number at the top, words far below."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.choice, self.number, self.last = QComboBox(), QSpinBox(), QLabel("at the end")
+        self.choice.addItems(["a", "b", "c"])
+        view = QWidget()
+        column = QVBoxLayout(view)
+        for part in (self.choice, self.number, QLabel("\n" * 40), self.last):
+            column.addWidget(part)
+        self.setWidget(view)
+
+
 @pytest.fixture
-def page(theme: Theme) -> Iterator[Scrolled]:
-    view, made = QWidget(), Scrolled()
-    column = QVBoxLayout(view)
-    for part in (QComboBox(), QSpinBox(), QLabel("\n" * 40), QLabel("at the end")):
-        column.addWidget(part)
-    view.findChild(QComboBox).addItems(["a", "b", "c"])
-    made.setWidget(view)
+def page(theme: Theme) -> Iterator[Page]:
+    made = Page()
     made.resize(200, 150)
     made.show()
     made.setFocus()
@@ -29,8 +38,8 @@ def page(theme: Theme) -> Iterator[Scrolled]:
     destroy(made)
 
 
-def test_the_wheel_changes_only_what_has_the_keyboard(page: Scrolled) -> None:
-    choice, number = page.findChild(QComboBox), page.findChild(QSpinBox)
+def test_the_wheel_changes_only_what_has_the_keyboard(page: Page) -> None:
+    choice, number = page.choice, page.number
     for field in (choice, number):
         wheel(field)
     assert (choice.currentIndex(), number.value()) == (0, 0)
@@ -42,8 +51,8 @@ def test_the_wheel_changes_only_what_has_the_keyboard(page: Scrolled) -> None:
     assert number.value() == 1
 
 
-def test_what_has_just_come_is_brought_into_sight(page: Scrolled) -> None:
-    last = page.findChildren(QLabel)[-1]
+def test_what_has_just_come_is_brought_into_sight(page: Page) -> None:
+    last = page.last
     assert last.visibleRegion().isEmpty()
     bring_into_sight(last)
     rules.settle()

@@ -10,6 +10,7 @@ from PySide6.QtGui import QContextMenuEvent, QDragEnterEvent, QDropEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLineEdit, QMenu, QWidget
 
+from gateway.units import Units
 from server_gui.core.desk.flags import FlagKind
 from server_gui.core.workspace.layouts import Layouts
 from server_gui.core.workspace.trigger import Condition, Mode, On, State
@@ -34,6 +35,7 @@ def signals(theme: Theme, bench: Bench, tmp_path: Path) -> Iterator[Signals]:
     feed(bench, 0, 500)
     made = Signals(bench.desk, theme, layouts=Layouts(tmp_path / "layouts"))
     made.resize(900, 700)
+    made._begun = True  # no plots of what a robot has at first: to make them is most of a test
     made.show()
     made.refresh()
     made.choose([KNEE, TORQUE])
@@ -280,6 +282,25 @@ def test_a_trigger_keeps_what_was_before_and_after_it(signals: Signals, bench: B
     assert signals.scene.frozen is None
 
 
+def test_what_is_waited_for_stays_the_same_in_other_units_and_layouts(signals: Signals, bench: Bench) -> None:
+    bar, layouts = signals.trigger, signals.layouts
+    bar.show_condition(Condition(On.RISE, KNEE, 0.5))
+    bar.arm.click()
+    layouts.save("Knees")
+    layouts.open("Knees")
+    layouts.save("Knees again")
+    kept = layouts._layouts.load("Knees again").trigger
+    assert kept is not None, "a layout that was opened and saved again has lost its trigger"
+    bench.desk.shown.change(Units({"rad": "rad"}))
+    signals.refresh()
+    assert bar.level.text() == "0.5 rad"
+    bar.show_condition(Condition(On.ABOVE, "left_toe.position", 2.0))  # as a layout of another robot has it
+    signals.choose([HIP])
+    assert (bar.condition.of, bar.condition.level) == ("left_toe.position", 2.0)
+    bar.on.setCurrentText(On.EMCY.value)
+    assert bar.condition.of == "left_hip"
+
+
 def test_an_emcy_is_waited_for_by_a_drives_state_where_it_tells_no_code(
     signals: Signals, bench: Bench
 ) -> None:
@@ -345,6 +366,20 @@ def test_a_note_is_kept_at_the_cursor(signals: Signals, bench: Bench) -> None:
     QTest.keyClicks(question.field, "slipped  here")
     QTest.keyClick(question.field, Qt.Key.Key_Return)
     assert notes.kept == [("slipped here", START_NS + 499 * 10_000_000 - 2_000_000_000)]
+
+
+def test_a_note_never_goes_to_another_robot_than_it_was_asked_for(signals: Signals, bench: Bench) -> None:
+    notes = signals._notes = Kept()
+    bench.add("exo-02", 7421).take([described("exo-02")])
+    signals.tools.note.click()
+    question = next(one for one in signals.findChildren(Question) if one.windowTitle() == "Note")
+    bench.desk.select(bench.desk.stations[1])  # while somebody types
+    assert isinstance(question.field, QLineEdit)
+    QTest.keyClicks(question.field, "slipped")
+    QTest.keyClick(question.field, Qt.Key.Key_Return)
+    assert notes.kept == []
+    bench.desk.select(bench.desk.stations[0])
+    assert "no note, other rows are looked at by now: slipped" in said(signals)
 
 
 def test_without_a_recorder_no_note_is_taken(signals: Signals) -> None:

@@ -168,6 +168,7 @@ class ComponentModule:
             finding_infos(quality.findings) or UNSET,
             emcy_info(component),
             self._angle(name),
+            getattr(component, "calibration", UNSET),
         )
 
     def _absent_info(self, name: str) -> ComponentInfo:

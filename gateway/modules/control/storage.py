@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from gateway.modules.component.module import ComponentModule
 
 ALL = 1  # the sub-index of all parameters
+_UNKNOWN = "NOBODY KNOWS whether it did: try again, or compare its values after a reset"
 _ON_COMMAND, _BY_ITSELF = 0b01, 0b10  # bits of what it reads as: the device's capabilities
 
 
@@ -82,7 +83,8 @@ class Storage:
         """Do it after every write that was asked for before, as long as there is leave.
 
         Raises:
-            RpcError: at once, or as the future's error. device_timeout: nobody knows whether it was done.
+            RpcError: at once, or as the future's error. device_timeout: it was sent, and nobody knows
+                whether it was done; mismatch: it was done, but not as it should be, or not recorded.
 
         """
         if component not in self.tables:
@@ -118,24 +120,34 @@ class _Run:
 
     def do(self) -> Stored:
         command = self._command
-        self._check_leave()
-        self._check_trials()
-        self._check_capability()
-        before = self._values() if command is STORING else {}
-        self._check_drives()
+        before = self._prepare()
         self._record(command.name, "nothing was sent", Share.ASKED)
         try:
             self._check_drives()  # recording took its time
             self._send()
-            self._check_answers()
-            self._check_unchanged(before)
+            self._verify(before)
         except RpcError as error:
-            self._record(f"{command.name} FAILED", str(error), result=str(error))
+            self._record(f"{command.name} FAILED", str(error), kind=error.kind, result=str(error))
             raise
-        self._record(f"{command.name} done", command.done, result=command.done)
+        self._record(f"{command.name} done", command.done, kind=Kind.MISMATCH, result=command.done)
         return Stored(self._component, command.done)
 
     # Before
+
+    def _prepare(self) -> Mapping[str, tuple[Number, bytes]]:
+        """Check all that can be; return what the device holds. A silence is none after the command."""
+        try:
+            self._check_leave()
+            self._check_trials()
+            self._check_capability()
+            before = self._values() if self._command is STORING else {}
+            self._check_drives()
+        except RpcError as error:
+            if error.kind is Kind.DEVICE_TIMEOUT:
+                said, component = f"{error}; nothing was sent", self._component
+                raise refuse(Kind.UNAVAILABLE, said, component=component) from error
+            raise
+        return before
 
     def _check_leave(self) -> None:
         said = self._leave.objection(self._address)
@@ -182,9 +194,22 @@ class _Run:
         except DeviceAbort as error:
             raise self._device_error(error) from error
         except (DriverError, TimeoutError) as error:
-            known = self._device_error(error)
-            said = f"{known}; NOBODY KNOWS whether it did: try again, or compare its values after a reset"
-            raise refuse(known.kind, said, component=self._component, object=command.object) from error
+            said = f"{self._device_error(error)}; {_UNKNOWN}"
+            kind, component = Kind.DEVICE_TIMEOUT, self._component
+            raise refuse(kind, said, component=component, object=command.object) from error
+
+    # Afterwards
+
+    def _verify(self, before: Mapping[str, tuple[Number, bytes]]) -> None:
+        """It has confirmed; what now cannot be looked at is not known, whatever the reason."""
+        try:
+            self._check_answers()
+            self._check_unchanged(before)
+        except RpcError as error:
+            if error.kind is Kind.MISMATCH:
+                raise
+            said = f"the device confirmed, but then: {error}"
+            raise refuse(Kind.DEVICE_TIMEOUT, said, component=self._component) from error
 
     def _check_answers(self) -> None:
         """A device that is busy afterwards answers again, and still says that it can."""
@@ -194,16 +219,13 @@ class _Run:
                 return self._check_capability()
             except RpcError as error:
                 if error.kind is not Kind.DEVICE_TIMEOUT or time.monotonic() > deadline:
-                    said = f"the device confirmed, but then: {error}"
-                    raise refuse(error.kind, said, component=self._component) from error
+                    raise
 
     def _capability(self) -> int:
         try:
             return unsigned(result(self._node.upload(self._command.index, ALL)))
         except (DriverError, TimeoutError) as error:
             raise self._device_error(error) from error
-
-    # Afterwards
 
     def _values(self) -> dict[str, tuple[Number, bytes]]:
         """What can be changed in the device, as it is now."""
@@ -227,14 +249,22 @@ class _Run:
 
     # Words
 
-    def _record(self, what: str, so: str, share: Share = Share.OUTCOME, /, **details: str) -> None:
+    def _record(
+        self,
+        what: str,
+        so: str,
+        share: Share = Share.OUTCOME,
+        /,
+        kind: Kind = Kind.UNAVAILABLE,
+        **details: str,
+    ) -> None:
         """Returns when it is durable; raises `RpcError` where it cannot be recorded, `so` says what then."""
         journal = self._storage.records.journal
         try:
             journal.append(self._who, what, share, component=self._component, **details).result()
         except OSError as error:
             said = f"it could not be recorded: {error.strerror or error}; {so}"
-            raise self._refusal(Kind.UNAVAILABLE, said) from error
+            raise self._refusal(kind, said) from error
 
     def _device_error(self, error: Exception) -> RpcError:
         kinds = ((DeviceAbort, Kind.DEVICE_ABORT), (TimeoutError, Kind.DEVICE_TIMEOUT))

@@ -20,6 +20,7 @@ from gateway.wire.parameter import PARAMETER_WRITE
 
 ENDING = "the gateway is ending"
 NOT_WRITTEN = "not written"
+NOTHING = "nothing was written"
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,6 +81,8 @@ class Transaction:
             self._prepare()
         except RpcError as error:
             self._ledger.refused(self._changes, error)
+            if len(self._changes) > 1 and NOTHING not in str(error):  # nobody is to wonder about the others
+                raise RpcError(f"{error}; {NOTHING}", error.data, error.code) from error
             raise
         try:
             for change in self._changes:

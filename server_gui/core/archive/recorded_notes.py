@@ -3,11 +3,14 @@
 from collections.abc import Sequence
 from typing import Final
 
+from ml.store.labels import counts
+from server_gui.core.archive.labelling import span
 from server_gui.core.archive.labels import SessionLabels
 from server_gui.core.archive.playback import Playback, PlayedRobot
 from server_gui.core.desk.flags import Flag, FlagKind
 
 NOTE_NS: Final = 1_000_000  # a label has a length
+NOTE: Final = "note: "
 
 
 class RecordedNotes:
@@ -23,10 +26,15 @@ class RecordedNotes:
         return "" if self._behind_ns() is not None else "no row is shown yet"
 
     def add(self, text: str, at_ns: int) -> None:
-        """Label the instant `at_ns` of the robot's clock."""
-        behind_ns = self._behind_ns()
-        if behind_ns is not None:
-            self._labels.add(text, at_ns - behind_ns, at_ns - behind_ns + NOTE_NS)
+        """Label the instant `at_ns` of the robot's clock; what counts as a label is marked as a note."""
+        behind_ns, session = self._behind_ns(), self._labels.session
+        if behind_ns is None:
+            return
+        began_ns = at_ns - behind_ns
+        ends_ns = began_ns + NOTE_NS if session is None else span(session)[1]
+        if began_ns <= ends_ns < began_ns + NOTE_NS:  # the last row: the note ends with its session
+            began_ns = ends_ns - NOTE_NS
+        self._labels.add(f"{NOTE}{text}" if counts(text) else text, began_ns, began_ns + NOTE_NS)
 
     def flags(self) -> Sequence[Flag]:
         """Return every note of the session."""

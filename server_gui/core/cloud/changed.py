@@ -44,6 +44,7 @@ class Kind(StrEnum):
 SECTIONS: Final[Mapping[str, Kind]] = {
     "zero": Kind.CALIBRATION,
     "scale": Kind.CALIBRATION,
+    "calibration": Kind.CALIBRATION,
     "firmware": Kind.FIRMWARE,
     "hardware": Kind.DEVICE,
     "vendor": Kind.DEVICE,
@@ -161,6 +162,8 @@ def _compared(kind: Kind, title: str, before: Facts, after: Facts, are_told: boo
     for name in dict.fromkeys([*before, *after]):
         old, new = before.get(name), after.get(name)
         said = [missing if value is None else _said(value) for value in (old, new)]
+        if said[0] == said[1] and old != new:  # alike in few digits only: not the same
+            said = [repr(value) for value in (old, new)]
         yield Difference(kind, title.format(name), said[0], said[1], _size(old, new))
 
 

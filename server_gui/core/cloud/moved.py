@@ -20,7 +20,7 @@ from msgspec.structs import replace as with_fields
 from ml.store.sessions import Session
 from ml.store.tables import PREDICTIONS, RESOURCES
 from server_gui.core.cloud.recordings import Recordings
-from server_gui.core.evidence.comparison import Evidence, Spell, compare
+from server_gui.core.evidence.comparison import Evidence, Spell, compare, differing
 from server_gui.core.evidence.cycles import STATE, Cycle, CycleCutter
 from server_gui.core.evidence.measures import CURVES
 from server_gui.core.processing.wiring import Wiring
@@ -29,6 +29,10 @@ LONGEST_S: Final = 1800.0  # of each session, from its beginning
 ROWS: Final = 256  # at a time: what computer and models say is told between
 APART_NS: Final = 10_000_000_000  # between the two walks, as they are laid one after the other
 ACTIVITY: Final = "activity"
+DAYS: Final = (
+    "two walks of one set-up differ, too, by the day and by how the robot was put on: how much was not "
+    "measured here, so a difference may be that alone"
+)
 
 Advance = Callable[[int], object]
 
@@ -93,6 +97,8 @@ def moved(before: Walk, after: Walk) -> Evidence:
     spell = Spell([(begins[0], ends[0])], [(begins[1] + shift_ns, ends[1] + shift_ns)])
     joints = list(dict.fromkeys([*before.joints, *after.joints]))
     found = compare(itertools.chain(sides[0], later), spell, joints)
+    if any(differing(found.metrics)):
+        notes.append(DAYS)
     return with_fields(found, notes=(*found.notes, *notes))
 
 

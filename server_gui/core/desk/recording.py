@@ -197,13 +197,20 @@ class Recording:
             return
         for told in self.on_mark if self._keeper is not None else ():
             told(text, ago_s)
+        none = "no recording goes on since then" if ago_s else "nothing is recorded"
         self._ask(
-            lambda keeper: keeper.mark(text, ago_s), lambda count: f"marked in {_robots(count)}: {text}"
+            lambda keeper: keeper.mark(text, ago_s),
+            lambda count: (
+                (NewsKind.STATE, f"marked in {_robots(count)}: {text}")
+                if count
+                else (NewsKind.WARNING, f"NOT marked, {none}: {text}")
+            ),
         )
 
     def upload(self) -> None:
         """Bring what was recorded until now into the store."""
-        self._ask(lambda keeper: keeper.upload(), lambda _: "what was recorded until now goes to the store")
+        said = NewsKind.STATE, "what was recorded until now goes to the store"
+        self._ask(lambda keeper: keeper.upload(), lambda _: said)
 
     @property
     def alarms(self) -> Alarms:
@@ -303,16 +310,21 @@ class Recording:
             self._alone_since_ns = time.monotonic_ns()
             self._news.add(NewsKind.WARNING, WHO, f"nobody else records any more; {SOON}")
 
-    def _ask(self, ask: Callable[[Keeper], "Future[int]"], done: Callable[[int], str]) -> None:
+    def _ask(
+        self, ask: Callable[[Keeper], "Future[int]"], done: Callable[[int], tuple[NewsKind, str]]
+    ) -> None:
         if self._keeper is None:
             self._news.add(NewsKind.WARNING, WHO, f"nobody records: {self.why}")
             return
         when_done(
             ask(self._keeper),
             self._deliver,
-            lambda count: self._news.add(NewsKind.STATE, WHO, done(count)),
-            lambda error: self._news.add(NewsKind.WARNING, WHO, str(error)),
+            lambda count: self._tell(*done(count)),
+            lambda error: self._tell(NewsKind.WARNING, str(error)),
         )
+
+    def _tell(self, kind: NewsKind, text: str) -> None:
+        self._news.add(kind, WHO, text)
 
 
 def _queue(report: CollectorReport) -> list[str]:

@@ -193,7 +193,7 @@ class Collector:
         return self._do(lambda: self._fleet.leave(robot))
 
     def mark(self, text: str, ago_s: float = 0.0) -> "concurrent.futures.Future[int]":
-        """Mark this instant, or one before, in every robot's recording; in how many it is on the disk."""
+        """Mark this instant, or one before, where it was recorded then; in how many it is on the disk."""
         return self.network.run(self._mark(text, ago_s))
 
     def upload(self) -> "concurrent.futures.Future[int]":
@@ -251,7 +251,7 @@ class Collector:
 
     async def _mark(self, text: str, ago_s: float = 0.0) -> int:
         lost = self._recorder.state.lost
-        robots = [] if self._fleet.is_paused else list(self._fleet.robots)
+        robots = self._fleet.recorded(time.time() - ago_s if ago_s else None)
         for name in robots:
             self._recorder.mark(name, text, ago_s)
         return len(robots) if await self._on_disk(lost) else 0

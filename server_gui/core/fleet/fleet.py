@@ -150,6 +150,14 @@ class Fleet:
         """Their names."""
         return tuple(self._members)
 
+    def recorded(self, at_utc_s: float | None) -> list[str]:
+        """Return whose recording goes on, and did at this time, None: now."""
+        return [
+            robot
+            for robot, member in self._members.items()
+            if (began_s := member.keeping.began_s) is not None and (at_utc_s is None or began_s <= at_utc_s)
+        ]
+
     @property
     def newest_ns(self) -> int | None:
         """When the newest row of any robot came, on our monotonic clock."""

@@ -17,6 +17,7 @@ from gateway.wire.robot import Description
 from server_gui.core.recording.records import NOBODY, Facts, Worn
 
 ENABLED: Final = "operation enabled"  # the word of a drive's state in which it follows its target
+NO_FILE: Final = "no file"
 DIGITS: Final = 12  # of a digest: enough to tell two files of a robot apart
 IDENTITY: Final = {  # CiA 301
     "0X1009:0": "hardware",
@@ -65,6 +66,8 @@ def setup(description: Description) -> dict[str, str | float]:
         if part.angle is not UNSET:
             found[f"zero/{part.name}"] = part.angle.zero_offset
             found[f"scale/{part.name}"] = part.angle.rad_per_count
+        if part.calibration is not UNSET:
+            found[f"calibration/{part.name}"] = part.calibration or NO_FILE
     for known in description.parameters:
         if known.read_only is None:
             found[f"limits/{known.name}"] = _limits(known)

@@ -12,8 +12,10 @@ from server_gui.core.workspace.dimensions import Dimension, literal
 from server_gui.core.workspace.grammar import ExpressionError, Node, Written
 
 Floats = npt.NDArray[np.float64]
+Rows = npt.NDArray[np.int64]
 
 LONGEST_S: Final = 60.0  # that `rms` and `mean` may go over
+EXACT: Final = 1e-9  # of a sum: what rounding may take of it
 NONE: Final = Dimension()
 ANGLE: Final = Dimension.of("rad")
 HERTZ, SECOND = Dimension.of("Hz"), Dimension.of("s")
@@ -246,31 +248,66 @@ class _LowPass:
 
 
 class _Window:
-    """Missing until the window is full, and where anything in it is missing."""
+    """Missing until the window is full, and where anything in it is missing.
+
+    Sums go on from block to block, so that a row costs the same whatever the window; they begin anew now and
+    then, with what is still needed.
+    """
 
     def __init__(self, step: Step, seconds: float, *, squared: bool) -> None:
         self._step = step
         self._seconds = seconds
         self._squared = squared
+        self._first = self._end = 0  # rows that are needed still, of those kept
         self._times: Floats = np.zeros(0)
-        self._values: Floats = np.zeros(0)
+        self._known: Floats = np.zeros(0)  # 0 where missing
+        self._sums: Floats = np.zeros((3, 1))  # of all rows before each: what is known, gaps, the largest sum
 
     def __call__(self, block: Block) -> Floats:
         new = _column(self._step, block)
-        before = len(self._times)
-        times, values = np.concatenate((self._times, block.times)), np.concatenate((self._values, new))
-        missing = np.isnan(values)
-        known = np.where(missing, 0.0, values * values if self._squared else values)
-        sums, gaps = (np.concatenate(([0.0], np.cumsum(column))) for column in (known, missing))
-        ends = np.arange(before, len(times))
-        begins = np.searchsorted(times, times[before:] - self._seconds + 1e-9, "left")
+        if not len(new):
+            return new
+        self._add(block.times, new * new if self._squared else new)
+        ends = np.arange(self._end - len(new), self._end)
+        due = block.times - self._seconds + 1e-9
+        begins = self._first + np.searchsorted(self._times[self._first : self._end], due, "left")
+        gaps = self._sums[1]
         whole = (begins > 0) & (gaps[ends + 1] == gaps[np.maximum(begins - 1, 0)])
-        found = (sums[ends + 1] - sums[begins]) / (ends + 1 - begins)
-        keep = max(int(begins[-1]) - 1, 0) if len(begins) else 0
-        self._times, self._values = times[keep:].copy(), values[keep:].copy()
+        found = self._differences(begins, ends + 1) / (ends + 1 - begins)
+        self._first = max(int(begins[-1]) - 1, 0)
         if self._squared:
             found = np.sqrt(np.maximum(found, 0.0))
         return np.where(whole, found, np.nan)
+
+    def _add(self, times: Floats, column: Floats) -> None:
+        missing = ~np.isfinite(column)
+        known = np.where(missing, 0.0, column)
+        if self._end + len(times) > len(self._times):
+            old, self._end = slice(self._first, self._end), self._end - self._first
+            kept, self._first = (self._times[old], self._known[old], np.diff(self._sums[1])[old]), 0
+            times, known = np.concatenate((kept[0], times)), np.concatenate((kept[1], known))
+            missing, self._end = np.concatenate((kept[2], missing)), 0
+            self._times, self._known = np.zeros(2 * len(times)), np.zeros(2 * len(times))
+            self._sums = np.zeros((3, 2 * len(times) + 1))
+        place, end = slice(self._end, self._end + len(times)), self._end + len(times)
+        after = slice(self._end + 1, end + 1)
+        self._times[place], self._known[place] = times, known
+        before = self._sums[:, self._end]
+        self._sums[0, after] = before[0] + np.cumsum(known)
+        self._sums[1, after] = before[1] + np.cumsum(missing)
+        self._sums[2, after] = np.maximum(before[2], np.maximum.accumulate(np.abs(self._sums[0, after])))
+        self._end = end
+
+    def _differences(self, begins: Rows, ends: Rows) -> Floats:
+        """Return the sum from each begin to its end; by hand where it drowns in what came before."""
+        found: Floats = self._sums[0, ends] - self._sums[0, begins]
+        error = np.finfo(np.float64).eps * self._sums[2, ends]
+        drowned = np.flatnonzero(~(error <= EXACT * np.abs(found)) | np.isinf(error))
+        if len(drowned):
+            first = int(begins[drowned[0]])
+            pairs = np.column_stack((begins[drowned], ends[drowned])).ravel() - first
+            found[drowned] = np.add.reduceat(np.append(self._known[first : self._end], 0.0), pairs)[::2]
+        return found
 
 
 Make = Callable[[_Compiler, Node, Sequence[Part]], Part]

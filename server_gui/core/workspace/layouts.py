@@ -91,7 +91,7 @@ def read(path: Path) -> Layout:
     if len(data) > MOST_BYTES:
         raise LayoutError(f"{path} is no layout: it is larger than {MOST_BYTES // 1024} KiB")
     try:
-        return decoded(data.decode("utf-8"))
+        return decoded(data.decode("utf-8-sig"))  # as an editor may have saved it
     except UnicodeDecodeError as error:
         raise LayoutError(f"{path} is no text in UTF-8 (byte {error.start})") from error
     except LayoutError as error:
@@ -102,7 +102,7 @@ def decoded(text: str) -> Layout:
     """Return the layout that a file's text tells; raises `LayoutError`, which names line and key."""
     try:
         found = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:  # a number of 5000 digits is a plain ValueError
         raise LayoutError(f"no TOML: {error}") from error
     if not isinstance(found.get("format"), int):
         raise LayoutError(f"key format: it is to be {FORMAT}, as the first line of a layout")
@@ -191,7 +191,7 @@ class Layouts:
 
     def _files(self) -> list[Path]:
         try:
-            return sorted(self.folder.glob(f"*{SUFFIX}"))
+            return sorted(path for path in self.folder.glob(f"*{SUFFIX}") if not path.is_fifo())
         except OSError:
             return []
 
@@ -249,9 +249,16 @@ def _check(layout: Layout, text: str) -> None:
             problem = curve_problem(curve) if curve or key != "x" else ""
             if problem:
                 raise LayoutError(_at(number, text, key, problem))
-    problem = "" if layout.trigger is None else layout.trigger.condition.problem
+    problem = "" if layout.trigger is None else _trigger_problem(layout.trigger)
     if problem:
         raise LayoutError(f"key trigger: {problem}")
+
+
+def _trigger_problem(trigger: TriggerLayout) -> str:
+    if trigger.condition.problem or trigger.on is not On.EMCY:
+        return trigger.condition.problem or curve_problem(trigger.of)
+    is_component = len(trigger.of) <= LONGEST and trigger.of.isprintable() and _CHANNEL.fullmatch(trigger.of)
+    return "" if is_component else f"{plain(trigger.of[:LONGEST_NAME])!r} is no component"
 
 
 def curve_problem(curve: str) -> str:

@@ -202,6 +202,11 @@ class Scene:
         self._source = None if self._station is None else self._station.rings.source
         self.trigger.arm(condition, self._newest_s())
 
+    def intend(self, condition: Condition | None) -> None:
+        """Wait for nothing; what a layout says would be waited for, and is saved with it, None: nothing."""
+        self.disarm()
+        self.trigger.condition = condition or Condition()
+
     def disarm(self) -> None:
         """Wait no more, and show what comes."""
         self.trigger.off()

@@ -89,7 +89,6 @@ class Trigger:
         self.count = 0
         self._since_s: float | None = None  # rows before are no news
         self._armed_s: float | None = None
-        self._last = math.nan
 
     def arm(self, condition: Condition, newest_s: float | None) -> None:
         """Wait for this, in what comes after `newest_s`."""
@@ -98,7 +97,7 @@ class Trigger:
 
     def _wait(self, since_s: float | None) -> None:
         self.state, self.at_s = State.ARMED, None
-        self._since_s, self._armed_s, self._last = since_s, since_s, math.nan
+        self._since_s, self._armed_s = since_s, since_s
 
     def off(self) -> None:
         """Wait for nothing."""
@@ -126,7 +125,7 @@ class Trigger:
         if self.state is State.SHOWN and self.at_s is not None and self.condition.mode is not Mode.SINGLE:
             due_s = max(self.at_s + self.condition.hold_off_s, self._since_s or -math.inf)
             if newest_s >= due_s:
-                self.state, self._since_s, self._armed_s, self._last = State.ARMED, due_s, due_s, math.nan
+                self.state, self._since_s, self._armed_s = State.ARMED, due_s, due_s
         if self.state is State.ARMED:
             self._look(times, values)
         if self.state is not State.TRIGGERED or self.at_s is None:
@@ -142,10 +141,11 @@ class Trigger:
         new = values[first:]
         if not len(new):
             return
-        before = np.concatenate(([self._last], new[:-1]))
+        # What was there when the wait began is news of nothing, but an edge may come from it.
+        before = np.concatenate((values[first - 1 : first] if first else [math.nan], new[:-1]))
         place = first_place(self.condition, before, new)
         if place is None:
-            self._since_s, self._last = float(times[-1]), float(new[-1])
+            self._since_s = float(times[-1])
             return
         self.state, self.at_s, self.count = State.TRIGGERED, float(times[first + place]), self.count + 1
 

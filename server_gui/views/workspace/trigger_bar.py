@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import QSignalBlocker, Signal
 from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLineEdit, QPushButton, QVBoxLayout
 
 from gateway.units import Unit
@@ -27,7 +27,8 @@ class TriggerBar(Card):
         self._theme = theme
         self._units: dict[str, Unit] = {}
         self._components: Sequence[str] = ()
-        self._unit = NO_UNIT
+        self._unit, self._unit_of = NO_UNIT, ""
+        self._is_of_drives = False
         self.of = _choice("What triggers: a curve, or a drive for EMCY")
         self.of.currentTextChanged.connect(self._show_unit)
         self.on = _choice("When it triggers", [one.value for one in On])
@@ -75,7 +76,7 @@ class TriggerBar(Card):
 
     def show_choices(self, scene: Scene) -> None:
         """What there is to trigger by: curves that are drawn, with their units, and drives."""
-        meant = map(scene.meaning, scene.workspace.curves)
+        meant = map(scene.meaning, [*scene.workspace.curves, self.of.currentText()])
         self._units = {one.text: one.unit for one in meant if one.unit is not None}
         self._components = scene.drives
         self._fit()
@@ -93,24 +94,34 @@ class TriggerBar(Card):
         self.hold_off.set_value(condition.hold_off_s)
 
     def _fit(self) -> None:
-        """Only what counts for what is waited for."""
+        """Only what counts for what is waited for. What was chosen stays so, also where it is not there."""
         on = On(self.on.currentText())
-        choices = list(self._components if on is On.EMCY else self._units)
-        known = [self.of.itemText(place) for place in range(self.of.count())]
-        if choices != known:
-            before = self.of.currentText()
-            self.of.clear()
-            self.of.addItems(choices)
-            if before in choices:
-                self.of.setCurrentText(before)
+        is_of_drives, before = on is On.EMCY, self.of.currentText()
+        choices = list(self._components if is_of_drives else self._units)
+        if before and before not in choices and is_of_drives is self._is_of_drives:
+            choices.append(before)
+        self._is_of_drives = is_of_drives
+        if choices != [self.of.itemText(place) for place in range(self.of.count())]:
+            with QSignalBlocker(self.of):
+                self.of.clear()
+                self.of.addItems(choices)
+                if before in choices:
+                    self.of.setCurrentText(before)
         self.level.setVisible(on is not On.EMCY)
         self.high.setVisible(on in WINDOWS)
         self._show_unit()
 
     def _show_unit(self) -> None:
-        self._unit = self._units.get(self.of.currentText(), NO_UNIT)
-        for field in (self.level, self.high):
-            field.set_suffix(self._unit.symbol)
+        """Levels of one curve stay what they are in whatever unit; those of another keep their numbers."""
+        of = self.of.currentText()
+        is_same, known = of == self._unit_of, self._units.get(of)
+        unit = known or (self._unit if is_same else NO_UNIT)
+        factor = unit.scale / self._unit.scale if is_same else 1.0
+        self._unit_of = of
+        if unit != self._unit:
+            self._unit = unit
+            for field in (self.level, self.high):
+                field.set_suffix(unit.symbol, factor)
 
 
 def _choice(name: str, texts: Sequence[str] = ()) -> QComboBox:
@@ -147,8 +158,8 @@ class NumberField(QLineEdit):
         """Have this number stand there."""
         self.setText(f"{value:.6g} {self._suffix}".rstrip())
 
-    def set_suffix(self, suffix: str) -> None:
-        """Have another unit behind it."""
+    def set_suffix(self, suffix: str, factor: float = 1.0) -> None:
+        """Have another unit behind it, and `factor` as many of it."""
         value, self._suffix = self.value, suffix
         if math.isfinite(value):
-            self.set_value(value)
+            self.set_value(value * factor)

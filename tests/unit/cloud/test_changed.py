@@ -11,7 +11,7 @@ from msgspec.structs import replace
 from gateway.main import main
 from ml.store.sessions import Session
 from server_gui.core.cloud.changed import NOT_RECORDED, NOT_THERE, Changes, Kind, Told, changes
-from server_gui.core.cloud.moved import Walk, moved
+from server_gui.core.cloud.moved import DAYS, Walk, moved
 from server_gui.core.evidence.comparison import Word
 from server_gui.core.evidence.cycles import Cycle
 from tests.unit.cloud.recordings import record
@@ -20,6 +20,7 @@ from tests.unit.evidence.synthetic import cycles
 SETUP = {
     "component/left_knee": "joint",
     "zero/left_knee": 0.01,
+    "calibration/trunk": "no file",
     "firmware/left_knee": "1.2",
     "EDS/left_knee": "drive.eds 0011",
     "limits/left_knee.gain": "0 … 10",
@@ -51,7 +52,12 @@ def test_what_differs_is_told_in_order_the_wearer_first() -> None:
     after = replace(
         OLD,
         parameters={"left_knee.gain": 3.0, "gait.step_length": 0.41},
-        setup={**SETUP, "zero/left_knee": 0.02, "firmware/left_knee": "1.3"},
+        setup={
+            **SETUP,
+            "zero/left_knee": 0.02,
+            "calibration/trunk": "t.toml 5e",
+            "firmware/left_knee": "1.3",
+        },
         versions={"gateway": "0.2.0"},
     )
     found = compared(after, wearers="P02", models="m2")
@@ -60,6 +66,7 @@ def test_what_differs_is_told_in_order_the_wearer_first() -> None:
         (Kind.PARAMETER, "left_knee.gain", "2", "3"),
         (Kind.PARAMETER, "gait.step_length", "0.4", "0.41"),
         (Kind.CALIBRATION, "left_knee zero offset (rad)", "0.01", "0.02"),
+        (Kind.CALIBRATION, "trunk calibration", "no file", "t.toml 5e"),
         (Kind.FIRMWARE, "left_knee firmware", "1.2", "1.3"),
         (Kind.MODEL, "model of activity", "m1", "m2"),
         (Kind.SOFTWARE, "gateway", "0.1.0", "0.2.0"),
@@ -120,6 +127,24 @@ def test_what_moved_is_said_in_the_words_of_edits_though_the_robot_has_booted() 
 def test_two_walks_alike_show_no_difference() -> None:
     found = moved(walked(cycles(seed=3)), walked(cycles(seed=4)))
     assert found.word is Word.SAME
+
+
+def test_the_day_alone_is_named_where_anything_moved() -> None:
+    """Nothing but the day: one metric a tenth off. That is sure of these two walks, and no more."""
+
+    def other_day(_: float, values: dict[str, float]) -> None:
+        values["left_knee.error_rms"] *= 1.1
+
+    found = moved(walked(cycles(seed=5)), walked(cycles(other_day, seed=6)))
+    assert found.word is not Word.SAME
+    assert DAYS in found.notes
+    assert DAYS not in moved(walked(cycles(seed=3)), walked(cycles(seed=4))).notes
+
+
+def test_numbers_that_differ_late_are_not_alike() -> None:
+    before = replace(OLD, parameters={"left_knee.gain": 1234567.0})
+    found = compared(replace(OLD, parameters={"left_knee.gain": 1234568.0}), before)
+    assert [(one.before, one.after) for one in found.differences] == [("1234567.0", "1234568.0")]
 
 
 def test_a_session_without_walking_has_no_verdict() -> None:

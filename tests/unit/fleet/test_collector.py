@@ -2,6 +2,7 @@
 
 import shutil
 import threading
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
@@ -115,8 +116,14 @@ def test_a_robot_that_joins_later_is_recorded_marked_and_shown(settings: ServerS
         Collector(settings, subscribers=[lambda robot, _: shown.append(robot)]) as collector,
     ):
         collector.follow("exo-other", Address.parse(other.address)).result(WAIT_S)
-        until(collector, lambda: collector.report().result(WAIT_S).robots["exo-other"].rows > 5)
+        until(
+            collector,
+            lambda: min(one.rows for one in collector.report().result(WAIT_S).robots.values()) > 5,
+        )
         assert collector.mark("stairs").result(WAIT_S) == 2
+        assert collector.mark("before it began", 3600.0).result(WAIT_S) == 0
+        for member in collector._fleet._members.values():  # as if they were recorded for long
+            member.keeping.began_s = time.time() - 1000.0
         assert collector.mark("earlier", 60.0).result(WAIT_S) == 2
         note = '{"text": "at the door", "ago_s": 30.0}'
         assert ask(settings.recorder.spool, "note", note) == b"2\n"

@@ -26,14 +26,18 @@ FIRMWARE = {"left_knee": {"0X100A:0": "1.2", "0X1018:4": "77"}}
 
 def knee(**fields: Any) -> Described:
     part = ComponentInfo("left_knee", "joint", "ok", None, DEVICE, angle=AngleInfo(-1e-5, 0.02))
+    sole = ComponentInfo("left_insole", "insole", "ok", calibration="left.toml ab")
+    trunk = ComponentInfo("trunk", "imu", "ok", calibration="")
     facts = described().description
-    return Described(replace(facts, components=[part], file="cd" * 32, **fields))
+    return Described(replace(facts, components=[part, sole, trunk], file="cd" * 32, **fields))
 
 
 def test_the_set_up_tells_eds_calibration_limits_and_the_robots_file() -> None:
     found = session_facts.setup(knee().description)
     assert found["EDS/left_knee"] == "joint_drive.eds abababababab"
     assert (found["zero/left_knee"], found["scale/left_knee"]) == (0.02, -1e-5)
+    assert (found["calibration/left_insole"], found["calibration/trunk"]) == ("left.toml ab", "no file")
+    assert "calibration/left_knee" not in found
     assert found["limits/left_knee.max_torque"] == "8 … 80 N·m, steps of 40"
     assert found["robot.toml/digest"] == "cd" * 6
     assert found["enabled/left_knee.state"] == "4"

@@ -384,6 +384,7 @@ def test_what_cannot_be_read_first_is_not_written(standing: Client, bench: Bench
     bench.left.node.before_upload = fail
     error = standing.refused("parameter.write", changes=CHANGES)
     assert (error.kind, error.data["component"]) == ("device_timeout", "left_knee")
+    assert str(error).endswith("; nothing was written"), "the other device's: was it written?"
     assert bench.gait.node.written() == []
 
 

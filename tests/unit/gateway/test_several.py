@@ -24,9 +24,10 @@ def parameter(name: str, address: str, **fields: object) -> ParameterInfo:
 def robot(*parameters: ParameterInfo, right: AngleInfo | None = None) -> Description:
     """Two knees: the right one's counts fall when it bends."""
     right = right or AngleInfo(-PER_COUNT, 0.02)
+    device: dict[str, str | int] = {"eds_digest": "5e"}
     components = [
-        ComponentInfo("left_knee", "joint", "ok", angle=AngleInfo(PER_COUNT, -0.01)),
-        ComponentInfo("right_knee", "joint", "ok", angle=right),
+        ComponentInfo("left_knee", "joint", "ok", device=device, angle=AngleInfo(PER_COUNT, -0.01)),
+        ComponentInfo("right_knee", "joint", "ok", device=device, angle=right),
         ComponentInfo("trunk", "imu", "ok"),
     ]
     return replace(described().description, components=components, parameters=list(parameters))
@@ -119,6 +120,52 @@ def test_axes_of_one_drive_have_their_objects_800h_apart() -> None:
 
 def test_a_home_offset_is_nobody_elses() -> None:
     assert "belongs to" in over("left_knee.it", 5, robot(*pair("0x607C:0"))).refused["right_knee"]
+
+
+@pytest.mark.parametrize("address", ["0x607E:0", "0x687E:0", "0x6098:0", "0x6091:1"])
+def test_what_makes_a_joints_counts_what_they_are_is_nobody_elses(address: str) -> None:
+    """None of it is negative, and yet copied to the other side it would turn that joint round."""
+    found = over("left_knee.it", 1, robot(*pair(address, type="UNSIGNED8", min=0)))
+    assert list(found.changes) == ["left_knee.it"]
+    assert "that drive" in found.refused["right_knee"]
+
+
+@pytest.mark.parametrize(
+    ("right", "why"),
+    [
+        (AngleInfo(-2 * PER_COUNT, 0.0), "a count is another angle there"),
+        (AngleInfo(0.0, 0.0), "does not tell how much a count is"),
+    ],
+)
+def test_counts_are_copied_only_where_they_are_as_much(right: AngleInfo, why: str) -> None:
+    names = pair("0x6081:0", type="UNSIGNED32")
+    assert over("left_knee.it", 9000, robot(*names)).changes["right_knee.it"] == 9000
+    assert why in over("left_knee.it", 9000, robot(*names, right=right)).refused["right_knee"]
+    told = pair("0x6081:0", type="UNSIGNED32", unit="rad/s")
+    assert not over("left_knee.it", 2, robot(*told, right=right)).problem
+
+
+@pytest.mark.parametrize(
+    ("device", "is_copied"),
+    [
+        ({"eds_digest": "ab", "vendor": "A", "product": "X1"}, True),
+        ({"eds_digest": "5e"}, True),
+        ({"eds_digest": "ab", "vendor": "A", "product": "X2"}, False),
+        ({"eds_digest": "ab", "vendor": "", "product": ""}, False),
+        ({}, False),
+    ],
+)
+def test_a_makers_own_object_is_copied_only_between_devices_of_one_kind(
+    device: dict[str, str | int], *, is_copied: bool
+) -> None:
+    """2040h of one maker is a gain, and of the other what it likes."""
+    description = robot(*pair("0x2040:0", type="UNSIGNED16"))
+    known: dict[str, str | int] = {"eds_digest": "5e", "vendor": "A", "product": "X1"}
+    left, right, trunk = description.components
+    parts = [replace(left, device=known), replace(right, device=device), trunk]
+    found = over("left_knee.it", 7, replace(description, components=parts))
+    assert ("right_knee.it" in found.changes) is is_copied
+    assert ("own object" in found.problem) is not is_copied
 
 
 def test_another_drive_without_the_object_is_named_until_it_is_left_out() -> None:

@@ -273,23 +273,61 @@ def test_a_node_that_is_not_trusted_stores_nothing(resting: Bench, writer: Clien
 # What goes wrong
 
 
-@pytest.mark.parametrize(
-    ("error_", "kind"),
-    [(DeviceTimeout("no answer within 10 s"), "device_timeout"), (Unavailable("bus off"), "unavailable")],
-)
-def test_no_answer_means_that_nobody_knows(
-    resting: Bench, writer: Client, error_: Exception, kind: str
-) -> None:
+@pytest.mark.parametrize("error_", [DeviceTimeout("no answer within 10 s"), Unavailable("bus off")])
+def test_no_answer_means_that_nobody_knows(resting: Bench, writer: Client, error_: Exception) -> None:
     def fail(index: int, data: bytes) -> None:
         raise error_
 
     resting.left.node.before_download = fail
     error = writer.refused("parameter.store", component="left_knee")
-    assert (error.kind, error.data["component"]) == (kind, "left_knee")
+    assert (error.kind, error.data["component"]) == ("device_timeout", "left_knee")
     assert "NOBODY KNOWS whether it did" in str(error)
     begin, end = journal(writer)
     assert (begin["what"], end["what"]) == ("store", "store FAILED")
     assert "NOBODY KNOWS" in end["result"]
+
+
+@pytest.mark.parametrize("object_", [STORE, TORQUE])
+def test_a_silence_before_the_command_leaves_nothing_unknown(
+    resting: Bench, writer: Client, object_: int
+) -> None:
+    def fail(index: int) -> None:
+        if index == object_:
+            raise DeviceTimeout("silence")
+
+    resting.left.node.before_upload = fail
+    error = writer.refused("parameter.store", component="left_knee")
+    assert (error.kind, "nothing was sent" in str(error)) == ("unavailable", True)
+    assert resting.left.node.written() == []
+
+
+@pytest.mark.parametrize("object_", [STORE, TORQUE])
+def test_what_cannot_be_looked_at_after_it_has_confirmed_is_not_refused(
+    resting: Bench, writer: Client, object_: int
+) -> None:
+    def fail(index: int) -> None:
+        if index == object_ and resting.left.node.written():
+            raise Unavailable("bus off")
+
+    resting.left.node.before_upload = fail
+    error = writer.refused("parameter.store", component="left_knee")
+    assert (error.kind, "the device confirmed, but then" in str(error)) == ("device_timeout", True)
+
+
+def test_what_was_stored_but_could_not_be_recorded_is_not_refused(
+    resting: Bench, writer: Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    append = Journal.append
+
+    def full(self: Journal, who: str, what: str, *share: Any, **details: Any) -> Any:
+        if what == "store done":
+            raise OSError(28, "No space left on device")
+        return append(self, who, what, *share, **details)
+
+    monkeypatch.setattr(Journal, "append", full)
+    error = writer.refused("parameter.store", component="left_knee")
+    assert (error.kind, "could not be recorded: No space left" in str(error)) == ("mismatch", True)
+    assert "stored, and it still holds" in str(error)
 
 
 def test_a_refusal_of_the_device_is_told_with_its_code(resting: Bench, writer: Client) -> None:

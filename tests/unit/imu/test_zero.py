@@ -5,12 +5,15 @@ from pathlib import Path
 
 import pytest
 
+from drivers.calibration_file import mark
 from drivers.errors import SettingsError
 from drivers.imu import rotation, zero
+from drivers.imu.build import build_imu
 from drivers.imu.formats import FORMATS
 from drivers.imu.frame import ImuFrame
 from drivers.imu.motion import TILT, TrunkMotion
 from drivers.imu.settings import ImuSettings
+from drivers.site import Site
 
 
 def up(forward: float, left: float) -> rotation.Vector:
@@ -57,6 +60,13 @@ def test_file_keeps_the_zero(tmp_path: Path) -> None:
     path = tmp_path / "trunk.zero.toml"
     path.write_text(zero.text(measured, "2026-11-21T08:00:00Z"))
     assert zero.load(path) == pytest.approx(measured, abs=1e-8)
+    before = mark(path)
+    path.write_text(zero.text(measured, "2026-11-22T08:00:00Z"))
+    assert mark(path) != before, "another file is taken for the one before"
+    told = build_imu(
+        "trunk", ImuSettings(port="-", zero=path.name), Site(tmp_path / "robot.toml")
+    ).calibration
+    assert told == mark(path)
 
 
 @pytest.mark.parametrize(

@@ -181,6 +181,9 @@ def test_calibration_file_turns_counts_into_pressure(
     )
     settings = InsoleSettings(port=str(terminal.path), calibration="left.toml")
     insole = Insole("left_insole", settings, beside=tmp_path)
+    name, digest = insole.calibration.split()
+    assert (name, len(digest)) == ("left.toml", 12)
+    assert Insole("left_insole", InsoleSettings(port="-")).calibration == ""
     insole.start()
     try:
         send(terminal, insole, lambda: sender.frame([3095] * 15 + [0], 0))

@@ -133,6 +133,38 @@ def test_a_window_is_missing_until_it_is_full_and_after_a_gap() -> None:
     assert found[-1] == pytest.approx(3.0)
 
 
+@pytest.mark.parametrize("spike", [1e17, 1e200, math.inf])
+@pytest.mark.parametrize("text", ["mean(left_knee.position, 0.03)", "rms(left_knee.position, 0.03)"])
+def test_a_spike_that_has_left_the_window_leaves_nothing_behind(text: str, spike: float) -> None:
+    """Sums that go on would lose the small in the large: 0 was drawn where 1 was."""
+    values = [1.0] * 20
+    values[5] = spike
+    found = computed(text, position=values)
+    assert found[9:] == pytest.approx([1.0] * 11)
+
+
+def test_values_whose_sum_is_no_float_any_more_spoil_only_their_window() -> None:
+    found = computed("mean(left_knee.position, 0.03)", position=[1.0] * 4 + [1e308] * 2 + [1.0] * 8)
+    assert found[9:] == pytest.approx([1.0] * 5)
+
+
+def test_a_long_window_costs_no_more_a_row_than_a_short_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    """24 means over a minute at 1 kHz took two frames' time each frame."""
+    written = parse("mean(a.x, 60)")
+    program = Program(written, "mean(a.x, 60)", {"a.x": "rad"})
+    times, sizes, add_up = np.arange(62_000) / 1000, [], np.cumsum
+
+    def counted(values: Floats) -> Floats:
+        sizes.append(len(values))
+        return np.asarray(add_up(values))
+
+    program.take(Block(times[:61_000], {"a.x": times[:61_000]}))
+    monkeypatch.setattr(np, "cumsum", counted)
+    for begin in range(61_000, 62_000, 50):
+        program.take(Block(times[begin : begin + 50], {"a.x": times[begin : begin + 50]}))
+    assert sum(sizes) < 10_000
+
+
 def test_a_lowpass_reaches_63_percent_after_its_time_constant() -> None:
     cutoff_hz = 1 / (2 * math.pi * 0.1)
     found = computed(f"lowpass(left_knee.position, {cutoff_hz})", position=[0.0] + [1.0] * 40)

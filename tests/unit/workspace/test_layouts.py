@@ -1,5 +1,6 @@
 """Layouts: what is saved is loaded again, and what is no layout says where."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -110,6 +111,16 @@ def test_an_imported_one_never_replaces_one_that_is_there(layouts: Layouts, tmp_
             'name = "Knees"\ntrigger = { on = "comes into", of = "a.x", level = 2, high = 1 }',
             "key trigger: the window's upper end",
         ),
+        (
+            'name = "Knees"',
+            f'name = "Knees"\ntrigger = {{ on = "rises through", of = "{"z" * 500}" }}',
+            "key trigger: a curve is written in at most 400",
+        ),
+        (
+            'name = "Knees"',
+            'name = "Knees"\ntrigger = { on = "emergency (EMCY)", of = "\\u001b[2J" }',
+            r"key trigger: '.*2J' is no component",
+        ),
     ],
 )
 def test_what_is_no_layout_says_where(old: str, new: str, problem: str, tmp_path: Path) -> None:
@@ -119,6 +130,11 @@ def test_what_is_no_layout_says_where(old: str, new: str, problem: str, tmp_path
     with pytest.raises(LayoutError, match=problem) as found:
         read(file)
     assert "it.toml" in str(found.value)
+
+
+def test_an_editor_may_have_marked_its_unicode(tmp_path: Path) -> None:
+    (tmp_path / "it.toml").write_text(GOOD, encoding="utf-8-sig")
+    assert read(tmp_path / "it.toml").name == "Knees"
 
 
 def test_a_damaged_file_hides_no_other(layouts: Layouts, tmp_path: Path) -> None:
@@ -131,6 +147,17 @@ def test_a_damaged_file_hides_no_other(layouts: Layouts, tmp_path: Path) -> None
     assert [name for name in ("bad", "huge", "deep") if any(f"{name}.toml" in text for text in damaged)] == [
         "bad", "huge", "deep",
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize("text", ["format = 1\nname = 'x'\nspan_s = {}", "format = {}"])
+def test_a_number_without_end_is_no_layout_and_hides_no_other(
+    layouts: Layouts, tmp_path: Path, text: str
+) -> None:
+    layouts.save(layout("good"))
+    (layouts.folder / "bad.toml").write_text(text.format("9" * 5000))
+    os.mkfifo(layouts.folder / "waits.toml")  # to open it would be to wait for ever
+    assert layouts.names() == ["good"]
+    assert len(layouts.damaged()) == 1
 
 
 def test_a_folder_that_cannot_be_written_says_so(tmp_path: Path) -> None:

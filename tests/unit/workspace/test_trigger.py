@@ -44,6 +44,16 @@ def test_what_triggers(on: On, values: list[float], row: int | None) -> None:
     assert trigger.at_s == (None if row is None else float(row))
 
 
+@pytest.mark.parametrize("armed_s", [0.0, 1.0])
+def test_an_edge_right_after_it_was_armed_is_seen(armed_s: float) -> None:
+    """What it begins from came before; what leads to it is news."""
+    values = np.array([0.0, 0.0, 3.0] if armed_s else [0.0, 3.0])
+    trigger = Trigger()
+    trigger.arm(Condition(On.RISE, "x", level=2.0, before=1.0), armed_s)
+    assert trigger.take(np.arange(float(len(values))), values, 1.0)
+    assert trigger.at_s == armed_s + 1.0
+
+
 def run(
     mode: Mode, hold_off_s: float = 0.0, before: float = 0.5, seconds: float = 20.0
 ) -> list[tuple[float, State]]:
