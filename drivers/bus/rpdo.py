@@ -66,5 +66,9 @@ def _read_all(sdo: SdoChannel, description: Description) -> Iterator[Rpdo]:
             continue  # the EDS knows it, this device does not
         if not cob_id & NOT_VALID:
             kind = unsigned(sdo.upload(RPDO_PARAMETER + number, 2)[:1])
-            can_id = cob_id & 0x1FFF_FFFF | EXTENDED if cob_id & EXTENDED_ID else cob_id & 0x7FF
-            yield Rpdo(can_id, kind, read_mapping(sdo, RPDO_MAPPING + number))
+            yield Rpdo(identifier(cob_id), kind, read_mapping(sdo, RPDO_MAPPING + number))
+
+
+def identifier(cob_id: int) -> int:
+    """As a frame has it, of a PDO's COB-ID (1400h:1, 1800h:1)."""
+    return cob_id & 0x1FFF_FFFF | EXTENDED if cob_id & EXTENDED_ID else cob_id & 0x7FF

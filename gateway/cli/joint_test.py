@@ -20,9 +20,11 @@ from gateway.commission.draft import Draft, alone
 from gateway.commission.powered_run import NotStopped, Outcome
 from gateway.config.reading import load
 from gateway.config.robot import RobotConfig
+from gateway.joint_test import left
 from gateway.joint_test.limits import LATE_S, Asked, NotAllowed
 from gateway.joint_test.motion import Kind, Wish
 from gateway.joint_test.talk import Test, tested
+from gateway.records.folder import RecordsFolder
 from gateway.records.records import Records
 from gateway.user_name import user_name
 
@@ -222,6 +224,15 @@ def _records(config: RobotConfig) -> Iterator[Records]:
         records.close()
 
 
+def _folder(folder: Path) -> Path:
+    """There, before anything is asked; raises `SettingsError`."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise SettingsError(f"{folder} is no folder to record into: {error.strerror}; give --out") from error
+    return folder
+
+
 def _lead(
     config: RobotConfig,
     joint: str,
@@ -231,7 +242,7 @@ def _lead(
     records: Records,
 ) -> int:
     began = datetime.datetime.now(datetime.UTC).strftime("%Y%m%dT%H%M%SZ")
-    folder = options.out or config.path.parent / FOLDER
+    folder = _folder(options.out or config.path.parent / FOLDER)
     test = Test(
         config,
         joint,
@@ -243,7 +254,9 @@ def _lead(
         ),
         folder / f"{config.robot.name}.{joint}.{kind}.{began}.jsonl",
         options.who,
+        records,
     )
+    result = "nothing got power"
     benches = {name: CanBench(name, settings) for name, settings in config.can.items()}
     bench = benches[test.settings.bus]
     try:
@@ -252,42 +265,60 @@ def _lead(
             options.who, "joint test begun", joint=joint, test=kind, file=str(test.file)
         ).result()
         outcome = run(tested(bench, benches, test), face)
+        if outcome is None:
+            return 1
+        result = outcome.problem or "recorded"
+        return _told(test, outcome, as_json=options.json)
     except NotStopped as error:
         warn("joint-test", f"NOT STOPPED: {error}")
-        _put_down(records, test, str(error))
+        result = f"NOT STOPPED: {error}"
         return stop_drives(Draft(config.path, go_on=False), bench, as_json=options.json) or 1
     except Ended as end:
-        _put_down(records, test, "interrupted")
+        result = "interrupted"
         warn("joint-test", "interrupted; the drive is without power")
         return end.status
     except EOFError:
+        result = "nobody answered any more"
         warn("joint-test", "nobody answers any more; the drive is without power")
         return 1
     except (NotAllowed, DriverError, OSError) as error:
+        result = str(error)
         warn("joint-test", f"{joint}: {error}")
         return 1
     finally:
         for one in benches.values():
             one.close()
-    return _told(records, test, outcome, as_json=options.json)
+        records.journal.append(
+            test.who, "joint test ended", joint=test.joint, test=str(test.wish.kind), result=result
+        )
 
 
-def _told(records: Records, test: Test, outcome: Outcome | None, *, as_json: bool) -> int:
-    if outcome is None:
-        return 1
-    _put_down(records, test, outcome.problem or "recorded")
+def _told(test: Test, outcome: Outcome, *, as_json: bool) -> int:
     if as_json:
         say_json({"tested": {"file": str(test.file), "problem": outcome.problem, "off": outcome.off}})
     return 0 if outcome.problem is None else 1
 
 
-def _put_down(records: Records, test: Test, result: str) -> None:
-    records.journal.append(
-        test.who, "joint test ended", joint=test.joint, test=str(test.wish.kind), result=result
-    )
-
-
 def _stop(file: Path, joint: str, *, as_json: bool) -> int:
     config = _load(file, joint)
     bus = config.joint[joint].bus
-    return stop_drives(Draft(file, go_on=False), CanBench(bus, config.can[bus]), as_json=as_json)
+    status = stop_drives(Draft(file, go_on=False), CanBench(bus, config.can[bus]), as_json=as_json)
+    if (words := _cut_off(config)) is not None:
+        warn("joint-test", f"{words}. The next gwrms joint-test puts it back before it asks for its phrase")
+    return status
+
+
+def _cut_off(config: RobotConfig) -> str | None:
+    """What a test has left that nobody leads any more, in words."""
+    folder = RecordsFolder(config.records)
+    try:
+        folder.open()
+    except OSError:
+        return None  # it is under way, or nobody can tell
+    try:
+        found = left.read(folder.joint_test)
+    except NotAllowed as error:
+        return str(error)
+    finally:
+        folder.close()
+    return None if found is None else found.words

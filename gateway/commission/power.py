@@ -5,7 +5,7 @@ stops by itself when this program dies, is suspended, or stands still (`drivers/
 """
 
 import time
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 
 from drivers.bus.arming import Arming
@@ -42,6 +42,12 @@ class Foreign:
             **{base + node: f"process data to node {node}" for node in {node_id, *others} for base in _RPDOS},
         }.items():
             bus.subscribe(can_id, self._noting(words))
+        self._bus = bus
+
+    def hear(self, nodes: Mapping[int, int]) -> None:
+        """Notice process data on these identifiers as well, each with the node that takes it."""
+        for can_id, node in nodes.items():
+            self._bus.subscribe(can_id, self._noting(f"process data to node {node}"))
 
     def check(self) -> None:
         """Raise `Unavailable` where somebody was heard."""

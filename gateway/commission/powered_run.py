@@ -98,13 +98,14 @@ class PoweredRun:
 
     def end(self) -> Outcome:
         """Stop it where it goes on, and wait until the drive is disabled, or did not confirm that in time."""
-        while not self.done:
-            self.stop("it was given up")
+        while True:
             try:
-                self._thread.join()
+                while not self.done:
+                    self.stop("it was given up")
+                    self._thread.join()
+                return self._outcome
             except KeyboardInterrupt:
                 continue  # that is what is being done
-        return self._outcome
 
     # In the thread.
 

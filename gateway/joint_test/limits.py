@@ -74,18 +74,11 @@ def limits(
         raise NotAllowed("its drive tells no limit of current or torque (6073h, 6072h)")
     low, high = _range(drive, rules, joint)
     first, last, fastest, time_s = planned(wish, period_s)
-    room = OVERSHOOT * wish.amplitude
     if wish.kind is Kind.CHIRP and wish.high_hz > MOST_SHARE / period_s:
         raise NotAllowed(
             f"{wish.high_hz:g} Hz is beyond a quarter of its {1 / period_s:g} cycles a second: ask for less"
         )
-    if not low <= angle + first - room or not angle + last + room <= high:
-        raise NotAllowed(
-            f"from {math.degrees(angle):.1f}° it would go to {math.degrees(angle + first):.1f}° … "
-            f"{math.degrees(angle + last):.1f}°, and may overshoot by {math.degrees(room):.1f}°: that is not "
-            f"within its limits {math.degrees(low):.1f}° … {math.degrees(high):.1f}°. Bring it elsewhere by "
-            "hand, or ask for less"
-        )
+    check_room(wish, angle, (first, last), (low, high))
     speed = _least("speed", "rad/s", asked.speed, MOST_SPEED, _levels(rules, joint, "velocity"))
     if fastest > speed:
         raise NotAllowed(
@@ -102,7 +95,11 @@ def limits(
             f"a relay of {wish.torque:g} N·m needs room for the load's torque: its limit, {torque:.3g} N·m, "
             "must be twice that"
         )
-    currents = [*_levels(rules, joint, "current"), *([drive.rated_current] if drive.rated_current else [])]
+    share = max(1.0, torque / drive.rated_torque)  # who asks for more torque asks for its current too
+    currents = [
+        *_levels(rules, joint, "current"),
+        *([share * drive.rated_current] if drive.rated_current else []),
+    ]
     lags = _levels(rules, joint, "following_error")
     return Limits(
         low=low,
@@ -114,6 +111,24 @@ def limits(
         time_s=EXTRA_S + SLOWER * time_s,
         late_s=asked.late_s,
     )
+
+
+def check_room(wish: Wish, angle: float, targets: tuple[float, float], ends: tuple[float, float]) -> None:
+    """Whether the lowest and highest of the `targets`, relative to `angle`, are well within its `ends` (rad).
+
+    Raises:
+        NotAllowed: it would come too near to one, or beyond.
+
+    """
+    room = OVERSHOOT * wish.amplitude
+    (first, last), (low, high) = targets, ends
+    if not low <= angle + first - room or not angle + last + room <= high:
+        raise NotAllowed(
+            f"from {math.degrees(angle):.1f}° it would go to {math.degrees(angle + first):.1f}° … "
+            f"{math.degrees(angle + last):.1f}°, and may overshoot by {math.degrees(room):.1f}°: that is not "
+            f"within its limits {math.degrees(low):.1f}° … {math.degrees(high):.1f}°. Bring it elsewhere by "
+            "hand, or ask for less"
+        )
 
 
 def _least(what: str, unit: str, asked: float | None, most: float, levels: tuple[float, ...]) -> float:

@@ -31,7 +31,7 @@ def read(sdo: SdoChannel, description: Description, offset: int, wanted: Callabl
             data = sdo.upload(index, subindex)
         except DeviceAbort:
             continue  # its EDS knows it, this device does not
-        found[_name(index, subindex)] = _value(data, kind)
+        found[name_of(index, subindex)] = _value(data, kind)
     return found
 
 
@@ -42,7 +42,7 @@ def changed(before: Parameters, after: Parameters) -> dict[str, Change]:
 
 def put_back(sdo: SdoChannel, description: Description, before: Parameters, names: Iterator[str]) -> None:
     """Write these as they were; raises `DriverError`. Whoever calls it reads all again."""
-    kinds = {_name(one.index, one.subindex): one for one in description.variables() if one.writable}
+    kinds = {name_of(one.index, one.subindex): one for one in description.variables() if one.writable}
     for name in names:
         value, variable = before[name], kinds.get(name)
         bits = None if variable is None else _integer(variable.data_type)
@@ -80,5 +80,6 @@ def _value(data: bytes, kind: DataType | None) -> int | str:
     return int.from_bytes(data[: (kind.bits + 7) // 8], "little", signed=kind.kind == "signed")
 
 
-def _name(index: int, subindex: int) -> str:
+def name_of(index: int, subindex: int) -> str:
+    """Of an object, as in `Parameters`."""
     return f"0x{index:04X}:{subindex}"

@@ -13,9 +13,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from drivers.bus.cycles import next_due
+from drivers.bus.fields import Linear
 from drivers.bus.master import SYNC
 from drivers.bus.sdo.channel import SdoChannel
 from drivers.bus.sender import always
+from drivers.joint.axis import POSITION_ACTUAL
 from drivers.joint.cia402 import DriveState, drive_state
 from drivers.joint.drive import JointDrive
 from drivers.joint.homing import MODE
@@ -46,6 +48,7 @@ class Plan:
 
     wish: Wish
     limits: Limits
+    angle: float  # rad, where it stood when that was agreed to
     period_s: float
     parameters: parameters.Parameters  # as they were before
 
@@ -120,6 +123,7 @@ class TestRun(PoweredRun):
     def __init__(self, power: Power, reader: JointDrive, guarding: Guarding, plan: Plan) -> None:
         super().__init__(power)
         self.moved = 0.0  # rad
+        self.restored = False  # whether all parameters were read, and are as before
         self._reader = reader
         self._guarding = guarding
         self._plan = plan
@@ -144,11 +148,15 @@ class TestRun(PoweredRun):
     def _set_up(self) -> None:
         mode = TORQUE_MODE if self._by_torque else POSITION_MODE
         self._wait(self._power.drive.ask(lambda axis: axis.write(MODE, bytes([mode]))))
+        data = self._wait(self._power.drive.ask(lambda axis: axis.read(POSITION_ACTUAL, 4)))
+        linear = self._linear("position")
+        self._check_place(int.from_bytes(data, "little", signed=True) * linear.scale + linear.offset)
 
     def _act(self) -> None:
         make_urgent()
         began = time.monotonic()
         self._start = self._hold()
+        self._check_place(self._start)
         self.said = f"{self._plan.wish.kind} test"
         targets = motion(self._plan.wish, self._plan.period_s)
         target = next(targets)
@@ -187,7 +195,9 @@ class TestRun(PoweredRun):
         late_s = time.monotonic() - due
         self._late_s = max(self._late_s, late_s)
         if late_s > self._plan.limits.late_s:
-            raise Ended(f"a cycle came {late_s * 1000:.0f} ms after its time: this computer is too busy")
+            raise Ended(
+                f"a cycle came {late_s * 1000:.0f} ms after its time: this computer is too busy (--late)"
+            )
         sync_ns = time.monotonic_ns()
         self._power.bus.send(SYNC, b"")
         seen = self._watch.after(sync_ns, self._plan.limits.late_s)
@@ -198,11 +208,7 @@ class TestRun(PoweredRun):
 
     def _aim(self, target: float) -> None:
         """The target of the next SYNC, in the drive's own units; the drive confirms that it has it."""
-        readings = self._reader.reading
-        linears = scalings(self._reader.settings, {} if readings is None else readings.scaling)
-        linear = linears["torque" if self._by_torque else "position"]
-        if linear is None:
-            raise Ended("the drive has come up anew, or nobody knows its units any more")
+        linear = self._linear("torque" if self._by_torque else "position")
         value = target if self._by_torque else self._start + target
         (index, size), counts = (
             TARGET_TORQUE if self._by_torque else TARGET_POSITION,
@@ -210,6 +216,14 @@ class TestRun(PoweredRun):
         )
         data = (counts & (1 << 8 * size) - 1).to_bytes(size, "little")
         self._wait(self._power.drive.ask(lambda axis: axis.write(index, data)))
+
+    def _linear(self, quantity: str) -> Linear:
+        readings = self._reader.reading
+        linears = scalings(self._reader.settings, {} if readings is None else readings.scaling)
+        linear = linears[quantity]
+        if linear is None:
+            raise Ended("the drive has come up anew, or nobody knows its units any more")
+        return linear
 
     def _keep(self, seen: Seen, target: float) -> None:
         self.moved = seen.position - self._start
@@ -228,6 +242,15 @@ class TestRun(PoweredRun):
         )
 
     # Whether all is as it must be.
+
+    def _check_place(self, angle: float) -> None:
+        """Whether it still stands where it was when somebody agreed to what will move."""
+        plan = self._plan
+        if abs(angle - plan.angle) > DRIFT:
+            raise Ended(
+                f"the joint was moved: it stood at {math.degrees(plan.angle):.1f}° when its motion was "
+                f"agreed to, and is at {math.degrees(angle):.1f}°. Begin again"
+            )
 
     def _objection(self) -> str | None:
         return super()._objection() or self._guarding.tripped
@@ -256,14 +279,25 @@ class TestRun(PoweredRun):
             and target is not None
             and abs(self._start + target - seen.position) > limits.lag
         ):
-            raise Ended(f"the joint is more than {math.degrees(limits.lag):.1f}° behind its target")
+            raise Ended(
+                f"the joint is more than {math.degrees(limits.lag):.1f}° behind its target{self._jerk()}"
+            )
         self._judge_speed(seen)
         for what, value, most, unit in (
             ("torque", seen.torque, limits.torque, "N·m"),
             ("current", seen.current, limits.current, "A"),
         ):
             if value is not None and most is not None and abs(value) > most:
-                raise Ended(f"its {what} is {value:.3g} {unit}, beyond the limit of {most:.3g} {unit}")
+                raise Ended(
+                    f"its {what} is {value:.3g} {unit}, beyond the limit of {most:.3g} {unit} "
+                    f"(--max-torque){self._jerk()}"
+                )
+
+    def _jerk(self) -> str:
+        """In words, that a late cycle may be why."""
+        if self._late_s <= self._plan.period_s:
+            return ""
+        return f"; a cycle came {self._late_s * 1000:.0f} ms late, which jerks a joint"
 
     def _judge_speed(self, seen: Seen) -> None:
         """As the drive says it, and as its position goes: units that were misread show here."""
@@ -276,7 +310,7 @@ class TestRun(PoweredRun):
         if speed > self._plan.limits.speed:
             raise Ended(
                 f"the joint moves at {math.degrees(speed):.3g}°/s, beyond its limit of "
-                f"{math.degrees(self._plan.limits.speed):.3g}°/s"
+                f"{math.degrees(self._plan.limits.speed):.3g}°/s (--max-speed){self._jerk()}"
             )
 
     # Afterwards, without power.
@@ -296,6 +330,7 @@ class TestRun(PoweredRun):
         left = self._asked(lambda: self._power.node.run(restore), READ_S)
         if left is None:
             return "its parameters could not be read again: nobody knows whether they are as before"
+        self.restored = not left
         words = ", ".join(f"{name} was {was}, is {now}" for name, (was, now) in left.items())
         return f"not all is as before: {words}" if left else None
 

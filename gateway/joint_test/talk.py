@@ -17,7 +17,10 @@ import msgspec
 
 import eds
 from drivers.bus.nmt import NmtState
+from drivers.bus.pdo import NOT_VALID
+from drivers.bus.rpdo import MAX_RPDOS, RPDO_PARAMETER, identifier
 from drivers.bus.settings import Role
+from drivers.bus.values import unsigned
 from drivers.errors import DriverError, SettingsError, Unavailable
 from drivers.joint.cia402 import ABORT_CONNECTION_OPTIONS, ENERGISED, QUICK_STOP_OPTIONS, option_text
 from drivers.joint.drive import JointDrive
@@ -32,13 +35,14 @@ from gateway.commission.joints import words
 from gateway.commission.power import Power
 from gateway.commission.powered_run import NotStopped, Outcome
 from gateway.config.robot import JointTable, RobotConfig
+from gateway.joint_test import left, parameters
 from gateway.joint_test import limits as limiting
-from gateway.joint_test import parameters
 from gateway.joint_test.limits import Asked, Drive, Limits, NotAllowed
 from gateway.joint_test.motion import Wish, planned
 from gateway.joint_test.recording import Recording
 from gateway.joint_test.run import NEEDED, POSITION_MODE, READ_S, TORQUE_MODE, Plan, TestRun
 from gateway.joint_test.watching import Guarding
+from gateway.records.records import Records
 
 LEAST_PERIOD_S, MOST_PERIOD_S = 0.005, 0.02
 USUAL_PERIOD_S = 0.01
@@ -47,6 +51,7 @@ TICK_S = 0.02
 LOW_LIMIT, HIGH_LIMIT = (0x607D, 1), (0x607D, 2)
 PERIOD, EXPONENT = (0x60C2, 1), (0x60C2, 2)
 MILLE = 1000.0
+NO_PDO = NOT_VALID.to_bytes(4, "little")  # where the drive has none
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +65,7 @@ class Test:
     asked: Asked
     file: Path
     who: str
+    records: Records
 
     @property
     def settings(self) -> JointTable:
@@ -68,6 +74,20 @@ class Test:
     @property
     def axis(self) -> Axis:
         return Axis(self.settings.node_id, self.settings.axis)
+
+    @property
+    def mode(self) -> int:
+        """The mode of operation in which it is moved."""
+        return TORQUE_MODE if self.wish.kind.by_torque else POSITION_MODE
+
+    @property
+    def left(self) -> Path:
+        """What is to be put back where it is cut off."""
+        return self.records.folder.joint_test
+
+    def tell(self, what: str, **details: object) -> None:
+        """Write it into the journal; raises `OSError`."""
+        self.records.journal.append(self.who, what, **details).result()
 
     @property
     def phrase(self) -> str:
@@ -99,14 +119,16 @@ def tested(bench: Bench, others: Mapping[str, Bench], test: Test) -> Talk[Outcom
     """
     _may_be_led(test)
     yield Say("Asking whether every other drive is off …")
-    for name in test.config.joint:
-        _is_off(others[test.config.joint[name].bus] if name != test.joint else bench, test.config, name)
+    _all_off(bench, others, test)
+    benches = {**others, test.settings.bus: bench}
+    yield from left.put_right(test.left, benches, test.config.joint, test.tell)
     if why := (yield from armed(bench, test.axis)):
         raise NotAllowed(why)
     known = yield from answered(lambda: _known(bench, test))
     if not (yield from _agreed(test, known)):
         yield Say("Nothing gets power.")
         return None
+    _all_off(bench, others, test)  # the phrase may have taken its time
     return (yield from _moved(bench, test, known))
 
 
@@ -118,6 +140,11 @@ def _may_be_led(test: Test) -> None:
         )
     if test.settings.sdo_cob_ids is not None:
         raise NotAllowed("it is asked by an SDO channel of its own (sdo_cob_ids), which this does not use")
+
+
+def _all_off(bench: Bench, others: Mapping[str, Bench], test: Test) -> None:
+    for name, joint in test.config.joint.items():
+        _is_off(others[joint.bus] if name != test.joint else bench, test.config, name)
 
 
 def _is_off(bench: Bench, config: RobotConfig, name: str) -> None:
@@ -169,10 +196,9 @@ def _signed(bench: Bench, axis: Axis, index: int, subindex: int) -> int | None:
 
 
 def _has_mode(bench: Bench, test: Test) -> None:
-    mode = TORQUE_MODE if test.wish.kind.by_torque else POSITION_MODE
     modes = number(bench, test.axis, MODES)
-    if modes is not None and not modes >> mode - 1 & 1:
-        raise NotAllowed(f"its drive has no mode {mode} (6502h), by which it is moved SYNC by SYNC")
+    if modes is not None and not modes >> test.mode - 1 & 1:
+        raise NotAllowed(f"its drive has no mode {test.mode} (6502h), by which it is moved SYNC by SYNC")
 
 
 def _period(bench: Bench, axis: Axis) -> float:
@@ -235,13 +261,16 @@ def explained(test: Test, known: Known) -> Iterator[str]:
 
 def _moved(bench: Bench, test: Test, known: Known) -> Talk[Outcome | None]:
     yield Say("Listening whether somebody else is on the bus; then it begins …")
-    nodes = {one.node_id for one in test.config.joint.values() if one.bus == test.settings.bus}
+    beside = [one for one in test.config.joint.values() if one.bus == test.settings.bus]
+    nodes = {one.node_id for one in beside}
+    taken = {can_id: one.node_id for one in beside for can_id in _taken(bench, test, one)}
     try:
         with (
             bench.power(test.settings, known.description, nodes) as power,
             _reader(test, power, known) as reader,
             Guarding(test.config, reader, power.bus) as guarding,
         ):
+            power.foreign.hear(taken)
             outcome = yield from _led(test, known, power, reader, guarding)
     except DriverError as error:
         yield Say(f"Nothing got power: {error}.")
@@ -249,6 +278,16 @@ def _moved(bench: Bench, test: Test, known: Known) -> Talk[Outcome | None]:
     if outcome is not None and power.left is not None:
         yield Say(f"{power.left}.")
     return outcome
+
+
+def _taken(bench: Bench, test: Test, joint: JointTable) -> Iterator[int]:
+    """The identifiers of the process data that a drive takes as it is configured now, wherever they are."""
+    description = eds.load(eds.locate(joint.eds, test.config.path), joint.node_id)
+    for index in range(RPDO_PARAMETER, RPDO_PARAMETER + MAX_RPDOS):
+        if index in description.object_dictionary:
+            cob_id = unsigned(bench.read(joint.node_id, index, 1) or NO_PDO)
+            if not cob_id & NOT_VALID:
+                yield identifier(cob_id)
 
 
 @contextmanager
@@ -289,19 +328,30 @@ def _led(
     before = yield from _parameters(power, known)
     if before is None:
         return None
-    plan = Plan(test.wish, known.limits, known.period_s, before)
+    plan = Plan(test.wish, known.limits, known.angle, known.period_s, before)
     head = _head(test, known, before, guarding)
     with Recording(test.file, head, by_torque=test.wish.kind.by_torque) as recording:
+        _keep(test, before)
         run = TestRun(power, reader, guarding, plan)
         try:
             outcome = yield from _followed(run, test, recording)
         finally:
             run.finish()
+            if run.restored:
+                left.settled(test.left)
     result = (
         f"It is recorded in {test.file}" if outcome.problem is None else f"It was ended: {outcome.problem}"
     )
     yield Say(f"{result}; {outcome.text}.")
     return outcome
+
+
+def _keep(test: Test, before: parameters.Parameters) -> None:
+    """What it is about to change, so that it is put back also where nothing of this program is left."""
+    changes = left.changes(before, test.mode, test.settings.axis * AXIS_OFFSET)
+    if changes:
+        place = (test.joint, test.settings.bus, test.settings.node_id)
+        left.keep(test.left, left.Left(*place, _now(), test.who, changes))
 
 
 def _parameters(power: Power, known: Known) -> Talk[parameters.Parameters | None]:
@@ -340,12 +390,22 @@ def _followed(run: TestRun, test: Test, recording: Recording) -> Talk[Outcome]:
             recording.add(run.take())
     finally:
         outcome = run.end()
-        with suppress(OSError):
-            recording.add(run.take())
-            recording.end(problem=outcome.problem, off=outcome.off, state=outcome.state, late_s=run.late_s)
-        if not outcome.off:
-            raise NotStopped(f"{words(test.joint)}: {outcome.problem or 'tested'}; {outcome.text}")
+        try:
+            _close(recording, run, outcome)
+        finally:
+            if not outcome.off:
+                raise NotStopped(f"{words(test.joint)}: {outcome.problem or 'tested'}; {outcome.text}")
     return outcome
+
+
+def _close(recording: Recording, run: TestRun, outcome: Outcome) -> None:
+    with suppress(OSError):
+        recording.add(run.take())
+        recording.end(problem=outcome.problem, off=outcome.off, state=outcome.state, late_s=run.late_s)
+
+
+def _now() -> str:
+    return datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
 
 
 def _head(test: Test, known: Known, before: parameters.Parameters, guarding: Guarding) -> dict[str, Any]:
@@ -354,7 +414,7 @@ def _head(test: Test, known: Known, before: parameters.Parameters, guarding: Gua
         "robot": test.config.robot.name,
         "joint": test.joint,
         "test": str(test.wish.kind),
-        "began": datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
+        "began": _now(),
         "who": test.who,
         "wish": asdict(test.wish),
         "limits": asdict(known.limits),

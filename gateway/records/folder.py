@@ -27,6 +27,11 @@ class RecordsFolder:
         return self.path / "stop.json"
 
     @property
+    def joint_test(self) -> Path:
+        """What a test of a joint changes in its drive, while it is under way or after it was cut off."""
+        return self.path / "joint-test.json"
+
+    @property
     def unfinished(self) -> bool:
         """Whether a stop is held or a write is still to be taken back, as the last gateway left it.
 

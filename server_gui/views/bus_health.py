@@ -34,6 +34,7 @@ from server_gui.core.processing.bus_health import (
 from server_gui.views.marks import Mark
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_text
+from server_gui.views.widgets.columns import title_widths
 from server_gui.views.widgets.fitted import FittedLabel
 from server_gui.views.widgets.mark import MarkIcon
 from server_gui.views.widgets.plot import css
@@ -127,6 +128,7 @@ class BusCard(Card):
         self.table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         self.table.horizontalHeader().setSectionResizeMode(1, QHeaderView.ResizeMode.Stretch)
         self.table.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        theme.changed.connect(self._forget)
         head = QGridLayout()
         head.setColumnStretch(2, 1)
         head.addWidget(self._icon, 0, 0)
@@ -136,6 +138,10 @@ class BusCard(Card):
         self.body.addWidget(self._counters)
         self.body.addWidget(self._kinds)
         self.body.addWidget(self.table)
+
+    def _forget(self) -> None:
+        """Rows and letters are of the size before."""
+        self.table.setRowCount(0)
 
     def show_bus(self, bus: BusInfo) -> None:
         """Show how it is now."""
@@ -182,11 +188,8 @@ class BusCard(Card):
 
     def _fit(self) -> None:
         """What has no room is left out whole: no number is cut."""
-        header = self.table.horizontalHeader()
-        widths = [
-            max(self.table.sizeHintForColumn(column), header.sectionSizeHint(column))
-            for column in range(len(TITLES))
-        ]
+        titles = title_widths(self.table)
+        widths = [max(self.table.sizeHintForColumn(column), title) for column, title in enumerate(titles)]
         shown = set(range(len(TITLES)))
         for column in SPARE:
             if sum(widths[known] for known in shown) > self.table.viewport().width():

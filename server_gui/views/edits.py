@@ -21,7 +21,8 @@ from server_gui.core.desk.station import Station
 from server_gui.core.evidence.comparison import Measured, Word
 from server_gui.core.evidence.cycles import DRAWN
 from server_gui.core.evidence.file import Told
-from server_gui.core.evidence.wording import changes, number, share
+from server_gui.core.evidence.shown import in_units, symbols
+from server_gui.core.evidence.wording import changes, from_to, number, share
 from server_gui.core.experiments.plan import Kind
 from server_gui.core.experiments.wording import record, what, whole
 from server_gui.views.experiments.form import ExperimentForm, Tried
@@ -38,6 +39,7 @@ MOST_PX: Final = 16_777_215  # what Qt takes for no end
 MOST: Final = 8  # metrics that are told one by one
 UNIT: Final = {"position": "rad", "following_error": "rad", "current": "A", "torque": "N·m"}
 TONES: Final = {Word.BETTER: "good", Word.WORSE: "bad", Word.MIXED: "bad"}
+ARROW: Final = "\N{NO-BREAK SPACE}→\N{NO-BREAK SPACE}"
 NONE: Final = (
     "No edit is known yet. Change a parameter while somebody walks: what that does to tracking, current, "
     "torque and gait is judged here, stride by stride, before and after."
@@ -52,6 +54,8 @@ class Edits(QWidget):
         super().__init__()
         self._desk = desk
         self._theme = theme
+        self._known: tuple[object, ...] = ()  # what is shown was made of this
+        self._units: dict[str, dict[str, str]] = {}  # symbols of each edit, by parameter
         self._shown: list[Told] = []
         self._drawn: Told | None = None
         self.setAccessibleName("Edits")
@@ -93,13 +97,27 @@ class Edits(QWidget):
         writes = () if run is None else run.writes
         judged = [] if station is None else whole(tuple(station.judged.values()), writes)
         known = sorted(judged, key=lambda one: -one.edit.utc_ns)
-        if known == self._shown:
+        made_of = (known, self._desk.shown.revision, 0 if station is None else len(station.known))
+        if made_of == self._known:
             return
+        self._known = made_of
+        known = self._in_units(known, station)
         if [told.edit.id for told in known] == [told.edit.id for told in self._shown]:
             self._grow(known)
         else:
             self._list(known)
         self._choose()
+
+    def _in_units(self, known: list[Told], station: Station | None) -> list[Told]:
+        """Return them as people read values, whose symbols are kept."""
+
+        def si(name: str) -> str | None:
+            info = None if station is None else station.known.get(name)
+            return None if info is None else info.unit
+
+        units = self._desk.shown.units
+        self._units = {one.edit.id: symbols(one, units, si) for one in known}
+        return [in_units(one, units, si) for one in known]
 
     def _left(self) -> QVBoxLayout:
         """The list, and what else may be tried."""
@@ -113,6 +131,7 @@ class Edits(QWidget):
         buttons.addWidget(self.sweep)
         column.addWidget(self.list, 1)
         column.addLayout(buttons)
+        column.addStretch(0)  # while there is no list, they stand at the top
         return column
 
     def compare(self, station: Station) -> None:
@@ -133,7 +152,7 @@ class Edits(QWidget):
         """More is known of some: hundreds of others are not laid out again each second."""
         for row, (told, shown) in enumerate(zip(known, self._shown, strict=True)):
             if told != shown:
-                self.list.item(row).setText(_line(told))
+                self.list.item(row).setText(self._line(told))
         self._shown = known
 
     def _list(self, known: list[Told]) -> None:
@@ -142,7 +161,7 @@ class Edits(QWidget):
         self.list.blockSignals(True)
         self.list.clear()
         for told in known:
-            self.list.addItem(QListWidgetItem(_line(told)))
+            self.list.addItem(QListWidgetItem(self._line(told)))
         places = [place for place, told in enumerate(known) if chosen and told.edit.id == chosen.edit.id]
         # Who looks at the newest one wants to see the next one, too.
         was_newest = self._drawn is None or not places
@@ -162,7 +181,7 @@ class Edits(QWidget):
         if told is None:
             set_text(self.words, NONE)
         else:
-            set_text(self.verdict, _verdict(told))
+            set_text(self.verdict, self._verdict(told))
             set_tone(self.verdict, TONES.get(told.evidence.word, ""))
             set_text(self.words, "\n".join(_said(told)))
         tried = None if told is None else told.experiment
@@ -174,6 +193,7 @@ class Edits(QWidget):
         joints = list(dict.fromkeys(channel.rpartition(".")[0] for channel in found))
         for channel in self.curves.keys() - found.keys():
             gone = self.curves.pop(channel)
+            gone.hide()  # at once: what comes in its place is drawn before it is gone
             self._grid.removeWidget(gone)
             gone.deleteLater()
         for channel, one in found.items():
@@ -183,6 +203,28 @@ class Edits(QWidget):
             widget = self.curves[channel]
             self._grid.addWidget(widget, joints.index(joint), DRAWN.index(quantity))
             widget.show_curves(one, self._desk.shown.units.unit(quantity, UNIT[quantity]))
+
+    def _what(self, told: Told) -> str:
+        """What was changed, in its unit."""
+        if told.experiment is None:
+            return changes(told.edit, self._units.get(told.edit.id, {}))
+        return f"{what(told)} {told.experiment.unit}".rstrip()
+
+    def _line(self, told: Told) -> str:
+        word = told.evidence.word if told.is_final else f"{told.evidence.word} so far"
+        ended = told.edit.state if told.experiment is None else told.experiment.kind
+        values = self._what(told).replace(" → ", ARROW)  # no line ends within them
+        return f"{told.edit.utc[11:19]}  {values}\n{ended} · {word}"
+
+    def _verdict(self, told: Told) -> str:
+        evidence, tried = told.evidence, told.experiment
+        if tried is not None:
+            word = f"{counted(len(tried.periods), 'period')}" if tried.responses else str(evidence.word)
+            back = "" if tried.is_back else "; NOT CONFIRMED that it is back"
+            return f"{self._what(told)}: {word}{back}"
+        strides = f"{counted(evidence.cycles_before, 'gait cycle')} before, {evidence.cycles_after} after"
+        so_far = "" if told.is_final else " so far"
+        return f"{self._what(told)}: {evidence.word}{so_far} ({strides})"
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
@@ -195,22 +237,6 @@ class Edits(QWidget):
         self._row.setDirection(direction.TopToBottom if is_narrow else direction.LeftToRight)
         self.list.setMaximumSize(MOST_PX if is_narrow else px(LIST), px(ABOVE) if is_narrow else MOST_PX)
         self.list.setMinimumWidth(0 if is_narrow else px(LIST))
-
-
-def _line(told: Told) -> str:
-    word = told.evidence.word if told.is_final else f"{told.evidence.word} so far"
-    ended = told.edit.state if told.experiment is None else told.experiment.kind
-    return f"{told.edit.utc[11:19]}  {what(told)}\n{ended} · {word}"
-
-
-def _verdict(told: Told) -> str:
-    evidence, tried = told.evidence, told.experiment
-    if tried is not None:
-        word = f"{counted(len(tried.periods), 'period')}" if tried.responses else str(evidence.word)
-        return f"{what(told)}: {word}{'' if tried.is_back else '; NOT CONFIRMED that it is back'}"
-    strides = f"{counted(evidence.cycles_before, 'gait cycle')} before, {evidence.cycles_after} after"
-    so_far = "" if told.is_final else " so far"
-    return f"{changes(told.edit)}: {evidence.word}{so_far} ({strides})"
 
 
 def _said(told: Told) -> list[str]:
@@ -238,5 +264,5 @@ def _said(told: Told) -> list[str]:
 def _metric(one: Measured) -> str:
     name = one.title.replace("_", " ")
     interval = f"{number(one.low)} to {number(one.high)} {one.unit}".rstrip()
-    means = f"{number(one.before)} → {number(one.after)}"
+    means = f"{from_to(one.before, one.after)} {one.unit}".rstrip()
     return f"{name} {one.word}: {share(one)} (95 % interval {interval}); means {means}"

@@ -113,7 +113,7 @@ class Header(QWidget):
     def _fit(self) -> None:
         """Show as many chips as have room for all of their first line, and give each what it needs."""
         station = self._desk.selected
-        self.stop.most = max(round(self.width() * STOP_SHARE), self._theme.px(150))
+        self.stop.allow(max(round(self.width() * STOP_SHARE), self._theme.px(150)))
         self._empty.setVisible(station is None)
         has_outcome = self._has_outcome
         shown = [] if station is None else [name for name in self._chips if self._is_wanted(name)]
@@ -128,6 +128,7 @@ class Header(QWidget):
         self._outcome.setVisible(has_outcome)
         self._outcome.setMinimumWidth(self._outcome.needs if has_outcome else 0)
         self._row.setStretchFactor(self._outcome, self._outcome.wants if has_outcome else 0)
+        self._row.activate()  # at once: what is wider now would lie over its neighbour until the next event
 
     @property
     def _has_outcome(self) -> bool:

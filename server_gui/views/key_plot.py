@@ -75,7 +75,7 @@ class KeyPlot(Card):
             self._say(station, unit, flags, live=live)
 
     def _say(self, station: Station, unit: Unit, flags: Sequence[PlacedFlag], *, live: bool) -> None:
-        self.set_title(f"{self._kind.title} ({unit.symbol})")
+        self.set_title(f"{self._kind.title} ({unit.symbol})", whole=True)
         values = self._values(station)
         told = {word: unit.text(value) for (_, _, word), value in zip(self._kind.curves, values, strict=True)}
         inks = [colour if live else "old" for _, colour, _ in self._kind.curves]

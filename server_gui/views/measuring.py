@@ -4,15 +4,18 @@ from collections.abc import Sequence
 from typing import Final
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QFocusEvent, QKeyEvent
-from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableWidget, QTableWidgetItem
+from PySide6.QtGui import QFocusEvent, QKeyEvent, QResizeEvent
+from PySide6.QtWidgets import QAbstractItemView, QTableWidget, QTableWidgetItem
 
 from gateway.units import Unit
 from server_gui.core.desk.measuring import Measured
 from server_gui.views.theme import Theme
+from server_gui.views.widgets import columns
 from server_gui.views.widgets.card import Card
 
 TITLES: Final = ("Channel", "A", "B", "B − A", "Min", "Max", "Mean", "SD", "Unit")
+SPARE: Final = (7, 5, 4, 6, 8)  # left out in this order where there is less room
+NAME: Final = 90  # wide at least, at text of 100 %: a channel
 ROWS: Final = 6  # that are in sight at most
 FAR: Final = 10  # samples, with Shift
 KEYS: Final = {Qt.Key.Key_A: 0, Qt.Key.Key_B: 1}
@@ -40,9 +43,7 @@ class Measuring(Card):
         self.table.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.table.setShowGrid(False)
         self.table.verticalHeader().hide()
-        header = self.table.horizontalHeader()
-        header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)  # names whole, else scrolled
-        header.setStretchLastSection(True)
+        columns.prepare(self.table)
         self.body.addWidget(self.table)
         self.hide()
 
@@ -62,6 +63,7 @@ class Measuring(Card):
             texts = (name, *(_text(unit, value) for value in values), unit.symbol)
             for column, text in enumerate(texts):
                 self._set(place, column, text)
+        self._share()
 
     def focusInEvent(self, event: QFocusEvent) -> None:
         super().focusInEvent(event)
@@ -81,12 +83,19 @@ class Measuring(Card):
         else:
             super().keyPressEvent(event)
 
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._share()
+
+    def _share(self) -> None:
+        """Numbers are whole: of less room names give up their middle, then columns go."""
+        columns.fit(self.table, {0: self._theme.px(NAME)}, SPARE)
+
     def _fit(self, rows: int) -> None:
         height = self._theme.px(20)
         self.table.verticalHeader().setDefaultSectionSize(height)
         header = self.table.horizontalHeader().sizeHint().height()
-        bar = self.table.horizontalScrollBar().sizeHint().height()
-        self.table.setFixedHeight(header + min(rows, ROWS) * height + bar)
+        self.table.setFixedHeight(header + min(rows, ROWS) * height + 2)
 
     def _set(self, row: int, column: int, text: str) -> None:
         item = self.table.item(row, column)

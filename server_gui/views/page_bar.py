@@ -4,6 +4,8 @@ from PySide6.QtCore import QEvent
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QAbstractButton, QButtonGroup, QPushButton, QTabWidget, QWidget
 
+from server_gui.views.theme import LOOSE, TIGHT
+
 
 class PageBar(QWidget):
     """In place of the bar that `pages` has itself, which puts some behind arrows; `corner` is beside it."""
@@ -20,6 +22,7 @@ class PageBar(QWidget):
             button.setCheckable(True)
             self._group.addButton(button, place)
         self._corner = corner
+        self._is_tight = False
         corner.setParent(self)
         self._group.idClicked.connect(pages.setCurrentIndex)
         pages.currentChanged.connect(self._mark)
@@ -42,9 +45,22 @@ class PageBar(QWidget):
     def _mark(self, place: int) -> None:
         self._group.button(place).setChecked(True)
 
+    def _tighten(self, room: int) -> None:
+        """Put names closer to each other where that saves a row."""
+        saved = 2 * (LOOSE - TIGHT) * len(self.buttons)
+        wide = sum(button.sizeHint().width() for button in self.buttons)
+        loose = wide + saved if self._is_tight else wide
+        is_tight = loose - saved <= room < loose
+        if is_tight != self._is_tight:
+            self._is_tight = is_tight
+            for button in self.buttons:
+                button.setProperty("tight", is_tight)
+                button.style().polish(button)
+
     def _arrange(self) -> None:
         """From left to right; what has no room beside the corner begins another row."""
         corner = self._corner.sizeHint()
+        self._tighten(self.width() - corner.width())
         high = max(corner.height(), *(button.sizeHint().height() for button in self.buttons))
         self._corner.setGeometry(self.width() - corner.width(), 0, corner.width(), high)
         left, row, room = 0, 0, self.width() - corner.width()

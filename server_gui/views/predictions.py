@@ -119,6 +119,8 @@ def lines(station: Station) -> Iterator[Line]:
             line = said(shown, stopped=stopped, unseen=blind(station))
             if task == GAIT_PHASE and line.mark.colour == "accent":
                 line = _stride(station, line)
+            if not station.is_live and line.mark.colour != "bad":
+                line = Line(Mark("ring", "old", "not known"), "not known", "no live data")
             yield replace(line, text=f"{title}: {line.text}")
     if predictions.problem:
         yield Line(
@@ -193,7 +195,7 @@ def _stride(station: Station, line: Line) -> Line:
     if max(differences) <= AGREES:
         return replace(line, text="steps and model agree")
     mark = Mark("triangle", "warn", "differs")
-    return replace(line, mark=mark, text=f"steps, model {max(differences):.0f} % apart")
+    return replace(line, mark=mark, text=f"{max(differences):.0f} % apart")
 
 
 def _knows(shown: Told) -> bool:

@@ -23,17 +23,16 @@ from server_gui.views.widgets.plain import PlainLabel
 from server_gui.views.widgets.plot import Curve
 
 GIB: Final = 1 << 30
-MIB: Final = 1 << 20
 KIB: Final = 1 << 10
 OLD_S: Final = 5.0
 SLOW: Final = 6  # frames between two looks
 TOP: Final = 4  # processes that are drawn
 # Each card's series, with what people call them and their colours.
 CPU: Final = {
-    "cpu_percent": Curve("all cores %", "accent"),
-    "gateway_cpu_percent": Curve("gateway, of one core %", "good"),
+    "cpu_percent": Curve("all cores", "accent"),
+    "gateway_cpu_percent": Curve("gateway, of one core", "good"),
 }
-MEMORY: Final = {"memory_used": Curve("used MiB", "accent")}
+MEMORY: Final = {"memory_used": Curve("used", "accent")}
 DISK_AND_NETWORK: Final = {
     "disk_read": Curve("disk read", "accent"),
     "disk_written": Curve("written", "good"),
@@ -41,7 +40,7 @@ DISK_AND_NETWORK: Final = {
     "sent": Curve("out", OTHERS[2]),
 }
 NARROW, THREE, TRENDS = 800, 500, 260  # wide, at text of 100 %: trends and processes; three trends; two
-TEMPERATURE: Final = {"hottest": Curve("hottest °C", "warn")}
+TEMPERATURE: Final = {"hottest": Curve("hottest", "warn")}
 
 
 class Resources(QWidget):
@@ -54,10 +53,11 @@ class Resources(QWidget):
         self._taken: ResourceSnapshot | None = None
         self._frame = 0
         self.setObjectName("page")
-        self.cpu, self.memory = Trend(theme, "CPU", 20.0), Trend(theme, "Memory", 256.0, 1 / MIB)
+        self.cpu = Trend(theme, "CPU", 20.0, symbol=" %")
+        self.memory = Trend(theme, "Memory", 0.25, 1 / GIB, symbol=" GiB", digits=2)
         self.top = Trend(theme, "CPU by process", 10.0, unit="% of a core")
         self.devices = Trend(theme, "Disk and network", 10.0, 1 / KIB, unit="KiB/s")
-        self.temperature = Trend(theme, "Temperature", 10.0)
+        self.temperature = Trend(theme, "Temperature", 10.0, symbol=" °C")
         self.facts = PlainLabel()
         self.facts.setWordWrap(True)
         computer = Card("Computer")
@@ -172,7 +172,7 @@ class Resources(QWidget):
         memory = seen.memory
         share = 100 * memory.used / memory.total
         amount = f"{share:.0f} % · {memory.used / GIB:.2f} of {memory.total / GIB:.1f} GiB"
-        self.memory.set_note(f"{old}{amount}", f"{old[:5]} {share:.0f} %".strip(), old[:5])
+        self.memory.set_note(f"{old}{amount}", f"{old}{share:.0f} %", f"{old[:5]}")
         held = held_back(station.processes)
         self.temperature.set_note(held, held.partition(" · ")[0], "▲" if "▲" in held else "")
         set_text(self.facts, facts(station, seen))

@@ -30,6 +30,7 @@ from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.elided import ElidedLabel
 from server_gui.views.widgets.files import ask_save, save_whole
 from server_gui.views.widgets.plain import PlainLabel, set_tip
+from server_gui.views.widgets.scrolled import bring_into_sight
 from server_gui.views.workspace.beside_menu import BesideMenu, others_of
 from server_gui.views.workspace.drawing import AnyPlot, draw, flag, read
 from server_gui.views.workspace.expression_bar import ExpressionBar
@@ -40,7 +41,7 @@ from server_gui.views.workspace.tools import SPANS_S, Tools
 from server_gui.views.workspace.trigger_bar import TriggerBar
 
 Floats = npt.NDArray[np.float64]
-NARROW, LIST = 700, 150  # wide, at text of 100 %: tools in more rows; the channels at least
+LIST, MARGIN = 150, 8  # wide: the channels at least, at text of 100 %; beside everything
 GONE: Final = "Live: that instant is gone from here, see Recordings"
 AROUND_S: Final = 5.0  # that are shown before and after an event
 SLOW: Final = 5  # frames between two looks at what people read
@@ -71,8 +72,7 @@ class Signals(QWidget):
         self.area.moved.connect(self._move)
         self.area.fitted.connect(self._follow)
         self.area.hovered.connect(self._hovered)
-        self._begun = False
-        self._frame = 0
+        self._begun, self._frame = False, 0
         self._jumped_ns: int | None = None  # on the robot's clock
         self._is_gone = False  # the instant that was asked for last
         self._told = ""  # what came of what was done last
@@ -98,9 +98,8 @@ class Signals(QWidget):
         folder = default_file().with_name("layouts")
         self.layouts = LayoutMenu(layouts or Layouts(folder), self.layout_now, self.show_layout, self.tell)
         self.beside = BesideMenu(self.scene, self._others, self.tell)
-        self.tools = Tools(self, (self.layouts, self.beside))
-        tools = self.tools
-        self.span, self.pause, self.fit, self.box = tools.span, tools.pause, tools.fit, tools.box
+        self.tools = tools = Tools(self, (self.layouts, self.beside))
+        self.span, self.pause, self.fit, self.box = tools.span, tools.pause, tools.follow, tools.box
         self.cursors, self.said = tools.cursors, tools.said
         self._bind()
         self._lay_out()
@@ -215,7 +214,7 @@ class Signals(QWidget):
         splitter.setStretchFactor(1, 1)
         splitter.setSizes([self._theme.px(190), self._theme.px(700)])
         everything = QVBoxLayout(self)
-        everything.setContentsMargins(8, 8, 8, 0)
+        everything.setContentsMargins(MARGIN, MARGIN, MARGIN, 0)
         everything.addLayout(self.tools.rows)
         everything.addWidget(splitter, 1)
 
@@ -236,7 +235,7 @@ class Signals(QWidget):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        self.tools.be_narrow(self.width() < self._theme.px(NARROW))
+        self.tools.fit(self.width() - 2 * MARGIN)
 
     def _build(self) -> None:
         """Make the plots anew; what part of the time is in sight stays."""
@@ -433,6 +432,7 @@ class Signals(QWidget):
         self.measuring.setVisible(on)
         if on:
             self.measuring.setFocus()
+            bring_into_sight(self.measuring)
         self._mark()
         self._frame = 0  # measure at once
 

@@ -73,6 +73,7 @@ class StatusBar(QStatusBar):
         self._refresh_recording(station)
         set_text(self._window, f"{self._rate():.0f} fps")
         set_tip(self._window, "frames that this window draws a second")
+        QApplication.sendPostedEvents(self, QEvent.Type.LayoutRequest)  # no number is drawn where it was
 
     def _refresh_recording(self, station: Station | None) -> None:
         address, is_live = (None, False) if station is None else (station.address, station.is_live)
@@ -101,4 +102,4 @@ def _computer(station: Station) -> tuple[str, ...]:
     most = busiest(station)
     short = f"CPU {cpu} · memory {share}"
     full = () if most is None else (f"{short} · most: {most.name} {most.percent:.0f} %",)
-    return *full, short
+    return *full, short, f"CPU {cpu}"

@@ -9,6 +9,8 @@ from PySide6.QtGui import QColor, QFont, QFontDatabase, QPalette
 from PySide6.QtWidgets import QApplication
 
 SMALLEST_SCALE, LARGEST_SCALE = 0.8, 2.0
+LOOSE: Final = 11  # px beside the name of a page, where there is room for that
+TIGHT: Final = 5  # else
 BASE_POINTS: Final = 9.0
 
 
@@ -133,7 +135,7 @@ QLabel#banner[tone="bad"] {{ border-color: {bad}; }}
 QLabel#banner[tone="good"] {{ background: {card}; border-color: {good}; }}
 QTabWidget::pane {{ border: none; border-top: 1px solid {border}; }}
 QTabBar {{ background: {panel}; }}
-QTabBar::tab {{ background: transparent; color: {dim}; padding: 7px 11px; border: none;
+QTabBar::tab {{ background: transparent; color: {dim}; padding: 7px {loose}px; border: none;
     border-bottom: 2px solid transparent; }}
 QTabBar::tab:selected {{ color: {text}; border-bottom: 2px solid {accent}; }}
 QTabBar QToolButton {{ padding: 0; border-radius: 0; }}
@@ -150,18 +152,20 @@ QPushButton#primary {{ font-weight: bold; }}
 QPushButton#primary:disabled {{ background: {card}; color: {old}; border-color: {border}; }}
 QPushButton#page_name {{ background: transparent; color: {dim}; padding: 7px 11px; border: none;
     border-bottom: 2px solid transparent; border-radius: 0; }}
+QPushButton#page_name[tight="true"] {{ padding: 7px {tight}px; }}
 QPushButton#page_name:checked {{ color: {text}; border-bottom: 2px solid {accent}; }}
 QPushButton#page_name:focus, QPushButton#page_name:hover {{ color: {text}; background: {card}; }}
 QPushButton#stop {{ background: {stop}; color: white; border: 3px solid {stop_border}; border-radius: 6px;
     font-weight: bold; padding: 6px 14px; }}
 QPushButton#stop:pressed {{ background: #7d0a1d; }}
+QPushButton#stop:disabled {{ background: {card}; color: {old}; border-color: {border}; }}
 QPushButton#stop:focus {{ border-color: {text}; }}
 QPushButton#robot_stop {{ color: {bad}; border-color: {bad}; padding: 2px 8px; font-weight: bold; }}
 QLineEdit, QAbstractSpinBox, QComboBox, QPlainTextEdit {{ background: {field}; border: 1px solid {edge};
     border-radius: 4px; padding: 4px 6px; selection-background-color: {accent};
     selection-color: {on_accent}; }}
 QLineEdit:focus, QAbstractSpinBox:focus {{ border-color: {accent}; }}
-QAbstractSpinBox {{ padding-right: 16px; }}
+QAbstractSpinBox {{ padding: 3px 16px 3px 4px; }}
 QAbstractSpinBox::up-button, QAbstractSpinBox::down-button {{ background: transparent; border: none;
     width: 16px; }}
 QAbstractSpinBox::up-arrow, QAbstractSpinBox::down-arrow {{ image: none; width: 0; height: 0; }}
@@ -263,7 +267,9 @@ class Theme(QObject):
         colours = {name: getattr(self.colours, name) for name in Colours.__slots__}
         selection = self.colour("accent")
         selection.setAlpha(70)
-        return STYLE.format(**colours, selection=selection.name(QColor.NameFormat.HexArgb))
+        return STYLE.format(
+            **colours, loose=LOOSE, tight=TIGHT, selection=selection.name(QColor.NameFormat.HexArgb)
+        )
 
     def _palette(self) -> QPalette:
         roles = {

@@ -19,13 +19,27 @@ SPANS_S: Final = (30.0, 60.0, 120.0, 300.0, 600.0)  # of the past, the shortest 
 
 
 class Trend(Card):
-    """`least` is the smallest range that is shown, in the unit of `scale` times what comes."""
+    """`least` is the smallest range that is shown, in the unit of `scale` times what comes.
 
-    def __init__(self, theme: Theme, title: str, least: float, scale: float = 1.0, *, unit: str = "") -> None:
+    The `unit` stands beside the title, or as `symbol` behind each value, which has so many `digits`.
+    """
+
+    def __init__(
+        self,
+        theme: Theme,
+        title: str,
+        least: float,
+        scale: float = 1.0,
+        *,
+        unit: str = "",
+        symbol: str = "",
+        digits: int = 1,
+    ) -> None:
         super().__init__(title)
         self.set_note(unit, unit.partition(" ")[0], "")
         self._theme = theme
         self._name, self._least, self._scale = title, least, scale
+        self._symbol, self._digits = symbol, digits
         self._shown: tuple[object, ...] = ()
         self._rows = object()  # another one where what is drawn is no longer only added to
         self.legend = Wrapped(f"Values of {title}", named=True)
@@ -63,18 +77,24 @@ class Trend(Card):
             self._shown, self._rows = (source, tuple(curves)), object()
             self.plot.set_curves(curves)
         self.plot.draw(self._rows, times, columns, live=live, scale=self._scale)
-        self._say(curves, columns)
+        self._say(curves, columns, live=live)
 
     def _resize(self) -> None:
         if "plot" in self.__dict__:  # it has been shown
             self.plot.setMinimumHeight(self._theme.px(LEAST_HIGH))
 
-    def _say(self, curves: Sequence[Curve], columns: Sequence[Floats]) -> None:
+    def _say(self, curves: Sequence[Curve], columns: Sequence[Floats], *, live: bool) -> None:
         said = []
         for curve, values in zip(curves, columns, strict=True):
             known = values[~np.isnan(values)]
-            newest = f"{known[-1] * self._scale:.1f}" if len(known) else "–"
-            said.append((css(self._theme, curve.colour), "━", f"{curve.channel} {newest}"))
+            value = f"{known[-1] * self._scale:.{self._digits}f}" if len(known) else "–"
+            said.append(
+                (
+                    css(self._theme, curve.colour if live else "old"),
+                    "━",
+                    f"{curve.channel} {value}{self._symbol}",
+                )
+            )
         self.legend.say(said)
         self.plot.setAccessibleDescription(self.legend.accessibleDescription())
 

@@ -10,6 +10,7 @@ from PySide6.QtWidgets import (
     QAbstractItemView,
     QAbstractScrollArea,
     QApplication,
+    QHeaderView,
     QLabel,
     QScrollArea,
     QTabBar,
@@ -19,7 +20,7 @@ from PySide6.QtWidgets import (
 
 from server_gui.views.robots_panel import RobotCard
 from server_gui.views.theme import Theme
-from server_gui.views.widgets.elided import ElidedLabel
+from server_gui.views.widgets.elided import ElidedLabel, PathLabel
 from server_gui.views.widgets.fitted import FittedLabel
 from server_gui.views.widgets.mark import MarkIcon
 from server_gui.views.widgets.stop_button import StopButton
@@ -62,7 +63,11 @@ def halved_numbers(window: QWidget) -> list[str]:
     """Every number of which a digit is missing for want of room."""
     found = []
     for widget in seen(window):
-        if isinstance(widget, QLabel) and _has_number(widget) and _is_cut(widget):
+        if (
+            isinstance(widget, QLabel)
+            and _has_number(widget)
+            and (_is_cut(widget) or not (_is_inside(widget, window) or _is_scrolled(widget)))
+        ):
             found.append(f"{_path(widget)}: {widget.text()}")
         if isinstance(widget, FittedLabel) and DIGIT.search(widget.shown) and not widget.is_whole:
             found.append(f"{_path(widget)}: {widget.shown}")
@@ -76,16 +81,38 @@ def halved_numbers(window: QWidget) -> list[str]:
     return found
 
 
+def cut_words(window: QWidget) -> list[str]:
+    """Every text of several lines of which some have no room."""
+    return [
+        f"{_path(label)}: {label.text()}"
+        for label in seen(window)
+        if isinstance(label, QLabel)
+        and label.wordWrap()
+        and label.text()
+        and label.heightForWidth(label.width()) > label.height() + label.fontMetrics().descent()
+    ]
+
+
+def cut_titles(window: QWidget) -> list[str]:
+    """Every title of a column of which letters have no room."""
+    across = Qt.Orientation.Horizontal
+    return [
+        f"{_path(header)}: {header.model().headerData(place, across)}"
+        for header in seen(window)
+        if isinstance(header, QHeaderView) and header.orientation() is across
+        for place in range(header.count())
+        if not header.isSectionHidden(place) and header.sectionSize(place) < _title_wide(header, place)
+    ]
+
+
 def out_of_reach(window: QWidget) -> list[str]:
     """Every control that is not whole on the screen, and to which nothing scrolls."""
     found = []
     for widget in window.findChildren(QWidget):
         if not widget.isVisible() or not widget.focusPolicy() & Qt.FocusPolicy.TabFocus:
             continue
-        corners = (widget.rect().topLeft(), widget.rect().bottomRight())
-        inside = all(window.rect().contains(widget.mapTo(window, corner)) for corner in corners)
-        if not inside and not _is_scrolled(widget) and not _is_behind(widget):
-            found.append(f"{_path(widget)} at {widget.mapTo(window, corners[0]).toTuple()}")
+        if not _is_inside(widget, window) and not _is_scrolled(widget) and not _is_behind(widget):
+            found.append(f"{_path(widget)} at {widget.mapTo(window, widget.rect().topLeft()).toTuple()}")
     return found
 
 
@@ -106,7 +133,8 @@ def nameless(window: QWidget) -> list[str]:
 
 def _has_number(label: QLabel) -> bool:
     """Names may have digits, too, and are elided in their middle."""
-    is_name = isinstance(label.parentWidget(), RobotCard) and label.objectName() == "title"
+    of_card = isinstance(label.parentWidget(), RobotCard) and label.objectName() == "title"
+    is_name = of_card or isinstance(label, PathLabel)
     return bool(DIGIT.search(label.text())) and not is_name
 
 
@@ -121,6 +149,11 @@ def _is_cut(label: QLabel) -> bool:
     return type(label).paintEvent is QLabel.paintEvent and widest > room
 
 
+def _title_wide(header: QHeaderView, place: int) -> int:
+    title = str(header.model().headerData(place, header.orientation()) or "")
+    return max(map(header.fontMetrics().horizontalAdvance, title.split("\n")))
+
+
 def _halved_cells(view: QTableView) -> Iterator[str]:
     for row, column in _cells(view):
         index = view.model().index(row, column)
@@ -128,7 +161,9 @@ def _halved_cells(view: QTableView) -> Iterator[str]:
         right = index.data(Qt.ItemDataRole.TextAlignmentRole)
         is_number = right is not None and bool(Qt.AlignmentFlag(right) & Qt.AlignmentFlag.AlignRight)
         metrics = view.fontMetrics() if font is None else QFontMetrics(font)
-        if is_number and metrics.horizontalAdvance(text) > view.columnWidth(column):
+        left, wide = view.columnViewportPosition(column), view.columnWidth(column)
+        is_cut_off = left < view.viewport().width() < left + wide and view.horizontalScrollBar().value() == 0
+        if is_number and (metrics.horizontalAdvance(text) > wide or is_cut_off):
             yield f"{_path(view)}: {text}"
 
 
@@ -140,6 +175,11 @@ def _cells(view: QTableView) -> Iterator[tuple[int, int]]:
         for column in range(model.columnCount(QModelIndex())):
             if not view.isColumnHidden(column):
                 yield row, column
+
+
+def _is_inside(widget: QWidget, window: QWidget) -> bool:
+    corners = (widget.rect().topLeft(), widget.rect().bottomRight())
+    return all(window.rect().contains(widget.mapTo(window, corner)) for corner in corners)
 
 
 def _is_scrolled(widget: QWidget) -> bool:

@@ -4,13 +4,21 @@ import time
 
 import pytest
 from msgspec.structs import replace
+from PySide6.QtCore import QRectF
+from PySide6.QtGui import QImage, QPainter
 
+from gateway.units import Units
 from server_gui.core.evidence.comparison import Word, compare
 from server_gui.core.evidence.curves import Curves, Side
+from server_gui.core.evidence.edits import Change
 from server_gui.core.evidence.file import Told
 from server_gui.core.tuning.writing import Trial
 from server_gui.views.main_window import MainWindow
+from server_gui.views.theme import Theme
+from server_gui.views.widgets.framed import draw_frame
+from server_gui.views.widgets.stride_curves import CYCLE
 from tests.gui.fakes import Bench
+from tests.support.desk import looked
 from tests.unit.evidence.synthetic import cycles, spell
 from tests.unit.evidence.test_comparison import ERROR, times
 from tests.unit.evidence.test_file import told
@@ -37,6 +45,35 @@ def test_the_newest_edit_is_shown_with_its_word_and_its_strides(bench: Bench, wi
     assert set(window.edits.curves) == {"left_knee.position", "left_knee.following_error"}
     described = window.edits.curves["left_knee.position"].accessibleDescription()
     assert described.startswith("40 strides before and 41 after, from ")
+
+
+def test_values_and_metrics_are_in_the_units_that_were_chosen(bench: Bench, window: MainWindow) -> None:
+    bench.station.take([looked()])
+    one = worse()
+    bench.station.take_evidence(
+        replace(one, edit=replace(one.edit, changes=(Change("gait.step_length", 0.4, 0.43),)))
+    )
+    window.edits.refresh()
+    assert "gait.step_length 400 → 430 mm: worse" in window.edits.verdict.text()
+    assert "0.05993 °)" in window.edits.words.text()
+    bench.desk.shown.change(Units(by_si={"m": "m", "rad": "rad"}))
+    window.edits.refresh()
+    assert "gait.step_length 0.40 → 0.43 m: worse" in window.edits.verdict.text()
+    assert "0.001046 rad)" in window.edits.words.text()
+
+
+@pytest.mark.parametrize("scale", [1.0, 2.0])
+def test_no_figure_lies_over_a_curve(theme: Theme, scale: float) -> None:
+    theme.set(scale=scale)
+    image = QImage(theme.px(180), theme.px(130), QImage.Format.Format_RGB32)
+    painter = QPainter(image)
+    area = draw_frame(painter, theme, QRectF(image.rect()), "left knee (°)", ("-12.5", "110.0"), CYCLE)
+    metrics = painter.fontMetrics()
+    painter.end()
+    assert area.left() >= max(map(metrics.horizontalAdvance, ("-12.5", "110.0")))
+    assert image.height() - area.bottom() >= metrics.height()
+    assert area.top() >= metrics.height()
+    assert area.width() > 0.4 * image.width()
 
 
 def test_who_looks_at_an_older_edit_keeps_looking_at_it(bench: Bench, window: MainWindow) -> None:

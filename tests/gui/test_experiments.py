@@ -167,5 +167,5 @@ def test_a_sweep_is_told_with_its_response_and_without_its_parts(
     assert "sweep 2800 … 3200" in window.edits.verdict.text()
     assert ("NOT CONFIRMED" in window.edits.verdict.text()) is not is_back
     assert "proposal: 3200" in window.edits.words.text()
-    assert "3200: 0.0041" in window.edits.response.accessibleDescription()
+    assert "3200: 0.2349" in window.edits.response.accessibleDescription()
     window.edits.response.grab()

@@ -203,7 +203,7 @@ def test_disk_network_heat_and_who_uses_the_cpu_are_shown_over_time(view: Resour
         ("network in", "1.0"),
         ("out", "64.0"),
     ]
-    assert re.findall(r"━ ([^<]+) ([\d.]+)<", told[view.temperature]) == [("hottest °C", "61.5")]
+    assert re.findall(r"━ ([^<]+) ([\d.]+) °C<", told[view.temperature]) == [("hottest", "61.5")]
     assert re.findall(r"━ ([^<]+) ([\d.]+)<", told[view.top]) == [
         ("gait_ctrl", "40.0"),
         ("&lt;b&gt;", "5.0"),

@@ -116,6 +116,8 @@ def test_every_view_in_every_state(
             broken += [f"{where}: half a number: {one}" for one in rules.halved_numbers(full)]
             broken += [f"{where}: out of reach: {one}" for one in rules.out_of_reach(full)]
             broken += [f"{where}: nameless: {one}" for one in rules.nameless(full)]
+            broken += [f"{where}: no room for: {one}" for one in rules.cut_words(full)]
+            broken += [f"{where}: no room for the title: {one}" for one in rules.cut_titles(full)]
             if (full.width(), full.height()) != (width, height) or not stop_is_whole(full):
                 broken.append(f"{where}: STOP is not whole")
     assert not broken, "\n".join(sorted(set(broken)))
@@ -142,6 +144,8 @@ def test_a_recording_in_its_views(
             *rules.halved_numbers(player),
             *rules.out_of_reach(full),
             *rules.nameless(full),
+            *rules.cut_words(full),
+            *rules.cut_titles(full),
         ]
         assert not broken, "\n".join(broken)
         assert stop_is_whole(full)

@@ -11,6 +11,7 @@ from server_gui.core.desk.soles import cells_of
 from server_gui.core.follow.events import LinkChanged
 from server_gui.views.alarm_words import quiet
 from server_gui.views.header import _WORDS
+from server_gui.views.predictions import lines
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.pressure_map import (
     BEHIND_M,
@@ -22,6 +23,7 @@ from server_gui.views.widgets.pressure_map import (
     PressureMap,
 )
 from tests.gui.fakes import Bench, destroy
+from tests.gui.foreseen import predicted
 from tests.support.desk import described, looked, walking
 
 
@@ -53,6 +55,16 @@ def test_nothing_in_the_header_is_green_where_nothing_is_known(
     assert "all ok" not in str(shown)
     assert shown["drives"].parts[0].startswith("– of ")
     assert quiet(station)[1] != "No alarms"
+
+
+@pytest.mark.parametrize(("label", "gone"), [("steady", "not known"), ("fall", "Fall 99 %")])
+def test_balance_is_not_known_while_nothing_new_comes_but_a_fall_stays(
+    bench: Bench, label: str, gone: str
+) -> None:
+    for age_s, said in ((70.0, gone), (0.0, f"{label.capitalize()} 99 %")):
+        bench.station.take([described(), walking(100, age_s), looked()])
+        bench.station.take_prediction(predicted(label, {label: 0.99}, "falling"))
+        assert f"Balance: {said}" in [line.text for line in lines(bench.station)]
 
 
 def test_a_sole_that_is_lost_is_hatched_and_one_without_load_is_not(theme: Theme) -> None:

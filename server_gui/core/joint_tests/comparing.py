@@ -21,6 +21,12 @@ ANALYSES: Final[Mapping[str, Callable[[Test], Result]]] = {
     "relay": relay,
 }
 _CONDITIONS: Final = ("wish", "limits", "drive", "parameters")
+_IDENTITY: Final = {  # CiA 301 §7.5.2.19
+    "0x1018:1": "vendor",
+    "0x1018:2": "product",
+    "0x1018:3": "revision",
+    "0x1018:4": "serial number",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +72,8 @@ def differences(one: Test, other: Test) -> Iterator[str]:
         before, now = _flat(getattr(other.head, name)), _flat(getattr(one.head, name))
         for key in sorted(before.keys() | now.keys()):
             if before.get(key) != now.get(key):
-                yield f"{name} {key}: {_word(before.get(key))}, now {_word(now.get(key))}"
+                what = f"another drive: its {_IDENTITY[key]}" if key in _IDENTITY else f"{name} {key}"
+                yield f"{what}: {_word(before.get(key))}, now {_word(now.get(key))}"
     if one.head.period_s != other.head.period_s:
         yield f"a target each {other.head.period_s * 1000:g} ms, now {one.head.period_s * 1000:g} ms"
 

@@ -1,10 +1,10 @@
 """A test's file: its conditions, its samples, how it ended (`gateway/joint_test/recording.py` writes it)."""
 
-import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import msgspec
 import numpy as np
@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 
 FORMAT: Final = 1
 NEEDED: Final = ("sync_ns", "target", "position", "velocity", "torque", "current")
+ALWAYS: Final = ("sync_ns", "target", "position")  # in every sample
 LARGEST: Final = 200_000_000  # bytes; an hour of samples is a tenth of that
 
+_ROW: Final = msgspec.json.Decoder(list[float | None])
 Samples = NDArray[np.float64]  # (n,)
 
 
@@ -85,35 +87,39 @@ def read(path: Path) -> Test:
     lines = path.read_text(encoding="utf-8", errors="replace").split("\n")
     try:
         head = msgspec.json.decode(lines[0], type=Head)
-    except msgspec.DecodeError as error:
+    except (msgspec.DecodeError, RecursionError) as error:
         raise NotReadable(f"{path} is no recording of a joint's test: {error}") from error
     if head.format != FORMAT:
         raise NotReadable(f"{path} has format {head.format}, this program reads {FORMAT}: use a newer one")
+    if missing := [name for name in NEEDED if name not in head.columns]:
+        raise NotReadable(f"{path} has no {', '.join(missing)}")
     rows: list[list[float]] = []
     ended = None
     for number, line in enumerate(lines[1:], start=2):
-        last = number >= len(lines) - 1
-        if line.startswith("["):
-            if (row := _row(line, len(head.columns))) is not None:
-                rows.append(row)
-            elif not last:
-                raise NotReadable(f"{path}: line {number} is no sample")
-        elif line:
-            ended = _ended(line)
-    if missing := [name for name in NEEDED if name not in head.columns]:
-        raise NotReadable(f"{path} has no {', '.join(missing)}")
+        row = _row(line, len(head.columns))
+        if row is not None and ended is None:
+            rows.append(row)
+        elif ended is None and (ended := _ended(line)) is not None:
+            continue
+        elif line and number < len(lines) - 1:
+            raise NotReadable(f"{path} is damaged: line {number} is no sample, and not its end")
     table = np.array(rows, dtype=np.float64).reshape(-1, len(head.columns))
-    return Test(path, head, {name: table[:, at] for at, name in enumerate(head.columns)}, ended)
+    test = Test(path, head, {name: table[:, at] for at, name in enumerate(head.columns)}, ended)
+    if missing := [name for name in ALWAYS if np.isnan(test[name]).any()]:
+        raise NotReadable(f"{path} is damaged: samples without {', '.join(missing)}")
+    if np.any(np.diff(test["sync_ns"]) <= 0.0):
+        raise NotReadable(f"{path} is damaged: its samples are not in the order of time")
+    return test
 
 
 def _row(line: str, width: int) -> list[float] | None:
     try:
-        found: Any = json.loads(line)
-    except ValueError:
+        found = _ROW.decode(line)
+    except (msgspec.DecodeError, RecursionError):
         return None
-    numbers = [float("nan") if one is None else one for one in found]
-    whole = len(numbers) == width and all(isinstance(one, int | float) for one in numbers)
-    return [float(one) for one in numbers] if whole else None
+    if len(found) != width or any(one is not None and not math.isfinite(one) for one in found):
+        return None
+    return [math.nan if one is None else one for one in found]
 
 
 def _ended(line: str) -> Ended | None:
@@ -122,5 +128,5 @@ def _ended(line: str) -> Ended | None:
 
     try:
         return msgspec.json.decode(line, type=Line).ended
-    except msgspec.DecodeError:
+    except (msgspec.DecodeError, RecursionError):
         return None

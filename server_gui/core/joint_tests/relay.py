@@ -4,6 +4,7 @@ With a relay of ±d and a swing of ±a the ultimate gain is 4 d / (π √(a² �
 of a loop over the bus: the delay of a cycle is in it, so that a loop inside the drive stands more than this.
 """
 
+import math
 from itertools import pairwise
 from typing import Final
 
@@ -42,7 +43,7 @@ def relay(test: Test) -> Result:
     swing = float(np.mean(swings))
     if swing <= hysteresis:
         return _none("it swings by no more than the hysteresis", curves)
-    gain = 4.0 * size / (np.pi * np.sqrt(swing**2 - hysteresis**2))
+    gain = 4.0 * size / (math.pi * math.sqrt(swing**2 - hysteresis**2))
     period = float(np.mean(periods))
     share = float(np.std(swings, ddof=1)) / swing
     return Result(

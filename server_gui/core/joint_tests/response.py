@@ -65,7 +65,8 @@ def measured(test: Test) -> Response | None:
     target, position = (
         signal.detrend(np.interp(even, times, test[name]), type="constant") for name in ("target", "position")
     )
-    segment = max(LEAST_SEGMENT, 2 * len(even) // (SEGMENTS + 1))
+    # Even, so that they reach to the end: there alone are the highest frequencies.
+    segment = max(LEAST_SEGMENT, 2 * (len(even) // (SEGMENTS + 1)))
     segment = min(segment, len(even) // 2)
     spectral = {"fs": 1.0 / period, "nperseg": segment}
     hz, cross = signal.csd(target, position, **spectral)

@@ -179,7 +179,7 @@ def _misses(node: NodeInfo) -> bool:
 
 
 def _gathered(nodes: Sequence[NodeInfo]) -> Iterator[tuple[str, str]]:
-    """What nodes have, those with the same in one: `all 6 nodes: 3–4 % of its PDOs are missing`."""
+    """What nodes have, those with the same in one: `all 6 nodes: 3–4 % of their PDOs are missing`."""
     same: dict[tuple[str, str], list[tuple[NodeInfo, str]]] = {}
     for node in nodes:
         said = [(one.words, one.check) for one in node.findings]
@@ -188,7 +188,8 @@ def _gathered(nodes: Sequence[NodeInfo]) -> Iterator[tuple[str, str]]:
         for words, check in said:
             same.setdefault((NUMBER.sub("#", words), check), []).append((node, words))
     for (_, check), found in same.items():
-        yield f"{_whose([node for node, _ in found], nodes)}: {_spread([words for _, words in found])}", check
+        said_of = [words if len(found) == 1 else words.replace(" its ", " their ") for _, words in found]
+        yield f"{_whose([node for node, _ in found], nodes)}: {_spread(said_of)}", check
 
 
 def _whose(found: Sequence[NodeInfo], nodes: Sequence[NodeInfo]) -> str:

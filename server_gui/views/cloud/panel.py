@@ -32,6 +32,7 @@ from server_gui.views.cloud.settings_form import SettingsForm
 from server_gui.views.marks import Mark
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_text
+from server_gui.views.widgets.elided import PathLabel
 from server_gui.views.widgets.files import ask_folder
 from server_gui.views.widgets.mark import MarkIcon
 from server_gui.views.widgets.plain import PlainLabel
@@ -43,6 +44,7 @@ NO_STORE: Final = (
     "Nothing has been uploaded yet. What is recorded comes here by itself, a batch at a time; "
     "Upload now brings it at once."
 )
+NO_JOBS: Final = "Uploads, verifications and downloads that you begin here show how far they are."
 
 
 class Cloud(QWidget):
@@ -73,7 +75,9 @@ class Cloud(QWidget):
             "Everything that was recorded until now, without waiting for the batch to be full"
         )
         self.upload.clicked.connect(self._upload)
+        self.spool = PathLabel("dim")
         self._cards["Waiting for upload"].body.addWidget(self.waiting, 1)
+        self._cards["Waiting for upload"].body.addWidget(self.spool)
         self._cards["Waiting for upload"].body.addWidget(self.upload)
         self.hint = PlainLabel(NO_STORE)
         self.hint.setObjectName("dim")
@@ -81,6 +85,10 @@ class Cloud(QWidget):
         self._cards["In the store"].body.addWidget(self.hint)
         self._cards["In the store"].body.addWidget(self.browser, 1)
         self._cards["In the store"].body.addLayout(self._actions())
+        self.no_jobs = PlainLabel(NO_JOBS)
+        self.no_jobs.setObjectName("dim")
+        self.no_jobs.setWordWrap(True)
+        self._cards["Jobs"].body.addWidget(self.no_jobs)
         self._cards["Jobs"].body.addWidget(self.jobs)
         self._top = QBoxLayout(QBoxLayout.Direction.LeftToRight)
         self._top.addWidget(self._cards["Store"], 3)
@@ -108,6 +116,7 @@ class Cloud(QWidget):
         self._refresh_waiting()
         self.browser.refresh()
         self.jobs.refresh()
+        self.no_jobs.setVisible(not self._archive.jobs.jobs)
         count = under_way(self._archive.jobs.jobs)
         self._cards["Jobs"].set_note(f"{count} under way" if count else "none under way")
 
@@ -199,14 +208,15 @@ class Cloud(QWidget):
         busy = under_way([job for job in self._archive.jobs.jobs if job.name == UPLOAD])
         self.upload.setEnabled(not busy)
         if report is None:
-            folder = self._archive.settings.recorder.spool
-            set_text(self.waiting, f"{self._recording.said(None).text}. The spool is {folder}.")
+            self.spool.say("spool", str(self._archive.settings.recorder.spool))
+            set_text(self.waiting, f"{self._recording.said(None).text}.")
             return
+        self.spool.say("spool", str(report.spool))
         uploader = report.uploader
         lines = [
-            f"{_waiting(uploader.waiting)}, {size(uploader.backlog_bytes)} with what is being recorded",
+            f"{_waiting(uploader.waiting)}, {size(uploader.backlog_bytes)} including what is being recorded",
             f"{uploader.uploaded} uploaded since recording began",
-            f"spool {report.spool}, {size(report.disk_free_bytes)} free on its disk",
+            f"{size(report.disk_free_bytes)} free on the disk of the spool",
         ]
         if uploader.problem is not None:
             lines.insert(0, f"▲ It is tried again by itself: {uploader.problem}")

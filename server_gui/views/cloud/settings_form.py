@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import Final
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QWheelEvent
 from PySide6.QtWidgets import QComboBox, QGridLayout, QLineEdit, QPushButton, QWidget
 
 from server_gui.core.settings.file_edits import Value, change
@@ -23,20 +22,6 @@ WHEN: Final = "in force when the window, or the collector, starts again"
 NO_KEYS: Final = "keys are never written: they come from the AWS environment or profile"
 
 
-class CalmCombo(QComboBox):
-    """The wheel changes it only when it has the focus."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-
-    def wheelEvent(self, event: QWheelEvent) -> None:
-        if self.hasFocus():
-            super().wheelEvent(event)
-        else:
-            event.ignore()
-
-
 class SettingsForm(Card):
     """Of this file. What nobody has edited is not written."""
 
@@ -44,7 +29,7 @@ class SettingsForm(Card):
         super().__init__("Store settings")
         self._file = file
         store, recorder = settings.store, settings.recorder
-        self.url, self.upload = QLineEdit(store.url), CalmCombo()
+        self.url, self.upload = QLineEdit(store.url), QComboBox()
         self.batch, self.compact = QLineEdit(f"{recorder.batch_s:g}"), QLineEdit(f"{store.compact_h:g}")
         for policy, text in POLICIES.items():
             self.upload.addItem(text, policy.value)

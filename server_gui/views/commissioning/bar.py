@@ -24,17 +24,21 @@ STOP_TIP: Final = (
 
 
 class Bar(QWidget):
-    """`stopped` asks for a STOP of the drives that are commissioned, `interrupted` for the command's end."""
+    """`stopped` asks for a STOP of the drives that are commissioned, `interrupted` for the command's end.
+
+    The button `start` is in the place of that which interrupts, as long as nothing runs.
+    """
 
     stopped = Signal()
     interrupted = Signal()
 
-    def __init__(self, commissioning: Commissioning, theme: Theme) -> None:
+    def __init__(self, commissioning: Commissioning, theme: Theme, start: QPushButton) -> None:
         super().__init__()
         self._commissioning = commissioning
         self._theme = theme
         self.setObjectName("dock")
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
+        self._start = start
         self._icon = MarkIcon(theme, 14)
         self.stage, self.words = WholeLabel("title"), WholeLabel()
         self.interrupt = QPushButton("Interrupt")
@@ -52,6 +56,7 @@ class Bar(QWidget):
         row = QHBoxLayout()
         row.addWidget(self._icon)
         row.addWidget(self.stage, 1)
+        row.addWidget(start)
         row.addWidget(self.interrupt)
         row.addWidget(self.stop)
         everything.addLayout(row)
@@ -64,7 +69,8 @@ class Bar(QWidget):
         self._icon.show_mark(look.mark)
         set_text(self.stage, look.mark.word)
         set_text(self.words, self._said())
-        self.interrupt.setEnabled(now.runs)
+        self._start.setVisible(not now.runs)
+        self.interrupt.setVisible(now.runs)
         self.stop.setEnabled(now.can_stop)
         self.stop.name(None if now.wish is None else Path(now.wish.file).stem)
         self.stop.setAccessibleName("STOP the drives that are commissioned")

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Final
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QComboBox, QGridLayout, QHBoxLayout, QLineEdit, QPushButton, QWidget
+from PySide6.QtWidgets import QComboBox, QGridLayout, QLineEdit, QPushButton, QWidget
 
 from gateway.user_name import user_name
 from server_gui.core.commissioning.wish import Wish
@@ -28,7 +28,7 @@ THERE: Final = (
 
 
 class Form(Card):
-    """`wished` brings what is to begin, or to go on."""
+    """`wished` brings what is to begin, or to go on; its button `start` is not laid out here."""
 
     wished = Signal(object)
 
@@ -67,8 +67,8 @@ class Form(Card):
         about = WholeLabel("dim")
         about.setText(ABOUT)
         self.body.addWidget(about)
-        self.body.addLayout(self._grid())
         self.body.addWidget(self.wrong)
+        self.body.addLayout(self._grid())
         self.body.addWidget(self.left)
 
     @property
@@ -127,10 +127,6 @@ class Form(Card):
             grid.addWidget(field, place, 1, 1, 1 if button is not None else 2)
             if button is not None:
                 grid.addWidget(button, place, 2)
-        row = QHBoxLayout()
-        row.addStretch(1)
-        row.addWidget(self.start)
-        grid.addLayout(row, len(rows), 0, 1, 3)
         return grid
 
     def _browse(self, name: str, do: Callable[[], None]) -> QPushButton:

@@ -41,7 +41,8 @@ class CommissionPage(QWidget):
         self.commissioning = commissioning
         self._theme = theme
         self.setObjectName("page")
-        self.bar, self.form = Bar(commissioning, theme), Form()
+        self.form = Form()
+        self.bar = Bar(commissioning, theme, self.form.start)
         self.question, self.steps = Question(commissioning, theme), Steps(theme)
         self.result, self.log = Result(commissioning, theme), Log(commissioning, theme)
         self.bar.stopped.connect(commissioning.stop)
@@ -52,6 +53,7 @@ class CommissionPage(QWidget):
         left = QVBoxLayout()
         for widget, share in ((self.question, 0), (self.result, 2), (self.form, 0), (self.log, 1)):
             left.addWidget(widget, share)
+        left.addStretch(0)  # while nothing was said
         self._columns = QBoxLayout(QBoxLayout.Direction.LeftToRight)
         self._columns.addLayout(left, 3)
         self._columns.addWidget(self.steps, 2)
@@ -92,6 +94,7 @@ class CommissionPage(QWidget):
         self.question.refresh()
         self.steps.show_steps(now.steps, runs=now.runs)
         self.result.refresh()
+        self.log.setVisible(now.logged > 0)
         self.log.refresh()
 
     def _answer(self, text: str) -> None:

@@ -2,13 +2,14 @@
 
 from typing import Final
 
-from PySide6.QtCore import QPointF, QRectF, QSize, Qt
+from PySide6.QtCore import QPointF, QRectF, QSize
 from PySide6.QtGui import QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from server_gui.core.evidence.experiment import Experiment, Point, Response
 from server_gui.core.evidence.wording import number
 from server_gui.views.theme import Theme
+from server_gui.views.widgets.framed import draw_frame
 
 MARGIN: Final = 8
 DOT: Final = 3.0
@@ -23,11 +24,13 @@ class ResponsePlot(QWidget):
         self._told: Experiment | None = None
         self._response: Response | None = None
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-        self.setMinimumSize(200, 120)
         theme.changed.connect(self.update)
 
     def sizeHint(self) -> QSize:
-        return QSize(360, 200)
+        return QSize(self._theme.px(360), self._theme.px(200))
+
+    def minimumSizeHint(self) -> QSize:
+        return QSize(self._theme.px(200), self._theme.px(120))
 
     def show_response(self, told: Experiment) -> bool:
         """Draw this; False where there is nothing to be drawn."""
@@ -37,51 +40,40 @@ class ResponsePlot(QWidget):
             return False
         points = ", ".join(f"{number(one.value)}: {number(one.mean)}" for one in self._response.points)
         self.setAccessibleName(self._response.title.replace("_", " "))
-        self.setAccessibleDescription(points)
+        self.setAccessibleDescription(f"{points} {self._response.unit}".rstrip())
         self.update()
         return True
 
     def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        painter.setFont(self._theme.text_font(0.85))
         if self._told is not None and self._response is not None:
             self._draw(painter, self._told, self._response)
         painter.end()
 
     def _draw(self, painter: QPainter, told: Experiment, response: Response) -> None:
-        line = painter.fontMetrics().height()
-        area = QRectF(self.rect()).adjusted(MARGIN, line + MARGIN, -MARGIN, -line - MARGIN)
         low = min(point.low for point in response.points)
         high = max(point.high for point in response.points)
         first, last = response.points[0].value, response.points[-1].value
-        inner = area.adjusted(MARGIN, line, -MARGIN, -MARGIN)
+        unit = f" ({response.unit})" if response.unit else ""
+        name = f"{told.parameter.replace('_', ' ').replace('.', ' ')} ({told.unit})".replace(" ()", "")
+        names = (name, name.rpartition(" (")[0], told.unit)
+        across = (number(first), names, number(last))
+        title = f"{response.title.replace('_', ' ')}{unit}"
+        up = (number(low), number(high))
+        area = draw_frame(painter, self._theme, QRectF(self.rect()), title, up, across)
+        inner = area.adjusted(MARGIN, MARGIN, -MARGIN, -MARGIN)
 
         def at(value: float, mean: float) -> QPointF:
             across = (value - first) / ((last - first) or 1.0)
             up = (mean - low) / ((high - low) or 1.0)
             return QPointF(inner.left() + across * inner.width(), inner.bottom() - up * inner.height())
 
-        painter.setPen(self._theme.colour("border"))
-        painter.drawRect(area)
         painter.setPen(QPen(self._theme.colour("accent"), 1.5))
         painter.drawPolyline(QPolygonF([at(point.value, point.mean) for point in response.points]))
         for point in response.points:
             self._point(painter, told, point, at(point.value, point.low), at(point.value, point.high))
             painter.drawEllipse(at(point.value, point.mean), DOT, DOT)
-        unit = f" ({response.unit})" if response.unit else ""
-        painter.setPen(self._theme.colour("text"))
-        title = f"{response.title.replace('_', ' ')}{unit}"
-        painter.drawText(QRectF(MARGIN, 0, self.width(), line), Qt.AlignmentFlag.AlignLeft, title)
-        painter.setPen(self._theme.colour("dim"))
-        left = area.adjusted(4, 0, 0, 0)
-        painter.drawText(left, Qt.AlignmentFlag.AlignTop, number(high))
-        painter.drawText(left, Qt.AlignmentFlag.AlignBottom, number(low))
-        below = QRectF(area.left(), area.bottom() + 2, area.width(), line)
-        name = f"{told.parameter.replace('_', ' ').replace('.', ' ')} {told.unit}"
-        painter.drawText(below, Qt.AlignmentFlag.AlignLeft, number(first))
-        painter.drawText(below, Qt.AlignmentFlag.AlignHCenter, name)
-        painter.drawText(below, Qt.AlignmentFlag.AlignRight, number(last))
 
     def _point(self, painter: QPainter, told: Experiment, point: Point, low: QPointF, high: QPointF) -> None:
         name = (

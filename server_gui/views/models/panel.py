@@ -17,6 +17,7 @@ from server_gui.views.models.train_form import TrainForm, offer_robots
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_text
 from server_gui.views.widgets.plain import PlainLabel
+from server_gui.views.widgets.scrolled import bring_into_sight
 
 SLOW: Final = 6  # frames between two looks
 NARROW: Final = 480  # at text of 100 %: no room for all buttons in a row
@@ -117,10 +118,15 @@ class ModelsPage(QWidget):
         everything.addWidget(self.compare, 3)
 
     def _connect(self) -> None:
-        self.new.toggled.connect(self.form.setVisible)
+        self.new.toggled.connect(self._show_form)
         self.form.wished.connect(self._train)
         self.promote.clicked.connect(self._promote)
         self.back.clicked.connect(self._roll_back)
+
+    def _show_form(self, on: bool) -> None:
+        self.form.setVisible(on)
+        if on:
+            bring_into_sight(self.form)
 
     def _choose_trained(self) -> None:
         """What was trained here is looked at next, once."""

@@ -1,5 +1,6 @@
 """A device's objects as a table: texts are made of what is in sight, when it is drawn."""
 
+import re
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
@@ -15,6 +16,7 @@ from server_gui.views.theme import Theme
 from server_gui.views.widgets.plain import tip
 
 Index = QModelIndex | QPersistentModelIndex
+WHOSE: Final = re.compile(r"^.*?reading 0x[0-9A-Fa-f]+:\w+: (refused, )?| \(abort \w+\)$")  # its row, facts
 TITLES: Final = (
     "Object",
     "Name",
@@ -135,7 +137,9 @@ def _name(shown: Shown, info: ObjectInfo) -> str:
 
 def _holds(shown: Shown, info: ObjectInfo) -> str:
     held = shown.held(info)
-    return "–" if held is None else held.told.problem or held.told.words
+    if held is None or held.told.problem is None:
+        return "–" if held is None else held.told.words
+    return WHOSE.sub("", held.told.problem)
 
 
 def _age(shown: Shown, info: ObjectInfo) -> str:

@@ -3,7 +3,8 @@
 from collections.abc import Callable, Iterable, Mapping
 from typing import Final
 
-from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QSortFilterProxyModel, Qt, Signal
+from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QSize, QSortFilterProxyModel, Qt, Signal
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QButtonGroup, QGridLayout, QLineEdit, QPushButton, QVBoxLayout, QWidget
 
 from server_gui.core.desk.desk import Desk
@@ -12,8 +13,7 @@ from server_gui.views.theme import Theme
 
 Index = QModelIndex | QPersistentModelIndex
 NAME_ROLE: Final = Qt.ItemDataRole.UserRole + 1
-ROOMY: Final = 1.1  # up to this size of text all buttons stand in one row
-A_ROW: Final = 3  # else
+A_ROW: Final = 3  # of the kinds, where one row has no room
 
 
 class Filter(QSortFilterProxyModel):
@@ -53,8 +53,6 @@ class FilterBar(QWidget):
     def __init__(self, desk: Desk, theme: Theme) -> None:
         super().__init__()
         self._desk = desk
-        self._theme = theme
-        self._is_short = False
         self.words = QLineEdit()
         self.words.setPlaceholderText("Filter: name, 0x6072, unit …   Ctrl+F")
         self.words.setClearButtonEnabled(True)
@@ -74,6 +72,7 @@ class FilterBar(QWidget):
         everything.setContentsMargins(0, 0, 0, 0)
         everything.addWidget(self.words)
         everything.addLayout(self._grid)
+        self._columns = 0
         theme.scaled.connect(self._arrange)
         self._arrange()
 
@@ -86,6 +85,7 @@ class FilterBar(QWidget):
             text = f"{kind} {len(names)}"
             if self.buttons[kind].text() != text:
                 self.buttons[kind].setText(text)
+                self._arrange()
             if self.buttons[kind].isChecked() and kind != "All":
                 chosen = names
         return chosen
@@ -95,16 +95,23 @@ class FilterBar(QWidget):
         self.words.clear()
         self.buttons["All"].setChecked(True)
 
-    def be_short(self, is_short: bool) -> None:
-        """Take little width."""
-        self._is_short = is_short
+    def minimumSizeHint(self) -> QSize:
+        """Of the kinds in two rows."""
+        wide = max(button.sizeHint().width() for button in self.buttons.values())
+        return QSize(A_ROW * wide, super().minimumSizeHint().height())
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
         self._arrange()
 
     def _arrange(self) -> None:
-        is_roomy = self._theme.scale <= ROOMY and not self._is_short
-        columns = len(KINDS) if is_roomy else A_ROW
-        for place, button in enumerate(self.buttons.values()):
-            self._grid.addWidget(button, place // columns, place % columns)
+        """In one row where that has room."""
+        wide = sum(button.sizeHint().width() + self._grid.spacing() for button in self.buttons.values())
+        columns = len(KINDS) if wide <= self.width() else A_ROW
+        if columns != self._columns:
+            self._columns = columns
+            for place, button in enumerate(self.buttons.values()):
+                self._grid.addWidget(button, place // columns, place % columns)
 
 
 def _changed(_desk: Desk, station: Station) -> tuple[str, ...]:

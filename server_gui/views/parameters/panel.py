@@ -110,8 +110,7 @@ class ParametersPanel(QWidget):
         self.more.setVisible(is_short)
         for button in self._seldom:
             button.setVisible(not is_short)
-        for part in (self.detail, self.filters):
-            part.be_short(is_short)
+        self.detail.be_short(is_short)
         for button in (self.review_button, self.more):
             self._buttons_grid.removeWidget(button)
         place = {False: ((0, 2), (0, 3)), True: ((1, 0), (1, 1))}[is_short]

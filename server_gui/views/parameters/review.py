@@ -19,6 +19,7 @@ from PySide6.QtWidgets import (
 from server_gui.core.tuning.edits import Change
 from server_gui.views.parameters.tree import range_text
 from server_gui.views.theme import Theme
+from server_gui.views.widgets.columns import title_widths
 from server_gui.views.widgets.plain import PlainLabel, set_tip
 
 TITLES: Final = ("Parameter", "Robot now", "", "New", "Unit", "Change", "Allowed", "")
@@ -158,11 +159,8 @@ class Review(QWidget):
 
     def _fit(self) -> None:
         """Leave out whole columns where the name has no room beside them."""
-        header = self.table.horizontalHeader()
-        wide = [
-            max(self.table.sizeHintForColumn(column), header.sectionSizeHint(column))
-            for column in range(len(TITLES))
-        ]
+        titles = title_widths(self.table)
+        wide = [max(self.table.sizeHintForColumn(column), title) for column, title in enumerate(titles)]
         shown = set(range(len(TITLES)))
         for column in SPARE:
             if sum(wide[known] for known in shown) + BESIDE > self.width():

@@ -26,6 +26,7 @@ from server_gui.core.tuning.edits import refusal, unit_of
 from server_gui.core.tuning.flash import RULE
 from server_gui.views.parameters.filter import NAME_ROLE, Filter
 from server_gui.views.theme import Theme
+from server_gui.views.widgets.columns import title_widths
 from server_gui.views.widgets.plain import set_tip
 
 Index = QModelIndex | QPersistentModelIndex
@@ -312,6 +313,8 @@ class ParameterTree(QTreeView):
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self._show_columns()
+        if self.currentIndex().isValid():
+            self.scrollTo(self.currentIndex())  # what is told of it below takes room from here
 
     @property
     def _says(self) -> bool:
@@ -321,16 +324,15 @@ class ParameterTree(QTreeView):
     def _show_columns(self) -> None:
         station = self._desk.selected
         self.setColumnHidden(SAID, not self._says)
-        always = sum(self._width(column) for column in (ROBOT, NEW, UNIT))
-        always += 0 if self.isColumnHidden(SAID) else self._width(SAID)
+        titles = title_widths(self)
+        wide = [max(self.sizeHintForColumn(column), title) for column, title in enumerate(titles)]
+        always = sum(wide[column] for column in (ROBOT, NEW, UNIT))
+        always += 0 if self.isColumnHidden(SAID) else wide[SAID]
         room = self.viewport().width() - self._theme.px(NAME_PX) - always
         for column in IF_ROOM:
             wanted = column != FILE or (station is not None and station.file is not None)
-            room -= self._width(column) if wanted else 0
+            room -= wide[column] if wanted else 0
             self.setColumnHidden(column, not wanted or room < 0)
-
-    def _width(self, column: int) -> int:
-        return max(self.sizeHintForColumn(column), self.header().sectionSizeHint(column))
 
     def _size_columns(self) -> None:
         header = self.header()

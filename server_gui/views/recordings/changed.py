@@ -61,6 +61,8 @@ class ChangedPage(QWidget):
         first.body.addWidget(self.unknown)
         second.body.addWidget(self.verdict)
         second.body.addWidget(self.moved, 1)
+        for card in (first, second):
+            card.body.addStretch(0)  # what is said stands at the top while there is no row
         everything = QVBoxLayout(self)
         everything.setContentsMargins(8, 8, 8, 8)
         everything.addLayout(row)
@@ -82,17 +84,19 @@ class ChangedPage(QWidget):
         rows = () if found is None else found.differences
         cells = [(str(one.kind), one.what, one.before, one.after) for one in rows]
         _fill(self.changed, cells)
+        self.changed.setVisible(bool(cells))
         if found is None:
             set_text(self.unknown, f"It cannot be told: {problem}" if problem else "looking …")
             return
-        alike = f"{counted(found.same, 'thing', 'things')} that both tell, and alike."
-        said = ["" if cells else "Nothing that both tell was otherwise.", alike, *not_known(found)]
+        alike = f"{counted(found.same, 'thing', 'things')} recorded in both, and the same."
+        said = ["" if cells else "Nothing recorded in both has changed.", alike, *not_known(found)]
         set_text(self.unknown, "\n".join(filter(None, said)))
 
     def _show_moved(self, found: Evidence | None, problem: str) -> None:
         measured = [] if found is None else [one for one in found.metrics if one.word in DIFFERENT]
         measured.sort(key=lambda one: -abs(one.size or 0.0))
         _fill(self.moved, [_cells(one) for one in measured])
+        self.moved.setVisible(bool(measured))
         for row, one in enumerate(measured):
             item = self.moved.item(row, 1)
             if item is not None and one.word in TONES:

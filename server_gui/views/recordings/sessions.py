@@ -5,10 +5,10 @@ from datetime import datetime
 from typing import Any, Final
 
 from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QHBoxLayout,
-    QHeaderView,
     QLineEdit,
     QPlainTextEdit,
     QPushButton,
@@ -26,12 +26,16 @@ from server_gui.core.cloud.tape import Tape
 from server_gui.core.desk.recording import Recording
 from server_gui.views.recordings.timeline import SECOND_NS, clock_text
 from server_gui.views.theme import Theme
+from server_gui.views.widgets import columns
 from server_gui.views.widgets.card import Card, set_text
 from server_gui.views.widgets.plain import PlainLabel, set_tip, tip
 from server_gui.views.widgets.rows import SORT_ROLE, Filtered, Index, RowsModel, RowsTable
 
 TITLES: Final = ("Began", "Robot", "Length", "Rows", "Size", "State", "Operator", "Notes")
-NUMBERS: Final = frozenset({2, 3, 4})
+BEGAN, ROBOT, LENGTH, ROWS, SIZE, STATE, OPERATOR, NOTES = range(len(TITLES))
+NUMBERS: Final = frozenset({LENGTH, ROWS, SIZE})
+NAMES: Final = {NOTES: 60, ROBOT: 60, OPERATOR: 60, STATE: 60}  # wide at least, at text of 100 %
+SPARE: Final = (ROWS, SIZE, STATE, OPERATOR, NOTES)  # left out in this order where there is less room
 EMPTY: Final = (
     "Nothing is recorded yet. What a robot sends while this window is open is recorded by itself: "
     "add a robot at the left, and its session appears here within seconds."
@@ -62,6 +66,26 @@ class SessionModel(RowsModel[Session]):
             case Qt.ItemDataRole.FontRole if column in NUMBERS:
                 return self._theme.number_font()
         return None
+
+
+class SessionsTable(RowsTable):
+    """What has no room is told of the chosen one beside it."""
+
+    def __init__(self, model: Filtered, theme: Theme) -> None:
+        super().__init__(model, "Recordings", BEGAN)
+        self._theme = theme
+        columns.prepare(self)
+        for changed in (model.dataChanged, model.rowsInserted, model.rowsRemoved):
+            changed.connect(self.fit)
+        theme.changed.connect(self.fit)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self.fit()
+
+    def fit(self) -> None:
+        """Share what room there is."""
+        columns.fit(self, {column: self._theme.px(least) for column, least in NAMES.items()}, SPARE)
 
 
 class SessionsPage(QWidget):
@@ -174,10 +198,8 @@ class SessionsPage(QWidget):
 
     def _table(self) -> RowsTable:
         self._filter = Filtered(self.sessions)
-        table = RowsTable(self._filter, "Recordings", 0)
+        table = SessionsTable(self._filter, self._theme)
         table.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
-        table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
-        table.horizontalHeader().setStretchLastSection(True)
         table.selectionModel().selectionChanged.connect(lambda *_: self._archive.choose(self.chosen))
         table.activated.connect(lambda _: self.play.click())
         return table
@@ -244,6 +266,8 @@ def _told(session: Session | None, tape: Tape | None, problem: str, held: Sequen
         "Robot": session.robot,
         "Began": _when(session.began),
         "Ended": "it goes on, or its server was killed" if session.ended is None else _when(session.ended),
+        "Length": f"{_cells(session)[LENGTH]}, {_cells(session)[ROWS]} rows, {_cells(session)[SIZE]}",
+        "State": _state(session),
         "Operator": session.operator,
         "Notes": session.notes,
         "Software": ", ".join(f"{name} {version}" for name, version in session.versions.items()),

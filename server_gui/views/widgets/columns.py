@@ -19,6 +19,18 @@ def prepare(view: QTableView | QTreeView) -> None:
     header.setStretchLastSection(False)
 
 
+def title_widths(view: QTableView | QTreeView) -> list[int]:
+    """Return how wide the title of each column is; Qt says 0 of one that is left out."""
+    header = header_of(view)
+    hidden = [column for column in range(header.count()) if header.isSectionHidden(column)]
+    for column in hidden:
+        header.setSectionHidden(column, False)
+    widths = [header.sectionSizeHint(column) for column in range(header.count())]
+    for column in hidden:
+        header.setSectionHidden(column, True)
+    return widths
+
+
 def fit(
     view: QTableView | QTreeView,
     names: Mapping[int, int],
@@ -32,7 +44,7 @@ def fit(
     """
     header = header_of(view)
     shown = {column for column in range(header.count()) if column not in unwanted}
-    titles = {one: header.sectionSizeHint(one) for one in shown}
+    titles = title_widths(view)
     wanted = {one: max(view.sizeHintForColumn(one), titles[one]) for one in shown}
     least = {one: min(width, max(names.get(one, width), titles[one])) for one, width in wanted.items()}
     room = view.viewport().width()

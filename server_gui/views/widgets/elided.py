@@ -4,7 +4,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import QSizePolicy
 
-from server_gui.views.widgets.plain import PlainLabel
+from server_gui.views.widgets.plain import PlainLabel, set_tip
 
 
 class ElidedLabel(PlainLabel):
@@ -22,3 +22,15 @@ class ElidedLabel(PlainLabel):
         text = self.fontMetrics().elidedText(self.text(), self._mode, room.width())
         painter.drawText(room, self.alignment(), text)
         painter.end()
+
+
+class PathLabel(ElidedLabel):
+    """What a folder is for and where it is: a name, however many digits it has; its tip has all of it."""
+
+    def say(self, what: str, path: str) -> None:
+        """Show this."""
+        text = f"{what} {path}"
+        if text != self.text():
+            self.setText(text)
+            self.setAccessibleName(text)
+            set_tip(self, text)

@@ -49,8 +49,9 @@ class FittedLabel(PlainLabel):
 
     def paintEvent(self, event: QPaintEvent) -> None:
         painter, text = QPainter(self), self.shown
-        if not self.is_whole and not any(sign.isdigit() for sign in text):
-            text = self.fontMetrics().elidedText(text, MIDDLE, self.contentsRect().width())
+        if not self.is_whole:
+            elided = self.fontMetrics().elidedText(text, MIDDLE, self.contentsRect().width())
+            text = "…" if any(sign.isdigit() for sign in text) else elided
         painter.drawText(self.contentsRect(), self.alignment(), text)
         painter.end()
 

@@ -47,6 +47,12 @@ class StopButton(QPushButton):
             self.setText(text)
             self.updateGeometry()
 
+    def allow(self, most: int) -> None:
+        """Let it be as wide as its name needs, up to so many pixels."""
+        if most != self.most:
+            self.most = most
+            self.updateGeometry()
+
     @property
     def lines(self) -> list[str]:
         """The name as it is drawn; where even two lines have no room, each is cut in its middle."""

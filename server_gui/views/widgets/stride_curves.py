@@ -11,11 +11,12 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from gateway.units import Unit
 from server_gui.core.evidence.curves import Curves, Side
 from server_gui.views.theme import Theme
+from server_gui.views.widgets.framed import draw_frame
 
 Floats = npt.NDArray[np.float64]
 
 BAND: Final = 60  # of 255: how dense one is
-MARGIN: Final = 4
+CYCLE: Final = ("0 %", ("of the gait cycle", "gait cycle"), "100 %")
 
 
 class StrideCurves(QWidget):
@@ -27,11 +28,13 @@ class StrideCurves(QWidget):
         self._curves: Curves | None = None
         self._unit = Unit("", "")
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-        self.setMinimumSize(120, 80)
         theme.changed.connect(self.update)
 
     def sizeHint(self) -> QSize:
-        return QSize(180, 110)
+        return QSize(self._theme.px(180), self._theme.px(130))
+
+    def minimumSizeHint(self) -> QSize:
+        return QSize(self._theme.px(120), self._theme.px(90))
 
     @property
     def title(self) -> str:
@@ -43,32 +46,22 @@ class StrideCurves(QWidget):
         """Draw this."""
         self._curves, self._unit = curves, unit
         low, high = self._range(curves)
-        counts = (0 if side is None else side.cycles for side in (curves.before, curves.after))
+        before, after = (0 if side is None else side.cycles for side in (curves.before, curves.after))
         self.setAccessibleName(self.title)
-        before, after = counts
-        self.setAccessibleDescription(
-            f"{before} strides before and {after} after, from {unit.text(low)} to {unit.text(high)}"
-        )
+        reach = f"{unit.text(low)} to {unit.text(high)} {unit.symbol}".rstrip()
+        self.setAccessibleDescription(f"{before} strides before and {after} after, from {reach}")
         self.update()
 
     def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        painter.setFont(self._theme.text_font(0.85))
-        line = painter.fontMetrics().height()
-        area = QRectF(self.rect()).adjusted(MARGIN, line + MARGIN, -MARGIN, -MARGIN)
-        painter.setPen(self._theme.colour("border"))
-        painter.drawRect(area)
         if self._curves is not None:
             low, high = self._range(self._curves)
+            up = (self._unit.text(low), self._unit.text(high))
+            area = draw_frame(painter, self._theme, QRectF(self.rect()), self.title, up, CYCLE)
             for side, colour in ((self._curves.before, "dim"), (self._curves.after, "accent")):
                 if side is not None:
                     self._draw(painter, area, side, colour, low, high)
-            painter.setPen(self._theme.colour("text"))
-            painter.drawText(QRectF(MARGIN, 0, self.width(), line), Qt.AlignmentFlag.AlignLeft, self.title)
-            painter.setPen(self._theme.colour("dim"))
-            painter.drawText(area, Qt.AlignmentFlag.AlignTop, self._unit.text(high))
-            painter.drawText(area, Qt.AlignmentFlag.AlignBottom, self._unit.text(low))
         painter.end()
 
     def _draw(self, painter: QPainter, area: QRectF, side: Side, name: str, low: float, high: float) -> None:

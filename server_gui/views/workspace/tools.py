@@ -32,8 +32,8 @@ class Tools(QWidget):
         self.span.setCurrentIndex(SPANS_S.index(10))
         self.span.setAccessibleName("How much of the past is shown")
         self.pause = _switch("Pause view", "The view stands still; data and recording go on")
-        self.fit = QPushButton("Fit")
-        self.fit.setToolTip("Undo zoom: the range follows the data again")
+        self.follow = QPushButton("Fit")
+        self.follow.setToolTip("Undo zoom: the range follows the data again")
         self.box = _switch(
             "Box zoom", "Drag a box around what is to be seen; else a drag moves, and the wheel zooms"
         )
@@ -55,7 +55,8 @@ class Tools(QWidget):
         self.note.clicked.connect(self.noted)
         self.said = ElidedLabel("dim")
         self._first = QBoxLayout(QBoxLayout.Direction.LeftToRight)
-        self._first.addLayout(_row((self.span, self.pause, self.fit, self.box, self.cursors)))
+        self._view = _row((self.span, self.pause, self.follow, self.box, self.cursors))
+        self._first.addLayout(self._view)
         self._events = _row((self.before, self.next, self.as_csv, self.as_png))
         self._first.addLayout(self._events)
         self._first.addStretch(1)
@@ -66,8 +67,10 @@ class Tools(QWidget):
         self.rows.addLayout(self._second)
         self._keys(page)
 
-    def be_narrow(self, narrow: bool) -> None:
-        """Stand in more rows."""
+    def fit(self, width: int) -> None:
+        """Stand in more rows where the first is wider than this."""
+        wide = sum(row.sizeHint().width() for row in (self._view, self._events))
+        narrow = wide + self._first.spacing() > width
         direction = QBoxLayout.Direction
         self._first.setDirection(direction.TopToBottom if narrow else direction.LeftToRight)
         for row in (self._events, self._second):
@@ -78,7 +81,7 @@ class Tools(QWidget):
         """Keys of this page; the sheet of keys tells them."""
         buttons = {
             "Ctrl+Shift+P": self.pause,
-            "Ctrl+0": self.fit,
+            "Ctrl+0": self.follow,
             "Ctrl+D": self.cursors,
             "Ctrl+E": self.as_csv,
             "Ctrl+Up": self.before,

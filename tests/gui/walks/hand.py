@@ -76,10 +76,12 @@ class Hand:
         self.xdotool("mousemove", str(x), str(y))
 
     def reach(self, name: str) -> bool:
-        """Turn the wheel over the tab until it is in sight, as long as that changes anything."""
+        """Turn the wheel over the tab until it is in sight, also once what has come has its place."""
         for _ in range(MOST_TURNS):
             if self.can_see(name):
-                return True
+                time.sleep(STILL_S)
+                if self.can_see(name):
+                    return True
             self.wheel("page")
         return False
 

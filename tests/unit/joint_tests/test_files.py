@@ -80,6 +80,34 @@ def test_another_file_is_named_as_none(tmp_path: Path, text: str) -> None:
         read(tmp_path / "other.jsonl")
 
 
+@pytest.mark.parametrize(
+    ("line", "so"),
+    [
+        ("x0, 1, 0.0, 0.0, 0.0, null, 0.0, 39]", "line 200 is no sample"),
+        ("[0, 1, 0.0]", "line 200 is no sample"),
+        ("[0, 1, 0.0, 0.0, 0.0, NaN, 0.0, 39]", "line 200 is no sample"),
+        ("[0, 1, 0.0, 0.0, 0.0, 1e999, 0.0, 39]", "line 200 is no sample"),
+        ("[" * 100_000, "line 200 is no sample"),
+        ('{"ended": {"problem": null, "off": true, "state": "off"}}', "line 201 is no sample"),
+        ("[1980000000, 1, 0.0, null, 0.0, null, 0.0, 39]", "samples without position"),
+        ("[0, 1, 0.0, 0.0, 0.0, null, 0.0, 39]", "not in the order of time"),
+    ],
+)
+def test_one_that_is_damaged_shows_nothing(tmp_path: Path, line: str, so: str) -> None:
+    path = kept(tmp_path / "exo.left_knee.step.1.jsonl")
+    lines = path.read_text(encoding="utf-8").split("\n")
+    lines[199] = line
+    path.write_text("\n".join(lines), encoding="utf-8")
+    with pytest.raises(NotReadable, match=so):
+        read(path)
+
+
+def test_another_drive_is_called_so(tmp_path: Path) -> None:
+    before = read(kept(tmp_path / "1.jsonl", parameters={"0x1018:4": 7}))
+    now = read(kept(tmp_path / "2.jsonl", parameters={"0x1018:4": 8}))
+    assert list(differences(now, before)) == ["another drive: its serial number: 7, now 8"]
+
+
 def test_the_last_one_stands_beside_it_with_what_differs(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -38,6 +38,12 @@ def test_the_narrowest_of_file_and_drive_counts() -> None:
     assert (found.speed, found.torque, found.current, found.lag) == (1.0, 30.0, 5.0, 0.02)
 
 
+def test_who_asks_for_more_torque_gets_the_current_for_it() -> None:
+    assert [allowed(asked=Asked(torque=most)).current for most in (20.0, 40.0, 80.0)] == [5.0, 5.0, 10.0]
+    current = LevelRule(watch="current", above=6.0)
+    assert allowed(asked=Asked(torque=80.0), current=current).current == 6.0
+
+
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [

@@ -123,6 +123,16 @@ def test_bandwidth_and_phase_margin_of_a_second_order(damping: float) -> None:
     assert value(result, "phase_margin") == pytest.approx(math.degrees(margin), abs=5.0)
 
 
+@pytest.mark.parametrize("lost", range(9))
+def test_the_highest_frequencies_are_seen_however_long_a_test_was(lost: int) -> None:
+    times = np.arange(0.0, 30.5 - 0.01 * lost, 0.01)
+    target = 0.02 * signal.chirp(times, 0.2, 30.0, 15.0, method="logarithmic")
+    position = target + np.random.default_rng(1).normal(0.0, 2e-4, len(times))
+    response = measured(made(sampled(times, target, position), Wish(Kind.CHIRP, 0.02, 10.0, seconds=30.0)))
+    assert response is not None
+    assert response.coherence[response.hz < 14.0].min() > 0.9
+
+
 def test_what_is_not_coherent_is_unknown_and_judges_nothing() -> None:
     times = np.arange(0.0, 60.0, 0.01)
     target = 0.02 * signal.chirp(times, 0.2, 60.0, 15.0, method="logarithmic")

@@ -110,14 +110,14 @@ def test_what_several_nodes_have_is_said_once() -> None:
         for place, name in enumerate(names)
     ]
     bus = replace(BUS, load_percent=24.0, nodes=nodes)
-    assert findings(bus) == [("all 3 nodes: 3–5 % of its PDOs are missing", "")]
+    assert findings(bus) == [("all 3 nodes: 3–5 % of their PDOs are missing", "")]
     well = replace(NODE, node_id=9, components=["right_hip"], pdos_missing_percent=0.0)
     whose = "left hip, left knee, right knee"
-    assert findings(replace(bus, nodes=[*nodes, well])) == [(f"{whose}: 3–5 % of its PDOs are missing", "")]
+    assert findings(replace(bus, nodes=[*nodes, well])) == [(f"{whose}: 3–5 % of their PDOs are missing", "")]
     nodes.append(replace(nodes[0], node_id=4, components=["left_ankle"]))
     for others, whose in ((1, "all nodes but right hip"), (3, "left hip, left knee and 2 more nodes")):
         wells = [replace(well, node_id=9 + place) for place in range(others)]
-        said = f"{whose}: 3–5 % of its PDOs are missing"
+        said = f"{whose}: 3–5 % of their PDOs are missing"
         assert findings(replace(bus, nodes=[*nodes, *wells])) == [(said, "")]
     lost = [replace(node, findings=[LOST]) for node in nodes[:2]]
     assert findings(replace(bus, nodes=[*lost, nodes[2]])) == [

@@ -1,0 +1,63 @@
+"""The header at every width: nothing in it lies over anything else, whatever it has just been told."""
+
+import itertools
+from collections.abc import Callable, Iterator
+
+import pytest
+from PySide6.QtWidgets import QApplication, QPushButton, QWidget
+
+from server_gui.views.header import Header
+from server_gui.views.theme import Theme
+from tests.gui import rules
+from tests.gui.fakes import Bench, destroy
+from tests.gui.test_rules import _fault, _link_lost, _never_reached, _stopped, _unconfirmed, _walks
+
+LEAST = 1024  # wide, where every number has room
+WIDTHS = (*range(320, 1000, 120), LEAST, 1366, 1920)
+STATES = (_walks, _link_lost, _never_reached, _fault, _stopped, _unconfirmed)
+
+
+@pytest.fixture
+def header(bench: Bench, theme: Theme) -> Iterator[Header]:
+    made = Header(bench.desk, theme, QPushButton("View"))
+    made.show()
+    yield made
+    destroy(made)
+
+
+@pytest.mark.parametrize("scale", [1.0, 1.5, 2.0])
+def test_chips_never_overlap(bench: Bench, theme: Theme, header: Header, scale: float) -> None:
+    theme.set(scale=scale)
+    broken = []
+    for state, width in itertools.product(STATES, WIDTHS):
+        header.resize(width, header.height())
+        if width == WIDTHS[0]:
+            _told(bench, state)
+        header.refresh()  # a slow window is drawn as it is now, before Qt's own events
+        if width >= header.minimumSizeHint().width():
+            broken += [f"{state.__name__} {width}: {one}" for one in _overlaps(header)]
+            QApplication.processEvents()
+            broken += [f"{state.__name__} {width}, settled: {one}" for one in _overlaps(header)]
+            halved = rules.halved_numbers(header) if width >= LEAST else []
+            broken += [f"{state.__name__} {width}: {one}" for one in halved]
+    assert not broken, "\n".join(broken)
+
+
+def _told(bench: Bench, state: Callable[[Bench], None]) -> None:
+    bench.desk.select(bench.desk.stations[0])
+    state(bench)
+
+
+def _overlaps(header: Header) -> list[str]:
+    parts = [one for one in header.children() if isinstance(one, QWidget) and one.isVisible()]
+    pairs = itertools.combinations(parts, 2)
+    found = [f"{_name(one)} over {_name(other)}" for one, other in pairs if _meet(one, other)]
+    return found + [f"{_name(one)} outside" for one in parts if not header.rect().contains(one.geometry())]
+
+
+def _meet(one: QWidget, other: QWidget) -> bool:
+    return one.geometry().intersects(other.geometry())
+
+
+def _name(one: QWidget) -> str:
+    return one.accessibleName() or type(one).__name__
