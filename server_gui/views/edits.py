@@ -1,5 +1,6 @@
 """Edits: what each change of a parameter did to the walk, in words and as strides before and after."""
 
+import datetime
 from typing import Final
 
 from PySide6.QtCore import Qt
@@ -15,11 +16,13 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from gateway.amounts import NONE as NO_TIME
 from gateway.amounts import counted
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.evidence.comparison import Measured, Word
 from server_gui.core.evidence.cycles import DRAWN
+from server_gui.core.evidence.edits import Edit
 from server_gui.core.evidence.file import Told
 from server_gui.core.evidence.shown import in_units, symbols
 from server_gui.core.evidence.wording import changes, from_to, number, share
@@ -145,8 +148,20 @@ class Edits(QWidget):
 
     def _ask(self, kind: Kind, station: Station | None, tried: Tried | None = None) -> None:
         if station is not None:
+            tried = tried or self._chosen_edit(station)
             self.form = ExperimentForm(self, self._desk, station, self._theme, kind, tried)
             self.form.show()
+
+    def _chosen_edit(self, station: Station) -> Tried | None:
+        """What is looked at, unless something was staged or tried since."""
+        told = self._chosen
+        known = next((one for one in station.judged.values() if told and one.edit.id == told.edit.id), None)
+        if known is None or len(known.edit.changes) != 1 or station.writing.trial or station.edits.staged:
+            return None
+        (change,) = known.edit.changes
+        if change.old is None or change.name not in station.known:
+            return None
+        return Tried(change.name, change.old, change.new)
 
     def _grow(self, known: list[Told]) -> None:
         """More is known of some: hundreds of others are not laid out again each second."""
@@ -214,7 +229,7 @@ class Edits(QWidget):
         word = told.evidence.word if told.is_final else f"{told.evidence.word} so far"
         ended = told.edit.state if told.experiment is None else told.experiment.kind
         values = self._what(told).replace(" → ", ARROW)  # no line ends within them
-        return f"{told.edit.utc[11:19]}  {values}\n{ended} · {word}"
+        return f"{_when(told.edit)}  {values}\n{ended} · {word}"
 
     def _verdict(self, told: Told) -> str:
         evidence, tried = told.evidence, told.experiment
@@ -237,6 +252,16 @@ class Edits(QWidget):
         self._row.setDirection(direction.TopToBottom if is_narrow else direction.LeftToRight)
         self.list.setMaximumSize(MOST_PX if is_narrow else px(LIST), px(ABOVE) if is_narrow else MOST_PX)
         self.list.setMinimumWidth(0 if is_narrow else px(LIST))
+
+
+def _when(edit: Edit) -> str:
+    """In the time of this place; of another day that, too."""
+    try:
+        at = datetime.datetime.fromtimestamp(edit.utc_ns / 1e9, datetime.UTC).astimezone()
+    except (OverflowError, ValueError, OSError):  # nobody's calendar has it
+        return NO_TIME
+    is_today = at.date() == datetime.datetime.now().astimezone().date()
+    return f"{at:%H:%M:%S}" if is_today else f"{at:%Y-%m-%d %H:%M}"
 
 
 def _said(told: Told) -> list[str]:

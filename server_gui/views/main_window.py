@@ -157,7 +157,7 @@ class MainWindow(QMainWindow):
         self.objects.edited.connect(self._edit_parameter)
         self.audit = Audit(desk, theme, None if archive is None else archive.journals)
         self.edits = Edits(desk, theme)
-        for bar in (self.trial, self.parameters.trial):
+        for bar in (self.trial, self.parameters.trial, self.overview.now):
             bar.compare.connect(self.edits.compare)
         self.help, self.help_button = Help(theme), QPushButton("?")
         self.empty = EmptyView(theme)

@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from PySide6.QtCore import QSize, Qt
+from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QFrame, QGridLayout, QHBoxLayout, QPushButton, QSizePolicy, QVBoxLayout, QWidget
 
@@ -12,7 +12,7 @@ from server_gui.core.tuning.writing import Trial
 from server_gui.views.marks import Mark, drives_mark, enabled_text
 from server_gui.views.predictions import STOPPED, activity
 from server_gui.views.theme import Theme
-from server_gui.views.trial_words import changes, ends, wordings
+from server_gui.views.trial_words import TO_AB, changes, ends, so_far, wordings
 from server_gui.views.widgets.fitted import FittedLabel
 from server_gui.views.widgets.mark import MarkIcon
 from server_gui.views.widgets.plain import set_tip
@@ -56,7 +56,12 @@ class Fact(QWidget):
 
 
 class NowLine(QFrame):
-    """Facts beside each other, or below each other where there is less room."""
+    """Facts beside each other, or below each other where there is less room.
+
+    `compare` brings the station whose trial is to become an A/B trial.
+    """
+
+    compare = Signal(object)
 
     def __init__(self, desk: Desk, theme: Theme) -> None:
         super().__init__()
@@ -74,11 +79,14 @@ class NowLine(QFrame):
         self.take_back.setToolTip("The values from before are in force again")
         self.keep.clicked.connect(lambda: desk.selected.keep_trial() if desk.selected else None)
         self.take_back.clicked.connect(lambda: desk.selected.end_trial() if desk.selected else None)
+        self.ab = QPushButton("A/B …")
+        self.ab.setToolTip(TO_AB)
+        self.ab.clicked.connect(lambda: self.compare.emit(desk.selected) if desk.selected else None)
         self._decide = QWidget()
         row = QHBoxLayout(self._decide)
         row.setContentsMargins(0, 0, 0, 0)
         row.addStretch(1)
-        for button in (self.take_back, self.keep):
+        for button in (self.take_back, self.ab, self.keep):
             row.addWidget(button)
         self._grid = QGridLayout(self)
         self._grid.setContentsMargins(10, 3, 10, 3)
@@ -95,7 +103,7 @@ class NowLine(QFrame):
         self._fit(on_trial=self._placed[1])
 
     def offer(self, wanted: bool) -> None:
-        """Whether what is on trial is kept or taken back here: not where its own panel is in sight."""
+        """Whether what is on trial is judged, kept or taken back here: not where its panel is in sight."""
         self._is_offered = wanted
         self._decide.setVisible(wanted and self._placed[1])
 
@@ -121,13 +129,20 @@ class NowLine(QFrame):
     def _show_trial(self, station: Station, trial: Trial) -> None:
         units = self._desk.shown.units
         tip = "\n".join(changes(station, trial, units))
-        self.trial.say(ON_TRIAL, wordings(station, trial, units), (ends(trial),), tip)
+        back = ends(trial)
+        seen = (f"{back}; {so_far(station.trial_evidence)}",) if self._is_offered else ()
+        self.trial.say(ON_TRIAL, wordings(station, trial, units), (*seen, back), tip)
+        self.ab.setVisible(len(trial.values) == 1)
 
     def _fit(self, *, on_trial: bool) -> None:
-        """What is on trial stands beside the other facts where all its words have room, else below them."""
+        """What is on trial stands beside the other facts where all its words have room, else below them.
+
+        So it does where it is judged: those words change with each stride, and nothing may move with them.
+        """
         a_fact, around = self._theme.px(A_FACT), self.width() - self._grid.contentsRect().width()
         needed = 2 * a_fact + 2 * self._grid.horizontalSpacing() + self.trial.sizeHint().width() + around
-        columns = 3 if on_trial and self.width() >= needed else min(max(self.width() // a_fact, 1), 2)
+        is_beside = on_trial and not self._is_offered and self.width() >= needed
+        columns = 3 if is_beside else min(max(self.width() // a_fact, 1), 2)
         self._arrange(columns, on_trial=on_trial)
         self._grid.setColumnMinimumWidth(2, self.trial.sizeHint().width() if columns > 2 else 0)
 

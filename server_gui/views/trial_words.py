@@ -1,12 +1,19 @@
 """What is on trial, in words: the same wherever a trial is shown."""
 
+import operator
+from typing import Final
+
+from gateway.amounts import counted
 from gateway.units import Units
 from server_gui.core.desk.station import Station
-from server_gui.core.evidence.comparison import Word
+from server_gui.core.evidence.comparison import FEWEST, Evidence, Word
 from server_gui.core.evidence.file import Told
 from server_gui.core.evidence.wording import share
 from server_gui.core.tuning.edits import unit_of
 from server_gui.core.tuning.writing import Trial
+
+TO_AB: Final = "Take it back now, and ask about an A/B trial of both values"
+UNLIKE: Final = "too few strides of both sides are alike"
 
 
 def changes(station: Station, trial: Trial, units: Units) -> list[str]:
@@ -31,10 +38,24 @@ def so_far(edit: Told | None) -> str:
         return "what it does is seen once somebody walks"
     evidence = edit.evidence
     if evidence.word is Word.FEW:
-        return f"{evidence.cycles_after} gait cycles until now: not enough to judge it"
+        return _not_enough(evidence)
     strongest = next((one for one in evidence.metrics if one.series == evidence.strongest), None)
     what = "" if strongest is None else f" ({strongest.title.replace('_', ' ')} {share(strongest)})"
     return f"so far {evidence.word}{what}"
+
+
+def _not_enough(evidence: Evidence) -> str:
+    """Whether it is too early, or what keeps strides from being counted."""
+    before, after = evidence.cycles_before, evidence.cycles_after
+    if min(before, after) >= 2 * FEWEST:
+        most = sorted(evidence.left_out.items(), key=operator.itemgetter(1), reverse=True)
+        left_out = [f"{counted(count, 'gait cycle')} left out, {why}" for why, count in most]
+        return f"cannot be judged so far: {[*left_out, *evidence.notes, UNLIKE][0]}"
+    if after >= 2 * FEWEST > before:
+        need = f"{counted(before, 'gait cycle')}, and it takes {FEWEST} of each leg"
+        return f"too little was seen before it: {need}; what comes once it is taken back counts, too"
+    strides = f"{counted(before, 'gait cycle')} before, {after} since"
+    return f"too early to judge it: {strides}; it takes {FEWEST} of each leg on both sides"
 
 
 def ends(trial: Trial) -> str:

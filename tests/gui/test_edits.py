@@ -93,7 +93,7 @@ def test_a_trial_that_counts_down_says_what_it_does_so_far(
     bench: Bench, window: MainWindow, word: Word | None
 ) -> None:
     said = {
-        Word.FEW: "not enough to judge it",
+        Word.FEW: "too early to judge it: 49 gait cycles before, 3 since; it takes 8 of each leg",
         Word.WORSE: "so far worse (left knee tracking",
         None: "once somebody",
     }
@@ -102,9 +102,52 @@ def test_a_trial_that_counts_down_says_what_it_does_so_far(
     )
     if word is not None:
         known = worse(is_final=False)
-        bench.station.take_evidence(replace(known, evidence=replace(known.evidence, word=word)))
+        cycles = 3 if word is Word.FEW else known.evidence.cycles_after
+        found = replace(known.evidence, word=word, cycles_after=cycles)
+        bench.station.take_evidence(replace(known, evidence=found))
     window.trial.refresh()
     assert said[word] in window.trial.words.text()
+
+
+@pytest.mark.parametrize(
+    ("left_out", "notes", "said"),
+    [
+        (
+            {"left_knee: it reports a fault": 3, "left_knee: values are missing": 40},
+            (),
+            "40 gait cycles left",
+        ),
+        ({}, ("strides lasted 1.2 s before and 1.6 s after",), "strides lasted"),
+        ({}, (), "too few strides of both sides are alike"),
+    ],
+)
+def test_enough_strides_that_cannot_be_judged_say_why(
+    bench: Bench, window: MainWindow, left_out: dict[str, int], notes: tuple[str, ...], said: str
+) -> None:
+    bench.station.writing.trial = Trial(
+        1, {"gait.step_length": 0.4}, {"gait.step_length": 0.3}, time.monotonic_ns() + 10**10
+    )
+    known = worse(is_final=False)
+    found = replace(known.evidence, word=Word.FEW, left_out=left_out, notes=notes)
+    bench.station.take_evidence(replace(known, evidence=found))
+    window.trial.refresh()
+    assert f"cannot be judged so far: {said}" in window.trial.words.text()
+
+
+def test_an_edit_stands_at_the_time_of_this_place(
+    bench: Bench, window: MainWindow, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As all else in the window, and not in UTC."""
+    monkeypatch.setenv("TZ", "UTC-05:30")  # east of it, as POSIX writes that
+    time.tzset()
+    try:
+        known = worse()
+        bench.station.take_evidence(replace(known, edit=replace(known.edit, utc_ns=1_700_000_000 * 10**9)))
+        window.edits.refresh()
+    finally:
+        monkeypatch.undo()
+        time.tzset()
+    assert window.edits.list.item(0).text().startswith("2023-11-15 03:43  ")
 
 
 def test_evidence_that_grows_lays_no_other_edit_out_again(bench: Bench, window: MainWindow) -> None:

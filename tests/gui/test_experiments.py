@@ -1,5 +1,7 @@
 """A/B trials and sweeps in the window: begun from the page of edits, ended from the bar, told on the page."""
 
+import math
+
 import pytest
 from msgspec.structs import replace
 
@@ -129,6 +131,38 @@ def test_from_a_trials_bar_both_of_its_values_are_asked_about(bench: Bench, wind
     run = bench.station.experiment
     assert run is not None
     assert f"seed {run.plan.seed}" in said, "what was said is what is begun"
+
+
+def test_the_form_begins_with_the_edit_that_is_looked_at(bench: Bench, window: MainWindow) -> None:
+    bench.station.take([looked()])
+    (change,) = told().edit.changes
+    edit = replace(told().edit, changes=(replace(change, name=NAME, old=0.4, new=0.42),))
+    bench.station.take_evidence(replace(told(), edit=edit))
+    window.edits.refresh()
+    window.edits.ab.click()
+    form = window.edits.form
+    assert form.parameter.currentText() == NAME
+    assert [field.text() for field in form.fields.values()] == ["400", "420"]
+    form.reject()
+    window.edits.sweep.click()
+    assert window.edits.form.parameter.currentText() == NAME
+    assert window.edits.form.fields["From"].text() == "400"
+    window.edits.form.reject()
+
+
+def test_bounds_are_in_the_units_of_the_window(bench: Bench, window: MainWindow) -> None:
+    bench.station.take([looked()])
+    window.edits.refresh()
+    window.edits.ab.click()
+    form = window.edits.form
+    form.parameter.setCurrentText(NAME)
+    form.fields["B"].setText("420")
+    assert form.error.accessibleName() == "Most tracking error (°)"
+    form.error.setText("2")
+    assert form.plan.bounds.error == pytest.approx(math.radians(2.0))
+    form.error.setText("-2")
+    assert "a number above 0" in form.words.text()
+    form.reject()
 
 
 def test_a_trial_of_several_parameters_is_no_ab_trial(bench: Bench, window: MainWindow) -> None:

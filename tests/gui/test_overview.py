@@ -275,6 +275,10 @@ def test_a_trial_is_kept_or_taken_back_where_it_is_seen(overview: Overview, benc
     assert overview.now.trial.isVisible()
     assert overview.now.trial.main.text() == "On trial: gait step length 400 → 420 mm"
     assert overview.now.trial.detail.text().startswith("taken back in ")
+    asked: list[object] = []
+    overview.now.compare.connect(asked.append)
+    overview.now.ab.click()
+    assert asked == [bench.station]
     overview.now.keep.click()
     overview.now.take_back.click()
     assert bench.first.named("confirm") == [(7,)]

@@ -69,7 +69,7 @@ class Evidence(Struct, frozen=True):
     word: Word
     strongest: str  # the series of a metric; empty where none differs
     metrics: tuple[Measured, ...]
-    cycles_before: int  # of both legs
+    cycles_before: int  # of both legs: that were compared, or, of a leg with too few on a side, that may be
     cycles_after: int
     left_out: Mapping[str, int] = {}  # cycles by what was wrong with them, with their joint
     notes: tuple[str, ...] = ()
@@ -147,7 +147,8 @@ def compare(
 ) -> Evidence:
     """Return what the edit of some components did to these joints and to the robot as a whole."""
     taken, left_out = _sorted_out(cycles, spell)
-    legs = {leg: _sided([cycle for cycle in taken if cycle.leg is leg], spell) for leg in Leg}
+    there = {leg: _all_of([cycle for cycle in taken if cycle.leg is leg], spell) for leg in Leg}
+    legs = {leg: _sided(there[leg]) for leg in Leg}
     most = max(legs.values(), key=lambda one: min(one.counts))
     found: list[_Found] = []
     for leg in Leg:
@@ -163,7 +164,8 @@ def compare(
     _measure(robot, most)
     own = [one for one in found if one.component in edited]
     measured = _worded([own, [one for one in found if one not in own], robot])
-    told = [sum(counts) for counts in zip(*(leg.counts for leg in legs.values()), strict=True)]
+    known = [(legs[leg] if legs[leg].cycles else there[leg]).counts for leg in Leg]
+    told = [sum(counts) for counts in zip(*known, strict=True)]
     strongest = max(differing(measured), key=lambda one: abs(one.size or 0.0), default=None)
     judged = {one.series for one in own or found}
     return Evidence(
@@ -180,8 +182,8 @@ def compare(
 def drawn(cycles: Iterable[Cycle], spell: Spell) -> list[Cycle]:
     """Return the cycles that are compared; of a leg that has too few on a side yet, all that may be."""
     taken, _ = _sorted_out(cycles, spell)
-    legs = [[cycle for cycle in taken if cycle.leg is leg] for leg in Leg]
-    return [cycle for leg in legs for cycle in (_sided(leg, spell).cycles or leg)]
+    legs = [_all_of([cycle for cycle in taken if cycle.leg is leg], spell) for leg in Leg]
+    return [cycle for leg in legs for cycle in (_sided(leg).cycles or leg.cycles)]
 
 
 def _sorted_out(cycles: Iterable[Cycle], spell: Spell) -> tuple[list[Cycle], dict[str, int]]:
@@ -199,15 +201,19 @@ def _sorted_out(cycles: Iterable[Cycle], spell: Spell) -> tuple[list[Cycle], dic
     return taken, dict(counted)
 
 
-def _sided(cycles: Sequence[Cycle], spell: Spell) -> _Sided:
-    """The cycles in activities that there are enough of on both sides."""
-    all_of = _Sided(
+def _all_of(cycles: Sequence[Cycle], spell: Spell) -> _Sided:
+    """These cycles, each on its side."""
+    return _Sided(
         cycles,
         np.array([spell.side(cycle) for cycle in cycles], dtype=np.bool_),
         np.array([(cycle.began_ns + cycle.ended_ns) / 2e9 for cycle in cycles]),
         np.array([cycle.seconds for cycle in cycles]),
         [cycle.activity or "" for cycle in cycles],
     )
+
+
+def _sided(all_of: _Sided) -> _Sided:
+    """Those in activities that there are enough of on both sides."""
     names = np.array(all_of.activities)
     both = {name for name in names.tolist() if all_of.where(names == name).is_enough}
     return all_of.where(np.array([name in both for name in names.tolist()], dtype=np.bool_))

@@ -45,6 +45,8 @@ class EvidenceService:
         self._robots: dict[str, RobotEvidence] = {}
         self._said: collections.deque[tuple[str, Prediction]] = collections.deque(maxlen=MOST_SAID)
         self._recorded: dict[str, str] = {}  # by robot: what its recording is called, as was told last
+        self._sizes: dict[str, int] = {}  # of the file of each when it was read
+        self._kept: dict[str, set[str]] = {}  # edits in those files that were told
         self._looked_s = 0.0
         self.worker = Worker("evidence", self._run, STILL_S)
 
@@ -85,6 +87,7 @@ class EvidenceService:
                 self._looked_s = now_s
                 for robot in list(self._robots):
                     self._guarded(robot, RobotEvidence.look)
+                    self._tell_news(robot)
         for robot in list(self._robots):
             self._guarded(robot, RobotEvidence.end)
 
@@ -102,11 +105,26 @@ class EvidenceService:
             log.exception("%s sent what no evidence can be found in; begun anew", robot)
             self._robots[robot] = known.anew()
 
+    def _tell_news(self, robot: str) -> None:
+        """What a command has kept meanwhile, such as `gwrms ab`, is told as well."""
+        if self._size(robot) != self._sizes.get(robot):
+            self._tell_kept(robot)
+
+    def _size(self, robot: str) -> int:
+        try:
+            return EvidenceFile(self._folder, robot).path.stat().st_size
+        except OSError:
+            return 0
+
     def _tell_kept(self, robot: str) -> None:
         if self._tell is None:
             return
+        self._sizes[robot] = self._size(robot)
         try:
             for told in EvidenceFile(self._folder, robot).read().values():
+                if told.edit.id in self._kept.setdefault(robot, set()):
+                    continue
+                self._kept[robot].add(told.edit.id)
                 if told.edit.robot == robot:  # names that differ in signs share a file
                     self._tell(robot, told)
         except OSError as error:
@@ -119,6 +137,7 @@ class EvidenceService:
                 EvidenceFile(self._folder, robot).add(replace(told, session=session))
             except OSError as error:
                 log.error("the evidence of edit %s of %s is not kept: %s", told.edit.id, robot, error)
+            self._kept.setdefault(robot, set()).add(told.edit.id)
         if self._tell is not None:
             self._tell(robot, told)
 

@@ -1,6 +1,7 @@
 """The stop rules: what ends an experiment, each in words. Nothing here asks the robot anything."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+import math
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -28,6 +29,10 @@ ENDING: Final = {
     "write taken back": "the robot has taken the write back",
     "ROLL-BACK FAILED": "the robot could not take the write back",
 }
+ASKED: Final = {
+    "following_error": "Most tracking error in the form, --most-error",
+    "current": "Most current in the form, --most-current",
+}
 OF_OTHERS: Final = {"write": "a write", "restore": "a restore", "store": "a store", "enable": "an enabling"}
 
 
@@ -45,6 +50,7 @@ class Watch:
     said: Callable[[float], str] = "{:g}".format  # a value of it, for people
     why: str | None = None
     most: dict[str, float] = field(default_factory=dict)  # by quantity, before the beginning
+    _usual: Collection[str] = ()  # quantities whose bound is twice what was usual
     _alarms: frozenset[object] = frozenset()
     _lasting: dict[object, int] = field(default_factory=dict)  # since when, on our clock
     _begun: bool = False
@@ -60,9 +66,11 @@ class Watch:
         self._begun, self._began_ns = True, robot_ns
         self._alarms = frozenset(alarm.key for alarm in alarms)
         usual = {name: AS_USUAL * most for name, most in self.most.items() if most > 0.0}
-        error = usual.get("following_error") if self.bounds.error is None else self.bounds.error
-        current = usual.get("current") if self.bounds.current is None else self.bounds.current
-        self.bounds = Bounds(error, current)
+        bounds = {"following_error": self.bounds.error, "current": self.bounds.current}
+        given = {name: bound for name, bound in bounds.items() if bound is not None}
+        self._usual = usual.keys() - given.keys()
+        found = usual | given
+        self.bounds = Bounds(found.get("following_error"), found.get("current"))
         return self.bounds
 
     def writes(self) -> None:
@@ -116,8 +124,15 @@ class Watch:
                 if not self._begun:
                     self.most[quantity] = max(found, self.most.get(quantity, 0.0))
                 elif limit is not None and found > limit:
-                    what = "tracking error" if quantity == "following_error" else quantity
-                    yield f"{joint}: {what} {found:.3g}, beyond the bound of {limit:.3g}"
+                    yield f"{joint}: {_over(quantity, found, limit)}{self._allowed(quantity)}"
+
+    def _allowed(self, quantity: str) -> str:
+        """What to do where the bound was nobody's choice."""
+        if quantity not in self._usual:
+            return ""
+        return (
+            f" (twice what was usual); if that much is harmless allow it: {ASKED[quantity]}, or nearer values"
+        )
 
     def _told(self, entries: Iterable[Mapping[str, Any]]) -> Iterator[str]:
         for entry in entries:
@@ -160,6 +175,14 @@ class Watch:
             found = f"{self.name} is {held} and not {ours}: somebody else has written it"
         if self._differs > 1:
             yield found
+
+
+def _over(quantity: str, found: float, limit: float) -> str:
+    """In both units of an angle: the window and the terminal tell it alike."""
+    if quantity != "following_error":
+        return f"{quantity} {found:.3g} A, beyond the bound of {limit:.3g} A"
+    said = [f"{value:.3g} rad ({math.degrees(value):.2g}°)" for value in (found, limit)]
+    return "tracking error {}, beyond the bound of {}".format(*said)
 
 
 def _sizes(values: Iterable[float | None]) -> Iterator[float]:

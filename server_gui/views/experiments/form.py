@@ -10,7 +10,6 @@ from PySide6.QtWidgets import (
     QGridLayout,
     QLineEdit,
     QPushButton,
-    QSpinBox,
     QVBoxLayout,
     QWidget,
 )
@@ -39,6 +38,7 @@ from server_gui.core.experiments.wording import stated
 from server_gui.core.tuning.edits import unit_of
 from server_gui.core.tuning.writing import WriteState
 from server_gui.views.theme import Theme
+from server_gui.views.widgets.calm_spin import CalmSpin
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.plain import PlainLabel
 
@@ -83,6 +83,9 @@ class ExperimentForm(QDialog):
         self.cycles = _spin(FEWEST_CYCLES, MOST_CYCLES, USUAL_CYCLES)
         self.transient = _spin(0, 20, USUAL_TRANSIENT)
         self.error, self.current = QLineEdit(), QLineEdit()
+        units = desk.shown.units
+        self._error_unit = units.unit("following_error", "rad")
+        self._current_unit = units.unit("current", "A")
         for bound in (self.error, self.current):
             bound.setPlaceholderText(USUAL)
         self.words = PlainLabel()
@@ -129,7 +132,10 @@ class ExperimentForm(QDialog):
             raise BadPlan(self._station.writing.text)
         values = [_number(field.text(), name, unit) for name, field in self.fields.items()]
         dwell = Dwell(self.cycles.value(), self.transient.value())
-        bounds = Bounds(_bound(self.error, "tracking error"), _bound(self.current, "current"))
+        bounds = Bounds(
+            _bound(self.error, "tracking error", self._error_unit),
+            _bound(self.current, "current", self._current_unit),
+        )
         if self._kind is Kind.AB:
             first, second = values
             pairs, seed = self.pairs.value(), self._seed
@@ -143,13 +149,13 @@ class ExperimentForm(QDialog):
         pairs = {"Pairs": self.pairs} if self._kind is Kind.AB else {}
         rows: dict[str, QWidget] = {
             "Parameter": self.parameter,
-            "In": self.unit,
+            "Unit": self.unit,
             **self.fields,
             **pairs,
             "Gait cycles each": self.cycles,
             "Left out after a change": self.transient,
-            "Most tracking error (rad)": self.error,
-            "Most current (A)": self.current,
+            f"Most tracking error ({self._error_unit.symbol})": self.error,
+            f"Most current ({self._current_unit.symbol})": self.current,
         }
         for row, (name, field) in enumerate(rows.items()):
             title = PlainLabel(name)
@@ -169,7 +175,8 @@ class ExperimentForm(QDialog):
     def _chosen(self) -> None:
         """Another parameter: begin with what was on trial; else with what is held, and was typed for it."""
         tried = self._tried
-        if tried is not None and tried.parameter == self.parameter.currentText():
+        is_ab = self._kind is Kind.AB  # a sweep begins with what is held
+        if tried is not None and is_ab and tried.parameter == self.parameter.currentText():
             info = self._station.known[tried.parameter]
             unit = unit_of(info.name, info.unit, self._desk.shown.units)
             self.unit.setText(unit.symbol or "no unit")
@@ -186,7 +193,7 @@ class ExperimentForm(QDialog):
         self.unit.setText(unit.symbol or "no unit")
         first = next(iter(self.fields.values()))
         first.setText(unit.editable(held))
-        if self._kind is Kind.AB:
+        if is_ab:
             self.fields["B"].setText("" if staged is None else unit.editable(staged.value))
         self._look()
 
@@ -216,8 +223,8 @@ class ExperimentForm(QDialog):
         self.accept()
 
 
-def _spin(least: int, most: int, usual: int) -> QSpinBox:
-    spin = QSpinBox()
+def _spin(least: int, most: int, usual: int) -> CalmSpin:
+    spin = CalmSpin()
     spin.setRange(least, most)
     spin.setValue(usual)
     return spin
@@ -230,12 +237,12 @@ def _number(text: str, name: str, unit: Unit) -> float:
         raise BadPlan(f"{name}: type a number" if not text else f"{name}: {error}") from error
 
 
-def _bound(field: QLineEdit, name: str) -> float | None:
+def _bound(field: QLineEdit, name: str, unit: Unit) -> float | None:
     text = field.text().strip()
     if not text:
         return None
     try:
-        value = float(text)
+        value = unit.si_value(text)
     except ValueError:
         value = 0.0
     if not 0.0 < value < 1e9:

@@ -2,14 +2,13 @@
 
 from typing import Final
 
-from PySide6.QtCore import QPointF, Qt, QTimer, Signal
-from PySide6.QtGui import QPainter, QPaintEvent, QPolygonF, QResizeEvent, QWheelEvent
+from PySide6.QtCore import Qt, QTimer, Signal
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QHBoxLayout,
     QHeaderView,
     QPushButton,
-    QSpinBox,
     QTableWidget,
     QTableWidgetItem,
     QVBoxLayout,
@@ -19,6 +18,7 @@ from PySide6.QtWidgets import (
 from server_gui.core.tuning.edits import Change
 from server_gui.views.parameters.tree import range_text
 from server_gui.views.theme import Theme
+from server_gui.views.widgets.calm_spin import CalmSpin
 from server_gui.views.widgets.columns import title_widths
 from server_gui.views.widgets.plain import PlainLabel, set_tip
 
@@ -29,30 +29,6 @@ SPARE: Final = (ALLOWED, BY)  # left out in this order where there is less room:
 BESIDE: Final = 16  # pixels of the table's frame and its bar
 TRIAL_S: Final = 30
 SETTLE_MS: Final = 400  # a click that was meant for what stood there before does not count
-
-
-class CalmSpin(QSpinBox):
-    """The wheel changes it only when it has the focus; its arrows are drawn in the colour of its text."""
-
-    def paintEvent(self, event: QPaintEvent) -> None:
-        super().paintEvent(event)
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(self.palette().text())
-        side = self.fontMetrics().height() / 3
-        x, middle = self.width() - side - 4, self.height() / 2
-        for way in (-1, 1):
-            foot, tip = middle + way * 2, middle + way * (2 + side * 0.8)
-            points = ((x - side / 2, foot), (x + side / 2, foot), (x, tip))
-            painter.drawPolygon(QPolygonF([QPointF(*point) for point in points]))
-        painter.end()
-
-    def wheelEvent(self, event: QWheelEvent) -> None:
-        if self.hasFocus():
-            super().wheelEvent(event)
-        else:
-            event.ignore()
 
 
 class Review(QWidget):

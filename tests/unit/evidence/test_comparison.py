@@ -106,6 +106,8 @@ def test_few_cycles_say_so_and_how_many() -> None:
     evidence = compare(cycles(times(ERROR, 2.0), until_s=68.0), spell(), JOINTS)
     assert evidence.word is Word.FEW
     assert evidence.strongest == ""
+    assert evidence.cycles_before >= 40, "what is there is told, also where it is too few on the other side"
+    assert 0 < evidence.cycles_after < 8
 
 
 def test_what_nothing_tells_has_no_data() -> None:

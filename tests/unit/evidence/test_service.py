@@ -4,8 +4,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
-from server_gui.core.evidence.file import Told, read_all
+from server_gui.core.evidence.file import EvidenceFile, Told, read_all
 from server_gui.core.evidence.service import EvidenceService
 from server_gui.core.follow.events import Event
 from tests.support.waiting import until
@@ -84,3 +85,19 @@ def test_it_belongs_to_the_recording_in_which_the_edit_was_made(tmp_path: Path, 
         session[0] = "bert"
     (told,) = read_all(tmp_path)
     assert told.session == "anna"
+
+
+def test_what_a_command_keeps_meanwhile_is_told(
+    tmp_path: Path, events: list[Event], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The window that records shows an A/B trial of a terminal."""
+    monkeypatch.setattr("server_gui.core.evidence.service.LOOK_S", 0.0)
+    heard: list[Told] = []
+    with EvidenceService(tmp_path, lambda _robot: "", lambda _robot, told: heard.append(told)) as service:
+        for event in events:
+            service.take("exo-01", event)
+        until(lambda: bool(heard))
+        other = replace(heard[0], edit=replace(heard[0].edit, id="of a command"), is_final=True)
+        EvidenceFile(tmp_path, "exo-01").add(other)
+        until(lambda: other in heard)
+    assert heard.count(other) == 1

@@ -12,7 +12,10 @@ from server_gui.core.alarms.alarm import Alarm
 from server_gui.core.alarms.texts import Kind as AlarmKind
 from server_gui.core.experiments.machine import ENDS, TABLE, Action, State
 from server_gui.core.experiments.machine import Event as Step
+from server_gui.core.experiments.plan import Bounds
+from server_gui.core.experiments.watch import Watch
 from server_gui.core.follow.events import Journalled
+from tests.support.desk import telemetry
 from tests.unit.experiments.world import NAME, ORIGINAL, World
 
 HAPPENINGS: Final[Mapping[str, Callable[[World], Any]]] = {
@@ -208,3 +211,16 @@ def test_the_journal_ends_it_by_what_others_do_now(entry: dict[str, Any], why: s
     world.run.take(Journalled(JournalEntries([entry])))
     assert why in (world.run.watch.why or "")
     assert bool(world.run.watch.why) is bool(why)
+
+
+@pytest.mark.parametrize(("bounds", "is_usual"), [(Bounds(), True), (Bounds(error=0.015), False)])
+def test_a_bound_that_nobody_chose_says_what_to_do(bounds: Bounds, is_usual: bool) -> None:
+    """The larger the effect of a value, the sooner twice the usual ends its trial."""
+    watch = Watch(NAME, ("left_knee",), bounds)
+    watch.take(telemetry([1], {"left_knee.following_error": [-0.01]}))
+    watch.begin((), 2)
+    watch.take(telemetry([3], {"left_knee.following_error": [0.03]}))
+    assert watch.why is not None
+    limit = "0.02 rad (1.1°)" if is_usual else "0.015 rad (0.86°)"
+    assert watch.why.startswith(f"left_knee: tracking error 0.03 rad (1.7°), beyond the bound of {limit}")
+    assert ("--most-error" in watch.why) is is_usual
