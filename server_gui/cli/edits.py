@@ -29,7 +29,10 @@ exit status
   0 shown, 1 not known or not to be read, 2 wrong usage"""
 HEADER: Final = ("ID", "WHEN (UTC)", "ROBOT", "WHO", "WHAT", "STATE", "VERDICT", "STRONGEST")
 COLUMNS: Final = ("METRIC", "WORD", "BEFORE", "AFTER", "DIFFERENCE", "95 % INTERVAL", "SIZE", "UNIT")
-NOTHING: Final = "no edit is known here: one is kept once it was made while this computer recorded the robot"
+NOTHING: Final = (
+    "no edit is known here: one is kept that was made while this computer recorded the robot, a minute "
+    "after it was taken back, or two after it was kept; until then the window has it"
+)
 EXPLAINED: Final = """
 The difference is the edit's: without a slow drift, and at equal speed; its interval holds in 95 of 100 edits.
 The size is the difference in standard deviations of single cycles. A word needs both: a difference that is

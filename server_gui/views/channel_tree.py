@@ -40,9 +40,13 @@ class ChannelTree(QTreeWidget):
     @property
     def items(self) -> list[QTreeWidgetItem]:
         """Every channel, in the robot's order."""
-        tops = [self.topLevelItem(row) for row in range(self.topLevelItemCount())]
-        found = [top.child(row) for top in tops if top is not None for row in range(top.childCount())]
-        return [item for item in found if item is not None]
+        return [item for group in self._groups for item in _within(group)]
+
+    @property
+    def _groups(self) -> list[QTreeWidgetItem]:
+        """The components."""
+        found = [self.topLevelItem(row) for row in range(self.topLevelItemCount())]
+        return [group for group in found if group is not None]
 
     @property
     def chosen(self) -> list[str]:
@@ -83,6 +87,8 @@ class ChannelTree(QTreeWidget):
             item.setHidden(not all(word in name for word in wanted))
             if words and not item.isHidden():
                 _open_group(item)
+        for group in self._groups:
+            group.setHidden(all(item.isHidden() for item in _within(group)))
 
     def mimeTypes(self) -> list[str]:
         return [CURVES]
@@ -117,6 +123,11 @@ def _title(info: ChannelInfo, units: Units) -> str:
     """Return what a channel is called below its component, in the unit that its plot has."""
     symbol = units.unit(info.quantity, info.unit).symbol
     return f"{info.quantity.replace('_', ' ')}  {symbol}".rstrip()
+
+
+def _within(group: QTreeWidgetItem) -> list[QTreeWidgetItem]:
+    found = [group.child(row) for row in range(group.childCount())]
+    return [item for item in found if item is not None]
 
 
 def _open_group(item: QTreeWidgetItem) -> None:

@@ -228,7 +228,7 @@ class Signals(QWidget):
         self.fit.clicked.connect(self._follow)
         self.box.toggled.connect(self._choose_by_box)
         self.cursors.toggled.connect(self._show_cursors)
-        tools.expression.toggled.connect(self.expression.setVisible)
+        tools.expression.toggled.connect(self.expression.open)
         tools.trigger.toggled.connect(self._show_trigger)
         tools.as_csv.clicked.connect(lambda: self._ask("csv", self.save_csv))
         tools.as_png.clicked.connect(lambda: self._ask("png", self.save_png))

@@ -41,6 +41,18 @@ def test_nothing_ticked_says_what_to_do(signals: Signals) -> None:
     assert "Tick channels" in signals.empty.text()
 
 
+def test_a_filter_leaves_only_components_that_have_a_channel(signals: Signals) -> None:
+    def seen() -> list[str]:
+        rows = [signals.channels.topLevelItem(row) for row in range(signals.channels.topLevelItemCount())]
+        return [row.text(0) for row in rows if row is not None and not row.isHidden()]
+
+    every = seen()
+    signals.channels.show_only("left_knee position")
+    assert seen() == ["left knee"]
+    signals.channels.show_only("")
+    assert seen() == every
+
+
 def test_too_many_curves_are_named_not_dropped_silently(signals: Signals) -> None:
     names = [
         f"{joint}.{quantity}"

@@ -19,6 +19,7 @@ from server_gui.views.signals import Signals
 from server_gui.views.theme import Theme
 from server_gui.views.unit_plot import EmptyPlot, UnitPlot
 from server_gui.views.widgets.dragging import CURVES, dragged, dropped
+from server_gui.views.workspace.expression_bar import EXAMPLE
 from server_gui.views.workspace.xy_plot import XYPlot
 from tests.gui.fakes import Bench, destroy
 from tests.gui.rules import nameless, out_of_reach
@@ -160,6 +161,9 @@ def test_everything_has_a_name_and_is_in_reach_at_any_width(signals: Signals) ->
 def test_an_expression_is_judged_while_one_types(signals: Signals) -> None:
     bar = signals.expression
     signals.tools.expression.click()
+    assert signals.window().focusWidget() is bar.field, "one types at once, after Ctrl+Shift+E too"
+    bar.field.setText(EXAMPLE.replace("right_knee", "left_hip"))
+    assert "apart, in °" in bar.words.text()
     bar.field.setText(f"{KNEE} + {TORQUE}")
     assert not bar.add.isEnabled()
     assert bar.place.text().splitlines()[1].index("^") == len(KNEE) + 1

@@ -47,7 +47,8 @@ class Leases:
             left_s = (held.expires_ns - time.monotonic_ns()) / 1e9
             raise refuse(
                 Kind.LEASE_HELD,
-                f"{held.session.who} has the lease for up to {left_s:.1f} s more; ask again then",
+                f"{held.session.who} has the lease for up to {left_s:.1f} s more; ask again then, "
+                "or have it released there",
             )
         if session.closed:
             raise refuse(Kind.NO_LEASE, "the connection has ended")

@@ -149,7 +149,8 @@ def compare(
     taken, left_out = _sorted_out(cycles, spell)
     there = {leg: _all_of([cycle for cycle in taken if cycle.leg is leg], spell) for leg in Leg}
     legs = {leg: _sided(there[leg]) for leg in Leg}
-    most = max(legs.values(), key=lambda one: min(one.counts))
+    most_leg = max(Leg, key=lambda leg: (min(legs[leg].counts), min(there[leg].counts)))
+    most = legs[most_leg]
     found: list[_Found] = []
     for leg in Leg:
         series = [
@@ -175,7 +176,7 @@ def compare(
         cycles_before=told[0],
         cycles_after=told[1],
         left_out=left_out,
-        notes=tuple(_notes(most)),
+        notes=tuple(_notes(most, there[most_leg])),
     )
 
 
@@ -352,8 +353,11 @@ def verdict(measured: Sequence[Measured], judged: Sequence[Measured]) -> Word:
     return differs or next((word for word in (Word.SAME, Word.FEW) if word in own), Word.NO_DATA)
 
 
-def _notes(sided: _Sided) -> Iterator[str]:
+def _notes(sided: _Sided, there: _Sided) -> Iterator[str]:
     if not sided.is_enough:
+        if there.is_enough:
+            before, after = (", ".join(_activities(there, side)) for side in (~there.after, there.after))
+            yield f"too few cycles of one activity on both sides: {before} before, {after} after"
         return
     before, after = (float(np.mean(sided.stride_s[side])) for side in (~sided.after, sided.after))
     if not sided.where(_same_speed(sided)).is_enough:
@@ -361,3 +365,9 @@ def _notes(sided: _Sided) -> Iterator[str]:
             f"strides lasted {before:.2f} s before and {after:.2f} s after: "
             "too few are equally long, so that only the cadence can be compared"
         )
+
+
+def _activities(sided: _Sided, side: Bools) -> Iterator[str]:
+    """How many cycles of each, the most first."""
+    for name, count in collections.Counter(sided.where(side).activities).most_common():
+        yield f"{count} {name or 'not known'}"

@@ -1,6 +1,6 @@
 """The grammar of expressions: text to a tree, with the place of everything; no text of any kind is executed.
 
-    curve    = [name "="] sum                     knee error = left_knee.position - left_knee.target
+    curve    = [name "="] sum                     apart = left_knee.position - right_knee.position
     sum      = product {("+" | "-") product}
     product  = factor {("*" | "/") factor}
     factor   = "-" factor | number ["[" unit "]"] | channel | function "(" sum {"," sum} ")" | "(" sum ")"

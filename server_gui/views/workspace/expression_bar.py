@@ -13,7 +13,7 @@ from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_text
 from server_gui.views.widgets.plain import PlainLabel, set_tip
 
-EXAMPLE = "knee error = left_knee.position - left_knee.target"
+EXAMPLE = "apart = left_knee.position - right_knee.position"  # of what every robot with two knees has
 HELP = f"Channels, numbers such as 5 [°], + − * / ( ), and {', '.join(sorted(FUNCTIONS))}; a name before ="
 
 
@@ -51,6 +51,12 @@ class ExpressionBar(Card):
         self._scale()
         theme.changed.connect(self._scale)
         self.hide()
+
+    def open(self, wanted: bool) -> None:
+        """Show it, ready to be typed in, or put it away."""
+        self.setVisible(wanted)
+        if wanted:
+            self.field.setFocus()
 
     def _scale(self) -> None:
         for part in (self.field, self.place):

@@ -48,7 +48,7 @@ class Tools(QWidget):
             button.setAccessibleName(f"To the event {which}")
             set_tip(button, f"To the event {which}: a stop, fault, write, trial or mark")
             button.clicked.connect(lambda _=False, way=way: self.turned.emit(way))
-        self.expression = _switch("Expression", "A curve that is computed, such as target minus position")
+        self.expression = _switch("Expression", "A curve that is computed, such as the left minus the right")
         self.trigger = _switch("Trigger", "Stand still when a curve does something, as an oscilloscope does")
         self.note = QPushButton("Note …")
         self.note.setToolTip("A note on the time axis, kept in the recording: at the active cursor, or now")

@@ -151,6 +151,15 @@ def test_only_the_same_activity_is_compared() -> None:
     assert evidence.left_out["the activity changed"] >= 3
 
 
+def test_strides_of_no_common_activity_are_told_with_theirs() -> None:
+    """Models say nothing while a window begins: 40 cycles that do not count want a reason."""
+    evidence = compare(cycles(activity=lambda at_s: "walk" if at_s >= AT_S else ""), spell(), JOINTS)
+    assert evidence.word is Word.FEW
+    (note,) = evidence.notes
+    found = rf"{evidence.cycles_before} not known before, {evidence.cycles_after} walk after"
+    assert note == f"too few cycles of one activity on both sides: {found}"
+
+
 def test_strides_of_another_activity_are_not_drawn_either() -> None:
     """Stairs laid over a walk would look like what the edit did."""
     taken = [
