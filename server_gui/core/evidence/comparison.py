@@ -356,8 +356,8 @@ def verdict(measured: Sequence[Measured], judged: Sequence[Measured]) -> Word:
 def _notes(sided: _Sided, there: _Sided) -> Iterator[str]:
     if not sided.is_enough:
         if there.is_enough:
-            before, after = (", ".join(_activities(there, side)) for side in (~there.after, there.after))
-            yield f"too few cycles of one activity on both sides: {before} before, {after} after"
+            old, new = (", ".join(_activities(there, side)) for side in (~there.after, there.after))
+            yield f"too few cycles of one activity on both sides: {old} before, {new} after"
         return
     before, after = (float(np.mean(sided.stride_s[side])) for side in (~sided.after, sided.after))
     if not sided.where(_same_speed(sided)).is_enough:
