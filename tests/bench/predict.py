@@ -39,7 +39,7 @@ from ml.serving.grid import period_ns
 from ml.serving.predictor import Windows, judged
 from server_gui.core.settings.prediction import Action, RuleSettings
 from tests.unit.ml.serving.small import hips
-from tests.unit.prediction.robots import predicting, promoters, publish, served, settings, telemetry
+from tests.unit.prediction.robots import described, predicting, promoters, publish, settings, telemetry
 
 ROBOTS = 50
 ROUNDS = 300
@@ -199,9 +199,11 @@ def _stopping() -> list[float]:
         publish(url, by=PROMOTER)  # a rule stops nothing by a model that nobody has signed
         server = replace(settings(url, rule), promoters=promoters(PROMOTER))
         with predicting(server) as (one, told):
-            for number in range(ROBOTS):
-                robot = f"exo-{number}"
-                served(one, told, robot)
+            robots = [f"exo-{number}" for number in range(ROBOTS)]
+            for robot in robots:
+                one.take(robot, described())
+            told.until(lambda: {(robot, "activity") for robot in robots} <= one.models.keys())
+            for number, robot in enumerate(robots):
                 *before, last = list(telemetry(hips(2.1, walks=True)))
                 for event in before:
                     one.take(robot, event)
