@@ -347,8 +347,8 @@ def _of_danger(facts: Facts) -> Iterator[Alarm]:
         return
     kind = Kind.DANGER if known.level >= Level.ALARM else Kind.DANGER_ADVICE
     did = "" if shown.is_known else "whether it is so still is not known"
-    what = f"level {known.level.word}: {known.reasons}"
-    yield Alarm(kind, "danger", what, "the wearer", did, check_of(kind), is_now=shown.is_known)
+    level = f"level {known.level.word}"
+    yield Alarm(kind, "danger", known.reasons, level, did, check_of(kind), is_now=shown.is_known)
 
 
 # --- small things

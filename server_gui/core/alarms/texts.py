@@ -32,7 +32,7 @@ class Kind(Enum):
     UNKNOWN = "state not known"
     BUS = "bus trouble"
     BLIND = "guard blind"
-    DANGER_ADVICE = "danger, advice"
+    DANGER_ADVICE = "danger possible"
     REPORTS = "warning"
     RECORDING = "recording"
     UPLOAD = "store"

@@ -10,13 +10,16 @@ from gateway.client import ConnectionState
 from ml.danger.levels import Level
 from server_gui.core.alarms.texts import Kind
 from server_gui.core.desk.desk import Desk
-from server_gui.core.desk.flags import Flag, FlagKind, of_events
+from server_gui.core.desk.flags import FlagKind, of_events
 from server_gui.core.desk.station import Station
 from server_gui.core.fleet.live_prediction import RecordedPrediction
 from server_gui.core.follow.events import LinkChanged
 from server_gui.core.prediction.news import turn
+from server_gui.core.prediction.robot_predictor import RobotPredictor
 from server_gui.core.recording.batching import EventKind
+from server_gui.terminal.foreseeing import Foreseeing
 from tests.support.desk import Bench, described, looked, walking
+from tests.support.terminal_robot import a_station, screen
 from tests.unit.prediction.endangered import HOT, endangered
 from tests.unit.prediction.robots import ROBOT
 
@@ -61,8 +64,10 @@ def test_from_advice_on_it_is_an_alarm_with_its_level_and_reasons(
     if kind is not None:
         (one,) = station.alarms.active
         assert one.alarm.mark.colour == colour
-        assert one.alarm.line.endswith(f"the wearer: level {level.word}: {HOT}")
+        assert one.alarm.line.endswith(f"level {level.word}: {HOT}")
         assert "on trial, and may be wrong" in one.alarm.check
+        assert f"{kind.value}: level {level.word}: {HOT}" in screen(station)
+        assert f"danger: {level.word}" in screen(station)
 
 
 def test_what_nobody_knows_any_more_is_not_over(station: Station) -> None:
@@ -116,3 +121,27 @@ def test_a_recording_keeps_it_as_events_which_are_shown_again() -> None:
     one._keep([endangered(Level.NONE)])
     assert [(event["robot"], event["level"]) for event in kept] == [(ROBOT, "advice"), (ROBOT, "none")]
     assert [flag.kind for flag in of_events([*kept, {"kind": "gap", "utc": NOW}])] == [FlagKind.DANGER] * 2
+
+
+def test_the_terminal_says_the_level_and_that_it_is_not_known_and_nothing_where_it_is_off() -> None:
+    station = a_station()
+    assert "danger" not in screen(station)
+    station.predictions.foresees = True
+    assert "danger: not known" in screen(station)
+    for level, words in ((Level.NONE, "danger: none"), (Level.UNKNOWN, "danger: not known")):
+        station.take_prediction(endangered(level))
+        assert words in screen(station, size=(80, 24))
+
+
+def test_what_breaks_while_it_foresees_is_told_once_and_ends_nothing_else(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    told: list[str] = []
+    one = Foreseeing(ROBOT, told.append)
+
+    def broken(*_: object) -> None:
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(RobotPredictor, "take", broken)
+    assert [list(one.take([])) for _ in range(2)] == [[], []]
+    assert told == ["danger is not foreseen any more: internal error, ZeroDivisionError"]
