@@ -125,7 +125,7 @@ def test_what_is_no_such_recording_is_refused_with_its_name(tmp_path: Path) -> N
     file = tmp_path / "other.jsonl"
     for text in ("", "nonsense\n", '{"session": 1}\n', '[1, 2]\n{"a": 1}\n'):
         file.write_text(text)
-        with pytest.raises(UnusableData, match="other.jsonl"):
+        with pytest.raises(UnusableData, match=r"other\.jsonl"):
             read(file)
     with pytest.raises(UnusableData, match="fewer than two wearers"):
         read(recording(file, 1))
