@@ -26,7 +26,7 @@ MOST: Final = 10_000  # predictions, that wait for nobody
 class Watched:
     """A robot, and what is predicted of it."""
 
-    def __init__(self, *, foresees: bool) -> None:
+    def __init__(self, *, foresees: bool = False) -> None:
         self.robot = Robot()
         self.predictions = StationPredictions(foresees=foresees)
 

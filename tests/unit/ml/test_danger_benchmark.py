@@ -23,11 +23,11 @@ def seen(subject: str, name: str = "overheating", *, is_seen: bool = True, silen
     """A wearer who walks, meets a danger that does harm, and walks again; `silent`: no detector speaks."""
     source = np.random.default_rng(int(subject))
     parts = [(HEALTHY, CALM), (1.0, COMES), (1.5, LIES), (OVER, LIES), (HEALTHY, CALM // 5)]
-    danger = np.repeat(*zip(*parts, strict=True))
+    danger = np.concatenate([np.full(count, number) for number, count in parts])
     above = np.abs(source.normal(0.0, 1.0, (len(danger), len(DETECTORS))))
     if is_seen:
         above[danger == 1.0] += 30.0
-    at_s = PERIOD_S * np.arange(len(danger)) + LEARNED_S
+    at_s = PERIOD_S * np.arange(len(danger), dtype=np.float64) + LEARNED_S
     labels = np.full(len(danger), "walk")
     return Seen(subject, (name,), at_s, np.full_like(above, np.nan) if silent else above, danger, labels)
 
@@ -35,7 +35,7 @@ def seen(subject: str, name: str = "overheating", *, is_seen: bool = True, silen
 def judged(danger: list[float], level: list[Level]) -> Judged:
     """One wearer, a row a tenth of a second."""
     count = len(danger)
-    at_s = LEARNED_S + 1.0 + 0.1 * np.arange(count)
+    at_s = LEARNED_S + 1.0 + 0.1 * np.arange(count, dtype=np.float64)
     one = Seen("1", ("slip",), at_s, np.zeros((count, 8)), np.array(danger), np.full(count, "walk"))
     return Judged(one, np.zeros(count), np.array(level, dtype=np.int_))
 

@@ -96,7 +96,8 @@ def test_a_calibration_that_cannot_be_used_is_a_problem_and_foresees_nothing(
 
 @pytest.mark.parametrize("value", [None, math.nan, math.inf, -math.inf])
 def test_what_is_no_number_is_missing(robot: RobotPredictor, value: float | None) -> None:
-    said = foreseen(robot, rows(40, **{name.replace(".", "__"): value for name in CHANNELS}))
+    columns = {name.replace(".", "__"): value for name in CHANNELS}
+    said = foreseen(robot, rows(40, 0, **columns))
     assert is_unknown(said)
     assert {one.verdict.number for one in said} == {None}
 
@@ -131,14 +132,13 @@ def test_of_a_dead_robot_the_last_word_is_not_known_any_more() -> None:
 
 def test_what_was_known_last_stays_while_nobody_knows_better() -> None:
     known = StationPredictions()
-    known.take(endangered(Level.ALARM))
-    known.take(endangered(Level.UNKNOWN))
-    assert known.danger is not None
-    assert not known.danger.is_known
-    assert known.danger.known is not None
-    assert known.danger.known.level is Level.ALARM
-    known.take(endangered(Level.NONE))
-    assert known.danger.known.level is Level.NONE
+    found: list[tuple[bool, Level | None]] = []
+    for level in (Level.ALARM, Level.UNKNOWN, Level.NONE):
+        known.take(endangered(level))
+        assert known.danger is not None
+        before = known.danger.known
+        found.append((known.danger.is_known, None if before is None else before.level))
+    assert found == [(True, Level.ALARM), (False, Level.ALARM), (True, Level.NONE)]
 
 
 def test_no_rule_begins_to_hold_by_what_is_unknown() -> None:
