@@ -131,6 +131,7 @@ class App:
         self.desk.recording = self.feeds.recording(self._poster.deliver, self.desk.news)
         self.desk.keep_evidence = self._keep
         self._predicts = settings.prediction.enabled
+        self._foresees = self._predicts and settings.prediction.danger
         self._opening = opening
         self._own = OwnRobot() if opening is None else opening.own
         self.demo: DemoBar | None = None  # once a simulated robot of ours is followed
@@ -201,6 +202,7 @@ class App:
         is_named = name not in (name_of(str(address)), OWN)
         station = Station(name, str(address), link, self._poster.deliver, self.desk.news, is_named=is_named)
         station.predictions.off = not self._predicts
+        station.predictions.foresees = self._foresees
         self._mailboxes[name], self._stations[name] = mailbox, station
         self._followed.append(Followed(station, mailbox, network.run(link.run()), Ticks()))
         self.feeds.follow(name, address)

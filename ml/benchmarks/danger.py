@@ -12,9 +12,9 @@ from ml.benchmarks.danger_data import SUDDEN, WALKS, Seen, read
 from ml.benchmarks.outcome import Outcome
 from ml.danger.budget import BLOCK_S, BUDGETS, rate_interval, rule_of_three, share_interval, thresholds
 from ml.danger.combine import Calibration, calibrated, evidence, fit, tails
+from ml.danger.detector import DETECTORS
 from ml.danger.levels import Level, Levels
 from ml.danger.now import CHANNELS
-from ml.danger.watch import DETECTORS
 from ml.features.recipe import Features, Recipe
 from ml.features.windows import Samples
 

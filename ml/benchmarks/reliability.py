@@ -13,8 +13,8 @@ import msgspec
 from ml.benchmarks.danger import cross_judged, learn, reliability
 from ml.benchmarks.danger_data import read
 
-SIZE, EDGE = 320, 46  # px, of the diagram and of its margin
-LINE, POINT, TEXT = "#8a94a0", "#2a6fb0", "#5a6470"  # to be read on light and dark
+SIZE, EDGE = 320, 62  # px, of the diagram and of its margin
+LINE, POINT, TEXT = "#8a94a0", "#3a80c4", "#77818d"  # to be read on light and dark
 TICKS: Final = (0.0, 0.25, 0.5, 0.75, 1.0)
 
 Table = Sequence[tuple[float, float, int]]

@@ -1,6 +1,6 @@
 """One number out of all detectors: calibrated log odds, against which no evidence of danger ever speaks."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -8,6 +8,7 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
+from ml.danger.detector import DETECTORS
 from ml.danger.levels import URGENT, Level
 from ml.errors import UnusableModel
 
@@ -105,8 +106,26 @@ def calibrated(odds: Floats, danger: npt.NDArray[np.bool_]) -> tuple[Sequence[fl
 
 
 def load(path: Path = SHIPPED) -> Calibration:
-    """What ships; raises `UnusableModel` where the file is damaged."""
+    """What ships; raises `UnusableModel` where the file is damaged, or was learned for other detectors."""
     try:
-        return msgspec.json.decode(path.read_bytes(), type=Calibration)
+        found = msgspec.json.decode(path.read_bytes(), type=Calibration)
     except (OSError, msgspec.DecodeError) as error:
         raise UnusableModel(f"{path}: the calibration of danger cannot be read: {error}") from error
+    for why in _unfit(found):
+        raise UnusableModel(f"{path}: the calibration of danger cannot be used: {why}")
+    return found
+
+
+def _unfit(one: Calibration) -> Iterator[str]:
+    """Why it would say what is not so."""
+    if one.detectors != DETECTORS:
+        yield f"it is of the detectors {', '.join(one.detectors)}, and these are {', '.join(DETECTORS)}"
+    if not len(one.floor) == len(one.scale) == len(DETECTORS) == len(one.weights) - 2:
+        yield "it does not have a floor, a scale and a weight of each detector, and two weights of the worst"
+    if min((*one.weights, *one.scale), default=-1.0) < 0.0:
+        yield "a weight or a scale is negative: evidence would speak against danger"
+    if not one.odds or len(one.odds) != len(one.share):
+        yield "it does not say which odds came true how often"
+    missing = [level.word for level in URGENT if level.word not in one.thresholds]
+    if missing:
+        yield f"no threshold of {', '.join(missing)}"

@@ -1,7 +1,7 @@
 """What a detector of danger is: it measures what is unusual, and says it in words."""
 
 from collections.abc import Sequence
-from typing import Protocol
+from typing import Final, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -9,6 +9,8 @@ import numpy.typing as npt
 from ml.danger.now import Now
 
 Floats = npt.NDArray[np.float64]
+
+DETECTORS: Final = ("tracking", "torque", "strides", "support", "balance", "rhythm", "agreement", "drift")
 
 
 class Detector(Protocol):

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from ml.danger.agreement import Agreement
 from ml.danger.balance import Balance
 from ml.danger.combine import Calibration
-from ml.danger.detector import Detector
+from ml.danger.detector import DETECTORS, Detector
 from ml.danger.drift import Drift
 from ml.danger.levels import Level, Levels
 from ml.danger.now import CHANNELS, Now
@@ -27,11 +27,9 @@ Floats = npt.NDArray[np.float64]
 
 PERIOD_S: Final = 0.035  # rows that come sooner after another are passed over: 25 a second are enough
 HELD_S: Final = 0.1  # a value that is older is missing
-STALE_S: Final = 0.5  # without a row nothing is known any more
 LEARNS_BELOW: Final = 15.0  # spreads above what is usual: models follow what is less
 TOLD: Final = 3  # reasons
 TELLING: Final = 2.0  # spreads from which on a detector is a reason
-DETECTORS: Final = ("tracking", "torque", "strides", "support", "balance", "rhythm", "agreement", "drift")
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +50,11 @@ class Verdict:
     def speaking(self) -> int:
         """How many detectors the number is made of."""
         return len(DETECTORS) - len(self.silent)
+
+    @property
+    def reasons(self) -> str:
+        """Why, in words."""
+        return "; ".join(self.why) or "several things together, none of which would tell it alone"
 
 
 def detectors() -> tuple[Detector, ...]:
@@ -77,7 +80,7 @@ class Evidence:
         """Take values in the order of `CHANNELS`, NaN where missing; spreads (detectors,), likewise."""
         self._now.take(at_s, values)
         learn = self._worst < LEARNS_BELOW
-        with np.errstate(invalid="ignore"):
+        with np.errstate(invalid="ignore", over="ignore"):
             numbers = np.concatenate([one.measure(self._now, learn=learn) for one in self.detectors])
         self.keys = self._usual[self._now.walking].take(at_s, numbers, quiet=learn)
         above = np.fmax.reduceat(self.keys, self._starts)
@@ -111,6 +114,7 @@ class Watch:
         """Take a row in the order of `CHANNELS`; the verdict, where one was due."""
         row = np.array(values, dtype=np.float64)  # None becomes NaN
         there = np.isfinite(row)
+        row[~there] = np.nan
         self._held[there] = row[there]
         self._held_ns[there] = stamp_ns
         if stamp_ns - self._taken_ns < PERIOD_S * 1e9:

@@ -22,6 +22,7 @@ EPILOG: Final = """keys
 What one may not do on this robot is grey, with the reason below; STOP is for everybody.
 Angles are in degrees and lengths in millimetres, as in the window. What is old is grey, and says
 how old. q waits until it is known what became of a STOP.
+With danger = true in [prediction] of the server's file, danger is foreseen as in the window.
 Without a terminal: gwrms watch, gwrms describe.
 
 exit status
@@ -41,7 +42,8 @@ def main(argv: list[str]) -> int:
     from server_gui.terminal.followed_robot import EVERY_PARAMETER, FollowedRobot
 
     ends_s = math.inf if arguments.seconds is None else time.monotonic() + arguments.seconds
-    with Ending() as ending, FollowedRobot(arguments.robot, EVERY_PARAMETER) as followed:
+    followed_robot = FollowedRobot(arguments.robot, EVERY_PARAMETER, foresees=_foresees())
+    with Ending() as ending, followed_robot as followed:
 
         def tick() -> bool:
             ending.check()
@@ -54,6 +56,18 @@ def main(argv: list[str]) -> int:
             _tell(followed.station.stopping)
             return ended.status
         return _tell(followed.station.stopping)
+
+
+def _foresees() -> bool:
+    """Whether the server's file wants danger foreseen; one that cannot be read hinders nobody."""
+    from server_gui.core.settings.server_file import SettingsError, load
+
+    try:
+        prediction = load().prediction
+    except SettingsError as error:
+        warn("top", f"danger is not foreseen: {error}")
+        return False
+    return prediction.enabled and prediction.danger
 
 
 def _tell(stopping: StopProgress) -> int:

@@ -2,6 +2,7 @@
 
 import collections
 import concurrent.futures
+import functools
 from collections.abc import Callable
 from typing import Self
 
@@ -9,14 +10,16 @@ from msgspec.structs import replace
 
 from gateway.client import Address
 from gateway.wire.resource import ResourceSnapshotParams
+from ml.danger.now import CHANNELS
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.events import Event, Looked, Telemetry
 from server_gui.core.follow.feed import Feed, FollowSettings
 from server_gui.core.follow.mailbox import Mailbox
 from server_gui.core.follow.network import Network
-from server_gui.core.follow.news import News
+from server_gui.core.follow.news import News, NewsKind
 from server_gui.core.tuning.link import Link
 from server_gui.core.tuning.writing import WriteState
+from server_gui.terminal.foreseeing import Foreseeing
 from server_gui.terminal.summary import Summary
 
 CLIENT = "gwrms view"
@@ -33,7 +36,9 @@ PROCESSES = ResourceSnapshotParams(limit=8)
 class FollowedRobot:
     """Use it as a context manager; call `update` often, then read `station`."""
 
-    def __init__(self, address: Address, following: FollowSettings = FOLLOWING) -> None:
+    def __init__(
+        self, address: Address, following: FollowSettings = FOLLOWING, *, foresees: bool = False
+    ) -> None:
         self.summary: Summary | None = None
         self._mailbox = Mailbox()
         self._posted: collections.deque[Callable[[], None]] = collections.deque()
@@ -47,6 +52,13 @@ class FollowedRobot:
             PROCESSES,
         )
         self.station = Station(str(address), str(address), self._link, self._posted.append, News())
+        self.station.predictions.foresees = foresees
+        self._foreseeing: Foreseeing | None = None
+        if foresees:
+            self._foreseeing = Foreseeing(
+                str(address), functools.partial(self.station.tell, NewsKind.WARNING)
+            )
+            following = replace(following, channels=(*following.channels, *CHANNELS))
         self._feed = Feed(address, [self._mailbox.put], following)
         self._running: list[concurrent.futures.Future[None]] = []
         self._given_back = 0  # the revision of what was written when the lease was given back
@@ -69,6 +81,8 @@ class FollowedRobot:
             self._posted.popleft()()
         events = self._mailbox.drain()
         self.station.take(events)
+        for news in () if self._foreseeing is None else self._foreseeing.take(events):
+            self.station.take_prediction(news)
         if self.summary is not None:
             self._add_up(self.summary, events)
         self._give_back_control()

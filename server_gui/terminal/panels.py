@@ -15,7 +15,9 @@ from gateway.client import ConnectionState
 from gateway.plain import plain
 from gateway.units import Unit, Units
 from gateway.wire.parameter import ParameterInfo, ParameterValue
+from ml.danger.levels import Level
 from server_gui.core.alarms.alarm import Active
+from server_gui.core.alarms.found import undriven
 from server_gui.core.alarms.marks import GLYPHS
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.news import NewsKind
@@ -83,11 +85,24 @@ def header(station: Station, where: str, look: Look) -> RenderableType:
     known = mark_text(station.mark)
     where = f"{where}  {station.who}" if station.who else where
     row.add_row(
-        Text.assemble((plain(name), "bold"), "  ", known, ("  " + plain(where), DIM)), _link(robot, look)
+        Text.assemble((plain(name), "bold"), "  ", known, _danger(station), ("  " + plain(where), DIM)),
+        _link(robot, look),
     )
     if not look.roomy:
         return row
     return Panel(row, title="[bold]GWRMS[/]", title_align="left", box=box.ROUNDED, border_style=DIM)
+
+
+def _danger(station: Station) -> Text:
+    """The level of danger, or that it is not known; nothing where nobody foresees it, or it is no sign."""
+    shown = station.predictions.danger
+    if not station.predictions.foresees or undriven(station.robot, station.stopping):
+        return words("")
+    if shown is None or not shown.is_known:
+        return words("  danger: not known", style=OLD)
+    level = shown.said.verdict.level
+    style = BAD if level >= Level.ALARM else WARN if level > Level.NONE else DIM
+    return words(f"  danger: {level.word}", style=style)
 
 
 def _link(robot: Robot, look: Look) -> Text:

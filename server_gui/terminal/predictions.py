@@ -39,7 +39,9 @@ def told(name: str, watched: Watched) -> str:
         lines += [table(HEADER, map(_row, shown), RIGHT), table(MODELS, map(_model, shown)).rstrip()]
     lines += [f"{task}: {why}" for task, why in known.why.items()] or [known.problem] * (not shown)
     lines += _right(shown)
-    lines += [] if known.danger is None else [f"DANGER {known.danger.text}"]
+    if known.danger is not None or known.foresees:
+        danger = "unknown: nothing has been said" if known.danger is None else known.danger.text
+        lines.append(f"DANGER {danger}")
     lines += [f"RULE {rule.text}" for rule in known.rules]
     drifted = {channel for one in shown for channel in one.predicted.trust.drifted}
     lines += [

@@ -26,6 +26,9 @@ def quiet(station: Station | None) -> tuple[Mark, str, str]:
         return Mark("diamond", "accent"), "A recording", "no fault shown"
     if not station.is_live or not station.robot.parts:
         return Mark("ring", "old"), "Alarms not known", "no live data"
+    known = station.predictions
+    if known.foresees and not (known.danger is not None and known.danger.is_known):
+        return Mark("ring", "dim"), "No alarms", "danger is not known"
     return Mark("disc", "good"), "No alarms", "all ok"
 
 

@@ -4,15 +4,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Final
 
+from ml.danger.detector import DETECTORS
 from ml.danger.levels import Level as DangerLevel
-from ml.danger.watch import DETECTORS
 from ml.robot.task import ABNORMAL, UNKNOWN
 from ml.serving.trust import Level
 from server_gui.core.desk.belief import belief, blind, not_judged
 from server_gui.core.desk.leg_phase import LegPhase, apart, leg_phase, phase_at
 from server_gui.core.desk.station import Station
 from server_gui.core.models.names import model_name, told_name
-from server_gui.core.prediction.current import STALE_S, Recalled, ShownDanger, Told
+from server_gui.core.prediction.current import STALE_S, Recalled, StationPredictions, Told
 from server_gui.core.processing.gait_events import Leg
 from server_gui.views.marks import Mark
 
@@ -126,8 +126,8 @@ def lines(station: Station) -> Iterator[Line]:
         yield Line(
             Mark("ring", "old", "no model"), "Not predicted", predictions.problem, "", predictions.problem
         )
-    if predictions.danger is not None and not stopped:
-        yield _danger(predictions.danger)
+    if not stopped and not station.robot.is_recording:
+        yield from _danger(predictions)
     for rule in predictions.rules:
         yield Line(Mark("triangle", "warn", "rule"), f"Rule {rule.rule.action.value}", rule.text)
     told = {alarm.subject: alarm.mark for alarm in station.alarms.each}
@@ -138,16 +138,21 @@ def lines(station: Station) -> Iterator[Line]:
         yield Line(mark, f"{name}: {mark.word}", why, "", why)
 
 
-def _danger(shown: ShownDanger) -> Line:
-    """What is foreseen: its level and number, then why; nothing old or unknown is called fine."""
+def _danger(predictions: StationPredictions) -> Iterator[Line]:
+    """What is foreseen: its level and number, then why; nothing old, unknown or unsaid is called fine."""
+    shown = predictions.danger
+    if shown is None:
+        if predictions.foresees:
+            yield Line(Mark("ring", "old", "not known"), "Danger: not known", "nothing has been said of it")
+        return
     verdict = shown.said.verdict
-    if shown.is_stale() or verdict.number is None or verdict.level is DangerLevel.UNKNOWN:
+    if not shown.is_known or verdict.number is None:
         mark, text = Mark("ring", "old", "not known"), "Danger: not known"
     else:
         mark = _DANGERS[verdict.level]
         text = f"Danger: {verdict.level.word} {100 * verdict.number:.0f} %"
     speak = f"{verdict.speaking} of {len(DETECTORS)} detectors"
-    return Line(mark, text, "; ".join(verdict.why) or speak, speak, shown.text)
+    yield Line(mark, text, "; ".join(verdict.why) or speak, speak, shown.text)
 
 
 _DANGERS: Final = {

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from msgspec.structs import replace
 from threadpoolctl import threadpool_limits
 
 from ml.benchmarks.models.falling import FallSettings, fall_trees
@@ -38,13 +39,14 @@ from ml.serving.grid import period_ns
 from ml.serving.predictor import Windows, judged
 from server_gui.core.settings.prediction import Action, RuleSettings
 from tests.unit.ml.serving.small import hips
-from tests.unit.prediction.robots import predicting, publish, served, settings, telemetry
+from tests.unit.prediction.robots import described, predicting, promoters, publish, settings, telemetry
 
 ROBOTS = 50
 ROUNDS = 300
 WARM = 20  # rounds that do not count
 ONE_MS, ALL_MS = 2.0, 8.0  # the 99th percentiles that are allowed where the yardsticks are these:
 YARDSTICKS_MS = (2.4, 2.9)  # medians for one row and for fifty, on a computer that does little else
+PROMOTER = "tester"
 LEARNED = 1800  # rows that the models have learned from
 
 Predict = Callable[[npt.NDArray[np.float32]], Any]
@@ -194,11 +196,14 @@ def _stopping() -> list[float]:
     rule = RuleSettings("activity", "walk", 0.5, action=Action.STOP)
     with tempfile.TemporaryDirectory() as folder:
         url = Path(folder).as_uri()
-        publish(url)
-        with predicting(settings(url, rule)) as (one, told):
-            for number in range(ROBOTS):
-                robot = f"exo-{number}"
-                served(one, told, robot)
+        publish(url, by=PROMOTER)  # a rule stops nothing by a model that nobody has signed
+        server = replace(settings(url, rule), promoters=promoters(PROMOTER))
+        with predicting(server) as (one, told):
+            robots = [f"exo-{number}" for number in range(ROBOTS)]
+            for robot in robots:
+                one.take(robot, described())
+            told.until(lambda: {(robot, "activity") for robot in robots} <= one.models.keys())
+            for number, robot in enumerate(robots):
                 *before, last = list(telemetry(hips(2.1, walks=True)))
                 for event in before:
                     one.take(robot, event)

@@ -9,16 +9,19 @@ from typing import Any, Final
 from gateway.client import ConnectionState
 from gateway.wire.bus import CLOSED
 from gateway.wire.robot import GuardRuleInfo
+from ml.danger.levels import Level
 from server_gui.core.alarms.alarm import Alarm
 from server_gui.core.alarms.causes import Stall, stood_still
 from server_gui.core.alarms.marks import ENABLED, age_text
 from server_gui.core.alarms.texts import Kind, check_of, error_check, error_text
 from server_gui.core.follow.robot import Part, Robot
+from server_gui.core.prediction.current import ShownDanger
 from server_gui.core.processing import bus_health
 from server_gui.core.tuning.stop import StopProgress, StopState
 
 MOVES: Final = 0.1  # rad/s: what turns faster is not at rest
 SOON_NS: Final = 3_000_000_000  # for so long a link without a row is nothing strange
+_QUICK_STOP: Final = "quick stop active"
 _IN_FAULT: Final = ("fault", "fault reaction active")
 _CODE: Final = re.compile(r"0x([0-9A-Fa-f]{4})\b")
 _PREFIX: Final = re.compile(r"^(the drive is in fault: |it reports )")
@@ -49,6 +52,7 @@ class Facts:
     address: str
     journal: Iterable[Mapping[str, Any]] = ()
     stalls: Sequence[Stall] = ()
+    danger: ShownDanger | None = None
 
 
 def alarms(facts: Facts) -> Iterator[Alarm]:
@@ -65,6 +69,7 @@ def alarms(facts: Facts) -> Iterator[Alarm]:
     yield from _of_those_that_come_up(robot)
     yield from _of_guard(facts)
     yield from _of_buses(robot)
+    yield from _of_danger(facts)
     if not robot.is_recording:
         yield from stood_still(facts.stalls)
 
@@ -315,6 +320,35 @@ def _of_buses(robot: Robot) -> Iterator[Alarm]:
         kind = Kind.BUS_FAILS if bus_health.level(bus) is bus_health.Level.ALARM else Kind.BUS
         where, is_now = f"bus {bus.name}", now is not None
         yield Alarm(kind, f"bus.{bus.name}", what, where, check=check or check_of(kind), is_now=is_now)
+
+
+# --- danger
+
+
+def undriven(robot: Robot, stopping: StopProgress) -> str:
+    """Return why what the robot does now is no sign of anything: it does not drive its wearer."""
+    words = [(word or "").lower() for word in _words(robot).values()]
+    if stopping.held:
+        return "a stop is held"
+    if _QUICK_STOP in words:
+        return "drives stop"
+    if any(word in _IN_FAULT for word in words):
+        return "a drive is in fault"
+    return "no drive is enabled" if words and all(words) and ENABLED not in words else ""
+
+
+def _of_danger(facts: Facts) -> Iterator[Alarm]:
+    """From advice on; what was so when it was known last does not end by being unknown."""
+    shown = facts.danger
+    known = None if shown is None else shown.known
+    if shown is None or known is None or known.level < Level.ADVICE:
+        return
+    if undriven(facts.robot, facts.stopping):
+        return
+    kind = Kind.DANGER if known.level >= Level.ALARM else Kind.DANGER_ADVICE
+    did = "" if shown.is_known else "whether it is so still is not known"
+    level = f"level {known.level.word}"
+    yield Alarm(kind, "danger", known.reasons, level, did, check_of(kind), is_now=shown.is_known)
 
 
 # --- small things

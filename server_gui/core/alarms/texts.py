@@ -19,6 +19,7 @@ class Kind(Enum):
     NO_LINK = "no link"
     FAULT = "fault"
     GUARD = "guard tripped"
+    DANGER = "danger foreseen"
     IMPLAUSIBLE = "not to be believed"
     LOST = "lost"
     NO_DATA = "no data yet"
@@ -31,6 +32,7 @@ class Kind(Enum):
     UNKNOWN = "state not known"
     BUS = "bus trouble"
     BLIND = "guard blind"
+    DANGER_ADVICE = "danger possible"
     REPORTS = "warning"
     RECORDING = "recording"
     UPLOAD = "store"
@@ -85,6 +87,18 @@ TEXTS: Final = dict(
             "square",
             "bad",
             "find out why before the stop is reset; the rule's limit is in its file",
+        ),
+        _text(
+            Kind.DANGER,
+            "square",
+            "bad",
+            "look at the wearer now, STOP if in doubt; it is on trial, and may be wrong (gwrms docs danger)",
+        ),
+        _text(
+            Kind.DANGER_ADVICE,
+            "triangle",
+            "warn",
+            "look at the wearer and the robot; it is on trial, and may be wrong (gwrms docs danger)",
         ),
         _text(Kind.IMPLAUSIBLE, "square", "bad", "check the encoder or sensor, and its cable"),
         _text(Kind.LOST, "cross", "bad", "check its power, its cable and its address"),

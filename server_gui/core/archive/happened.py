@@ -5,7 +5,7 @@ from concurrent.futures import Future
 from typing import Any, Final
 
 from server_gui.core.cloud.tape import Rows, Tape
-from server_gui.core.desk.flags import Entry, Flag, Flags, StateWatch, of_marks, of_recorded_journal
+from server_gui.core.desk.flags import Entry, Flag, Flags, StateWatch, of_events, of_recorded_journal
 from server_gui.core.threads.answers import Deliver, when_done
 
 PIECE_NS: Final = (
@@ -29,7 +29,7 @@ class Happened:
         """Find out of another recording; `words` are those of its channels that are states."""
         self._tape, self.problem, self.until_ns = tape, "", tape.first_ns
         self.flags.clear()
-        self.flags.add(*of_marks(tape.events))
+        self.flags.add(*of_events(tape.events))
         self._look(tape, words, StateWatch())
 
     def tell(self, entries: Iterable[Entry]) -> None:

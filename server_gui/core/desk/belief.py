@@ -7,14 +7,12 @@ from typing import Final
 
 from ml.registry.card import Source
 from ml.serving.trust import Level
-from server_gui.core.alarms.marks import ENABLED
+from server_gui.core.alarms.found import undriven
 from server_gui.core.desk.station import Station
 from server_gui.core.models.names import told_name
 from server_gui.core.prediction.current import Recalled, Shown, Told
 from server_gui.core.prediction.state import Quality
 
-QUICK_STOP: Final = "quick stop active"
-IN_FAULT: Final = ("fault", "fault reaction active")
 NOT_SEEN: Final = ("lost", "stale")
 SOURCES: Final = {
     Source.SIMULATED: "learned in the simulator",
@@ -58,15 +56,7 @@ def belief(told: Told) -> Belief:
 
 def not_judged(station: Station) -> str:
     """Return why what the robot does now is no sign of anything: it does not drive its wearer."""
-    robot = station.robot
-    words = [(robot.word(f"{joint}.state") or "").lower() for joint in robot.names("joint")]
-    if station.stopping.held:
-        return "a stop is held"
-    if QUICK_STOP in words:
-        return "drives stop"
-    if any(word in IN_FAULT for word in words):
-        return "a drive is in fault"
-    return "no drive is enabled" if words and all(words) and ENABLED not in words else ""
+    return undriven(station.robot, station.stopping)
 
 
 def blind(station: Station) -> str:

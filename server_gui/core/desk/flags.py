@@ -22,6 +22,7 @@ class FlagKind(Enum):
     WRITE = "write"
     TRIAL = "trial"
     MARK = "mark"
+    DANGER = "danger"  # advice or worse is foreseen, or is over
     TRIGGER = "trigger"  # of the signals, and nowhere else
 
 
@@ -125,11 +126,12 @@ def of_recorded_journal(entries: Iterable[Entry]) -> Iterator[Flag]:
         yield from _of_entry(entry, "utc_ns")
 
 
-def of_marks(events: Iterable[Entry]) -> Iterator[Flag]:
-    """Yield the marks among the events of a recording, in UTC."""
+def of_events(events: Iterable[Entry]) -> Iterator[Flag]:
+    """Yield what the events of a recording tell of robot and wearer, in UTC; others tell what is missing."""
     for event in events:
-        if event.get("kind") == EventKind.MARKER.value:
-            yield Flag(utc_ns(event["utc"]), str(event.get("text") or "mark"), FlagKind.MARK)
+        kind = TOLD.get(str(event.get("kind")))
+        if kind is not None:
+            yield Flag(utc_ns(event["utc"]), str(event.get("text") or kind.value), kind)
 
 
 def _of_entry(entry: Entry, clock: str) -> Iterator[Flag]:
@@ -164,6 +166,7 @@ def _at(flag: Flag) -> int:
     return flag.at_ns
 
 
+TOLD: Final = {EventKind.MARKER.value: FlagKind.MARK, EventKind.DANGER.value: FlagKind.DANGER}
 _HOW: Final = {FlagKind.FAULT: "fault", FlagKind.STOP: "quick stop"}
 _ENTRIES: Final = {
     "stop": FlagKind.STOP,

@@ -17,6 +17,7 @@ from gateway.wire.parameter import ParameterInfo, Written
 from gateway.wire.resource import ProcessUse, ResourceSnapshot
 from gateway.wire.robot import Description
 from gateway.wire.stop import Stopped
+from ml.danger.levels import Level
 from server_gui.core.alarms.alarm import Alarms
 from server_gui.core.alarms.causes import STOOD_S, Stalls, gathered
 from server_gui.core.alarms.found import Facts, any_enabled
@@ -45,7 +46,7 @@ from server_gui.core.follow.robot import Robot
 from server_gui.core.follow.robot_news import RobotNews
 from server_gui.core.objects.objects import Objects
 from server_gui.core.prediction.current import StationPredictions
-from server_gui.core.prediction.news import PredictionNews, Ruled
+from server_gui.core.prediction.news import Endangered, PredictionNews, Ruled, turn
 from server_gui.core.processing.robot_processing import RobotProcessing
 from server_gui.core.threads.answers import Deliver, Result, when_done
 from server_gui.core.tuning.commands import Commands
@@ -158,7 +159,8 @@ class Station:
     def alarms(self) -> Alarms:
         """What is wrong with it, as of now."""
         stalls, now_s = self._stalls.latest, self.robot.now_s()
-        facts = Facts(self.robot, self.stopping, self.address, self.audit.entries, stalls)
+        told, danger = self.audit.entries, self.predictions.danger
+        facts = Facts(self.robot, self.stopping, self.address, told, stalls, danger)
         if self.stopping.was_ended and any_enabled(self.robot) and self.is_live:
             self.stopping.was_ended = False
         self._alarms.look(
@@ -269,9 +271,15 @@ class Station:
 
     def take_prediction(self, news: PredictionNews) -> None:
         """Apply what models say of this robot."""
+        before = self.predictions.danger
         self.predictions.take(news)
         if isinstance(news, Ruled):
             self.tell(NewsKind.WARNING, news.text)
+        if isinstance(news, Endangered):
+            level = Level.NONE if before is None else before.said.verdict.level
+            if (happened := turn(level, news.verdict)) is not None:
+                self.tell(NewsKind.WARNING, happened)
+                self.flags.add(Flag(news.verdict.stamp_ns, happened, FlagKind.DANGER))
 
     def take_evidence(self, told: Told) -> None:
         """Apply what is known now of an edit."""

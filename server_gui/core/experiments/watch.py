@@ -19,7 +19,14 @@ PASSES_NS: Final = 2_000_000_000
 # Not of the robot's state, or looked at elsewhere: rows that do not come have a rule of their own (`STALE_S`
 # of a run), and what a troubled bus has lost is left out with its strides.
 NO_REASON: Final = frozenset(
-    {AlarmKind.STALE, AlarmKind.BUS, AlarmKind.NOT_RECORDED, AlarmKind.RECORDING, AlarmKind.UPLOAD}
+    {
+        AlarmKind.STALE,
+        AlarmKind.BUS,
+        AlarmKind.NOT_RECORDED,
+        AlarmKind.RECORDING,
+        AlarmKind.UPLOAD,
+        AlarmKind.DANGER_ADVICE,  # a changed parameter is unusual; from the level alarm on it counts
+    }
 )
 ENDING: Final = {
     "stop": "somebody has sent a STOP",

@@ -9,8 +9,9 @@ from collections.abc import Callable, Sequence
 import msgspec
 
 from gateway.wire.stop import Stopped
+from ml.danger.levels import Level
 from server_gui.core.fleet.stop_links import StopRobot
-from server_gui.core.prediction.news import Predicted, PredictionNews, Ruled
+from server_gui.core.prediction.news import Endangered, Predicted, PredictionNews, Ruled, turn
 from server_gui.core.prediction.service import PredictionService
 from server_gui.core.recording.batching import EventKind
 from server_gui.core.recording.recorder import Recorder
@@ -41,6 +42,7 @@ class RecordedPrediction(PredictionService):
         self._session = session
         self._stop_robot = stop
         self._show = show
+        self._levels: dict[str, Level] = {}  # of danger, by robot
 
     def _keep(self, news: Sequence[PredictionNews]) -> None:
         told = [(self._session(one.robot), one) for one in news if isinstance(one, Predicted)]
@@ -51,8 +53,16 @@ class RecordedPrediction(PredictionService):
             if isinstance(one, Ruled):
                 log.warning("%s: %s", one.robot, one.text)
                 self._recorder.event(one.robot, EventKind.RULE, one.text, stamp=one.cause.prediction.stamp_ns)
+            if isinstance(one, Endangered):
+                self._note(one)
         if self._show is not None:
             self._show(news)
+
+    def _note(self, one: Endangered) -> None:
+        before, self._levels[one.robot] = self._levels.get(one.robot, Level.NONE), one.verdict.level
+        if (happened := turn(before, one.verdict)) is not None:
+            told = {"level": one.verdict.level.word, "number": one.verdict.number}
+            self._recorder.event(one.robot, EventKind.DANGER, happened, stamp=one.verdict.stamp_ns, **told)
 
     def _ask_to_stop(self, ruled: Ruled) -> None:
         self._stop_robot(ruled.robot, ruled.text).add_done_callback(functools.partial(self._stopped, ruled))

@@ -5,6 +5,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
+from ml.danger.levels import Level
+from ml.danger.watch import Verdict
 from ml.serving.predictor import Prediction
 from server_gui.core.follow import moment
 from server_gui.core.prediction.news import Endangered, Predicted, PredictionNews, Ruled, Serves
@@ -39,15 +41,21 @@ class Shown:
 
 @dataclass(frozen=True, slots=True)
 class ShownDanger:
-    """What was foreseen last, and when that came."""
+    """What was foreseen last, and when that came; `known` is the newest verdict whose level is known."""
 
     said: Endangered
     came_ns: int  # our monotonic clock
+    known: Verdict | None = None
 
     def is_stale(self, now_ns: int | None = None) -> bool:
         """Return whether it is too old to be called live: nothing is known then."""
         now_ns = time.monotonic_ns() if now_ns is None else now_ns
         return now_ns - self.came_ns + (self.said.took_ns or 0) > STALE_S * 1e9
+
+    @property
+    def is_known(self) -> bool:
+        """Return whether somebody can say now how it is."""
+        return not self.is_stale() and self.said.verdict.level is not Level.UNKNOWN
 
     @property
     def text(self) -> str:
@@ -87,6 +95,7 @@ class StationPredictions:
     danger: ShownDanger | None = None
     why: dict[str, str] = field(default_factory=dict)
     off: bool = False
+    foresees: bool = False  # whether danger is to be foreseen: then nothing said is not known, and no silence
     revision: int = 0
     _rules: dict[RuleSettings, Ruled] = field(default_factory=dict)
     _looked: bool = False
@@ -117,7 +126,7 @@ class StationPredictions:
             case Predicted():
                 self.by_task[news.prediction.task] = Shown(news, time.monotonic_ns())
             case Endangered():
-                self.danger = ShownDanger(news, time.monotonic_ns())
+                self.danger = ShownDanger(news, time.monotonic_ns(), self._known(news.verdict))
             case Ruled(began=True):
                 self._rules[news.rule] = news
             case Ruled():
@@ -126,6 +135,11 @@ class StationPredictions:
                 self.why, self._looked = dict(news.why), True
                 for task in self.by_task.keys() - news.models.keys():
                     del self.by_task[task]
+
+    def _known(self, verdict: Verdict) -> Verdict | None:
+        if verdict.level is not Level.UNKNOWN:
+            return verdict
+        return None if self.danger is None else self.danger.known
 
     def clear(self) -> None:
         """The link has dropped, or the robot has booted: nothing is known of it now."""

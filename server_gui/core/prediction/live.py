@@ -26,16 +26,16 @@ MOST: Final = 10_000  # predictions, that wait for nobody
 class Watched:
     """A robot, and what is predicted of it."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, foresees: bool = False) -> None:
         self.robot = Robot()
-        self.predictions = StationPredictions()
+        self.predictions = StationPredictions(foresees=foresees)
 
 
 class Live:
     """Follows robots from entering to leaving; use it as a context manager. No rule stops a robot here."""
 
     def __init__(self, settings: ServerSettings, robots: Mapping[str, Address]) -> None:
-        self.robots = {name: Watched() for name in robots}
+        self.robots = {name: Watched(foresees=settings.prediction.danger) for name in robots}
         self._addresses = robots
         self._following = FollowSettings(
             "gwrms predict",

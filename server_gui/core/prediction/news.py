@@ -3,7 +3,9 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from ml.danger.watch import DETECTORS, Verdict
+from ml.danger.detector import DETECTORS
+from ml.danger.levels import Level
+from ml.danger.watch import Verdict
 from ml.registry.card import Card
 from ml.serving.predictor import Prediction
 from ml.serving.trust import Trust
@@ -47,6 +49,17 @@ class Endangered:
             return "unknown: no detector has what it needs"
         speak = f"{verdict.speaking} of {len(DETECTORS)} detectors speak"
         return "; ".join([f"{verdict.level.word}, {verdict.number:.2f}, {speak}", *verdict.why])
+
+
+def turn(before: Level, verdict: Verdict) -> str | None:
+    """What is to be noted where advice, or what is worse, begins or ends; None where nothing has happened."""
+    if verdict.level is before or max(verdict.level, before) < Level.ADVICE:
+        return None
+    if verdict.level is Level.UNKNOWN:
+        return f"danger: not known any more, after {before.word}"
+    if verdict.level < Level.ADVICE:
+        return f"danger: {before.word} is over"
+    return f"danger: {verdict.level.word}: {verdict.reasons}"
 
 
 @dataclass(frozen=True, slots=True)

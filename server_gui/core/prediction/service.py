@@ -54,6 +54,7 @@ class PredictionService:
         self._inbox = Inbox[Event]()
         self._robots: dict[str, RobotPredictor] = {}
         self._calibration: Calibration | None = None
+        self._unforeseen: str | None = None  # why danger is not, though it is to be
         self._broken: dict[str, str] = {}  # models, and why
         self._judged = 0
         self._skipped = 0
@@ -88,7 +89,8 @@ class PredictionService:
     @property
     def state(self) -> PredictingState:
         """How it goes now; from any thread."""
-        problems = [one for one in (self._serving.problem, self._tracking.problem) if one is not None]
+        said = self._serving.problem, self._tracking.problem, self._unforeseen
+        problems = [one for one in said if one is not None]
         problems += [f"{robot}: {task}: {why}" for (robot, task), why in self._serving.problems.items()]
         problems += self._powerless()
         robots = {robot: _reports(known) for robot, known in self._robots.copy().items()}
@@ -117,7 +119,8 @@ class PredictionService:
         try:
             self._calibration = load() if self._settings.prediction.danger else None
         except UnusableModel as error:
-            log.warning("danger is not foreseen: %s", error)
+            self._unforeseen = f"danger is not foreseen: {error}"
+            log.warning("%s", self._unforeseen)
         with threadpool_limits(limits=1):  # small batches gain nothing from more, and the cores are others'
             while (taken := self._inbox.take(BEAT_S)) is not None:
                 self._worker.beat()

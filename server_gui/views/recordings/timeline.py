@@ -10,8 +10,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from ml.store.labels import Label, utc_ns
 from server_gui.core.cloud.tape import Tape
-from server_gui.core.desk.flags import Flag
-from server_gui.core.recording.batching import EventKind
+from server_gui.core.desk.flags import TOLD, Flag
 from server_gui.views.marks import Mark, draw
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.cursors import FLAGS
@@ -168,7 +167,7 @@ class Timeline(QWidget):
         painter.drawRect(bar)
         self._draw_ticks(painter, bar)
         for happened in self._tape.events:
-            if happened["kind"] != EventKind.MARKER.value:
+            if happened["kind"] not in TOLD:
                 self._draw_mark(painter, bar, MISSING, utc_ns(happened["utc"]))
         for flag in self._flags:
             self._draw_mark(painter, bar, FLAGS[flag.kind], flag.at_ns)

@@ -19,12 +19,14 @@ FLAGS: Final = {
     FlagKind.FAULT: Mark("triangle", "bad", "fault"),
     FlagKind.WRITE: Mark("disc", "accent", "write"),
     FlagKind.TRIAL: Mark("half", "accent", "trial"),
+    FlagKind.DANGER: Mark("triangle", "warn", "danger"),
     FlagKind.MARK: Mark("diamond", "text", "mark"),
     FlagKind.TRIGGER: Mark("ring", "accent", "trigger"),
 }
 FIRST: Final = (
     FlagKind.FAULT,
     FlagKind.STOP,
+    FlagKind.DANGER,
     FlagKind.MARK,
     FlagKind.TRIAL,
     FlagKind.WRITE,

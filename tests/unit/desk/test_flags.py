@@ -9,8 +9,8 @@ from server_gui.core.desk.flags import (
     FlagKind,
     Flags,
     StateWatch,
+    of_events,
     of_journal,
-    of_marks,
     of_recorded_journal,
 )
 from server_gui.core.desk.recording import By, Recording
@@ -74,7 +74,7 @@ def test_the_journal_tells_stops_writes_and_trials_of_this_boot() -> None:
 def test_marks_of_a_recording_are_flags() -> None:
     at = datetime.datetime(2026, 11, 23, tzinfo=datetime.UTC)
     events = [{"kind": "marker", "utc": at, "text": "turns"}, {"kind": "gap", "utc": at, "text": ""}]
-    assert [(flag.text, flag.kind) for flag in of_marks(events)] == [("turns", FlagKind.MARK)]
+    assert [(flag.text, flag.kind) for flag in of_events(events)] == [("turns", FlagKind.MARK)]
 
 
 def test_flags_are_in_the_order_of_time_bounded_and_none_is_told_twice() -> None:

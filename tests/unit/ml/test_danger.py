@@ -9,10 +9,11 @@ from hypothesis import strategies as st
 
 from ml.danger.budget import BUDGETS, rate_interval, rule_of_three, share_interval, thresholds
 from ml.danger.combine import Calibration, load
+from ml.danger.detector import DETECTORS
 from ml.danger.levels import CALM_S, URGENT, Level, Levels
 from ml.danger.now import CHANNELS
 from ml.danger.usual import FEWEST, WAITS, Usual
-from ml.danger.watch import DETECTORS, Watch
+from ml.danger.watch import Watch
 
 PERIOD_NS = 140_000_000  # as seldom as can be: it is learned from seconds, not from rows
 CALIBRATION = load()

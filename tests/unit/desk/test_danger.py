@@ -1,0 +1,147 @@
+"""Danger at the desk: an alarm from advice on, a flag on the axis of time, and never fine where unknown."""
+
+import time
+from datetime import UTC, datetime
+from typing import Any, Final
+
+import pytest
+
+from gateway.client import ConnectionState
+from ml.danger.levels import Level
+from server_gui.core.alarms.texts import Kind
+from server_gui.core.desk.desk import Desk
+from server_gui.core.desk.flags import FlagKind, of_events
+from server_gui.core.desk.station import Station
+from server_gui.core.fleet.live_prediction import RecordedPrediction
+from server_gui.core.follow.events import LinkChanged
+from server_gui.core.prediction.news import turn
+from server_gui.core.prediction.robot_predictor import RobotPredictor
+from server_gui.core.recording.batching import EventKind
+from server_gui.terminal.foreseeing import Foreseeing
+from tests.support.desk import Bench, described, looked, walking
+from tests.support.terminal_robot import a_station, screen
+from tests.unit.prediction.endangered import HOT, endangered
+from tests.unit.prediction.robots import ROBOT
+
+NOW: Final = datetime.now(UTC)
+KINDS: Final = {Kind.DANGER, Kind.DANGER_ADVICE}
+
+
+@pytest.fixture
+def station(monkeypatch: pytest.MonkeyPatch) -> Station:
+    """A robot that walks, whose data and whose danger stay new within a test."""
+    monkeypatch.setattr("server_gui.core.follow.robot.STALE_NS", 60_000_000_000)
+    monkeypatch.setattr("server_gui.core.prediction.current.STALE_S", 60.0)
+    bench = Bench(Desk())
+    made = bench.add("exo-01")
+    made.predictions.foresees = True
+    made.take([described(), walking(50), looked()])
+    return made
+
+
+def told(station: Station) -> list[tuple[Kind, bool]]:
+    """The alarms of danger, and whether each is so now."""
+    active = (one.alarm for one in station.alarms.active)
+    return [(alarm.kind, alarm.is_now) for alarm in active if alarm.kind in KINDS]
+
+
+@pytest.mark.parametrize(
+    ("level", "kind", "colour"),
+    [
+        (Level.UNKNOWN, None, None),
+        (Level.NONE, None, None),
+        (Level.EARLY, None, None),
+        (Level.ADVICE, Kind.DANGER_ADVICE, "warn"),
+        (Level.ALARM, Kind.DANGER, "bad"),
+        (Level.STOP, Kind.DANGER, "bad"),
+    ],
+)
+def test_from_advice_on_it_is_an_alarm_with_its_level_and_reasons(
+    station: Station, level: Level, kind: Kind | None, colour: str | None
+) -> None:
+    station.take_prediction(endangered(level))
+    assert told(station) == ([] if kind is None else [(kind, True)])
+    if kind is not None:
+        (one,) = station.alarms.active
+        assert one.alarm.mark.colour == colour
+        assert one.alarm.line.endswith(f"level {level.word}: {HOT}")
+        assert "on trial, and may be wrong" in one.alarm.check
+        assert f"{kind.value}: level {level.word}: {HOT}" in screen(station)
+        assert f"danger: {level.word}" in screen(station)
+
+
+def test_what_nobody_knows_any_more_is_not_over(station: Station) -> None:
+    station.take_prediction(endangered(Level.ALARM))
+    station.take_prediction(endangered(Level.UNKNOWN))
+    assert told(station) == [(Kind.DANGER, False)]
+    (one,) = station.alarms.active
+    assert one.alarm.did == "whether it is so still is not known"
+    station.take_prediction(endangered(Level.NONE))
+    assert not told(station)
+
+
+def test_a_robot_that_is_stopped_or_has_gone_is_not_judged(station: Station) -> None:
+    station.take_prediction(endangered(Level.ALARM))
+    station.stopping.described(True, "somebody's")
+    assert not told(station)
+    station.take([LinkChanged(ConnectionState.WAITING, "gone", time.monotonic_ns())])
+    assert station.predictions.danger is None
+    assert Kind.NO_LINK in {one.alarm.kind for one in station.alarms.active}
+
+
+def test_it_stands_on_the_axis_of_time_where_it_begins_gets_worse_and_ends(station: Station) -> None:
+    levels = (Level.NONE, Level.EARLY, Level.ADVICE, Level.ADVICE, Level.ALARM, Level.UNKNOWN, Level.NONE)
+    for second, level in enumerate(levels):
+        station.take_prediction(endangered(level, stamp_ns=second * 10**9))
+    flags = [flag for flag in station.flags if flag.kind is FlagKind.DANGER]
+    assert [(flag.at_ns // 10**9, flag.text) for flag in flags] == [
+        (2, f"danger: advice: {HOT}"),
+        (4, f"danger: alarm: {HOT}"),
+        (5, "danger: not known any more, after alarm"),
+    ]
+
+
+def test_what_ends_is_said_and_what_is_below_advice_is_not_noted() -> None:
+    assert turn(Level.STOP, endangered(Level.EARLY).verdict) == "danger: stop is over"
+    assert turn(Level.NONE, endangered(Level.EARLY).verdict) is None
+    assert turn(Level.UNKNOWN, endangered(Level.NONE).verdict) is None
+
+
+def test_a_recording_keeps_it_as_events_which_are_shown_again() -> None:
+    kept: list[dict[str, Any]] = []
+
+    class Recorder:
+        def event(self, robot: str, kind: EventKind, text: str, **data: Any) -> None:
+            kept.append({"robot": robot, "kind": kind.value, "text": text, "utc": NOW, **data})
+
+    one = object.__new__(RecordedPrediction)
+    one._recorder, one._show, one._levels = Recorder(), None, {}  # type: ignore[assignment]
+    one._session = lambda _: ""
+    one._keep([endangered(Level.NONE), endangered(Level.ADVICE), endangered(Level.ADVICE)])
+    one._keep([endangered(Level.NONE)])
+    assert [(event["robot"], event["level"]) for event in kept] == [(ROBOT, "advice"), (ROBOT, "none")]
+    assert [flag.kind for flag in of_events([*kept, {"kind": "gap", "utc": NOW}])] == [FlagKind.DANGER] * 2
+
+
+def test_the_terminal_says_the_level_and_that_it_is_not_known_and_nothing_where_it_is_off() -> None:
+    station = a_station()
+    assert "danger" not in screen(station)
+    station.predictions.foresees = True
+    assert "danger: not known" in screen(station)
+    for level, words in ((Level.NONE, "danger: none"), (Level.UNKNOWN, "danger: not known")):
+        station.take_prediction(endangered(level))
+        assert words in screen(station, size=(80, 24))
+
+
+def test_what_breaks_while_it_foresees_is_told_once_and_ends_nothing_else(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    told: list[str] = []
+    one = Foreseeing(ROBOT, told.append)
+
+    def broken(*_: object) -> None:
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(RobotPredictor, "take", broken)
+    assert [list(one.take([])) for _ in range(2)] == [[], []]
+    assert told == ["danger is not foreseen any more: internal error, ZeroDivisionError"]
