@@ -115,3 +115,20 @@ def test_a_store_is_downloaded_and_verified(
     shown.until(lambda: all(job.is_over for job in archive.jobs.jobs), "did both")
     assert [job.state for job in archive.jobs.jobs] == [JobState.DONE, JobState.DONE]
     assert Store((tmp_path / "copy").as_uri()).dataset("sessions").count_rows() > 0
+
+
+@pytest.mark.parametrize("width", [500, 1200])
+def test_what_came_of_a_job_is_whole(theme: Theme, width: int) -> None:
+    jobs = Jobs()
+    jobs.jobs.appendleft(Job("Train activity", JobState.DONE, said="Better: " + "F1 on held-out people " * 8 + "0.97"))
+    table = JobsTable(jobs, theme)
+    table.resize(width, 300)
+    table.show()
+    table.refresh()
+    settle()
+    room = table.visualItemRect(item) if (item := table.item(0, SAID)) is not None else QRect()
+    wraps = Qt.TextFlag.TextWordWrap
+    needs = table.fontMetrics().boundingRect(QRect(0, 0, room.width() - 8, 10_000), wraps, jobs.jobs[0].said)
+    assert room.height() >= needs.height() > 0
+    jobs.close()
+    destroy(table)
