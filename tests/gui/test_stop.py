@@ -238,11 +238,11 @@ def test_a_held_stop_that_was_not_confirmed_is_ended_by_whoever_resets_it() -> N
 def test_a_name_that_has_room_beside_the_word_is_not_cut(theme: Theme) -> None:
     button = StopButton("robot_stop")
     button.name("simulated-exo")
+    button.show()
     font = QApplication.font()
     font.setBold(False)
     name = QFontMetrics(font).horizontalAdvance("simulated-exo")
-    button.setFixedWidth(button._word + button._gap + name + 20)  # 8 + 8 of padding, 2 of frame
-    button.show()
+    button.setFixedWidth(button._word + button._gap + name + 20)  # 8 + 8 of padding, and a frame
     assert button.lines == ["simulated-exo"]
     assert button.is_whole
     destroy(button)

@@ -21,6 +21,7 @@ SMALL: Final = 0.75  # of the size that text has elsewhere: what is smaller is n
 LEAST: Final = 90  # wide and high, at text of 100 %: three lines have room in its middle
 READ: Final = 0.85  # of it, for a phase's name
 FREE: Final = 1.08  # of the box in the middle: the circle that touches no ring
+MOST, MOST_SHORT = 5, 3  # lines; above and below three small ones the circle has no room
 LETTERS: Final = 0.7  # of a line, high
 DIM: Final = 70  # opacity of the phases that are not now, of 255
 
@@ -172,7 +173,7 @@ class GaitRing(QWidget):
             if (now := self._phases[leg] or self._modelled[leg]) is not None:
                 said = self._phase_text(leg, now, box.width(), is_short=is_short)
                 legs.append((said, leg.value if self._live else "old", plain, False))
-        most = max(1, int(box.height() / line))
+        most = max(1, min(int(box.height() / line), MOST_SHORT if is_short else MOST))
         words: list[Row] = [(one, colour, bold, True) for one in self._word_lines(box, most - len(legs))]
         if is_short:
             return [*legs[:1], *words, *legs[1:]], line

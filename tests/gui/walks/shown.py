@@ -92,6 +92,7 @@ def painted() -> None:
     ends_s = time.monotonic() + PAINTED_S
     while time.monotonic() < ends_s and not all(map(_is_on_screen, QApplication.topLevelWindows())):
         QApplication.processEvents()
+    rules.settle()
     for top in QApplication.topLevelWidgets():
         if top.isVisible():
             top.repaint()
