@@ -9,7 +9,6 @@ from PySide6.QtGui import QFontMetrics, QPainter, QResizeEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QHeaderView,
-    QStyledItemDelegate,
     QStyleOptionViewItem,
     QTableView,
 )
@@ -23,6 +22,7 @@ from server_gui.core.follow.robot import Part
 from server_gui.core.tuning.stop import StopState
 from server_gui.views.marks import STILL_ENABLED, state_mark
 from server_gui.views.theme import Theme
+from server_gui.views.widgets.elided import SentenceDelegate
 from server_gui.views.widgets.plain import tip
 
 Index = QModelIndex | QPersistentModelIndex
@@ -142,11 +142,11 @@ class JointModel(QAbstractTableModel):
         return None
 
 
-class BarDelegate(QStyledItemDelegate):
-    """Draws a cell's bar below its text: from the middle, as far as its share."""
+class BarDelegate(SentenceDelegate):
+    """Draws a cell's bar below its text: from the middle, as far as its share; errors to a whole word."""
 
     def __init__(self, theme: Theme) -> None:
-        super().__init__()
+        super().__init__(ERROR)
         self._theme = theme
 
     def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: Index) -> None:

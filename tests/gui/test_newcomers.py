@@ -21,7 +21,10 @@ from tests.support.desk import JOINTS, looked, walking
 
 ANGLES = {side: ["+16°", "+43°", "-13°"] for side in ("left", "right")}
 OLD_S = 70.0
-MANY = "overcurrent, 0x2310; its position jumped by 8.7° within 50 ms; left and right differ; 11 % of its PDOs are missing (for 60 s)"
+MANY = (
+    "overcurrent, 0x2310; its position jumped by 8.7° within 50 ms, which is not its speed; "
+    "11 % of its PDOs are missing (for 60 s)"
+)
 LASTING = " (for 60 s)"
 
 

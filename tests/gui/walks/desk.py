@@ -168,9 +168,10 @@ def learning(bench: Bench) -> None:
     put(bench.store.as_uri(), bench.folder / "walks", days)
     hand.key("alt+m")
     hand.insist("Train a model", lambda: hand.reads("What it predicts"))
+    hand.reach("Start training")
     hand.click("Training: Judged by")
     hand.type(JUDGE)  # by name: else the recording of this bench may be among the judges
-    hand.reach("Start training")
+    hand.sees(JUDGE)
     hand.keep("train")
     hand.click("Start training")
     hand.sees("Better: F1", within_s=AGAIN_S)
