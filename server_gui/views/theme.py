@@ -228,6 +228,8 @@ class Theme(QObject):
         self.colours = PALETTES[self.look]
         font = QFont(self._family)
         font.setPointSizeF(BASE_POINTS * self.scale)
+        if (self._application.font(), self._application.styleSheet()) == (font, self._style()):
+            return  # every widget would take them anew, for a second
         self._application.setFont(font)
         self._application.setPalette(self._palette())
         # Never without a sheet in between: Qt 6.11 then keeps widgets that are gone, and crashes later.

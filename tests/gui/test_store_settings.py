@@ -4,9 +4,6 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import QPointF, Qt
-from PySide6.QtGui import QWheelEvent
-from PySide6.QtWidgets import QApplication
 
 from server_gui.core.settings.file_edits import change
 from server_gui.core.settings.server_file import SettingsError, load
@@ -123,14 +120,3 @@ def test_a_folder_that_cannot_be_written_is_said(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(SettingsError, match="cannot be"):
         change(tmp_path / "file" / "server.toml", {("store", "url"): "s3://lab/exo"})
-
-
-def test_the_wheel_changes_nothing_without_focus(form: SettingsForm) -> None:
-    before = form.upload.currentIndex()
-    form.url.setFocus()
-    here = QPointF(5, 5)
-    none = (Qt.MouseButton.NoButton, Qt.KeyboardModifier.NoModifier, Qt.ScrollPhase.NoScrollPhase)
-    down = QPointF(0, -120).toPoint()
-    event = QWheelEvent(here, form.upload.mapToGlobal(here), down, down, *none, False)
-    QApplication.sendEvent(form.upload, event)
-    assert form.upload.currentIndex() == before

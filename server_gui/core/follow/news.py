@@ -5,12 +5,13 @@ import dataclasses
 import re
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import Final
 
 KEPT: Final = 500
 AGAIN_S: Final = 60.0  # within which the same is a repeat
+_NUMBER: Final = re.compile(r"\b\d+(\.\d+)?(?= ?(?:s|ms|%|°)(?:\W|$))")
 
 
 class NewsKind(Enum):
@@ -44,11 +45,11 @@ class Item:
     text: str
     count: int = 1
     first_s: float | None = None
+    key: tuple[NewsKind, str, str] = field(init=False, compare=False, repr=False)
 
-    @property
-    def key(self) -> tuple[NewsKind, str, str]:
-        """What repeats of it have in common: everything but the numbers in it."""
-        return self.kind, self.robot, _NUMBER.sub("#", self.text)
+    def __post_init__(self) -> None:
+        """Find what repeats of it have in common: everything but the numbers in it."""
+        object.__setattr__(self, "key", (self.kind, self.robot, _NUMBER.sub("#", self.text)))
 
 
 class News:
@@ -86,6 +87,3 @@ class News:
 
     def _is_grave(self, place: int) -> bool:
         return self.items[place].kind in GRAVE
-
-
-_NUMBER: Final = re.compile(r"\b\d+(\.\d+)?(?= ?(?:s|ms|%|°)(?:\W|$))")
