@@ -421,7 +421,7 @@ def test_after_a_reset_how_to_go_on_stands_before_warnings_and_after_what_is_bad
     bench.station.stopping.was_reset(held=False)
     bench.look_again([looked(state="stale", problem="late")])
     settle(window, bench)
-    assert [one.alarm.kind for _, one in window.alarms.told][0] is Kind.RESET
+    assert window.alarms.told[0][1].alarm.kind is Kind.RESET
     assert "enable the drives" in " ".join(window.alarms.texts)
     assert bench.station.mark.word == "component stale", "its mark is that of the worst"
     bench.look_again([looked(state="lost", problem="gone")])
