@@ -426,4 +426,4 @@ def test_after_a_reset_how_to_go_on_stands_before_warnings_and_after_what_is_bad
     assert bench.station.mark.word == "component stale", "its mark is that of the worst"
     bench.look_again([looked(state="lost", problem="gone")])
     settle(window, bench)
-    assert window.alarms.told[0][1].alarm.kind is Kind.LOST
+    assert window.alarms.told[0][1].alarm.mark.word == "lost"
