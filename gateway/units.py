@@ -38,7 +38,7 @@ class Unit:
 
         """
         try:
-            number = Decimal(typed)
+            number = Decimal(typed.replace("−", "-") if isinstance(typed, str) else typed)
             value = self._nearest(number) if number.is_finite() else math.nan
         except ArithmeticError:
             number, value = Decimal("NaN"), math.nan
@@ -127,7 +127,12 @@ def unit_named(symbol: str, si: str) -> Unit:
 
 def rounded(value: float, digits: int, sign: str = "") -> str:
     """Return a number with so many decimal places, and never −0; `sign` "+" shows that of others, too."""
-    return f"{round(value, digits) + 0.0:{sign}.{digits}f}"
+    return with_minus(f"{round(value, digits) + 0.0:{sign}.{digits}f}")
+
+
+def with_minus(number: str) -> str:
+    """Return a number for reading: with the sign for minus, as wide as +."""
+    return number.replace("-", "−")
 
 
 def percent_body_weight(body_mass: float) -> Unit:

@@ -126,7 +126,10 @@ class AlarmStrip(Choosable):
             self.list.turn()
 
     def _active(self) -> list[Told]:
-        """Of all robots and the recording; of the one that is looked at first, where they are as bad."""
+        """Of all robots and the recording; of the one that is looked at first, where they are as bad.
+
+        How to go on after a reset is what its user looks for next: only what is bad goes before.
+        """
         selected = self._desk.selected
         found: list[Told] = [(None, one) for one in self._desk.recording.alarms.active]
         found += [(station, one) for station in self._desk.stations for one in station.alarms.active]
@@ -136,6 +139,8 @@ class AlarmStrip(Choosable):
                 told[1].is_acknowledged,
                 told[1].alarm.kind is not Kind.NOT_STOPPED,
                 told[0] is not None and told[0] is not selected,
+                told[1].alarm.mark.colour != "bad",
+                told[1].alarm.kind is not Kind.RESET,
                 told[1].alarm.rank,
                 told[1].since_s,
             ),

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
     QComboBox,
     QHBoxLayout,
@@ -132,6 +133,10 @@ class Audit(QWidget):
             [line for name, history in self._called.items() for line in self._lines(name, history)]
         )
         self.table.setColumnHidden(ROBOT, len(self._called) < 2)
+        policy = Qt.ScrollBarPolicy  # titles alone are nothing to scroll to
+        self.table.setHorizontalScrollBarPolicy(
+            policy.ScrollBarAsNeeded if self.model.rows else policy.ScrollBarAlwaysOff
+        )
         _offer(self.robot, list(self._called))
         _offer(self.who, sorted({line.act.who for line in self.model.rows}))
         self._filter()

@@ -24,6 +24,7 @@ from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.news import Item, NewsKind
 from server_gui.views.theme import Theme
+from server_gui.views.widgets.elided import SentenceDelegate
 from server_gui.views.widgets.plain import tip
 
 Index = QModelIndex | QPersistentModelIndex
@@ -135,6 +136,7 @@ class EventsPanel(QWidget):
         self.table.setTabKeyNavigation(False)
         self.table.setShowGrid(False)
         self.table.setWordWrap(False)
+        self.table.setItemDelegate(SentenceDelegate(COLUMNS - 1))
         self.table.verticalHeader().hide()
         header = self.table.horizontalHeader()
         header.hide()

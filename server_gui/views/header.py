@@ -182,7 +182,7 @@ def _drives(station: Station) -> Words:
     count = enabled_text(station.robot, live=station.is_live)
     if not station.is_live:
         return Words(Mark("ring", "old"), "Drives not known", (count, "CiA 402"))
-    mark = drives_mark(station.robot)
+    mark = drives_mark(station.robot, is_unproven=station.stopping.is_unproven)
     return Words(mark, mark.word.capitalize(), (count, "CiA 402"))
 
 

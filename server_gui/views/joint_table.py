@@ -9,7 +9,6 @@ from PySide6.QtGui import QFontMetrics, QPainter, QResizeEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QHeaderView,
-    QStyledItemDelegate,
     QStyleOptionViewItem,
     QTableView,
 )
@@ -21,8 +20,9 @@ from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.robot import Part
 from server_gui.core.tuning.stop import StopState
-from server_gui.views.marks import state_mark
+from server_gui.views.marks import STILL_ENABLED, state_mark
 from server_gui.views.theme import Theme
+from server_gui.views.widgets.elided import SentenceDelegate
 from server_gui.views.widgets.plain import tip
 
 Index = QModelIndex | QPersistentModelIndex
@@ -142,11 +142,11 @@ class JointModel(QAbstractTableModel):
         return None
 
 
-class BarDelegate(QStyledItemDelegate):
-    """Draws a cell's bar below its text: from the middle, as far as its share."""
+class BarDelegate(SentenceDelegate):
+    """Draws a cell's bar below its text: from the middle, as far as its share; errors to a whole word."""
 
     def __init__(self, theme: Theme) -> None:
-        super().__init__()
+        super().__init__(ERROR)
         self._theme = theme
 
     def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: Index) -> None:
@@ -237,7 +237,9 @@ def _row(station: Station, joint: str, desk: Desk) -> list[Cell]:
     part = robot.parts[joint]
     gone = part.state in ("stale", "lost")
     stale = gone or not station.is_live
-    mark = state_mark(part.state if gone else robot.word(f"{joint}.state"))
+    word = part.state if gone else robot.word(f"{joint}.state")
+    unproven = word == ENABLED and station.stopping.is_unproven
+    mark = STILL_ENABLED if unproven else state_mark(word)
     age = "" if not gone or part.age_ms is None else f" {part.age_ms / 1000:.1f} s"
     side = joint.partition("_")[0]
     state = f"{GLYPHS.get(mark.shape, '◆')} {mark.word}{age}"

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from gateway.units import Unit
+from gateway.units import Unit, with_minus
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.measuring import row_at
 from server_gui.core.desk.station import Station
@@ -161,5 +161,5 @@ def _limit_texts(limits: Sequence[float], unit: Unit) -> str:
     """`±40 and ±80`, `−5 and 120`."""
     both = [limit for limit in limits if limit > 0 and -limit in limits]
     said = [f"±{limit * unit.scale:.4g}" for limit in both]
-    said += [f"{limit * unit.scale:.4g}" for limit in sorted(limits) if abs(limit) not in both]
+    said += [with_minus(f"{limit * unit.scale:.4g}") for limit in sorted(limits) if abs(limit) not in both]
     return " and ".join(dict.fromkeys(said))

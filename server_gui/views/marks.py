@@ -3,10 +3,29 @@
 from PySide6.QtCore import QPointF, QRectF
 from PySide6.QtGui import QBrush, QColor, QPainter, QPen, QPolygonF
 
-from server_gui.core.alarms.marks import NEWS, STATES, Mark, age_text, drives_mark, enabled_text, state_mark
+from server_gui.core.alarms.marks import (
+    NEWS,
+    STATES,
+    STILL_ENABLED,
+    Mark,
+    age_text,
+    drives_mark,
+    enabled_text,
+    state_mark,
+)
 from server_gui.core.desk.station import Station
 
-__all__ = ["NEWS", "STATES", "Mark", "age_text", "draw", "drives_mark", "enabled_text", "state_mark"]
+__all__ = [
+    "NEWS",
+    "STATES",
+    "STILL_ENABLED",
+    "Mark",
+    "age_text",
+    "draw",
+    "drives_mark",
+    "enabled_text",
+    "state_mark",
+]
 
 
 def old_text(station: Station) -> tuple[str, ...]:

@@ -7,7 +7,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QFocusEvent, QKeyEvent, QResizeEvent
 from PySide6.QtWidgets import QAbstractItemView, QTableWidget, QTableWidgetItem
 
-from gateway.units import Unit
+from gateway.units import Unit, with_minus
 from server_gui.core.desk.measuring import Measured
 from server_gui.views.theme import Theme
 from server_gui.views.widgets import columns
@@ -53,7 +53,8 @@ class Measuring(Card):
         rate = "" if apart_s == 0.0 else f" · 1/Δt {1 / abs(apart_s):.4g} Hz"
         marks = ["▸ " if place == active else "" for place in (0, 1)]
         self.set_title(
-            f"{marks[0]}A {a_s:.3f} s   {marks[1]}B {b_s:.3f} s   Δt {apart_s:+.3f} s{rate}", whole=True
+            with_minus(f"{marks[0]}A {a_s:.3f} s   {marks[1]}B {b_s:.3f} s   Δt {apart_s:+.3f} s{rate}"),
+            whole=True,
         )
         if self.table.rowCount() != len(rows):
             self.table.setRowCount(len(rows))
@@ -110,4 +111,4 @@ class Measuring(Card):
 
 
 def _text(unit: Unit, value: float | None) -> str:
-    return "–" if value is None else f"{value * unit.scale:.5g}"
+    return "–" if value is None else with_minus(f"{value * unit.scale:.5g}")

@@ -170,5 +170,5 @@ def _drives(station: Station) -> tuple[Mark, tuple[str, ...], tuple[str, ...]]:
     count = enabled_text(station.robot, live=station.is_live)
     if not station.is_live:
         return Mark("ring", "old", "not known"), ("Drives not known now",), (count,)
-    mark = drives_mark(station.robot)
+    mark = drives_mark(station.robot, is_unproven=station.stopping.is_unproven)
     return mark, (mark.word.capitalize(),), (count,)

@@ -408,3 +408,22 @@ def test_words_have_room_beside_the_buttons_that_come_with_them(window: MainWind
         QApplication.processEvents()
         assert window.alarms.told
         assert not window.alarms._words.verticalScrollBar().isVisible()
+
+
+def test_after_a_reset_how_to_go_on_stands_before_warnings_and_after_what_is_bad(
+    window: MainWindow, bench: Bench
+) -> None:
+    received_ns = time.monotonic_ns()
+    columns: dict[str, list[float | None]] = {f"{joint}.state": [1.0] for joint in JOINTS}
+    bench.station.take(
+        [telemetry([received_ns], columns, received_ns), looked(state="stale", problem="late")]
+    )
+    bench.station.stopping.was_reset(held=False)
+    bench.look_again([looked(state="stale", problem="late")])
+    settle(window, bench)
+    assert window.alarms.told[0][1].alarm.kind is Kind.RESET
+    assert "enable the drives" in " ".join(window.alarms.texts)
+    assert bench.station.mark.word == "component stale", "its mark is that of the worst"
+    bench.look_again([looked(state="lost", problem="gone")])
+    settle(window, bench)
+    assert window.alarms.told[0][1].alarm.mark.word == "lost"

@@ -54,6 +54,15 @@ def view(theme: Theme, bench: Bench, journal: RobotsJournal) -> Iterator[Audit]:
     destroy(made)
 
 
+def test_titles_alone_are_nothing_to_scroll_to(theme: Theme, bench: Bench) -> None:
+    made = Audit(bench.desk, theme)
+    made.resize(400, 300)
+    made.show()
+    made.refresh()
+    assert not made.table.horizontalScrollBar().isVisible()
+    destroy(made)
+
+
 def column(view: Audit, place: int) -> list[str]:
     view.refresh()
     return [str(view.chosen.index(row, place).data()) for row in range(view.chosen.rowCount())]

@@ -4,16 +4,20 @@ import time
 from pathlib import Path
 
 import pytest
+from PySide6.QtCore import QRect, Qt
 from PySide6.QtWidgets import QPushButton, QTreeWidgetItem
 
 from ml.store import Store, StoreError
 from server_gui.core.archive import library
 from server_gui.core.archive.archive import Archive
-from server_gui.core.cloud.jobs import Job, JobState
+from server_gui.core.cloud.jobs import Job, Jobs, JobState
 from server_gui.core.desk.recording import By, Recording
 from server_gui.core.settings.server_file import ServerSettings
+from server_gui.views.cloud.jobs_table import SAID, JobsTable
+from server_gui.views.theme import Theme
 from tests.gui.archives import Shown, cell, record
-from tests.gui.fakes import Bench
+from tests.gui.fakes import Bench, destroy
+from tests.gui.rules import settle
 from tests.gui.test_recording import FakeKeeper, report
 
 
@@ -115,3 +119,21 @@ def test_a_store_is_downloaded_and_verified(
     shown.until(lambda: all(job.is_over for job in archive.jobs.jobs), "did both")
     assert [job.state for job in archive.jobs.jobs] == [JobState.DONE, JobState.DONE]
     assert Store((tmp_path / "copy").as_uri()).dataset("sessions").count_rows() > 0
+
+
+@pytest.mark.parametrize("width", [500, 1200])
+def test_what_came_of_a_job_is_whole(theme: Theme, width: int) -> None:
+    jobs = Jobs()
+    said = f"Better: {'F1 on held-out people ' * 8}0.97"
+    jobs.jobs.appendleft(Job("Train activity", JobState.DONE, said=said))
+    table = JobsTable(jobs, theme)
+    table.resize(width, 300)
+    table.show()
+    table.refresh()
+    settle()
+    room = table.visualItemRect(item) if (item := table.item(0, SAID)) is not None else QRect()
+    wraps = Qt.TextFlag.TextWordWrap
+    needs = table.fontMetrics().boundingRect(QRect(0, 0, room.width() - 8, 10_000), wraps, said)
+    assert room.height() >= needs.height() > 0
+    assert jobs.close(1.0)
+    destroy(table)

@@ -172,7 +172,7 @@ def test_two_cursors_tell_values_and_their_difference(signals: Signals) -> None:
     signals.cursors.click()
     signals._move(0, -6.004)
     signals._move(1, -4.0)
-    assert title(signals) == "A -6.000 s ▸ B -4.000 s Δt +2.000 s · 1/Δt 0.5 Hz"
+    assert title(signals) == "A −6.000 s ▸ B −4.000 s Δt +2.000 s · 1/Δt 0.5 Hz"
     assert cell(signals.measuring, 0, "Channel") == KNEE
     assert [cell(signals.measuring, 0, name) for name in ("A", "B", "B − A", "Unit")] == [
         f"{math.degrees(3.99):.5g}",
@@ -213,7 +213,7 @@ def test_cursors_are_moved_by_keys(signals: Signals) -> None:
         (Qt.Key.Key_Left, Qt.KeyboardModifier.NoModifier),
     ):
         QTest.keyClick(signals.measuring, key, modifier)
-    assert title(signals).startswith("A -4.990 s ▸ B -2.110 s Δt +2.880 s")
+    assert title(signals).startswith("A −4.990 s ▸ B −2.110 s Δt +2.880 s")
 
 
 def test_a_cursor_is_dragged_and_the_plot_stays(signals: Signals) -> None:

@@ -7,9 +7,11 @@ import time
 from collections.abc import Iterator
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QImage
+from PySide6.QtWidgets import QWidget
 
 from gateway.client import ConnectionState
 from gateway.units import Units
@@ -22,7 +24,7 @@ from server_gui.core.follow.robot import STALE_NS
 from server_gui.core.processing.gait_events import EventKind, Leg
 from server_gui.core.tuning.stop import Proof
 from server_gui.core.tuning.writing import Trial
-from server_gui.views.joint_table import ERROR, STOP, TORQUE, JointModel
+from server_gui.views.joint_table import ERROR, STATE, STOP, TORQUE, JointModel
 from server_gui.views.now_line import NowLine
 from server_gui.views.overview import Overview
 from server_gui.views.theme import Theme
@@ -264,6 +266,22 @@ def test_proof_of_a_stop_stands_at_each_joint(theme: Theme, bench: Bench) -> Non
     assert cells(model, 0)[STOP] == "no proof"
 
 
+def test_enabled_is_no_good_state_after_a_stop_that_is_not_confirmed(
+    overview: Overview, theme: Theme, bench: Bench
+) -> None:
+    bench.station.take([walking(100), looked()])
+    number = bench.station.stopping.sent()
+    for failed, colour in ((False, "good"), (True, "bad")):
+        if failed:
+            bench.station.stopping.failed(number, "no link")
+        overview.read_now()
+        overview.refresh()
+        model = JointModel(bench.desk, theme)
+        model.refresh()
+        assert overview.now.drives._icon._mark.colour == colour
+        assert {row[STATE].colour for row in model._cells} == {colour}
+
+
 def test_a_trial_is_kept_or_taken_back_where_it_is_seen(overview: Overview, bench: Bench) -> None:
     overview.refresh()
     assert not overview.now.trial.isVisible()
@@ -338,7 +356,7 @@ def test_the_ring_says_what_the_wearer_does_however_small_it_is(theme: Theme, sc
     known: Phases = dict.fromkeys(Leg, LegPhase(30.0, "mid-stance"))
     for word, least in (("Walk 94 %", "Walk"), ("Stopped", "Stopped"), ("Turn 61 %", "Turn")):
         ring.show_phases(known, known, word, "120 steps/min", live=True)
-        assert (ring.read[0], ring.read[-1]) == ("L  30 %", "R  30 %"), scale
+        assert (ring.read[0], ring.read[-1]) == ("L 30 %", "R 30 %"), scale
         assert ring.read[1].startswith(least), scale
     ring.show_phases(dict.fromkeys(Leg), dict.fromkeys(Leg), "Not known", "", live=False)
     assert " ".join(ring.read) == "Not known"
@@ -346,3 +364,35 @@ def test_the_ring_says_what_the_wearer_does_however_small_it_is(theme: Theme, sc
     ring.show_phases(known, known, "Walk 94 %", "120 steps/min", live=True)
     assert ring.read[:2] == ["Walk 94 %", "120 steps/min"]
     destroy(ring)
+
+
+@pytest.mark.parametrize(("scale", "side"), [(1.0, 90), (1.5, 90), (1.0, 240), (2.0, 160)])
+def test_words_in_the_ring_touch_it_nowhere(
+    theme: Theme, monkeypatch: pytest.MonkeyPatch, scale: float, side: int
+) -> None:
+    theme.set(scale=scale)
+    ring = GaitRing(theme)
+    ring.setFixedSize(theme.px(side), theme.px(side))
+    known: Phases = dict.fromkeys(Leg, LegPhase(100.0, "terminal stance"))
+    for word, below, phases in (
+        ("Walking", "120 steps/min", known),
+        ("Activity not known", "", dict.fromkeys(Leg)),
+    ):
+        ring.show_phases(phases, phases, word, below, live=True)
+        with_words = _pixels(ring)
+        with monkeypatch.context() as patched:
+            patched.setattr(GaitRing, "_draw_words", lambda *_: None)
+            changed = (with_words != _pixels(ring)).any(axis=2)
+        rings, band, _ = ring._places()
+        free = rings[Leg.RIGHT].width() / 2 - band / 2
+        down, across = np.nonzero(changed)
+        middle = rings[Leg.RIGHT].center()
+        assert len(down), word
+        assert np.hypot(across + 0.5 - middle.x(), down + 0.5 - middle.y()).max() < free, word
+    destroy(ring)
+
+
+def _pixels(widget: QWidget) -> npt.NDArray[np.uint8]:
+    """(height, width, 4)."""
+    image = widget.grab().toImage().convertToFormat(QImage.Format.Format_RGB32)
+    return np.array(image.constBits(), np.uint8).reshape(image.height(), image.width(), 4)

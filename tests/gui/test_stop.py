@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import pytest
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QFontMetrics
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QPushButton
 
@@ -14,6 +15,7 @@ from server_gui.views.header import Header
 from server_gui.views.main_window import MainWindow
 from server_gui.views.stop_keys import StopKeys
 from server_gui.views.theme import Theme
+from server_gui.views.widgets.stop_button import StopButton
 from tests.gui.fakes import Bench, destroy, stop_is_whole
 from tests.support.desk import JOINTS, described, looked, walking
 
@@ -231,3 +233,16 @@ def test_a_held_stop_that_was_not_confirmed_is_ended_by_whoever_resets_it() -> N
     stopping.answered(stopping.sent(), Stopped({"left_knee": "unreachable"}, held=True))
     stopping.read([{"n": 1, "what": "reset", "held": False}])
     assert (stopping.state, stopping.held) == (StopState.IDLE, False)
+
+
+def test_a_name_that_has_room_beside_the_word_is_not_cut(theme: Theme) -> None:
+    button = StopButton("robot_stop")
+    button.name("simulated-exo")
+    button.show()
+    font = QApplication.font()
+    font.setBold(False)
+    name = QFontMetrics(font).horizontalAdvance("simulated-exo")
+    button.setFixedWidth(button._word + button._gap + name + 20)  # 8 + 8 of padding, and a frame
+    assert button.lines == ["simulated-exo"]
+    assert button.is_whole
+    destroy(button)

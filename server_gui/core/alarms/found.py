@@ -25,6 +25,7 @@ _QUICK_STOP: Final = "quick stop active"
 _IN_FAULT: Final = ("fault", "fault reaction active")
 _CODE: Final = re.compile(r"0x([0-9A-Fa-f]{4})\b")
 _PREFIX: Final = re.compile(r"^(the drive is in fault: |it reports )")
+_LASTING: Final = re.compile(r" \(for \d+ s\)")  # an alarm says by itself since when
 _ADVICE: Final = re.compile(r": (?=(?:check|plug) )")  # with which what the robot says of a part may end
 # What shows it best, by the code's beginning; else the position.
 _SHOWN_BY: Final = (
@@ -206,7 +207,7 @@ def _of_drive(robot: Robot, name: str, stopping: StopProgress) -> Iterator[Alarm
 
 def _cause(robot: Robot, part: Part) -> tuple[str, int | None]:
     """Why a drive is in fault, and its code: as the robot says, else by the code that the drive tells."""
-    said = _PREFIX.sub("", part.problem or "")
+    said = _LASTING.sub("", _PREFIX.sub("", part.problem or ""))
     found = _CODE.search(said)
     if found is not None:
         return said, int(found[1], 16)
@@ -219,7 +220,7 @@ def _cause(robot: Robot, part: Part) -> tuple[str, int | None]:
 def _of_part(robot: Robot, part: Part, stopping: StopProgress) -> Iterator[Alarm]:
     if robot.is_recording:
         return
-    where, problem = _where(robot, part.name), part.problem or ""
+    where, problem = _where(robot, part.name), _LASTING.sub("", part.problem or "")
     kind = _KINDS.get(part.state)
     channel = _channel(robot, part.name, None)
     is_now = not robot.is_stale()

@@ -41,6 +41,8 @@ STATES: Final = {
     "fault reaction active": Mark("square", "bad", "fault reaction"),
 }
 
+STILL_ENABLED: Final = Mark("square", "bad", ENABLED)  # after a STOP that is not confirmed
+
 NEWS: Final = {
     NewsKind.LINK: Mark("cross", "bad", "LINK"),
     NewsKind.STATE: Mark("diamond", "accent", "STATE"),
@@ -62,8 +64,11 @@ def state_mark(word: str | None) -> Mark:
     return NOT_KNOWN if word is None else STATES.get(word.lower(), Mark("triangle", "warn", word))
 
 
-def drives_mark(robot: Robot) -> Mark:
-    """Return all drives in one: enabled only where every one is, the worst otherwise."""
+def drives_mark(robot: Robot, *, is_unproven: bool = False) -> Mark:
+    """Return all drives in one: enabled only where every one is, the worst otherwise.
+
+    `is_unproven`: they were told to stop and have not shown it; then enabled is no good state.
+    """
     joints = robot.names("joint")
     if not joints:
         return Mark("ring", "old", "no drives")
@@ -77,9 +82,9 @@ def drives_mark(robot: Robot) -> Mark:
     if None in words:
         return Mark("ring", "old", f"{words.count(None)} of {len(joints)} drives not known")
     if enabled == len(joints):
-        return STATES[ENABLED]
+        return STILL_ENABLED if is_unproven else STATES[ENABLED]
     if enabled:
-        return Mark("half", "warn", f"{enabled} of {len(joints)} enabled")
+        return Mark("half", "bad" if is_unproven else "warn", f"{enabled} of {len(joints)} enabled")
     return state_mark(words[0]) if len(set(words)) == 1 else Mark("half", "warn", "drives differ")
 
 

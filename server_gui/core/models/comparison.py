@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from gateway.amounts import NONE, counted
+from gateway.units import with_minus
 from ml.registry.card import Card, Metrics
 from server_gui.core.models.catalogue import Catalogue, Entry
 from server_gui.core.models.names import class_name
@@ -106,7 +107,7 @@ def signed(value: float | None) -> str:
     """Return a difference in percent points."""
     if value is None:
         return NONE
-    return "±0.0" if abs(value) < ALIKE else f"{value:+.1f}".replace("-", "−")
+    return "±0.0" if abs(value) < ALIKE else with_minus(f"{value:+.1f}")
 
 
 def headline(card: Card) -> str:

@@ -97,7 +97,7 @@ class Models:
         """Find out what it would change, for `change` to be confirmed."""
         judged = self.trained.get(model)
         if judged is not None and not judged.better:
-            self._say(NOT_BETTER.format(why="; ".join(judged.why)), Tone.BAD)
+            self._say(NOT_BETTER.format(why=judged.reasons), Tone.BAD)
             return
         self._ask(lambda: promotion(self.url, model, robot))
 

@@ -38,12 +38,17 @@ class Trained(msgspec.Struct, frozen=True):
     remarks: tuple[str, ...] = ()
 
     @property
-    def verdict(self) -> str:
-        """Return it in words."""
+    def reasons(self) -> str:
+        """Return why, with figures by their names for people."""
         why = "; ".join(self.why)
         for figure, words in WORDS.items():
             why = why.replace(figure, words)
-        return f"{BETTER if self.better else 'Not better'}: {why}"
+        return why
+
+    @property
+    def verdict(self) -> str:
+        """Return it in words."""
+        return f"{BETTER if self.better else 'Not better'}: {self.reasons}"
 
 
 class _Wrong(msgspec.Struct, frozen=True):

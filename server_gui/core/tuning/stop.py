@@ -65,6 +65,11 @@ class StopProgress:
         """How far it has gone, and whether one is held."""
         return self.state, self.held
 
+    @property
+    def is_unproven(self) -> bool:
+        """Whether drives were told to stop and have not shown it: then "enabled" is no good state."""
+        return self.state is StopState.NOT_CONFIRMED
+
     def sent(self) -> int:
         """Note that a STOP has gone out, and return its number."""
         self.number += 1

@@ -3,6 +3,7 @@
 from enum import Enum
 from typing import Final
 
+from gateway.units import with_minus
 from server_gui.core.desk.flags import FlagKind
 from server_gui.core.desk.station import Station
 
@@ -63,4 +64,4 @@ def offset_text(here: Station, beside: Station, shift: int | None, nudge_s: floa
         return "no rows yet"
     behind_s = (theirs + shift - ours) / 1e9 + nudge_s
     moved = f", moved by {nudge_s:+.2f} s" if nudge_s else ""
-    return f"its newest row is at {behind_s:+.2f} s{moved}".replace("-", "−")
+    return with_minus(f"its newest row is at {behind_s:+.2f} s{moved}")

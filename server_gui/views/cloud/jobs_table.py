@@ -38,7 +38,7 @@ class JobsTable(QTableWidget):
         self.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
         self.setTabKeyNavigation(False)
         self.setShowGrid(False)
-        self.setWordWrap(False)
+        self.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Ignored)
         self.verticalHeader().hide()
         self.horizontalHeader().hide()
@@ -87,7 +87,7 @@ class JobsTable(QTableWidget):
             self.removeCellWidget(row, BUTTON)
 
     def _restyle(self) -> None:
-        self.verticalHeader().setDefaultSectionSize(self._theme.px(30))
+        self.verticalHeader().setMinimumSectionSize(self._theme.px(30))
         self.setColumnWidth(BAR, self._theme.px(120))
         self.setMinimumHeight(self._theme.px(70))
 

@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
 )
 
 from gateway.parameter_files.comparison import Verdict
-from gateway.units import Unit
+from gateway.units import Unit, with_minus
 from gateway.wire.method import Number
 from gateway.wire.parameter import ParameterInfo
 from server_gui.core.desk.desk import Desk
@@ -345,8 +345,8 @@ class ParameterTree(QTreeView):
 
 def range_text(least: Number | None, most: Number | None, unit: Unit) -> str:
     """Return the smallest and the largest value that are allowed, in four digits."""
-    low = "" if least is None else f"{least * unit.scale:.4g}"
-    high = "" if most is None else f"{most * unit.scale:.4g}"
+    low = "" if least is None else with_minus(f"{least * unit.scale:.4g}")
+    high = "" if most is None else with_minus(f"{most * unit.scale:.4g}")
     return f"{low} … {high}" if low or high else "–"
 
 
@@ -360,7 +360,7 @@ def brief(unit: Unit, value: float) -> str:
         return f"{abs(shown):g}"
     places = max(unit.digits + 1, 3 - math.floor(math.log10(abs(shown))))
     text = f"{shown:.{places}f}"
-    return text.rstrip("0").rstrip(".") if "." in text else text
+    return with_minus(text.rstrip("0").rstrip(".") if "." in text else text)
 
 
 def exact(unit: Unit, value: float | None) -> str:

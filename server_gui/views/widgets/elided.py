@@ -1,10 +1,14 @@
-"""A label of a name, which has … in its middle where there is no room; numbers are for `FittedLabel`."""
+"""Names, with … in their middle where there is no room, and sentences, with … behind a whole word.
+
+Numbers alone are for `FittedLabel`.
+"""
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QPainter, QPaintEvent
-from PySide6.QtWidgets import QSizePolicy
+from PySide6.QtGui import QFontMetrics, QPainter, QPaintEvent
+from PySide6.QtWidgets import QSizePolicy, QStyle, QStyledItemDelegate, QStyleOptionViewItem
 
 from server_gui.views.widgets.plain import PlainLabel, set_tip
+from server_gui.views.widgets.rows import Index
 
 
 class ElidedLabel(PlainLabel):
@@ -34,3 +38,29 @@ class PathLabel(ElidedLabel):
             self.setText(text)
             self.setAccessibleName(text)
             set_tip(self, text)
+
+
+class SentenceDelegate(QStyledItemDelegate):
+    """Draws the sentences in a column as far as there is room for whole words: half a number is another."""
+
+    def __init__(self, column: int) -> None:
+        super().__init__()
+        self._column = column
+
+    def initStyleOption(self, option: QStyleOptionViewItem, index: Index) -> None:
+        super().initStyleOption(option, index)
+        if index.column() != self._column or option.widget is None:
+            return
+        margin = option.widget.style().pixelMetric(QStyle.PixelMetric.PM_FocusFrameHMargin) + 1
+        room = option.rect.width() - 2 * margin
+        option.text = whole_words(option.text, option.fontMetrics, room)
+
+
+def whole_words(text: str, metrics: QFontMetrics, room: int) -> str:
+    """Return all of it, or as many of its words as have room (pixels) with … behind, the first at least."""
+    if metrics.horizontalAdvance(text) <= room:
+        return text
+    words = text.split(" ")
+    while len(words) > 1 and metrics.horizontalAdvance(f"{' '.join(words)} …") > room:
+        words.pop()
+    return f"{' '.join(words)} …"

@@ -20,11 +20,14 @@ GAP_DEG: Final = 2.4  # between two phases
 SMALL: Final = 0.75  # of the size that text has elsewhere: what is smaller is not read
 LEAST: Final = 90  # wide and high, at text of 100 %: three lines have room in its middle
 READ: Final = 0.85  # of it, for a phase's name
+FREE: Final = 1.08  # of the box in the middle: the circle that touches no ring
+MOST, MOST_SHORT = 5, 3  # lines; above and below three small ones the circle has no room
+LETTERS: Final = 0.7  # of a line, high
 DIM: Final = 70  # opacity of the phases that are not now, of 255
 
 
 Phases = dict[Leg, LegPhase | None]
-Row = tuple[str, str, float, bool, float]  # text, colour, size, whether it is bold, how far it may stand out
+Row = tuple[str, str, float, bool]  # text, colour, size, whether it is bold
 
 
 class GaitRing(QWidget):
@@ -141,12 +144,19 @@ class GaitRing(QWidget):
     def _draw_words(self, painter: QPainter, box: QRectF) -> None:
         rows, line = self._rows(box)
         top = box.center().y() - line * len(rows) / 2
-        for text, colour, factor, bold, spare in rows:
-            place = QRectF(box.left() - spare, top, box.width() + 2 * spare, line)
+        for text, colour, factor, bold in rows:
+            place = QRectF(0.0, top, self._room(box, top, line), line)
+            place.moveCenter(QPointF(box.center().x(), place.center().y()))
             painter.setFont(self._fitting(text, factor, place, bold=bold))
             painter.setPen(self._theme.colour(colour))
             painter.drawText(place, Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextDontClip, text)
             top += line
+
+    def _room(self, box: QRectF, top: float, line: float) -> float:
+        """How wide the circle within the inner ring is where a line stands: less above and below."""
+        free = box.width() * FREE / 2
+        off = abs(top + line / 2 - box.center().y()) + line * LETTERS / 2
+        return 2 * math.sqrt(max(free**2 - off**2, 0.0))
 
     def _rows(self, box: QRectF) -> tuple[list[Row], float]:
         """The lines that have room, and how high each is; in a small ring the word has its widest part."""
@@ -156,21 +166,18 @@ class GaitRing(QWidget):
             box.height() / 5.2,
             QFontMetricsF(self._theme.text_font(READ if is_short else 0.8 * size)).height(),
         )
-        spare = 0.0 if is_short else 12.0
         plain, bold = (READ, READ) if is_short else (0.9 * size, 1.5 * size)
         colour = "text" if self._live else "old"
         legs: list[Row] = []
         for leg in Leg:
             if (now := self._phases[leg] or self._modelled[leg]) is not None:
                 said = self._phase_text(leg, now, box.width(), is_short=is_short)
-                legs.append((said, leg.value if self._live else "old", plain, False, spare))
-        most = max(1, int(box.height() / line))
-        words: list[Row] = [
-            (one, colour, bold, True, spare) for one in self._word_lines(box, most - len(legs))
-        ]
+                legs.append((said, leg.value if self._live else "old", plain, False))
+        most = max(1, min(int(box.height() / line), MOST_SHORT if is_short else MOST))
+        words: list[Row] = [(one, colour, bold, True) for one in self._word_lines(box, most - len(legs))]
         if is_short:
             return [*legs[:1], *words, *legs[1:]], line
-        below: list[Row] = [(self._below, "dim", 0.95 * size, False, spare)] if self._below else []
+        below: list[Row] = [(self._below, "dim", 0.95 * size, False)] if self._below else []
         return [*words, *below, *legs][:most], line
 
     def _word_lines(self, box: QRectF, most: int) -> list[str]:
@@ -185,8 +192,8 @@ class GaitRing(QWidget):
         """With the phase's name where that has room in letters that are read."""
         letter = leg.value[0].upper()
         full = f"{letter}  {now.phase} {now.percent:.0f} %"
-        fits = not is_short and self._width(full) <= room + 24
-        return full if fits else f"{letter}  {now.percent:.0f} %"
+        fits = not is_short and self._width(full) <= room
+        return full if fits else f"{letter} {now.percent:.0f} %"
 
     def _is_read(self, text: str, box: QRectF) -> bool:
         """Whether it has room in letters that are read."""
@@ -200,7 +207,7 @@ class GaitRing(QWidget):
         font = self._theme.text_font(factor, bold=bold)
         width = QFontMetricsF(font).horizontalAdvance(text)
         if width > place.width() > 0:
-            font.setPointSizeF(0.95 * font.pointSizeF() * place.width() / width)
+            font.setPointSizeF(0.98 * font.pointSizeF() * place.width() / width)
         return font
 
 

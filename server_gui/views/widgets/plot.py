@@ -382,7 +382,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
             axis.setStyle(tickLength=-4)
             if width is not None:
                 axis.setWidth(theme.px(width))
-                axis.set_label_room(metrics.ascent())
+                axis.set_label_room(metrics.height())
             else:
                 axis.set_label_room(metrics.horizontalAdvance("−000 s") + theme.px(6))
         self._lines.set_behind(theme.colour("card"))

@@ -20,7 +20,8 @@ HINT = (
     "emergency stop: keep the hardware one within reach."
 )
 MIDDLE: Final = Qt.TextElideMode.ElideMiddle
-AROUND = 34  # pixels of frame and padding at both sides
+AROUND = 34  # pixels of frame and padding at both sides, at most
+LEAST_AROUND: Final = 8
 
 
 class StopButton(QPushButton):
@@ -66,7 +67,7 @@ class StopButton(QPushButton):
     def minimumSizeHint(self) -> QSize:
         """Of the word alone: a long name makes nothing wider."""
         whole = super().sizeHint()
-        return QSize(min(whole.width(), self._word + AROUND), whole.height())
+        return QSize(min(whole.width(), self._word + self._around), whole.height())
 
     def sizeHint(self) -> QSize:
         """As wide as it may be where that is said, else as little as it needs: layouts stretch it."""
@@ -74,7 +75,7 @@ class StopButton(QPushButton):
             return self.minimumSizeHint()
         lines, font = self._lines
         wide = max(QFontMetrics(font).horizontalAdvance(line) for line in lines)
-        return QSize(self._word + self._gap + wide + AROUND, super().sizeHint().height())
+        return QSize(self._word + self._gap + wide + self._around, super().sizeHint().height())
 
     def paintEvent(self, event: QPaintEvent) -> None:
         option = QStyleOptionButton()
@@ -102,6 +103,12 @@ class StopButton(QPushButton):
         return QFontMetrics(self.font()).horizontalAdvance("STOP")
 
     @property
+    def _around(self) -> int:
+        """Pixels of frame and padding at both sides, as the style has it."""
+        text = self.fontMetrics().horizontalAdvance(self.text())
+        return min(max(super().sizeHint().width() - text, LEAST_AROUND), AROUND)
+
+    @property
     def _gap(self) -> int:
         return QFontMetrics(self.font()).horizontalAdvance("  ")
 
@@ -113,11 +120,12 @@ class StopButton(QPushButton):
         light.setBold(False)  # said, since a painter takes what a font leaves open from its widget
         if self._robot is None:
             return [], large
-        room = (self.width() if self.most is None else self.most) - AROUND - self._word - self._gap
+        room = (self.width() if self.most is None else self.most) - self._around - self._word - self._gap
         two = _in_two(self._robot)
-        forms = [([self._robot], large), ([self._robot], small), (two, small), (two, light)]
+        one = [self._robot]
+        forms = [(one, large), (one, small), (one, light), (two, small), (two, light)]
         if super().sizeHint().height() < 2 * QFontMetrics(small).lineSpacing():
-            forms, two = forms[:2], forms[0][0]
+            forms, two = forms[:3], one
         for lines, font in forms:
             if all(QFontMetrics(font).horizontalAdvance(line) <= room for line in lines):
                 return lines, font

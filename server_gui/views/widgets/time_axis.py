@@ -6,6 +6,8 @@ from typing import Final
 import pyqtgraph as pg
 from PySide6.QtCore import QRectF
 
+from gateway.units import with_minus
+
 STEPS_S: Final = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0, 300.0, 600.0)
 NOW: Final = "now"
 LAST: Final = "last"
@@ -52,4 +54,4 @@ class TimeAxis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph has no types
 
 def time_text(seconds: float) -> str:
     """Return a time until the newest row in words."""
-    return NOW if abs(seconds) < 1e-9 else f"{seconds:.6g} s".replace("-", "−")
+    return NOW if abs(seconds) < 1e-9 else with_minus(f"{seconds:.6g} s")

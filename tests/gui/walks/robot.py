@@ -105,8 +105,7 @@ def drive_fault(bench: Bench) -> None:
     if not hand.can_see("Show the signal ± 5 s"):
         hand.click("fault: right hip")
     hand.keep("fault")
-    hand.click("Show the signal ± 5 s")
-    hand.sees("right_hip.")
+    hand.insist("Show the signal ± 5 s", lambda: hand.reads("right_hip."))
     hand.keep("fault-signal")
     hand.click("Overview")
     clear_fault(hand, "fault: right hip")

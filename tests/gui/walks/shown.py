@@ -6,10 +6,12 @@ It answers only about what is visible, in lines of JSON at SOCKET, and does noth
 import contextlib
 import json
 import sys
+import time
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, Final
 
 from PySide6.QtCore import QRect, Qt
+from PySide6.QtGui import QWindow
 from PySide6.QtNetwork import QLocalServer, QLocalSocket
 from PySide6.QtWidgets import (
     QAbstractButton,
@@ -31,6 +33,8 @@ from server_gui.views.application import application
 from server_gui.views.main_window import MainWindow
 from server_gui.views.widgets.fitted import FittedLabel
 from tests.gui import rules
+
+PAINTED_S: Final = 5.0
 
 Place = tuple[str, QRect]  # what stands there, on the screen
 
@@ -83,6 +87,21 @@ def texts() -> list[str]:
     return [text for text in found if text]
 
 
+def painted() -> None:
+    """Let every window be on the screen that is open: of one that comes, what was there before is seen."""
+    ends_s = time.monotonic() + PAINTED_S
+    while time.monotonic() < ends_s and not all(map(_is_on_screen, QApplication.topLevelWindows())):
+        QApplication.processEvents()
+    rules.settle()
+    for top in QApplication.topLevelWidgets():
+        if top.isVisible():
+            top.repaint()
+
+
+def _is_on_screen(window: QWindow) -> bool:
+    return window.isExposed() or not window.isVisible()
+
+
 def broken() -> list[str]:
     """What of the rules for every picture of the window is not kept."""
     found = []
@@ -106,6 +125,7 @@ def _answer(asked: dict[str, Any]) -> object:
                 found = [area for text, area in there if text.startswith(name)]
             return [(one.center().x(), one.center().y(), one.width(), one.height()) for one in found]
         case {"picture": path}:
+            painted()
             return QApplication.primaryScreen().grabWindow(0).save(path)
         case {"texts": _}:
             return texts()

@@ -1,0 +1,34 @@
+"""Sentences where there is little room: words are left out, never a part of a number."""
+
+import pytest
+from PySide6.QtGui import QFontMetrics
+from PySide6.QtWidgets import QApplication, QStyleOptionViewItem, QTableWidget, QTableWidgetItem
+
+from server_gui.views.widgets.elided import SentenceDelegate, whole_words
+from tests.gui.fakes import destroy
+
+SAID = "its position jumped by 31.9° within 50 ms, which is not its speed"
+
+
+@pytest.mark.parametrize("room", range(0, 500, 7))
+def test_half_a_number_is_never_shown(qt: QApplication, room: int) -> None:
+    metrics = QFontMetrics(QApplication.font())
+    shown = whole_words(SAID, metrics, room)
+    assert shown == SAID or (shown.endswith(" …") and SAID.startswith(f"{shown.removesuffix(' …')} "))
+    assert metrics.horizontalAdvance(shown) <= max(room, metrics.horizontalAdvance("its …"))
+
+
+def test_a_sentence_in_a_table_ends_with_a_whole_word_and_other_columns_are_as_ever(qt: QApplication) -> None:
+    table, delegate = QTableWidget(1, 2), SentenceDelegate(1)
+    for column in (0, 1):
+        table.setItem(0, column, QTableWidgetItem(SAID))
+    option = QStyleOptionViewItem()
+    option.widget, option.rect = table, table.rect()
+    option.rect.setWidth(table.fontMetrics().horizontalAdvance(SAID[:25]))
+    texts = []
+    for column in (0, 1):
+        delegate.initStyleOption(option, table.model().index(0, column))
+        texts.append(option.text)
+    assert texts[0] == SAID
+    assert texts[1] in ("its position jumped by …", "its position jumped …")
+    destroy(table)
