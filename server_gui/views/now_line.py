@@ -80,7 +80,7 @@ class NowLine(QFrame):
         self.keep.clicked.connect(lambda: desk.selected.keep_trial() if desk.selected else None)
         self.take_back.clicked.connect(lambda: desk.selected.end_trial() if desk.selected else None)
         self.ab = QPushButton("A/B …")
-        self.ab.setToolTip(TO_AB)
+        set_tip(self.ab, TO_AB)
         self.ab.clicked.connect(lambda: self.compare.emit(desk.selected) if desk.selected else None)
         self._decide = QWidget()
         row = QHBoxLayout(self._decide)

@@ -7,7 +7,7 @@ from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.views.trial_words import TO_AB, changes, ends, so_far
 from server_gui.views.widgets.card import set_text
-from server_gui.views.widgets.plain import PlainLabel
+from server_gui.views.widgets.plain import PlainLabel, set_tip
 
 
 class TrialBar(QFrame):
@@ -41,7 +41,7 @@ class TrialBar(QFrame):
         keep.clicked.connect(self.keep)
         back.clicked.connect(self.take_back)
         self.ab = QPushButton("A/B …")
-        self.ab.setToolTip(TO_AB)
+        set_tip(self.ab, TO_AB)
         self.ab.clicked.connect(lambda: self.compare.emit(self.station))
         row = QHBoxLayout()
         row.addWidget(back)
