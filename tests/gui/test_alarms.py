@@ -188,7 +188,9 @@ def test_a_headline_is_whole_when_the_text_has_grown(window: MainWindow, bench: 
         headline = window.alarms.headline
         assert is_whole(headline), scale
         assert headline.visibleRegion().boundingRect().height() == headline.height(), scale
-        for row in opened(window, bench):
+        rows = opened(window, bench)
+        assert rows, scale
+        for row in rows:
             settle(window, bench)
             assert is_whole(row.headline), scale
             assert is_whole(row.details), scale
