@@ -41,6 +41,11 @@ class Booting:
         self._booted_generation = 0  # of the boot that is under way, or was the last
         self._booting: Future[None] | None = None
 
+    @property
+    def comes_up(self) -> bool:
+        """Whether an attempt is awaited, and none since it began anew has failed."""
+        return not self.ready and self.step is _COMING_UP
+
     def overtake(self) -> None:
         """A boot that is under way does not know all that it should: it counts no more."""
         with self._lock:

@@ -83,6 +83,11 @@ class Node(BusUser):
         return self._booting.ready
 
     @property
+    def comes_up(self) -> bool:
+        """Whether it is being read for the first time, and no attempt has failed."""
+        return self._booting.comes_up
+
+    @property
     def boots_begun(self) -> int:
         """Attempts to read what is needed of it."""
         return self._booting.begun

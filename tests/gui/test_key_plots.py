@@ -172,7 +172,8 @@ def test_the_pointer_reads_every_plot_at_one_time(overview: Overview, bench: Ben
     times = bench.station.rings.times(SECONDS)
     row = int(np.argmin(np.abs(times - (times[-1] - 4.0))))
     value = float(np.degrees(bench.station.rings.values("left_knee.position", len(times))[row]))
-    assert f"left {value:.1f}" in plot.legend.accessibleDescription()
+    shown = f"{value:.1f}".replace("-", "−")
+    assert f"left {shown}" in plot.legend.accessibleDescription()
     assert plot.note == "−4 s"
     overview._hover(None)
     draw(overview)

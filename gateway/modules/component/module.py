@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from gateway.registry import Context
 
 COLD_S = 1.0
+LATE_S = 5.0  # a device that answers, but is not read to the end yet, is waited for as long
 LOOK_S = 0.02  # how often a cold start looks whether the first values are there
 
 
@@ -70,6 +71,7 @@ class ComponentModule:
         self.sources: list[Source] = []  # what is no component and has channels all the same
         self._context = context
         self._warm_ns = 0
+        self._late_ns = 0
         self._waiting: list[tuple[Callable[[], bool], Future[None]]] = []
         self.handlers = Handlers(on(COMPONENT_SNAPSHOT, self._snapshot), on(BUS_SNAPSHOT, self._buses))
 
@@ -84,7 +86,9 @@ class ComponentModule:
             except Exception as error:  # noqa: BLE001 - one device's fault must not take the others with it
                 del self.robot.components[name]
                 self.robot.absent[name] = (component.kind, f"cannot start, {type(error).__name__}: {error}")
-        self._warm_ns = time.monotonic_ns() + round(COLD_S * 1e9)
+        now_ns = time.monotonic_ns()
+        self._warm_ns = now_ns + round(COLD_S * 1e9)
+        self._late_ns = now_ns + round(LATE_S * 1e9)
 
     def stop(self) -> None:
         """Stop everything, the buses last; every device is tried, and what failed is raised together."""
@@ -107,14 +111,22 @@ class ComponentModule:
         return [whole(one) for one in (*components, *self.sources)]
 
     def when_ready(self, names: Iterable[str]) -> "Future[None]":
-        """Done when these components are there, or the time for a cold start is over."""
+        """Done when these components are there, or the time for a cold start is over.
+
+        A device whose first reading is still under way then (a busy computer, a slow bus) has longer.
+        """
         wanted = tuple(names)
-        return self._when(lambda: all(self._is_there(name) for name in wanted))
+
+        def over() -> bool:
+            missing = [name for name in wanted if not self._is_there(name)]
+            return not missing or (self._is_warm() and not any(map(self._is_late, missing)))
+
+        return self._when(over)
 
     def when_known(self, selections: Iterable[Selection]) -> "Future[None]":
         """Done when these channels have had their first values, or the time for a cold start is over."""
         wanted = tuple(selections)
-        return self._when(lambda: all(map(_has_values, wanted)))
+        return self._when(lambda: self._is_warm() or all(map(_has_values, wanted)))
 
     def read(self, selections: Iterable[Selection], also: Collection[str] = ()) -> Snapshot:
         """The values now, and the quality of their components and of those that are named beside them."""
@@ -213,11 +225,16 @@ class ComponentModule:
         component = self.robot.components.get(name)
         return component is None or component.quality(time.monotonic_ns()).state is not State.LOST
 
-    def _when(self, ready: Callable[[], bool]) -> "Future[None]":
-        if self._is_warm() or ready():
+    def _is_late(self, name: str) -> bool:
+        """Whether it is being read for the first time, and is worth waiting for."""
+        node = getattr(self.robot.components.get(name), "node", None)
+        return node is not None and node.comes_up and time.monotonic_ns() < self._late_ns
+
+    def _when(self, over: Callable[[], bool]) -> "Future[None]":
+        if over():
             return done(None)
         future: Future[None] = Future()
-        self._waiting.append((ready, future))
+        self._waiting.append((over, future))
         if len(self._waiting) == 1:
             self._context.loop.call_later(LOOK_S, self._look)
         return future
@@ -226,11 +243,11 @@ class ComponentModule:
         return time.monotonic_ns() >= self._warm_ns
 
     def _look(self) -> None:
-        over = [future for ready, future in self._waiting if self._is_warm() or ready()]
-        self._waiting = [(ready, future) for ready, future in self._waiting if future not in over]
+        ended = [future for over, future in self._waiting if over()]
+        self._waiting = [(over, future) for over, future in self._waiting if future not in ended]
         if self._waiting:
             self._context.loop.call_later(LOOK_S, self._look)
-        for future in over:  # last, because whoever waited may begin to wait for something else
+        for future in ended:  # last, because whoever waited may begin to wait for something else
             future.set_result(None)
 
 

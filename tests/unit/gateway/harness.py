@@ -153,6 +153,7 @@ class FakeNode:
         self.log: list[tuple[str, int, bytes | None]] = []
         self.life = NodeLife(None)
         self.ready = True
+        self.comes_up = False
         self.answered_ns = 0
         self.distrust: str | None = None  # why nothing may be written to it
         self.before_download: Callable[[int, bytes], None] = lambda index, data: None

@@ -1,5 +1,6 @@
 """A stop and what is being written or taken back: which of them wins, and what stays as the stop set it."""
 
+import time
 from typing import Any
 
 import pytest
@@ -85,6 +86,18 @@ def test_a_node_that_has_not_come_up_is_not_written_to(robot: Tuned, bench: Benc
     error = robot.refused(robot.writing({STEP_LENGTH: 0.42}))
     assert (error.kind, str(error)) == ("unavailable", "gait.step_length: no frame of node 16")
     assert bench.gait.node.log == []
+
+
+@pytest.mark.usefixtures("impatient")
+def test_a_node_that_is_late_to_come_up_is_waited_for(robot: Tuned, bench: Bench) -> None:
+    bench.gait.node.ready, bench.gait.node.comes_up = False, True
+    bench.gait.lost = "it was not read yet"
+    written = robot.ask(robot.writing({STEP_LENGTH: 0.42}))
+    until(lambda: time.monotonic_ns() > robot.component._warm_ns, "a cold start's time is over")
+    robot.do(lambda: None)
+    assert not written.done()
+    bench.gait.node.ready, bench.gait.node.comes_up, bench.gait.lost = True, False, None
+    assert written.result(WAIT_S).after == {STEP_LENGTH: 0.42}
 
 
 def test_what_stops_a_controller_is_not_written_while_a_stop_is_held(controlled: Tuned, bench: Bench) -> None:
