@@ -275,6 +275,7 @@ class Station:
         self.predictions.take(news)
         if isinstance(news, Ruled):
             self.tell(NewsKind.WARNING, news.text)
+            self.flags.add(Flag(news.cause.prediction.stamp_ns, news.text, FlagKind.RULE))
         if isinstance(news, Endangered):
             level = Level.NONE if before is None else before.said.verdict.level
             if (happened := turn(level, news.verdict)) is not None:
