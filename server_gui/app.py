@@ -130,6 +130,7 @@ class App:
         )
         self.desk.recording = self.feeds.recording(self._poster.deliver, self.desk.news)
         self.desk.keep_evidence = self._keep
+        self.desk.adapt = self.feeds.adapt
         self._predicts = settings.prediction.enabled
         self._foresees = self._predicts and settings.prediction.danger
         self._opening = opening

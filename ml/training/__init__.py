@@ -8,5 +8,6 @@ material.py   the sessions of a wish, and the versions of their tables
 choosing.py   which sensors, and who is held out
 judging.py    the new model against the one that serves
 adapting.py   a wearer's own gait phase
+beside.py     an adapted model beside the one that it comes from, stride by stride
 training.py   all of it together
 """

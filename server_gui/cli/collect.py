@@ -199,6 +199,7 @@ def _predicted(state: PredictingState | None) -> list[str]:
         *([table(PREDICTED, rows, (3, 4))] if rows else []),
         *([] if state.labelled is None else [_labelled(state.labelled)]),
         *skipped,
+        *(f"{robot}: {text}\n" for robot, text in state.adapting.items() if text),
         *(f"{one}\n" for one in state.problems),
     ]
 

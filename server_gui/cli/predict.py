@@ -21,6 +21,7 @@ from ml.store.private import private_files
 from ml.store.sessions import Session
 from server_gui.cli.cloud_options import parser
 from server_gui.cli.rehearse import rehearse
+from server_gui.core.prediction.adaptation import Adapting
 from server_gui.core.prediction.live import Live
 from server_gui.core.prediction.news import Endangered, Predicted, PredictionNews, Ruled, Serves
 from server_gui.core.prediction.rehearsals import BENCHMARKS
@@ -189,6 +190,8 @@ def _show_new(news: Sequence[PredictionNews], said: dict[tuple[str, str], str]) 
                     say(f"{one.robot} danger: {one.text}\n")
             case Ruled():
                 say(f"{one.robot} {one.text}\n")
+            case Adapting():
+                pass  # nobody is named here
             case Serves():
                 for why in one.why.values():
                     say(f"{one.robot} {why}\n")
@@ -213,6 +216,8 @@ def fields(one: PredictionNews) -> dict[str, Any]:
             return {"robot": one.robot, "danger": levels | silent, "utc_ns": one.utc_ns}
         case Ruled():
             return {"robot": one.robot, "rule": one.rule, "holds": one.began, "text": one.text}
+        case Adapting():
+            return {"robot": one.robot, "adapting": one.state.value}
         case Serves():
             models = {task: card.id for task, card in one.models.items()}
             return {"robot": one.robot, "models": models, "why": one.why}

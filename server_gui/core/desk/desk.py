@@ -9,6 +9,7 @@ from server_gui.core.desk.recording import By, Recording
 from server_gui.core.desk.station import Station
 from server_gui.core.evidence.file import Told
 from server_gui.core.follow.news import News
+from server_gui.core.prediction.adaptation import Happening
 
 
 @dataclass(slots=True)
@@ -35,6 +36,7 @@ class Desk:
         self._recording = Recording(By.NOBODY, None, lambda call: call(), self.news)
         self.pins = Pins()
         self.keep_evidence: Callable[[str, Told], None] = lambda _robot, _told: None  # on the disk
+        self.adapt: Callable[[str, int, Happening], None] = lambda _robot, _number, _what: None
         self.on_select: list[Callable[[Station | None], None]] = []
 
     def __iter__(self) -> Iterator[Station]:

@@ -28,6 +28,7 @@ from server_gui.core.follow.events import Event, without_processes
 from server_gui.core.follow.feed import Feed, FollowSettings
 from server_gui.core.follow.network import Network
 from server_gui.core.follow.news import News
+from server_gui.core.prediction.adaptation import Happening
 from server_gui.core.prediction.news import PredictionNews
 from server_gui.core.prediction.service import PredictionService
 from server_gui.core.recording.errors import SpoolUnusable
@@ -124,6 +125,11 @@ class Feeds:
                 log.error("what came of %s of %s is not kept: %s", told.edit.names, robot, error)
 
         self._ending.submit(add)
+
+    def adapt(self, robot: str, number: int, what: Happening) -> None:
+        """Say what becomes of what was learned from a robot's wearer."""
+        if self._collector is not None:
+            self._collector.adapt(robot, number, what)
 
     @property
     def hangs(self) -> bool:

@@ -27,6 +27,7 @@ from server_gui.core.fleet.live_prediction import RecordedPrediction, TellPredic
 from server_gui.core.fleet.stop_links import StopLinks, StopRobot
 from server_gui.core.follow.feed import ONCE, FollowSettings
 from server_gui.core.follow.network import Network
+from server_gui.core.prediction.adaptation import Happening
 from server_gui.core.prediction.news import PredictionNews
 from server_gui.core.prediction.state import PredictingState
 from server_gui.core.recording.compaction import Compaction
@@ -122,6 +123,7 @@ class Collector:
                 self._fleet.session,
                 stop or self._stop_links.stop,
                 functools.partial(_tell_all, (self._evidence.predicted, tell_predictions)),
+                None if tell_predictions is None else self._fleet.wearing,  # whom could it be offered?
             )
             if settings.prediction.enabled
             else None
@@ -199,6 +201,11 @@ class Collector:
     def upload(self) -> "concurrent.futures.Future[int]":
         """Bring everything that was recorded until now into the store; how many batches waited."""
         return self._do(lambda: self._upload(""))
+
+    def adapt(self, robot: str, number: int, what: Happening) -> None:
+        """Say what becomes of what was learned from the wearer; from any thread."""
+        if self._prediction is not None:
+            self._prediction.say(robot, number, what)
 
     def pause(self) -> "concurrent.futures.Future[None]":
         """End every session, and record nothing until `go_on`."""

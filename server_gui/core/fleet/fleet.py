@@ -14,6 +14,7 @@ from server_gui.core.fleet.link_statistics import LinkReport, LinkStatistics
 from server_gui.core.fleet.robot_recording import RobotRecording
 from server_gui.core.follow.events import Event
 from server_gui.core.follow.feed import Feed, FollowSettings, Tell
+from server_gui.core.prediction.adaptation import Wearing
 from server_gui.core.recording.recorder import Recorder
 from server_gui.core.recording.records import NOBODY, Worn
 
@@ -72,7 +73,7 @@ class Member:
 class Fleet:
     """The robots of a server; what they send goes to the recorder, before any of `subscribers` is told of it.
 
-    For the network's thread, but for `robots`, `session` and `newest_ns`.
+    For the network's thread, but for `robots`, `session`, `wearing` and `newest_ns`.
     """
 
     def __init__(
@@ -140,6 +141,12 @@ class Fleet:
     def session(self, robot: str) -> str:
         """Return what a robot's recording that goes on is called."""
         return (self._members.get(robot) or self._left[robot]).session
+
+    def wearing(self, robot: str) -> Wearing:
+        """Return whose walk a robot's recording that goes on is of."""
+        member = self._members.get(robot)
+        session = "" if member is None else member.session
+        return Wearing(session, self._worn.wearer if session else "")
 
     def report(self) -> dict[str, LinkReport]:
         """Return how each robot's link does now."""

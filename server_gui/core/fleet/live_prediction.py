@@ -11,6 +11,7 @@ import msgspec
 from gateway.wire.stop import Stopped
 from ml.danger.levels import Level
 from server_gui.core.fleet.stop_links import StopRobot
+from server_gui.core.prediction.adaptation import Adapting, Wearing
 from server_gui.core.prediction.news import Endangered, Predicted, PredictionNews, Ruled, turn
 from server_gui.core.prediction.service import PredictionService
 from server_gui.core.recording.batching import EventKind
@@ -26,7 +27,8 @@ TellPredictions = Callable[[Sequence[PredictionNews]], None]
 class RecordedPrediction(PredictionService):
     """`PredictionService`, for robots that are recorded; `show` is told of everything afterwards.
 
-    `session` says what a robot's recording is called; `stop` stops a robot.
+    `session` says what a robot's recording is called; `stop` stops a robot. With `wearing` models are adapted
+    to who wears the robot by that, where somebody is shown it, who accepts it.
     """
 
     def __init__(
@@ -36,13 +38,15 @@ class RecordedPrediction(PredictionService):
         session: Callable[[str], str],
         stop: StopRobot,
         show: TellPredictions | None = None,
+        wearing: Callable[[str], Wearing] | None = None,
     ) -> None:
-        super().__init__(settings, self._keep, self._ask_to_stop)
+        super().__init__(settings, self._keep, self._ask_to_stop, wearing)
         self._recorder = recorder
         self._session = session
         self._stop_robot = stop
         self._show = show
         self._levels: dict[str, Level] = {}  # of danger, by robot
+        self._own_models: dict[str, str] = {}  # the adapted model that serves, by robot
 
     def _keep(self, news: Sequence[PredictionNews]) -> None:
         told = [(self._session(one.robot), one) for one in news if isinstance(one, Predicted)]
@@ -55,6 +59,8 @@ class RecordedPrediction(PredictionService):
                 self._recorder.event(one.robot, EventKind.RULE, one.text, stamp=one.cause.prediction.stamp_ns)
             if isinstance(one, Endangered):
                 self._note(one)
+            if isinstance(one, Adapting):
+                self._note_adapted(one)
         if self._show is not None:
             self._show(news)
 
@@ -63,6 +69,16 @@ class RecordedPrediction(PredictionService):
         if (happened := turn(before, one.verdict)) is not None:
             told = {"level": one.verdict.level.word, "number": one.verdict.number}
             self._recorder.event(one.robot, EventKind.DANGER, happened, stamp=one.verdict.stamp_ns, **told)
+
+    def _note_adapted(self, one: Adapting) -> None:
+        """Without the wearer's name: the session says whose walk it is."""
+        before, self._own_models[one.robot] = self._own_models.get(one.robot, ""), one.model
+        if one.model == before:
+            return
+        text = f"{before} serves no more"
+        if one.model and one.tried is not None:
+            text = f"{one.model} serves, learned from the wearer's walk: {one.tried.text} of the stride"
+        self._recorder.event(one.robot, EventKind.ADAPTED, text, model=one.model or before)
 
     def _ask_to_stop(self, ruled: Ruled) -> None:
         self._stop_robot(ruled.robot, ruled.text).add_done_callback(functools.partial(self._stopped, ruled))

@@ -9,6 +9,8 @@ track_record that of the last days, from the store; tracking: looks whether ther
 following    one robot: its rows, windows, trust and rules; danger: what is foreseen of it, where that is on
 rules        when a rule on predictions begins and ends to hold
 predicting   the thread that judges all robots together, and tells
+adaptation   what becomes of a wearer's own model, by the table of its states; adapting: what learns it
+hindsight    where in the stride both legs were; lesson: one walk to learn from
 news, state  what it tells; how it goes
 live         robots that are followed for a terminal alone
 replay       a recorded session, predicted again

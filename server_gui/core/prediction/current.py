@@ -9,6 +9,7 @@ from ml.danger.levels import Level
 from ml.danger.watch import Verdict
 from ml.serving.predictor import Prediction
 from server_gui.core.follow import moment
+from server_gui.core.prediction.adaptation import Adapting
 from server_gui.core.prediction.news import Endangered, Predicted, PredictionNews, Ruled, Serves
 from server_gui.core.settings.prediction import RuleSettings
 
@@ -93,6 +94,7 @@ class StationPredictions:
     by_task: dict[str, Shown] = field(default_factory=dict)
     recalled: dict[str, Recalled] = field(default_factory=dict)
     danger: ShownDanger | None = None
+    adapting: Adapting | None = None  # None: nobody learns from walks here
     why: dict[str, str] = field(default_factory=dict)
     off: bool = False
     foresees: bool = False  # whether danger is to be foreseen: then nothing said is not known, and no silence
@@ -127,6 +129,8 @@ class StationPredictions:
                 self.by_task[news.prediction.task] = Shown(news, time.monotonic_ns())
             case Endangered():
                 self.danger = ShownDanger(news, time.monotonic_ns(), self._known(news.verdict))
+            case Adapting():
+                self.adapting = news
             case Ruled(began=True):
                 self._rules[news.rule] = news
             case Ruled():
@@ -145,5 +149,5 @@ class StationPredictions:
         """The link has dropped, or the robot has booted: nothing is known of it now."""
         self.revision += 1
         self.by_task.clear()
-        self.danger = None
+        self.danger = self.adapting = None
         self._rules.clear()

@@ -42,6 +42,7 @@ class Model:
     card: Card
     learned: Learned
     objection: str | None = None
+    learned_from: str = ""  # the wearer whose walk it has learned from, too
 
 
 class ModelLoader:

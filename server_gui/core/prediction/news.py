@@ -9,6 +9,7 @@ from ml.danger.watch import Verdict
 from ml.registry.card import Card
 from ml.serving.predictor import Prediction
 from ml.serving.trust import Trust
+from server_gui.core.prediction.adaptation import Adapting
 from server_gui.core.prediction.state import Quality
 from server_gui.core.settings.prediction import Action, RuleSettings
 
@@ -19,7 +20,8 @@ class Predicted:
 
     `utc_ns` is when the window ended; `took_ns` how long after that the prediction was there, None where the
     robot's clock is not known. `quality` is how right the model was on this robot within the last days, None
-    where nobody has labelled any of that.
+    where nobody has labelled any of that. `learned_from` is the wearer whose walk the model has learned from,
+    too, where it was adapted live.
     """
 
     robot: str
@@ -29,6 +31,7 @@ class Predicted:
     utc_ns: int
     took_ns: int | None
     quality: Quality | None = None
+    learned_from: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,4 +105,4 @@ class Serves:
     why: Mapping[str, str]
 
 
-PredictionNews = Predicted | Endangered | Ruled | Serves
+PredictionNews = Predicted | Endangered | Ruled | Serves | Adapting

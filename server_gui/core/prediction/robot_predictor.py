@@ -72,6 +72,7 @@ class Watched:
                 clock.utc_ns(stamp_ns),
                 clock.age_ns(stamp_ns),
                 quality,
+                self.model.learned_from,
             )
             for rule in self._rules:
                 if (began := rule.take(prediction)) is not None:

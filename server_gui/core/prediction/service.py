@@ -2,7 +2,7 @@
 
 import collections
 import logging
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Final, Self, TypeVar
 
 from threadpoolctl import threadpool_limits
@@ -12,13 +12,15 @@ from ml.errors import UnusableModel
 from ml.robot.task import TASKS
 from ml.serving.predictor import judged
 from server_gui.core.follow.events import Event
+from server_gui.core.prediction.adaptation import GAIT_PHASE, Happening, Wearing
+from server_gui.core.prediction.adapting import AdaptingService
 from server_gui.core.prediction.inbox import Inbox
 from server_gui.core.prediction.model_loading import Model, ModelLoader
 from server_gui.core.prediction.news import Predicted, PredictionNews, Ruled
 from server_gui.core.prediction.robot_predictor import RobotPredictor, Watched
 from server_gui.core.prediction.state import PredictingState, TaskReport
 from server_gui.core.prediction.track_record_updates import TrackRecordUpdates
-from server_gui.core.settings.prediction import Action
+from server_gui.core.settings.prediction import Action, RuleSettings
 from server_gui.core.settings.server_file import ServerSettings
 from server_gui.core.threads.supervision import BEAT_S, Worker
 
@@ -28,6 +30,7 @@ Thing = TypeVar("Thing")
 
 STILL_S: Final = 1.0  # what is due of one model, and the rows of all robots, take less
 BROKEN: Final = "it cannot be used: internal error, "
+BARRED: Final = "a rule stops this robot by its gait phase, which an unproven model may not judge"
 
 
 class PredictionService:
@@ -35,7 +38,8 @@ class PredictionService:
 
     `take` gets everything that the robots' feeds tell. `tell` gets the news, and before that `stop` what asks
     for a stop: both are called in the thread that predicts, and must return at once. Without `stop` a rule
-    only says that it would.
+    only says that it would. With `wearing`, which says whose walk a robot's recording is of, models are
+    adapted to wearers, and `tell` is told of that in another thread.
     """
 
     def __init__(
@@ -43,6 +47,7 @@ class PredictionService:
         settings: ServerSettings,
         tell: Callable[[Sequence[PredictionNews]], None],
         stop: Callable[[Ruled], None] | None = None,
+        wearing: Callable[[str], Wearing] | None = None,
     ) -> None:
         self._settings = settings
         self._tell = tell
@@ -51,6 +56,7 @@ class PredictionService:
         self._tracking = TrackRecordUpdates(
             settings.store.url, lambda: {robot for robot, _ in self._serving.models}
         )
+        self._adapting = None if wearing is None else AdaptingService(wearing, lambda one: tell([one]))
         self._inbox = Inbox[Event]()
         self._robots: dict[str, RobotPredictor] = {}
         self._calibration: Calibration | None = None
@@ -63,23 +69,33 @@ class PredictionService:
     def __enter__(self) -> Self:
         self._serving.__enter__()
         self._tracking.__enter__()
+        if self._adapting is not None:
+            self._adapting.__enter__()
         self._worker.start()
         return self
 
     def __exit__(self, *exc: object) -> None:
         self._inbox.close()
         self._worker.join()
+        if self._adapting is not None:
+            self._adapting.__exit__(*exc)
         self._tracking.__exit__(*exc)
         self._serving.__exit__(*exc)
 
     @property
     def workers(self) -> tuple[Worker, ...]:
         """Its threads, to be watched over."""
-        return self._worker, self._serving.worker, self._tracking.worker
+        adapting = () if self._adapting is None else (self._adapting.worker,)
+        return self._worker, self._serving.worker, self._tracking.worker, *adapting
 
     def take(self, robot: str, event: Event) -> None:
         """Take what a robot's feed tells; from any thread, returns at once."""
         self._inbox.put(robot, event)
+
+    def say(self, robot: str, number: int, what: Happening) -> None:
+        """Accept what was learned from a wearer, decline it, take it back, or try again; from any thread."""
+        if self._adapting is not None:
+            self._adapting.say(robot, number, what)
 
     @property
     def models(self) -> Mapping[tuple[str, str], Model]:
@@ -100,18 +116,20 @@ class PredictionService:
             self._tracking.figures,
             self._judged,
             self._skipped + self._inbox.lost,
+            {} if self._adapting is None else {name: one.text for name, one in self._adapting.now.items()},
         )
 
     def _powerless(self) -> Iterator[str]:
         """Where a rule is to stop a robot, and may not by the model that serves."""
         for (robot, task), model in self._serving.models.items():
-            stops = (
-                rule
-                for rule in self._settings.rules
-                if rule.action is Action.STOP and rule.task == task and rule.concerns(robot)
-            )
-            for rule in stops if model.objection is not None else ():
+            for rule in self._stops(robot, task) if model.objection is not None else ():
                 yield f"{robot}: rule {rule.name} CANNOT STOP IT: {model.objection}"
+
+    def _stops(self, robot: str, task: str) -> Iterator[RuleSettings]:
+        """The rules that stop this robot by what a task's model says."""
+        for rule in self._settings.rules:
+            if rule.action is Action.STOP and rule.task == task and rule.concerns(robot):
+                yield rule
 
     # --- the thread that predicts
 
@@ -152,7 +170,9 @@ class PredictionService:
         if known is None:
             known = RobotPredictor(robot, self._settings.prediction, self._settings.rules, self._calibration)
             self._robots[robot] = known
-        self._serve(known)
+        self._serve(known, events)
+        if self._adapting is not None:
+            self._adapting.seen(robot, events)
         try:
             known.take(events)
         except Exception:  # what a robot sends wrongly disturbs no other
@@ -161,9 +181,11 @@ class PredictionService:
         if known.units:
             self._serving.robot(robot, known.units)
 
-    def _serve(self, robot: RobotPredictor) -> None:
+    def _serve(self, robot: RobotPredictor, events: Iterable[Event]) -> None:
         """Give a robot the models that serve it now, but for those that broke."""
         models, why = _of(robot.robot, self._serving.models), _of(robot.robot, self._serving.why)
+        adapted = self._own(robot.robot, events, models.get(GAIT_PHASE))
+        models |= {} if adapted is None else {GAIT_PHASE: adapted}
         broken = {
             task: self._broken[model.card.id]
             for task, model in models.items()
@@ -175,6 +197,19 @@ class PredictionService:
             self._tracking.wake()
         if news is not None and (whole or news.why):
             self._tell([news])
+
+    def _own(self, robot: str, events: Iterable[Event], model: Model | None) -> Model | None:
+        """What was adapted to the wearer and serves now, where it can be used."""
+        if self._adapting is None:
+            return None
+        trusted = model is not None and model.objection is None
+        bar = BARRED if trusted and any(self._stops(robot, GAIT_PHASE)) else ""
+        every_ns = self._settings.prediction.every_ns(GAIT_PHASE)
+        adapted = self._adapting.serves(robot, events, model, every_ns, bar)
+        if adapted is None or adapted.card.id not in self._broken:
+            return adapted
+        self._adapting.broke(robot)
+        return None
 
     def _due(self) -> Iterator[tuple[Model, list[tuple[RobotPredictor, Watched]]]]:
         """What is due, by model: robots that have the same one are judged together."""
@@ -198,6 +233,8 @@ class PredictionService:
             return []
         news: list[PredictionNews] = []
         for robot, watched in due:
+            if self._adapting is not None and model.card.task == GAIT_PHASE:
+                self._adapting.asked(robot.robot, watched.due)
             own = [next(predictions) for _ in watched.due]
             quality = self._tracking.quality(robot.robot, model.card)
             news += watched.predicted(robot.robot, robot.clock, quality, own)

@@ -59,3 +59,4 @@ class PredictingState(Struct, frozen=True):
     labelled: Figures | None = None  # None: nobody has looked yet
     judged: int = 0  # decisions since the start
     skipped: int = 0  # decisions that were due while too much was to do
+    adapting: dict[str, str] = {}  # by robot, in words; "" where there is nothing to say

@@ -31,6 +31,7 @@ class EventKind(Enum):
     CLOCK_STEP = "clock_step"  # this server's clock was set, or the robot's moved: by how much, from and to
     FORGOTTEN = "forgotten"  # everything of a wearer was removed; who that was is a hash
     DANGER = "danger"  # advice or worse was foreseen, or was over, or was no longer known
+    ADAPTED = "adapted"  # a model that was learned from the wearer's walk serves, or serves no more
     RULE = "rule"  # a rule on predictions began or ceased to hold, or what came of the stop that it asked for
 
 

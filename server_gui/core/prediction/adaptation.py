@@ -1,0 +1,176 @@
+"""What becomes of a wearer's own model: the table of its states, and what is told of it.
+
+One walk is learned from, tried beside the general model, offered, and taken back with a word. It belongs to a
+`Context`: the wearer who is named, the recording, the robot's boot, its link and the model that serves.
+Anything of that changes, and everything begins anew; the general model serves from then on.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+from types import MappingProxyType
+from typing import Final
+
+from server_gui.core.prediction.model_loading import Model
+
+GAIT_PHASE: Final = "gait_phase"  # the one task that is adapted
+LEARNED_S: Final = 60.0  # of steps
+TRIED_S: Final = 20.0  # of steps that come after those
+
+UNRECORDED: Final = "nothing is learned from a walk that is not recorded"
+
+
+class State(Enum):
+    """Where it stands."""
+
+    OFF = "off"
+    UNNAMED = "unnamed"
+    COLLECTING = "collecting"
+    LEARNING = "learning"
+    TRYING = "trying"
+    OFFERED = "offered"
+    SERVING = "serving"
+    NO_BETTER = "no better"
+    DECLINED = "declined"
+    TAKEN_BACK = "taken back"
+    FAILED = "failed"
+
+
+class Happening(Enum):
+    """What leads from one to another, but for a change of the context; those in capitals a person says."""
+
+    ENOUGH = "enough"
+    LEARNED = "learned"
+    BETTER = "better"
+    NO_BETTER = "no better"
+    BROKE = "broke"
+    ACCEPT = "ACCEPT"
+    DECLINE = "DECLINE"
+    TAKE_BACK = "TAKE BACK"
+    AGAIN = "AGAIN"
+
+
+def _table(rows: dict[State, dict[Happening, State]]) -> Mapping[State, Mapping[Happening, State]]:
+    return MappingProxyType({state: MappingProxyType(row) for state, row in rows.items()})
+
+
+ANEW: Final = {Happening.AGAIN: State.COLLECTING}
+# What is not in a row changes nothing.
+NEXT: Final = _table(
+    {
+        State.OFF: {},
+        State.UNNAMED: {},
+        State.COLLECTING: {Happening.ENOUGH: State.LEARNING, Happening.BROKE: State.FAILED},
+        State.LEARNING: {Happening.LEARNED: State.TRYING, Happening.BROKE: State.FAILED},
+        State.TRYING: {
+            Happening.BETTER: State.OFFERED,
+            Happening.NO_BETTER: State.NO_BETTER,
+            Happening.BROKE: State.FAILED,
+        },
+        State.OFFERED: {Happening.ACCEPT: State.SERVING, Happening.DECLINE: State.DECLINED},
+        State.SERVING: {Happening.TAKE_BACK: State.TAKEN_BACK, Happening.BROKE: State.FAILED},
+        State.NO_BETTER: ANEW,
+        State.DECLINED: ANEW,
+        State.TAKEN_BACK: ANEW,
+        State.FAILED: ANEW,
+    }
+)
+BY_PERSON: Final = (Happening.ACCEPT, Happening.DECLINE, Happening.TAKE_BACK, Happening.AGAIN)
+
+
+@dataclass(frozen=True, slots=True)
+class Wearing:
+    """Whose walk a robot's recording is of; "" where nobody is named, or nothing is recorded."""
+
+    session: str = ""
+    wearer: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Context:
+    """What all of it belongs to. `model` is the general one, None where none serves.
+
+    `links` counts how often the link came or went, `silences` how often nothing came for long. `bar` says why
+    no unproven model may serve this robot.
+    """
+
+    wearing: Wearing
+    boot_id: str | None
+    links: int
+    is_linked: bool
+    model: Model | None
+    bar: str = ""
+    silences: int = 0
+
+    @property
+    def first(self) -> State:
+        """Where everything begins in it."""
+        if self.model is None or not self.is_linked or self.why_off:
+            return State.OFF
+        return State.COLLECTING if self.wearing.wearer else State.UNNAMED
+
+    @property
+    def why_off(self) -> str:
+        """Why nothing is learned, where there is something to say of that."""
+        return self.bar or ("" if self.wearing.session else UNRECORDED)
+
+
+@dataclass(frozen=True, slots=True)
+class Tried:
+    """Both models on strides that neither has learned: RMS errors in % of the cycle."""
+
+    before: float
+    after: float
+    strides: int
+
+    @property
+    def text(self) -> str:
+        """In few words."""
+        return f"{self.before:.1f} → {self.after:.1f} %"
+
+
+@dataclass(frozen=True, slots=True)
+class Adapting:
+    """How it goes with one robot. `number` names the attempt: what a person says is about that one alone."""
+
+    robot: str
+    number: int
+    state: State
+    wearer: str = ""
+    stepped_s: float = 0.0  # in this state
+    tried: Tried | None = None
+    why: str = ""
+    model: str = ""  # the adapted one's id, while it serves
+
+    @property
+    def choices(self) -> tuple[Happening, ...]:
+        """What a person may say now."""
+        return tuple(one for one in BY_PERSON if one in NEXT[self.state])
+
+    @property
+    def text(self) -> str:
+        """In words."""
+        tried = "" if self.tried is None else self.tried.text
+        strides = "" if self.tried is None else f" of the stride, on {self.tried.strides} later strides"
+        match self.state:
+            case State.OFF:
+                return self.why
+            case State.UNNAMED:
+                return "name the wearer to learn from the walk: gwrms gui --wearer ID"
+            case State.COLLECTING:
+                return f"learning from {self.wearer}: {self.stepped_s:.0f} of {LEARNED_S:.0f} s of steps"
+            case State.LEARNING:
+                return f"learning from {self.wearer}: a copy of the model is trained"
+            case State.TRYING:
+                tried_s = f"{self.stepped_s:.0f} of {TRIED_S:.0f} s of steps"
+                return f"learned from {self.wearer}, tried beside the general model: {tried_s}"
+            case State.OFFERED:
+                return f"learned from {self.wearer}: {tried}{strides}"
+            case State.SERVING:
+                return f"learned from {self.wearer}, and serves: {tried}{strides}"
+            case State.NO_BETTER:
+                return f"learned from {self.wearer}: no better than the general model ({tried})"
+            case State.DECLINED | State.TAKEN_BACK:
+                return f"learned from {self.wearer}, {self.state.value}: the general model serves"
+            case State.FAILED:
+                return f"not learned from {self.wearer}: {self.why}"
