@@ -17,6 +17,7 @@ from server_gui.core.follow.moment import now_ns
 from server_gui.core.processing.gait_events import Leg
 from server_gui.views.joint_table import JointModel, JointTable
 from server_gui.views.key_plot import SECONDS, KeyPlot, Kind
+from server_gui.views.learned_offer import LearnedOffer
 from server_gui.views.marks import age_text, old_text
 from server_gui.views.now_line import NowLine
 from server_gui.views.pace import READ_NS
@@ -73,6 +74,8 @@ class Overview(QWidget):
         self.status_lines = Lines(theme, "What is predicted, and what devices say", STATUS_LINES)
         self._status.body.addWidget(self._ring, 1)
         self._status.body.addWidget(self.status_lines)
+        self.learned = LearnedOffer(desk, theme)
+        self._status.body.addWidget(self.learned)
         self._posture, self._figure = Card("Posture"), StickFigure(theme)
         self._posture.body.addWidget(self._figure)
         self._maps = {side: PressureMap(theme, side) for side in SIDES}
@@ -210,6 +213,7 @@ class Overview(QWidget):
             model = any(modelled.values())
             self._status.set_note(*(_meaning(sources, model=model) if live else old_text(station)))
             self.status_lines.show_lines(list(lines(station)))
+            self.learned.refresh(station)
 
     def _words(self, station: Station) -> tuple[str, str]:
         """What the wearer does, and how fast."""

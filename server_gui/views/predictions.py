@@ -12,6 +12,7 @@ from server_gui.core.desk.belief import belief, blind, not_judged
 from server_gui.core.desk.leg_phase import LegPhase, apart, leg_phase, phase_at
 from server_gui.core.desk.station import Station
 from server_gui.core.models.names import model_name, told_name
+from server_gui.core.prediction.adaptation import State
 from server_gui.core.prediction.current import STALE_S, Recalled, StationPredictions, Told
 from server_gui.core.processing.gait_events import Leg
 from server_gui.views.marks import Mark
@@ -20,6 +21,11 @@ ACTIVITY, FALLING, GAIT_PHASE = "activity", "falling", "gait_phase"
 STEADY: Final = "steady"
 LEAST: Final = 0.01  # what is less probable is not worth a word
 TITLES: Final = {FALLING: "Balance", GAIT_PHASE: "Stride"}
+LEARNED: Final = {state: ("ring", "dim", state.value) for state in State} | {
+    State.OFFERED: ("diamond", "accent", "offered"),
+    State.SERVING: ("disc", "accent", "serves"),
+    State.FAILED: ("triangle", "warn", "failed"),
+}  # shape, colour and word of what is learned from the wearer
 AGREES: Final = 8.0  # % of a stride, that steps and a model may be apart
 STOPPED: Final = "stopped"
 NOT_JUDGED: Final = "Not judged while stopped"
@@ -136,6 +142,9 @@ def lines(station: Station) -> Iterator[Line]:
         name = part.name.replace("_", " ")
         mark = told.get(part.name) or Mark("square", "bad", part.state)  # the same as everywhere
         yield Line(mark, f"{name}: {mark.word}", why, "", why)
+    if (adapting := predictions.adapting) is not None and adapting.text and not adapting.choices:
+        text = adapting.text[:1].upper() + adapting.text[1:]
+        yield Line(Mark(*LEARNED[adapting.state]), *text.split(": ", 1))
 
 
 def _danger(predictions: StationPredictions) -> Iterator[Line]:
@@ -229,5 +238,6 @@ def _tip(shown: Told) -> str:
     if isinstance(shown, Recalled):
         return f"{told_name(shown.prediction.model)}, {shown.prediction.model}"
     predicted = shown.predicted
-    told = [f"{model_name(predicted.card)}, {predicted.card.id}"]
+    learned = f", learned from {predicted.learned_from}" if predicted.learned_from else ""
+    told = [f"{model_name(predicted.card)}{learned}, {predicted.card.id}"]
     return "\n".join(told if predicted.quality is None else [*told, predicted.quality.text])

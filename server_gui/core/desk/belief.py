@@ -50,6 +50,8 @@ def belief(told: Told) -> Belief:
     if quality is None or not quality.labelled:
         card = predicted.card
         about = f"{SOURCES[card.source]} {_ago(card.made)}"
+        if predicted.learned_from:
+            about = f"learned from {predicted.learned_from}"
         return Belief(Worth.UNCHECKED, (f"not yet checked on this robot, {about}", "not yet checked"))
     return Belief(Worth.CHECKED, _checked(quality))
 

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Mapping
 from typing import Final
 
 from ml.registry.card import Card, Source
+from server_gui.core.prediction.adaptation import ADAPTED
 
 EVERY: Final = "every robot"
 TASKS: Final[Mapping[str, str]] = {"activity": "Activity", "gait_phase": "Gait phase", "falling": "Falling"}
@@ -42,8 +43,10 @@ def model_names(cards: Iterable[Card], shipped: Iterable[str] = ()) -> dict[str,
 
 def told_name(model: str) -> str:
     """Return a name of a model of which only the id (`activity-3fa2c1…`) is known."""
-    task, _, digits = model.rpartition("-")
-    return f"model {digits[:ID_SHOWN]} of {task_name(task).lower()}" if task else f"the model {model}"
+    base, adapted, _ = model.partition(ADAPTED)
+    task, _, digits = base.rpartition("-")
+    own = ", learned from its wearer" if adapted else ""
+    return f"model {digits[:ID_SHOWN]} of {task_name(task).lower()}{own}" if task else f"the model {model}"
 
 
 def class_name(name: str) -> str:

@@ -14,6 +14,7 @@ from typing import Final
 from server_gui.core.prediction.model_loading import Model
 
 GAIT_PHASE: Final = "gait_phase"  # the one task that is adapted
+ADAPTED: Final = ".w"  # in an adapted model's id, between that of the general model and its own digits
 LEARNED_S: Final = 60.0  # of steps
 TRIED_S: Final = 20.0  # of steps that come after those
 

@@ -50,6 +50,7 @@ class Began:
 
     context: Context
     every_ns: int
+    turn: int  # counts a robot's contexts: of two that are alike, with another between, one has ended
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +61,7 @@ class Said:
     what: Happening
 
 
+NOTHING: Final = Began(EMPTY, 1, 0)
 Thing = Began | Said | Batch | list[Window]
 
 
@@ -67,7 +69,7 @@ class _Attempts:
     """One robot, for this module's thread: the attempt of now."""
 
     def __init__(self, robot: str, tell: Callable[[Adapting], None]) -> None:
-        self.context = EMPTY
+        self.context, self.turn = EMPTY, 0
         self.now = Adapting(robot, 0, State.OFF)
         self.adapted: Model | None = None
         self._tell = tell
@@ -86,7 +88,7 @@ class _Attempts:
 
     def begin(self, began: Began) -> None:
         """Forget everything, and begin anew."""
-        self.context, self._every_ns = began.context, began.every_ns
+        self.context, self.turn, self._every_ns = began.context, began.turn, began.every_ns
         self._enter(began.context.first, why=began.context.why_off)
 
     def happened(self, what: Happening, *, found: Tried | None = None, why: str = "") -> None:
@@ -158,8 +160,8 @@ class AdaptingService:
         self._wearing = wearing
         self._tell = tell
         self._inbox = Inbox[Thing]()
-        self._contexts: dict[str, Context] = {}  # of the thread that predicts
-        self._serving: Mapping[str, tuple[Context, Model]] = {}  # replaced as a whole
+        self._contexts: dict[str, Began] = {}  # of the thread that predicts
+        self._serving: Mapping[str, tuple[int, Model]] = {}  # with its turn, replaced as a whole
         self._listening: frozenset[str] = frozenset()  # likewise
         self._attempts: dict[str, _Attempts] = {}
         self._heard_s: dict[str, float] = {}  # when a robot told something last
@@ -187,20 +189,21 @@ class AdaptingService:
 
         What was adapted in any other context serves from this call on no more.
         """
-        before = self._contexts.get(robot, EMPTY)
+        before = self._contexts.get(robot, NOTHING)
         self._heard_s[robot] = time.monotonic()
         context = replace(
-            _after(before, events),
+            _after(before.context, events),
             wearing=self._wearing(robot),
             model=model,
             bar=bar,
             silences=self._silences[robot],
         )
-        if context != before or robot not in self._contexts:
-            self._contexts[robot] = context
-            self._inbox.put(robot, Began(context, every_ns))
-        serving = self._serving.get(robot)
-        return serving[1] if serving is not None and serving[0] == context else None
+        now = before
+        if context != before.context:
+            now = self._contexts[robot] = Began(context, every_ns, before.turn + 1)
+            self._inbox.put(robot, now)
+        turn, adapted = self._serving.get(robot, (now.turn, None))
+        return adapted if turn == now.turn else None
 
     def seen(self, robot: str, events: Iterable[Event]) -> None:
         """Hear what a robot sends."""
@@ -272,7 +275,7 @@ class AdaptingService:
     def _publish(self, known: _Attempts) -> None:
         robot, model = known.now.robot, known.serves
         others = {name: one for name, one in self._serving.items() if name != robot}
-        self._serving = others if model is None else others | {robot: (known.context, model)}
+        self._serving = others if model is None else others | {robot: (known.turn, model)}
         listening = {name for name, one in self._attempts.items() if one.listens}
         self._listening = frozenset(listening)
 
@@ -286,7 +289,7 @@ class AdaptingService:
         for robot, known in self._attempts.items():
             if known.context != EMPTY and now_s - self._heard_s.get(robot, now_s) > SILENT_S:
                 self._silences[robot] += 1  # so that it begins anew where it speaks again
-                known.begin(Began(EMPTY, 1))
+                known.begin(NOTHING)
                 self._publish(known)
 
     def _told(self, adapting: Adapting) -> None:

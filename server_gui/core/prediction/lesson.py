@@ -13,7 +13,7 @@ from gateway.client import Batch
 from ml.features.recipe import Features
 from ml.robot.learned import Learned
 from ml.serving.predictor import Window
-from server_gui.core.prediction.adaptation import Tried
+from server_gui.core.prediction.adaptation import ADAPTED, Tried
 from server_gui.core.prediction.hindsight import LATEST_NS, Hindsight, Instant
 from server_gui.core.prediction.model_loading import Model
 
@@ -84,7 +84,7 @@ def learn(base: Model, robot: str, wearer: str, rows: Sequence[Row], told: Calla
     from ml.training.adapting import adapted  # brings scikit-learn
 
     learned = adapted(base.learned, _features(rows), _truth(rows), told=told)
-    name = f"{base.card.id}.w{_digest(robot, learned)}"
+    name = f"{base.card.id}{ADAPTED}{_digest(robot, learned)}"
     card = msgspec.structs.replace(base.card, id=name, robot=robot, parent=base.card.id)
     objection = f"{name} was learned from its wearer's walk just now, and nobody has promoted it"
     return replace(base, card=card, learned=learned, objection=objection, learned_from=wearer)

@@ -1,0 +1,86 @@
+"""What was learned from the wearer: offered with what it is worth, and taken back with one click."""
+
+from typing import Final
+
+from PySide6.QtWidgets import QHBoxLayout, QPushButton, QSizePolicy, QVBoxLayout, QWidget
+
+from server_gui.core.desk.desk import Desk
+from server_gui.core.desk.station import Station
+from server_gui.core.prediction.adaptation import Adapting, Happening, State
+from server_gui.views.marks import Mark
+from server_gui.views.predictions import LEARNED
+from server_gui.views.theme import Theme
+from server_gui.views.widgets.fitted import FittedLabel
+from server_gui.views.widgets.mark import MarkIcon
+from server_gui.views.widgets.plain import set_tip
+
+WORDS: Final = {
+    Happening.ACCEPT: ("Use it", "This robot is served by it, for this wearer and recording alone"),
+    Happening.DECLINE: ("No", "The general model goes on to serve; what was learned is forgotten"),
+    Happening.TAKE_BACK: ("Take back", "The general model serves again; what was learned is forgotten"),
+    Happening.AGAIN: ("Learn again", "A minute of steps is learned from anew"),
+}
+
+
+class LearnedOffer(QWidget):
+    """Shown while there is something to decide; what is clicked is about what is shown, and nothing later."""
+
+    def __init__(self, desk: Desk, theme: Theme) -> None:
+        super().__init__()
+        self._desk = desk
+        self._shown: tuple[Station, Adapting] | None = None
+        self.setAccessibleName("What was learned from the wearer")
+        self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
+        self._icon, self.words = MarkIcon(theme, 10), FittedLabel()
+        self.buttons = {what: QPushButton(text) for what, (text, _) in WORDS.items()}
+        self.buttons[Happening.ACCEPT].setObjectName("primary")
+        line, row = QHBoxLayout(), QHBoxLayout()
+        line.setSpacing(6)
+        line.addWidget(self._icon)
+        line.addWidget(self.words, 1)
+        row.addStretch(1)
+        for what in (Happening.DECLINE, Happening.TAKE_BACK, Happening.AGAIN, Happening.ACCEPT):
+            self.buttons[what].clicked.connect(lambda _=False, what=what: self._say(what))
+            set_tip(self.buttons[what], WORDS[what][1])
+            row.addWidget(self.buttons[what])
+        both = QVBoxLayout(self)
+        both.setContentsMargins(0, 2, 0, 0)
+        both.setSpacing(2)
+        both.addLayout(line)
+        both.addLayout(row)
+        self.hide()
+
+    def refresh(self, station: Station) -> None:
+        """Show how it is now."""
+        adapting = station.predictions.adapting
+        if adapting is None or not adapting.choices:
+            self._shown = None
+            self.hide()
+            return
+        if self._shown == (station, adapting):
+            return
+        self._shown = station, adapting
+        self._icon.show_mark(Mark(*LEARNED[adapting.state]))
+        self.words.say(*wordings(adapting))
+        self.setAccessibleDescription(adapting.text)
+        set_tip(self, adapting.text)
+        for what, button in self.buttons.items():
+            button.setVisible(what in adapting.choices)
+        self.show()
+
+    def _say(self, what: Happening) -> None:
+        if self._shown is not None:
+            station, adapting = self._shown
+            self._desk.adapt(station.name, adapting.number, what)
+
+
+def wordings(adapting: Adapting) -> tuple[str, ...]:
+    """Return what there is to say, the fullest first."""
+    tried = "" if adapting.tried is None else adapting.tried.text
+    short = {
+        State.OFFERED: f"Learned from {adapting.wearer}: {tried}",
+        State.SERVING: f"Served by what was learned from {adapting.wearer}: {tried}",
+        State.NO_BETTER: f"No better than the general model: {tried}",
+    }.get(adapting.state, "")
+    text = adapting.text[:1].upper() + adapting.text[1:]
+    return tuple(filter(None, (text, short, tried)))
