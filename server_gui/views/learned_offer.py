@@ -83,4 +83,4 @@ def wordings(adapting: Adapting) -> tuple[str, ...]:
         State.NO_BETTER: f"No better than the general model: {tried}",
     }.get(adapting.state, "")
     text = adapting.text[:1].upper() + adapting.text[1:]
-    return tuple(filter(None, (text, short, tried)))
+    return tuple(filter(None, (text, short, tried and f"From {adapting.wearer}: {tried}", tried)))

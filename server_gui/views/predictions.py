@@ -12,7 +12,7 @@ from server_gui.core.desk.belief import belief, blind, not_judged
 from server_gui.core.desk.leg_phase import LegPhase, apart, leg_phase, phase_at
 from server_gui.core.desk.station import Station
 from server_gui.core.models.names import model_name, told_name
-from server_gui.core.prediction.adaptation import State
+from server_gui.core.prediction.adaptation import LEARNED_S, TRIED_S, Adapting, State
 from server_gui.core.prediction.current import STALE_S, Recalled, StationPredictions, Told
 from server_gui.core.processing.gait_events import Leg
 from server_gui.views.marks import Mark
@@ -143,8 +143,19 @@ def lines(station: Station) -> Iterator[Line]:
         mark = told.get(part.name) or Mark("square", "bad", part.state)  # the same as everywhere
         yield Line(mark, f"{name}: {mark.word}", why, "", why)
     if (adapting := predictions.adapting) is not None and adapting.text and not adapting.choices:
-        text = adapting.text[:1].upper() + adapting.text[1:]
-        yield Line(Mark(*LEARNED[adapting.state]), *text.split(": ", 1))
+        yield _learning(adapting)
+
+
+def _learning(adapting: Adapting) -> Line:
+    """How it goes with what is learned from the wearer, while there is nothing to decide."""
+    whom = f"from the steps of {adapting.wearer}"
+    text, detail = {
+        State.UNNAMED: ("Wearer not named", adapting.text),
+        State.COLLECTING: (f"Learning {adapting.stepped_s:.0f} of {LEARNED_S:.0f} s", whom),
+        State.LEARNING: ("Learning", whom),
+        State.TRYING: (f"Trying {adapting.stepped_s:.0f} of {TRIED_S:.0f} s", f"what was learned {whom}"),
+    }.get(adapting.state, ("Not learned from", adapting.text))
+    return Line(Mark(*LEARNED[adapting.state]), text, detail, "", adapting.text)
 
 
 def _danger(predictions: StationPredictions) -> Iterator[Line]:

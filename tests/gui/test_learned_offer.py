@@ -1,0 +1,73 @@
+"""What was learned from the wearer is offered with what it is worth, and one click takes it back."""
+
+import dataclasses
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+
+from server_gui.core.desk.station import Station
+from server_gui.core.prediction.adaptation import NEXT, Adapting, Happening, State, Tried
+from server_gui.views.main_window import MainWindow
+from server_gui.views.predictions import LEARNED, lines
+from tests.gui.fakes import Bench
+from tests.gui.foreseen import predicted
+from tests.support.desk import looked, walking
+
+HOUR_S = 3600.0
+OFFERED = Adapting("exo-01", 7, State.OFFERED, "P01", tried=Tried(3.4, 2.1, 34))
+STRIDE = predicted("stride", {"stride": 0.97}, "gait_phase", values={"left": 0.2, "right": 0.7})
+
+
+@pytest.fixture
+def station(bench: Bench) -> Station:
+    """A robot that walks, whose data are not stale within a test."""
+    bench.station.take([walking(300, -HOUR_S), looked()])
+    return bench.station
+
+
+def show(window: MainWindow, station: Station, adapting: Adapting) -> list[str]:
+    """Which buttons there are."""
+    station.take_prediction(adapting)
+    window.overview.read_now()
+    window.refresh()
+    return [button.text() for button in window.overview.learned.buttons.values() if not button.isHidden()]
+
+
+def test_an_offer_is_accepted_and_taken_back_with_a_click_each(
+    window: MainWindow, station: Station, bench: Bench
+) -> None:
+    said: list[tuple[str, int, Happening]] = []
+    bench.desk.adapt = lambda *what: said.append(what)
+    offer = window.overview.learned
+    assert offer.isHidden()
+    assert show(window, station, OFFERED) == ["Use it", "No"]
+    assert not offer.isHidden()
+    assert "3.4 → 2.1 %" in offer.words.text()
+    assert offer.accessibleDescription().startswith("learned from P01: 3.4 → 2.1 %")
+    QTest.mouseClick(offer.buttons[Happening.ACCEPT], Qt.MouseButton.LeftButton)
+    assert show(window, station, dataclasses.replace(OFFERED, state=State.SERVING)) == ["Take back"]
+    QTest.mouseClick(offer.buttons[Happening.TAKE_BACK], Qt.MouseButton.LeftButton)
+    name = station.name
+    assert said == [(name, 7, Happening.ACCEPT), (name, 7, Happening.TAKE_BACK)]
+    assert show(window, station, dataclasses.replace(OFFERED, state=State.TAKEN_BACK)) == ["Learn again"]
+    show(window, station, dataclasses.replace(OFFERED, state=State.COLLECTING))
+    assert offer.isHidden(), "there is nothing to decide"
+
+
+def test_meanwhile_a_line_says_how_it_goes(station: Station) -> None:
+    station.take_prediction(Adapting("exo-01", 1, State.COLLECTING, "P01", 35.2))
+    line = list(lines(station))[-1]
+    assert (line.text, line.detail) == ("Learning 35 of 60 s", "from the steps of P01")
+    station.take_prediction(Adapting("exo-01", 1, State.UNNAMED))
+    assert "name the wearer" in list(lines(station))[-1].detail
+    station.take_prediction(Adapting("exo-01", 1, State.OFF))
+    assert not any("earn" in line.text for line in lines(station))
+    assert LEARNED.keys() == set(State) == NEXT.keys()
+
+
+def test_the_model_that_has_learned_from_the_wearer_is_called_so(station: Station) -> None:
+    station.take_prediction(dataclasses.replace(STRIDE, learned_from="P01"))
+    line = next(line for line in lines(station) if line.text.startswith("Stride"))
+    assert "learned from P01" in line.detail
+    assert ", learned from P01, gait_phase-3fa2c1" in line.tip
