@@ -47,7 +47,13 @@ class Question(QDialog):
         if field is not None:
             column.addWidget(field)
         column.addLayout(buttons)
+        self._column = column
         (field or self.cancel).setFocus()
+
+    def add(self, field: QLineEdit) -> None:
+        """Another field, above the buttons."""
+        self._column.insertWidget(self._column.count() - 1, field)
+        QWidget.setTabOrder(self.field or self.words, field)
 
 
 def ask(

@@ -53,7 +53,7 @@ def ask_recording(parent: QWidget, recording: Recording) -> None:
     if not recording.can_pause:
         return
     if recording.is_paused:
-        ask_name(parent, recording.go_on)
+        ask_name(parent, recording.go_on, recording.wearer)
         return
     text = (
         "Stop recording every robot of this window?\n\nRobots are shown as before, and their journals are "
@@ -62,13 +62,27 @@ def ask_recording(parent: QWidget, recording: Recording) -> None:
     ask(parent, "Stop recording", text, "Stop recording", recording.pause)
 
 
-def ask_name(parent: QWidget, begin: Callable[[str], None]) -> None:
-    """Ask what a recording is called, and begin it."""
-    name = QLineEdit()
-    name.setPlaceholderText("What it is of: wearer, trial, settings")
+def ask_name(parent: QWidget, begin: Callable[[str, str], None], worn_by: str = "") -> None:
+    """Ask what a recording is called and whose walk it is of, and begin it; `worn_by`: who it was last."""
+    name, wearer = QLineEdit(), QLineEdit(worn_by)
+    name.setPlaceholderText("What it is of: trial, settings")
     name.setAccessibleName("Name of the recording")
-    text = "A recording of every robot of this window begins. Its name stands among its notes."
-    ask(parent, "Start recording", text, "Start", lambda: begin(name.text().strip()), field=name)
+    wearer.setPlaceholderText("Who wears the robot: a pseudonym, such as P01")
+    wearer.setAccessibleName("Wearer")
+    text = (
+        "A recording of every robot of this window begins. Its name stands among its notes. Where the wearer "
+        "is named, the window can learn from the walk."
+    )
+    question = ask(
+        parent,
+        "Start recording",
+        text,
+        "Start",
+        lambda: begin(name.text().strip(), wearer.text().strip()),
+        field=name,
+    )
+    if question.field is name:  # else it is asked already
+        question.add(wearer)
 
 
 def _words(recording: Recording, said: Said, address: str | None) -> Words:

@@ -5,11 +5,14 @@ import dataclasses
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QLineEdit
 
 from server_gui.core.desk.station import Station
 from server_gui.core.prediction.adaptation import NEXT, Adapting, Happening, State, Tried
+from server_gui.views.ask import Question
 from server_gui.views.main_window import MainWindow
 from server_gui.views.predictions import LEARNED, lines
+from server_gui.views.recording_chip import ask_name
 from tests.gui.fakes import Bench
 from tests.gui.foreseen import predicted
 from tests.support.desk import looked, walking
@@ -71,3 +74,16 @@ def test_the_model_that_has_learned_from_the_wearer_is_called_so(station: Statio
     line = next(line for line in lines(station) if line.text.startswith("Stride"))
     assert "learned from P01" in line.detail
     assert ", learned from P01, gait_phase-3fa2c1" in line.tip
+
+
+def test_a_recording_is_begun_of_who_is_named(window: MainWindow) -> None:
+    begun: list[tuple[str, str]] = []
+    ask_name(window, lambda *what: begun.append(what), "P01")
+    ask_name(window, lambda *what: begun.append(what), "P01")  # it is asked once
+    (question,) = window.findChildren(Question)
+    name, wearer = question.findChildren(QLineEdit)
+    assert (name.accessibleName(), wearer.text()) == ("Name of the recording", "P01")
+    name.setText("stairs")
+    wearer.setText(" P02 ")
+    question.act.click()
+    assert begun == [("stairs", "P02")]

@@ -27,6 +27,7 @@ from server_gui.core.fleet.collector import Collector, CollectorReport
 from server_gui.core.fleet.link_statistics import LinkStatistics
 from server_gui.core.follow.news import News, NewsKind
 from server_gui.core.recording.recorder import Alarm, AlarmKind, RecorderState
+from server_gui.core.recording.records import Worn
 from server_gui.core.recording.uploader import UploaderState
 from server_gui.core.settings.server_file import (
     RecordingSettings,
@@ -95,7 +96,7 @@ class FakeKeeper:
         self.asked.append("pause")
         return settled(None)
 
-    def go_on(self, name: str) -> "Future[None]":
+    def go_on(self, name: str, wearer: str | None = None) -> "Future[None]":
         self.asked.append(f"go on {name}")
         return settled(None)
 
@@ -315,24 +316,29 @@ def test_what_the_window_shows_is_in_the_store_and_came_by_one_link(
 def test_what_comes_while_it_is_stopped_is_not_kept_and_a_name_begins_a_session(
     qt: QApplication, settings: ServerSettings, kept: QSettings
 ) -> None:
-    with running(qt, settings, kept, Record("Ada", "first")) as app:
+    with running(qt, settings, kept, Record("Ada", "first", Worn("P01", "signed"))) as app:
         recording, station = app.desk.recording, app.desk.stations[0]
         wait(lambda: rows(app, "exo-01") > 5 and recording.can_pause, "recorded")
+        assert recording.wearer == "P01"
         recording.pause()
         wait(lambda: recording.is_paused, "stopped")
         newest_ns = station.rings.newest_ns or 0
         wait(lambda: (station.rings.newest_ns or 0) > newest_ns + 10**9, "is shown as before")
-        recording.go_on("stairs")
+        recording.go_on("stairs", "P02")
         wait(lambda: not recording.is_paused, "went on")
         link = recording.link(station.address)
         assert link is not None
-        assert link.notes == "stairs"
+        assert (link.notes, link.wearer, recording.wearer) == ("stairs", "P02", "P02")
         again_ns = station.rings.newest_ns or 0
         wait(lambda: (station.rings.newest_ns or 0) > again_ns + 5 * 10**8, "recorded again")
     store = Store(settings.store.url)
     sessions = store.dataset("sessions").to_table().to_pylist()
     notes = {row["session"]: row["notes"] for row in sessions}
     assert sorted(notes.values()) == ["first", "stairs"]
+    worn = {(row["notes"], row["wearer"], row["consent"]) for row in sessions}
+    assert worn == {("first", "P01", "signed"), ("stairs", "P02", "")}, (
+        "what another has agreed to is not hers"
+    )
     stamps_ns = store.dataset(TELEMETRY.location("exo-01", 1)).to_table(["stamp_ns"])["stamp_ns"].to_pylist()
     gaps_ns = [late - soon for soon, late in itertools.pairwise(sorted(stamps_ns))]
     assert max(gaps_ns) > 9 * 10**8

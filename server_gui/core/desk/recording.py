@@ -53,8 +53,8 @@ class Pausing(Protocol):
         """End every session, and record nothing until `go_on`."""
         ...
 
-    def go_on(self, name: str) -> "Future[None]":
-        """Begin a session of every robot, with this name."""
+    def go_on(self, name: str, wearer: str | None = None) -> "Future[None]":
+        """Begin a session of every robot, with this name, of this wearer; None: of the same as before."""
         ...
 
 
@@ -171,10 +171,16 @@ class Recording:
         if self._pausing is not None:
             self._change(self._pausing.pause(), "stopped: what comes now is not kept")
 
-    def go_on(self, name: str) -> None:
-        """Begin a recording of every robot with this name."""
+    @property
+    def wearer(self) -> str:
+        """Whose walks are recorded, or would be; "" where nobody is named, or it is not known."""
+        links = () if self.report is None else self.report.robots.values()
+        return next((link.wearer for link in links), "")
+
+    def go_on(self, name: str, wearer: str | None = None) -> None:
+        """Begin a recording of every robot with this name, of this wearer; None: of the same as before."""
         if self._pausing is not None:
-            self._change(self._pausing.go_on(name), f"started: {name}" if name else "started")
+            self._change(self._pausing.go_on(name, wearer), f"started: {name}" if name else "started")
 
     def link(self, address: str | None) -> LinkReport | None:
         """Return what is known of the recording of the robot with this address."""

@@ -211,9 +211,9 @@ class Collector:
         """End every session, and record nothing until `go_on`."""
         return self._do(self._fleet.pause)
 
-    def go_on(self, name: str) -> "concurrent.futures.Future[None]":
-        """Begin a session of every robot, with this name."""
-        return self._do(lambda: self._fleet.go_on(name))
+    def go_on(self, name: str, wearer: str | None = None) -> "concurrent.futures.Future[None]":
+        """Begin a session of every robot, with this name, of this wearer; None: of the same as before."""
+        return self._do(lambda: self._fleet.go_on(name, wearer))
 
     def _do(self, what: Callable[[], Result]) -> "concurrent.futures.Future[Result]":
         """In the network's thread."""

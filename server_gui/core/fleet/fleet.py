@@ -53,9 +53,9 @@ class Member:
                 log.exception("%s: internal error; it is followed anew in %g s", self._robot, AGAIN_S)
             await asyncio.sleep(AGAIN_S)
 
-    def go_on(self, notes: str) -> None:
+    def go_on(self, notes: str, worn: Worn) -> None:
         """Record again, and ask once more what the devices are: they may be others by now."""
-        self.keeping.go_on(notes)
+        self.keeping.go_on(notes, worn)
         if self._live is not None:
             self._live.identify()
 
@@ -67,7 +67,9 @@ class Member:
     def report(self) -> LinkReport:
         """Return how its link does now."""
         found, keeping = self.statistics.report(self.keeping.session), self.keeping
-        return replace(found, recording_since_utc_s=keeping.began_s, notes=keeping.notes)
+        return replace(
+            found, recording_since_utc_s=keeping.began_s, notes=keeping.notes, wearer=keeping.worn.wearer
+        )
 
 
 class Fleet:
@@ -132,11 +134,16 @@ class Fleet:
         for member in self._members.values():
             member.keeping.pause()
 
-    def go_on(self, name: str) -> None:
-        """Record all of them again, in sessions with this name; without one as they were called."""
+    def go_on(self, name: str, wearer: str | None = None) -> None:
+        """Record all of them again, in sessions with this name; without one as they were called.
+
+        They are of this wearer, None: of the same as before. What another has agreed to is not known.
+        """
         self._notes, self.is_paused = name or self._notes, False
+        if wearer is not None and wearer != self._worn.wearer:
+            self._worn = Worn(wearer)
         for member in self._members.values():
-            member.go_on(self._notes)
+            member.go_on(self._notes, self._worn)
 
     def session(self, robot: str) -> str:
         """Return what a robot's recording that goes on is called."""
@@ -145,8 +152,9 @@ class Fleet:
     def wearing(self, robot: str) -> Wearing:
         """Return whose walk a robot's recording that goes on is of."""
         member = self._members.get(robot)
-        session = "" if member is None else member.session
-        return Wearing(session, self._worn.wearer if session else "")
+        if member is None or not (session := member.session):
+            return Wearing()
+        return Wearing(session, member.keeping.worn.wearer)
 
     def report(self) -> dict[str, LinkReport]:
         """Return how each robot's link does now."""

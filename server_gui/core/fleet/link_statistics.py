@@ -38,6 +38,7 @@ class LinkReport(Struct, frozen=True):
     clock_uncertainty_s: float | None
     recording_since_utc_s: float | None = None  # this session
     notes: str = ""  # its notes
+    wearer: str = ""  # whose walk it is of, or would be
 
 
 class LinkStatistics:

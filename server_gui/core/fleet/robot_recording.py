@@ -39,7 +39,7 @@ class RobotRecording:
         self._robot = robot
         self._recorder = recorder
         self._operator = operator
-        self._worn = worn
+        self.worn = worn
         self._facts = Facts()
         self._same: tuple[str | None, ...] = ()  # boot, configuration and software of this session
         self._linked = False
@@ -52,9 +52,9 @@ class RobotRecording:
         self.session, self.began_s, self._same = "", None, ()
         self._recorder.end(self._robot)
 
-    def go_on(self, notes: str) -> None:
-        """Keep everything again, in a new session with these notes."""
-        self._is_paused, self.notes = False, notes
+    def go_on(self, notes: str, worn: Worn | None = None) -> None:
+        """Keep everything again, in a new session with these notes, of this wearer; None: the same."""
+        self._is_paused, self.notes, self.worn = False, notes, worn or self.worn
         if self._description is not None:
             self._described(self._description)
 
@@ -88,7 +88,7 @@ class RobotRecording:
 
     def _described(self, description: Description) -> None:
         self._recorder.describe(self._robot, description)
-        found = session_facts.facts(description, self._operator, self.notes, self._worn)
+        found = session_facts.facts(description, self._operator, self.notes, self.worn)
         same = (description.boot_id, found.configuration_hash, description.version)
         if same != self._same:
             self._same, self._facts = same, found

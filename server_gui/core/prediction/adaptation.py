@@ -157,7 +157,7 @@ class Adapting:
             case State.OFF:
                 return self.why
             case State.UNNAMED:
-                return "name the wearer to learn from the walk: gwrms gui --wearer ID"
+                return "name the wearer to learn from the walk: stop the recording, and start it with a name"
             case State.COLLECTING:
                 return f"learning from {self.wearer}: {self.stepped_s:.0f} of {LEARNED_S:.0f} s of steps"
             case State.LEARNING:
