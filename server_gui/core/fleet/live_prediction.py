@@ -73,7 +73,7 @@ class RecordedPrediction(PredictionService):
     def _note_adapted(self, one: Adapting) -> None:
         """Without the wearer's name: the session says whose walk it is."""
         before, self._own_models[one.robot] = self._own_models.get(one.robot, ""), one.model
-        if one.model == before:
+        if one.model == before or not self._session(one.robot):
             return
         text = f"{before} serves no more"
         if one.model and one.tried is not None:

@@ -39,7 +39,7 @@ class Lesson:
         self.rows: list[Row] = []
         self._every_s = min(every_ns / 1e9, A_DECISION_S)
         self._hindsight = Hindsight()
-        self._waiting: collections.deque[tuple[int, Features]] = collections.deque()
+        self._waiting: collections.deque[Window] = collections.deque()
         self._after_ns = 0
 
     @property
@@ -54,23 +54,25 @@ class Lesson:
 
     def ask(self, windows: Sequence[Window]) -> None:
         """Take what the serving model was asked."""
-        if not windows:
-            return
-        found = self.base.learned.recipe.compute(np.concatenate([window.samples for window in windows]))
-        self._waiting += ((window.stamp_ns, found[at : at + 1]) for at, window in enumerate(windows))
-        while self._waiting and windows[-1].stamp_ns - self._waiting[0][0] > LATEST_NS:
+        self._waiting += windows
+        while self._waiting and self._waiting[-1].stamp_ns - self._waiting[0].stamp_ns > LATEST_NS:
             self._waiting.popleft()
 
     def see(self, batch: Batch) -> None:
         """Take the robot's rows, which show its strides."""
-        if self._hindsight.take(batch):
-            waiting, self._waiting = self._waiting, collections.deque()
-            for stamp_ns, features in waiting:
-                instant = self._hindsight.at(stamp_ns)
-                if instant is None:
-                    self._waiting.append((stamp_ns, features))
-                elif stamp_ns >= self._after_ns:
-                    self.rows.append(Row(stamp_ns, features, instant))
+        if not self._hindsight.take(batch):
+            return
+        told = [(window, self._hindsight.at(window.stamp_ns)) for window in self._waiting]
+        self._waiting = collections.deque(window for window, instant in told if instant is None)
+        known = [(window, instant) for window, instant in told if instant is not None]
+        self._add([one for one in known if one[0].stamp_ns >= self._after_ns])
+
+    def _add(self, known: Sequence[tuple[Window, Instant]]) -> None:
+        """Of those alone, and of a stride's at once, features are made: who stands costs nothing."""
+        if known:
+            found = self.base.learned.recipe.compute(np.concatenate([one.samples for one, _ in known]))
+            rows = zip(known, np.split(found, len(found)), strict=True)
+            self.rows += [Row(one.stamp_ns, features, instant) for (one, instant), features in rows]
 
     def turn_page(self) -> None:
         """Forget these rows; none that looks back on one of them comes from now on."""

@@ -55,6 +55,7 @@ class Bench:
         self.general: Model | None = walkers.model()
         self.bar = ""
         self.serves: Model | None = None
+        self.is_learning = True
         self.service = AdaptingService(lambda _: self.wearing, self.told.append)
 
     @property
@@ -68,6 +69,8 @@ class Bench:
         self.learn()
 
     def learn(self) -> None:
+        if not self.is_learning:
+            return
         for robot, things in (self.service._inbox.take(0.0) or {}).items():
             self.service._robot(robot, things)
 
@@ -172,13 +175,12 @@ def test_whatever_changes_ends_it_at_once(bench: Bench, what: str) -> None:
     bench.say(Happening.ACCEPT)
     assert bench.serves is not None
     number = bench.now.number
-    bench.learn = lambda: None  # type: ignore[method-assign]
+    bench.is_learning = False
     OPERATIONS[what](bench)
-    unchanged = what in ("P01 is named", "it is rolled back")
     assert (bench.serves is not None) == (what == "P01 is named")
-    del bench.learn  # type: ignore[attr-defined]
+    bench.is_learning = True
     bench.learn()
-    assert (bench.now.number == number) == (what == "P01 is named"), unchanged
+    assert (bench.now.number == number) == (what == "P01 is named")
 
 
 def test_it_goes_from_a_minute_of_steps_to_an_offer_and_back(bench: Bench) -> None:
@@ -249,7 +251,7 @@ def test_a_robot_that_falls_silent_is_forgotten_and_begins_anew(
     bench.walk()
     monkeypatch.setattr(module, "SILENT_S", -1.0)
     bench.service._drop_silent()
-    assert bench.now.state is State.OFF
+    assert bench.now.state.value == "off"
     assert bench.service._attempts[ROBOT].adapted is None
     monkeypatch.undo()
     bench.hear(ROWS)
