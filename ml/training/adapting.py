@@ -71,14 +71,15 @@ def adapted(
     """A copy that has also learned from these decisions; how far it trusts itself stays as it was.
 
     `features` (n, features) of the base's recipe, `truth` (n, 2) phases, NaN where the legs do not step.
-    `told` is called now and then, so that who learns in a thread can let others work.
+    `told` is called every few milliseconds, so that who learns in a thread can let others work.
     """
     inputs = np.clip(scaled(base.parts["scale"], features), -FAR, FAR)
     targets = pointers(truth)
     network = copy.deepcopy(base.parts["network"])
     random = np.random.default_rng(seed)
     for _ in range(EPOCHS):  # a `partial_fit` warns of nothing, so that any thread may learn
-        rows = random.permutation(len(inputs))
-        network.set_params(batch_size=min(BATCH, len(rows))).partial_fit(inputs[rows], targets[rows])
-        told()
+        order = random.permutation(len(inputs))
+        for rows in np.split(order, range(BATCH, len(order), BATCH)):
+            network.set_params(batch_size=len(rows)).partial_fit(inputs[rows], targets[rows])
+            told()
     return replace(base, parts={**base.parts, "network": network})
