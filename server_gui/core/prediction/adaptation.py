@@ -113,6 +113,8 @@ class Context:
     @property
     def why_off(self) -> str:
         """Why nothing is learned, where there is something to say of that."""
+        if self.model is None or not self.is_linked:
+            return ""
         return self.bar or ("" if self.wearing.session else UNRECORDED)
 
 

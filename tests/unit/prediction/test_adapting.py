@@ -210,6 +210,15 @@ def test_nobody_named_is_said_and_never_learned_from(bench: Bench) -> None:
     assert bench.now.text == "nothing is learned from a walk that is not recorded"
 
 
+def test_attempts_at_a_link_are_no_news(bench: Bench) -> None:
+    bench.hear(LOST)
+    assert (bench.now.state, bench.now.text) == (State.OFF, "")
+    count = len(bench.told)
+    for _ in range(3):
+        bench.hear(LOST)
+    assert len(bench.told) == count
+
+
 def test_what_was_said_to_an_offer_that_is_over_changes_nothing(bench: Bench) -> None:
     bench.walk()
     stale = bench.now.number
