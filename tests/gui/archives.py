@@ -21,9 +21,10 @@ from server_gui.core.recording.upload import send
 from server_gui.core.settings.server_file import RecordingSettings, ServerSettings, StoreSettings
 from server_gui.views.cloud.panel import Cloud
 from server_gui.views.main_window import USUAL, MainWindow
+from server_gui.views.pace import SLOW
 from server_gui.views.recordings.panel import Recordings
 from server_gui.views.theme import Theme
-from tests.gui.fakes import Bench, destroy
+from tests.gui.fakes import Bench, destroy, draw_frames
 from tests.gui.foreseen import predicted
 from tests.gui.running import wait
 from tests.support.commissioning import Played
@@ -125,8 +126,11 @@ class Shown:
     def draw(self) -> None:
         while self._posted:
             self._posted.pop(0)()
-        for _ in range(7):
-            self.window.refresh()
+        if isinstance(self.window, MainWindow):
+            draw_frames(self.window)
+        else:
+            for _ in range(SLOW + 1):
+                self.window.refresh()
         QApplication.processEvents()
 
     def until(self, so: Callable[[], object], what: str) -> None:
