@@ -296,8 +296,8 @@ class Theme(QObject):
 def _restyle(application: QApplication, sheet: str) -> None:
     """Take another style sheet, and style every widget by it once.
 
-    Qt alone styles a widget once for itself and once for each that it is within: eight times in the main window.
-    It does so with all that it remembers the style of, and so is made to forget that.
+    Qt alone styles a widget once for itself and once for each that it is within, so eight times in the main
+    window. It does so with all that it remembers the style of, and so is made to forget that.
     """
     application.style().unpolish(application)
     # Never without a sheet in between: Qt 6.11 then keeps widgets that are gone, and crashes later.

@@ -7,7 +7,6 @@ from server_gui.views.main_window import MainWindow
 from server_gui.views.pace import SLOW, Pace
 from tests.support import desk
 
-
 OVERVIEW = 0  # its page, which reads anew only when the window does
 
 

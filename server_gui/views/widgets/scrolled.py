@@ -9,7 +9,7 @@ class Scrolled(QScrollArea):
     """Has no focus of its own. Words that need more lines where they are narrow get them, also later ones.
 
     The wheel scrolls: what it would change under the pointer unseen, a choice or a number, it changes only
-    where that has the focus. A view is measured once it is seen: Qt styles what was measured anew, part by part,
+    where that has the focus. A view is measured once it is seen: what was measured before, Qt styles anew
     wherever it is put afterwards.
     """
 

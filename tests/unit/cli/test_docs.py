@@ -18,7 +18,14 @@ from tests.support.extras import ROOT
 
 PARTS = ("gwrms", "gateway", "drivers", "eds", "server_gui", "ml", "hil_sim")
 OF_THE_TREE = re.compile(r"\b(?:docs|scenarios|tests|tools)/\w|\./dev\b|CONTRIBUTING")
-WORDS = ("docs", "scenarios", "tests", "tools", "dev", "CONTRIBUTING")  # one of them is in all that is looked for
+WORDS = (
+    "docs",
+    "scenarios",
+    "tests",
+    "tools",
+    "dev",
+    "CONTRIBUTING",
+)  # one of them is in all that is looked for
 NAMED = re.compile(r"gwrms docs ([a-z][a-z/-]*[a-z])(?: and ([a-z-]+))?")
 
 
