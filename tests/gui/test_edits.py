@@ -1,13 +1,11 @@
 """The page of edits, and a trial's bar: what an edit did, while it counts down and afterwards."""
 
 import time
-from collections.abc import Iterator
 
 import pytest
 from msgspec.structs import replace
 from PySide6.QtCore import QRectF
 from PySide6.QtGui import QImage, QPainter
-from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from gateway.units import Units
 from server_gui.core.evidence.comparison import Word, compare
@@ -15,37 +13,15 @@ from server_gui.core.evidence.curves import Curves, Side
 from server_gui.core.evidence.edits import Change
 from server_gui.core.evidence.file import Told
 from server_gui.core.tuning.writing import Trial
-from server_gui.views.edits import Edits
 from server_gui.views.main_window import MainWindow
-from server_gui.views.parameters.trial_bar import TrialBar
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.framed import draw_frame
 from server_gui.views.widgets.stride_curves import CYCLE
-from tests.gui.fakes import Bench, destroy
+from tests.gui.fakes import Bench, Parts
 from tests.support.desk import looked
 from tests.unit.evidence.synthetic import cycles, spell
 from tests.unit.evidence.test_comparison import ERROR, times
 from tests.unit.evidence.test_file import told
-
-
-class Parts(QWidget):
-    """The page and the bar without the rest of the window, which takes its time to be made."""
-
-    def __init__(self, bench: Bench, theme: Theme) -> None:
-        super().__init__()
-        self.edits, self.trial = Edits(bench.desk, theme), TrialBar(bench.desk, of_all=True)
-        column = QVBoxLayout(self)
-        column.addWidget(self.edits, 1)
-        column.addWidget(self.trial)
-        self.resize(900, 700)
-
-
-@pytest.fixture
-def parts(theme: Theme, bench: Bench) -> Iterator[Parts]:
-    made = Parts(bench, theme)
-    made.show()
-    yield made
-    destroy(made)
 
 
 def worse(write: int = 1, *, is_final: bool = True) -> Told:
