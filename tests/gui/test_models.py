@@ -96,12 +96,12 @@ def test_models_are_listed_and_compared_by_names_instead_of_hashes(
     page = opened(shown)
     one, other = both
     choose(shown, page, other)
-    shown = [
+    cells = [
         str(page.rows.index(row, column).data())
         for row in range(page.rows.rowCount())
         for column in range(page.rows.columnCount())
     ]
-    words = " ".join([*shown, page.compare.said.text(), page.compare.other.currentText()])
+    words = " ".join([*cells, page.compare.said.text(), page.compare.other.currentText()])
     assert all(model.id not in words for model in both)
     assert "Falling of" in words
     rows = {entry.card.id: row for row, entry in enumerate(page.rows.rows)}
