@@ -1,7 +1,7 @@
 """A view that is scrolled where the screen is small or the text large, rather than the window made larger."""
 
 from PySide6.QtCore import QEvent, QObject, Qt, QTimer
-from PySide6.QtGui import QResizeEvent, QShowEvent
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QAbstractSpinBox, QApplication, QComboBox, QScrollArea, QWidget
 
 
@@ -9,34 +9,22 @@ class Scrolled(QScrollArea):
     """Has no focus of its own. Words that need more lines where they are narrow get them, also later ones.
 
     The wheel scrolls: what it would change under the pointer unseen, a choice or a number, it changes only
-    where that has the focus. A view is measured once it is seen: what was measured before, Qt styles anew
-    wherever it is put afterwards.
+    where that has the focus.
     """
 
     def __init__(self, view: QWidget | None = None) -> None:
         super().__init__()
         self._has_grown = False
-        self._unseen: QWidget | None = None
         self.setWidgetResizable(True)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         if view is not None:
             self.setWidget(view)
 
     def setWidget(self, widget: QWidget) -> None:
-        if self.isVisible():
-            super().setWidget(widget)
-        else:
-            widget.setParent(self.viewport())
-            self._unseen = widget
+        super().setWidget(widget)
         for field in (*widget.findChildren(QComboBox), *widget.findChildren(QAbstractSpinBox)):
             field.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
             field.installEventFilter(self)
-
-    def showEvent(self, event: QShowEvent) -> None:
-        super().showEvent(event)
-        if self._unseen is not None:
-            super().setWidget(self._unseen)
-            self._unseen = None
 
     def show_part(self, part: QWidget) -> None:
         """Scroll to a part that has just come, once it has its place."""
