@@ -3,16 +3,19 @@
 import math
 import random
 import statistics
+import tomllib
 from collections.abc import Sequence
 from functools import cache
 from itertools import pairwise
+from pathlib import Path
 
 import pytest
 
+from hil_sim import robot_file
 from hil_sim.channels import UNITS, reported
 from hil_sim.controller import CYCLE_TIME, STEP_LENGTH
 from hil_sim.errors import SimulatorError
-from hil_sim.exoskeleton import Exoskeleton
+from hil_sim.exoskeleton import SIDES, Exoskeleton
 from hil_sim.gait.activity import Activity
 from hil_sim.gait.gaits import LEFT, RIGHT
 from hil_sim.gait.subject import subject
@@ -187,7 +190,7 @@ def test_every_pace_is_one_that_the_controller_allows(walk: str) -> None:
 def test_slow_is_0_2_to_0_5_metres_a_second() -> None:
     steps, cycles = (0.2, 0.6), (1.0, 2.4)
     speeds = [Shape(*WALKS["slow"].pace(step, cycle), 0.06, 0.0).speed for step in steps for cycle in cycles]
-    assert (min(speeds), max(speeds)) == (pytest.approx(0.2), pytest.approx(0.5))
+    assert [min(speeds), max(speeds)] == pytest.approx([0.2, 0.5])
 
 
 def test_a_robot_begins_at_a_pace_of_its_wearers_walk_and_an_ordinary_one_as_ever() -> None:
@@ -232,6 +235,16 @@ def test_the_desk_finds_the_heel_strikes_of_the_affected_foot(walk: str) -> None
     assert len(true) >= 2
     assert matched(true, found) == len(true)
     assert len(found) <= len(true) + 1
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_the_file_of_a_robot_on_one_leg_describes_that_leg_alone(side: str, tmp_path: Path) -> None:
+    robot = Exoskeleton(assists=side)
+    file = tomllib.loads(robot_file.text(tmp_path, robot_file.virtual_bus("x"), robot))
+    assert set(file["joint"]) == {f"{side}_{joint}" for joint in ("hip", "knee", "ankle")}
+    others = [name for name in file["parameter"] if name.partition(".")[0] in robot.absent]
+    assert not others
+    assert len(file["insole"]) == 2
 
 
 def test_a_robot_on_one_leg_leaves_the_other_legs_node_ids_alone() -> None:
