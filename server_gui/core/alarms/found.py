@@ -102,7 +102,7 @@ def _of_stop(robot: Robot, stopping: StopProgress) -> Iterator[Alarm]:
 def remedy(robot: Robot) -> str:
     """What to do after a STOP that nobody has confirmed."""
     is_off = _is_live(robot) and None not in _words(robot).values() and not _moving(robot)
-    return "STOP again to be sure" if is_off else "use the hardware stop, now"
+    return "STOP again to be sure" if is_off else "use the hardware stop"
 
 
 def _after_stop(robot: Robot, stopping: StopProgress) -> str:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPaintEvent, QPen
+from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPainterPath, QPaintEvent, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from server_gui.views.theme import Theme
@@ -118,8 +118,10 @@ class StickFigure(QWidget):
         if not beside and abs(left.y() - right.y()) < high:  # neither letter lies over the other
             left.setY(right.y() - high)
         for side, point in at.items():
-            painter.setPen(self._theme.colour(side if self._live else "old"))
-            painter.drawText(point, side[0].upper())
+            letter = QPainterPath()
+            letter.addText(point, painter.font(), side[0].upper())
+            painter.strokePath(letter, QPen(self._theme.colour("card"), 3))  # it may stand on the other leg
+            painter.fillPath(letter, self._theme.colour(side if self._live else "old"))
 
     def _name_joint(self, painter: QPainter, name: str, point: QPointF, unit: float) -> None:
         painter.setFont(self._theme.text_font(bold=True))
