@@ -688,7 +688,7 @@ complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a 
 complete -c gwrms -n '_shtab_gwrms_using evaluate' -s h -l help -d 'show this help message and exit'
 complete -c gwrms -n '_shtab_gwrms_using evaluate' -l benchmark -xka "ipol-status ipol-phase ipol-adapt ipol-events sisfall-prefall aust-mode sim-activity sim-phase sim-walks sim-falling sim-danger" -d 'one of those below'
 complete -c gwrms -n '_shtab_gwrms_using evaluate' -l data -xka "(__fish_complete_path (commandline -ct))" -d 'the recordings'
-complete -c gwrms -n '_shtab_gwrms_using evaluate' -l json -d 'the figures as one JSON object, in the last line'
+complete -c gwrms -n '_shtab_gwrms_using evaluate' -l json -d 'the figures, of groups too, as one JSON object, in the last line'
 complete -c gwrms -n '_shtab_gwrms_using evaluate' -l report -xka "(__fish_complete_path (commandline -ct))" -d 'also write a page with tables and pictures'
 complete -c gwrms -n '_shtab_gwrms_using evaluate' -l search -d 'choose the settings again, by training subjects alone'
 complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a demo -d 'A simulated exoskeleton, its gateway and a live view, with one command.'

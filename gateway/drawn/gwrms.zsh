@@ -574,7 +574,7 @@ _shtab_gwrms_evaluate_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--benchmark[one of those below]:NAME:(ipol-status ipol-phase ipol-adapt ipol-events sisfall-prefall aust-mode sim-activity sim-phase sim-walks sim-falling sim-danger)"
   "--data[the recordings]:FILE:_files"
-  "--json[the figures as one JSON object, in the last line]"
+  "--json[the figures, of groups too, as one JSON object, in the last line]"
   "--report[also write a page with tables and pictures]:FILE.html:_files"
   "--search[choose the settings again, by training subjects alone]"
 )

@@ -63,19 +63,17 @@ def evaluate(path: Path, search: Search) -> Outcome:  # noqa: ARG001 - there is 
     groups = {
         name: _figures(list(of_it), classes) for name, of_it in groupby(found, key=lambda one: one.walks)
     }
-    worst = {
-        "worst_walks_macro_f1": min(one["macro_f1"] for one in groups.values()),
-        "worst_walks_rmse_percent": max(one["rmse_percent"] for one in groups.values()),
-    }
-    mean = {
-        name: float(np.nanmean([one[name] for one in groups.values()]))
-        for name in ("macro_f1", "rmse_percent")
+    macro_f1 = [one["macro_f1"] for one in groups.values()]
+    rmse = [one["rmse_percent"] for one in groups.values() if not math.isnan(one["rmse_percent"])]
+    figures = {
+        "worst_walks_macro_f1": min(macro_f1),
+        "worst_walks_rmse_percent": max(rmse, default=math.nan),
+        "macro_f1": float(np.mean(macro_f1)),
+        "rmse_percent": float(np.mean(rmse)) if rmse else math.nan,
     }
     people = len({session.subject for session in sessions})
     settings = "none: the models are those that come with GWRMS"
-    return Outcome(
-        worst | mean | _adaptation(found), people, groups, "walks", settings=settings, notes=(WHY,)
-    )
+    return Outcome(figures | _adaptation(found), people, groups, "walks", settings=settings, notes=(WHY,))
 
 
 def _shipped(registry: Registry, task: Task, sessions: Sequence[Session]) -> Learned:
@@ -144,13 +142,13 @@ def _figures(found: Sequence[Found], classes: int) -> dict[str, float]:
     )
     right = truth == likeliest
     return {
-        "people": len(found),
         "macro_f1": metrics.macro_f1(truth, likeliest, classes),
         "said_accuracy": float(right[~unknown].mean()) if not unknown.all() else float("nan"),
         "unknown_fraction": float(unknown.mean()),
         "rmse_percent": percent(np.concatenate([one.error for one in found]).ravel()),
         "later_rmse_percent": percent(np.concatenate([one.before for one in found]).ravel()),
         "adapted_rmse_percent": percent(np.concatenate([one.after for one in found]).ravel()),
+        "people": len(found),
     }
 
 

@@ -55,6 +55,7 @@ def test_a_recording_of_several_walks_is_judged_by_each_and_by_the_worst(
     assert len(rows) == 2
     worst = max(rows.values()) if name == "sim-phase" else min(rows.values())
     assert answer[f"worst_walks_{figure}"] == pytest.approx(worst, rel=0.01)
+    assert answer["by_walks"]["crouch"][figure] == pytest.approx(rows["crouch"], rel=0.01)
 
 
 def test_the_shipped_models_are_judged_by_walks_and_after_a_minute_of_the_wearer(tmp_path: Path) -> None:
