@@ -13,7 +13,7 @@ import pytest
 
 from hil_sim import robot_file
 from hil_sim.channels import UNITS, reported
-from hil_sim.controller import CYCLE_TIME, STEP_LENGTH
+from hil_sim.controller import CYCLE_TIME, STEP_LENGTH, ControllerState
 from hil_sim.errors import SimulatorError
 from hil_sim.exoskeleton import SIDES, Exoskeleton
 from hil_sim.gait.activity import Activity
@@ -22,6 +22,7 @@ from hil_sim.gait.subject import subject
 from hil_sim.gait.walk import Shape
 from hil_sim.gait.walks import NAMES, ORDINARY, WALKS, own_walk
 from hil_sim.gait.wearer import GRAVITY
+from hil_sim.node.cob_id import is_valid
 from hil_sim.sensors.faults import InsoleFaults
 from hil_sim.sensors.insoles.insole_cobs import CELLS
 from hil_sim.sensors.sole import Sole
@@ -247,12 +248,24 @@ def test_the_file_of_a_robot_on_one_leg_describes_that_leg_alone(side: str, tmp_
     assert len(file["insole"]) == 2
 
 
+@pytest.mark.parametrize(("side", "absent"), [("left", (3, 4, 5)), ("right", (0, 1, 2))])
+def test_no_reset_brings_pdos_to_the_absent_leg_back(side: str, absent: tuple[int, ...]) -> None:
+    dictionary = Exoskeleton(assists=side).controller.dictionary
+    for place in range(6):
+        for key in ((0x1400 + place, 1), (0x1801 + place, 1)):
+            entry = dictionary[key]
+            held = (entry.value, entry.default, entry.commissioned)
+            valid = {is_valid(int(one)) for one in held if one is not None}
+            assert valid == {place not in absent}
+
+
 def test_a_robot_on_one_leg_leaves_the_other_legs_node_ids_alone() -> None:
     robot = Exoskeleton(assists="left")
     heard: set[int] = set()
     robot.bus.attach("listener", lambda frame, _: heard.add(frame.cob_id))
     robot.power_on()
     robot.clock.run_until(1_500_000_000)
+    assert robot.controller.controller_state is ControllerState.RUNNING
     others = {node for cob_id in heard if (node := cob_id & 0x7F) in (4, 5, 6)}
     assert not others
     assert {0x201, 0x202, 0x203} <= heard
