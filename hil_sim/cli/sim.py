@@ -237,6 +237,7 @@ def _parse(argv: list[str]) -> tuple[argparse.Namespace, Script]:
         scenario=script.scenario,
         seed=script.seed,
         subject=script.subject,
+        walks=script.walks,
         imu=script.sensors.imu,
         insole=script.sensors.insole,
     )
