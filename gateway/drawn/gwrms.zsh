@@ -1263,7 +1263,7 @@ _shtab_gwrms_sim_options=(
   "--speed[times as fast as real time\; max for as fast as it goes (default\: 1)]:N:"
   "--seed[of noise, losses and strides\; same seed, same bytes (default\: 0)]:S:"
   "--subject[who wears the robot (default\: 0, nominal)]:N:"
-  "--walks[how they walk (default\: ordinary)]:NAME:(ordinary slow hemiparetic crouch steppage crutches_two_point crutches_three_point)"
+  "--walks[how they walk\: ordinary, slow, hemiparetic, crouch, steppage, crutches_two_point, crutches_three_point (default\: ordinary)]:NAME:(ordinary slow hemiparetic crouch steppage crutches_two_point crutches_three_point)"
   "--assists[the only leg that the robot is on, left or right]:SIDE:(left right)"
   "*--drive[the EDS or DCF of the drives, or of one joint\'s (again for another one)]:[JOINT=]FILE:"
   "*--mount[a drive\'s node id, 1 or -1 (its motor built in the other way round), counts at zero]:JOINT=NODE[,DIRECTION[,ZERO]]:"
@@ -1300,7 +1300,7 @@ _shtab_gwrms_sim_record_options=(
   "--minutes[of each wearer (default\: 6)]:M:"
   "--subjects[who wears the robot (default\: 0)]:N[-N]:"
   "--scenario[default\: practice]:scenario:(practice dangers walk stand sit sit_to_stand stairs_up stairs_down ramp_up ramp_down turn_left turn_right stumble fall day)"
-  "--walks[how they walk (default\: ordinary)]:NAME:(ordinary slow hemiparetic crouch steppage crutches_two_point crutches_three_point)"
+  "--walks[how they walk\: ordinary, slow, hemiparetic, crouch, steppage, crutches_two_point, crutches_three_point (default\: ordinary)]:NAME:(ordinary slow hemiparetic crouch steppage crutches_two_point crutches_three_point)"
   "--assists[the only leg that the robot is on, left or right]:SIDE:(left right)"
   "--seed[same seed, same recording (default\: 0)]:S:"
 )

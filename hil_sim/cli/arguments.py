@@ -14,7 +14,7 @@ def add_wearer(parser: argparse.ArgumentParser) -> None:
         choices=NAMES,
         default=ORDINARY,
         metavar="NAME",
-        help="how they walk (default: %(default)s)",
+        help=f"how they walk: {', '.join(NAMES)} (default: %(default)s)",
     )
     parser.add_argument(
         "--assists", choices=SIDES, metavar="SIDE", help="the only leg that the robot is on, left or right"
