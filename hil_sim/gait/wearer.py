@@ -61,8 +61,11 @@ class _Contact(NamedTuple):
 _STANDING = _Contact(0.5, 0.0, 0.110, 0.0)
 
 
-def _sway(amounts: tuple[float, ...], now_s: float) -> float:
-    return sum(
+def _sway(share: float, amounts: tuple[float, ...], now_s: float) -> float:
+    """So much of it."""
+    if not share:
+        return 0.0
+    return share * sum(
         amount * math.sin(math.tau * hertz * now_s) for amount, hertz in zip(amounts, _SWAY_HZ, strict=True)
     )
 
@@ -83,7 +86,7 @@ class Wearer:
         """Left and right foot at `now_s` (s, for the sway of standing)."""
         carried = self._carried() * (1.0 - self._support())
         swaying = self._generator.wearer.sway * self._standing()
-        load, place = (swaying * _sway(amounts, now_s) for amounts in (_SWAY_LOAD, _SWAY_COP))
+        load, place = (_sway(swaying, amounts, now_s) for amounts in (_SWAY_LOAD, _SWAY_COP))
         left, right = self._contacts()
         on_left, on_right = (1.0 - share for share in self._crutches())
         return (
@@ -173,7 +176,7 @@ class Wearer:
         generator = self._generator
         upright = (1.0 - generator.fall.share) * generator.wearer.sway
         moving, angle = generator.walking * upright, math.tau * generator.phase
-        swaying, aside = (upright * _sway(amounts, now_s) for amounts in (_SWAY_PITCH, _SWAY_ROLL))
+        swaying, aside = (_sway(upright, amounts, now_s) for amounts in (_SWAY_PITCH, _SWAY_ROLL))
         return Trunk(
             roll=moving * (_ROLL * math.sin(angle) + self._hike()) + generator.fall.roll + aside,
             pitch=generator.trunk + moving * _PITCH * math.sin(2.0 * angle) + swaying,
