@@ -107,7 +107,9 @@ def delete(store: Store, sessions: Sequence[Name]) -> None:
         with translated(f"{store.url}/{location} cannot be changed"):
             for at in range(0, len(mine), AT_ONCE):
                 upkeep.remove(store, location, _is_of(mine[at : at + AT_ONCE]))
-    concerned = [table for table in TABLES if not there.keys().isdisjoint(table.locations(store.about.shards))]
+    concerned = [
+        table for table in TABLES if not there.keys().isdisjoint(table.locations(store.about.shards))
+    ]
     upkeep.vacuum(store, concerned, timedelta(0))
     for path in left(store, sessions):
         store.objects.remove(path)
