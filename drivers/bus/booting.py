@@ -43,8 +43,9 @@ class Booting:
 
     @property
     def comes_up(self) -> bool:
-        """Whether an attempt is awaited, and none since it began anew has failed."""
-        return not self.ready and self.step is _COMING_UP
+        """Whether an attempt is under way, and none since it began anew has failed."""
+        attempt = self._booting
+        return attempt is not None and not attempt.done() and self.step is _COMING_UP
 
     def overtake(self) -> None:
         """A boot that is under way does not know all that it should: it counts no more."""

@@ -84,7 +84,7 @@ class Node(BusUser):
 
     @property
     def comes_up(self) -> bool:
-        """Whether it is being read for the first time, and no attempt has failed."""
+        """Whether it is being read now, and no attempt has failed since its bus was opened."""
         return self._booting.comes_up
 
     @property

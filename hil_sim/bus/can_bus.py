@@ -130,6 +130,13 @@ class CanBus:
         if not self.disturbances or all(one.leaves(frame, sender) for one in self.disturbances):
             self.queue(frame, sender)
 
+    def send_past(self, frame: Frame, sender: object, disturbance: Disturbance) -> None:
+        """Queue what `disturbance` has held back or made, unless one that acts since later stops it."""
+        held = self.disturbances
+        later = held[held.index(disturbance) + 1 :] if disturbance in held else held
+        if all(one.leaves(frame, sender) for one in later):
+            self.queue(frame, sender)
+
     def queue(self, frame: Frame, sender: object) -> None:
         """Queue a frame whatever disturbs the sending."""
         self._queued += 1

@@ -26,7 +26,7 @@ class _Answers(Disturbance):
 
     def _queue(self, frame: Frame) -> None:
         if self._node.powered:
-            self._site.robot.bus.queue(frame, self._node)
+            self._site.robot.bus.send_past(frame, self._node, self)
 
 
 class _Twice(_Answers):

@@ -8,9 +8,10 @@ from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QPushButton, QWidget
 
 from gateway.wire.stop import ROBOT_RESET
+from server_gui.core.alarms.found import remedy
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
-from server_gui.core.tuning.stop import StopProgress, StopState
+from server_gui.core.tuning.stop import StopState
 from server_gui.views.chip import Chip, Words
 from server_gui.views.marks import Mark, age_text, drives_mark, enabled_text
 from server_gui.views.predictions import status
@@ -107,8 +108,8 @@ class Header(QWidget):
         why_not = "" if station is None else station.refused(ROBOT_RESET)
         self.reset_button.setEnabled(not why_not)
         set_tip(self.reset_button, why_not or RESETTING)
-        if stopping is not None:
-            self._outcome.say(_outcome(stopping))
+        if station is not None:
+            self._outcome.say(_outcome(station))
 
     def _fit(self) -> None:
         """Show as many chips as have room for all of their first line, and give each what it needs."""
@@ -154,7 +155,8 @@ class Header(QWidget):
         self._fit()
 
 
-def _outcome(stopping: StopProgress) -> Words:
+def _outcome(station: Station) -> Words:
+    stopping = station.stopping
     if stopping.state is StopState.IDLE:
         mark, main = Mark("triangle", "warn", "STOPPED"), "STOP held"
         return Words(mark, main, ("until it is reset",), f"STOP held: {stopping.said}")
@@ -162,7 +164,7 @@ def _outcome(stopping: StopProgress) -> Words:
     parts: dict[StopState, tuple[str, ...]] = {
         StopState.SENT: ("the drives are asked",),
         StopState.CONFIRMED: (f"{stopping.drives} drives in {stopping.answered_ms or 0:.0f} ms",),
-        StopState.NOT_CONFIRMED: ("use the hardware stop",),
+        StopState.NOT_CONFIRMED: (remedy(station.robot),),
     }
     return Words(STOP_MARKS[stopping.state], f"STOP {stopping.state.value}", parts[stopping.state], tip)
 

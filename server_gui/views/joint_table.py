@@ -331,8 +331,9 @@ def _stop(station: Station, joint: str) -> Cell:
     proof = stopping.proofs.get(joint)
     if proof is not None:
         if station.robot.word(f"{joint}.state") == ENABLED:
-            return Cell("no more", "dim", None, f"{proof.text} since the latest STOP; enabled again since")
-        return Cell(proof.when, "good" if station.is_live else "old", None, f"{proof.text} since the STOP")
+            return Cell("no more", "dim", None, f"{proof.text}; enabled again since")
+        colour = "dim" if proof.was_so else "good"
+        return Cell(proof.when, colour if station.is_live else "old", None, proof.text)
     if stopping.state is StopState.IDLE:
         return Cell(NONE, "dim", None, "no stop was sent since the window began")
     return Cell("no proof", "bad" if stopping.state is StopState.NOT_CONFIRMED else "warn")

@@ -150,6 +150,7 @@ class RobotsPanel(QWidget):
         self.all_stop.name("ALL")
         self.all_stop.setAccessibleName("STOP every robot")
         self.all_stop.stopped.connect(self.stop_all)
+        self.all_stop.setEnabled(False)  # there is no robot yet
         everything = QVBoxLayout(self)
         everything.setContentsMargins(8, 8, 8, 8)
         everything.addWidget(scroll, 1)
@@ -174,6 +175,7 @@ class RobotsPanel(QWidget):
             self._add_card(station)
         for card in self.cards:
             card.refresh(selected=card.station is self._desk.selected)
+        self.all_stop.setEnabled(bool(stations))
 
     def _restyle(self) -> None:
         self.setMinimumWidth(self._theme.px(170))

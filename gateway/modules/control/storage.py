@@ -120,7 +120,13 @@ class _Run:
 
     def do(self) -> Stored:
         command = self._command
-        before = self._prepare()
+        try:
+            before = self._prepare()
+        except RpcError as error:  # nothing was sent; nobody waits for the journal
+            journal = self._storage.records.journal
+            what = f"{command.name} refused"
+            journal.append(self._who, what, Share.ASKED, component=self._component, result=str(error))
+            raise
         self._record(command.name, "nothing was sent", Share.ASKED)
         try:
             self._check_drives()  # recording took its time

@@ -82,9 +82,7 @@ def _of_stop(robot: Robot, stopping: StopProgress) -> Iterator[Alarm]:
     if stopping.state is StopState.NOT_CONFIRMED:
         now, moving = _after_unconfirmed(robot), _is_live(robot) and _moving(robot)
         what = f"still moving: STOP again; the STOP before failed: {stopping.why}" if moving else stopping.why
-        check = (
-            "use the hardware stop, now" if not _is_live(robot) or _moving(robot) else "STOP again to be sure"
-        )
+        check = remedy(robot)
         yield Alarm(Kind.NOT_STOPPED, "", what, did=now, check=check, since_s=stopping.since_s)
     elif stopping.held:
         yield Alarm(
@@ -99,6 +97,12 @@ def _of_stop(robot: Robot, stopping: StopProgress) -> Iterator[Alarm]:
         yield Alarm(
             Kind.RESET, "", "every drive is off", check=check_of(Kind.RESET), since_s=stopping.since_s
         )
+
+
+def remedy(robot: Robot) -> str:
+    """What to do after a STOP that nobody has confirmed."""
+    is_off = _is_live(robot) and None not in _words(robot).values() and not _moving(robot)
+    return "STOP again to be sure" if is_off else "use the hardware stop"
 
 
 def _after_stop(robot: Robot, stopping: StopProgress) -> str:

@@ -53,7 +53,7 @@ def _text(kind: Kind, shape: str, colour: str, check: str) -> tuple[Kind, Text]:
 
 TEXTS: Final = dict(
     (
-        _text(Kind.NOT_STOPPED, "square", "bad", "use the hardware stop, now"),
+        _text(Kind.NOT_STOPPED, "square", "bad", "use the hardware stop"),
         _text(
             Kind.ANOTHER,
             "square",

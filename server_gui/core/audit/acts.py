@@ -63,6 +63,9 @@ def _begun(entry: Entry, what: str) -> Iterable[Act]:
                 base, what=word, thing=name, old=before.get(name), new=new, outcome=outcome
             )
         return
+    if what in ("store refused", "restore refused"):
+        what, said = what.removesuffix(" refused"), f"refused: {said}"
+        base = dataclasses.replace(base, what=what, outcome=said)
     yield dataclasses.replace(base, thing=str(entry.get("component") or entry.get("drive") or ""))
 
 

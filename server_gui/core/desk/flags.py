@@ -23,6 +23,7 @@ class FlagKind(Enum):
     TRIAL = "trial"
     MARK = "mark"
     DANGER = "danger"  # advice or worse is foreseen, or is over
+    RULE = "rule"  # on predictions: it began or ceased to hold, or what came of its stop
     TRIGGER = "trigger"  # of the signals, and nowhere else
 
 
@@ -166,7 +167,11 @@ def _at(flag: Flag) -> int:
     return flag.at_ns
 
 
-TOLD: Final = {EventKind.MARKER.value: FlagKind.MARK, EventKind.DANGER.value: FlagKind.DANGER}
+TOLD: Final = {
+    EventKind.MARKER.value: FlagKind.MARK,
+    EventKind.DANGER.value: FlagKind.DANGER,
+    EventKind.RULE.value: FlagKind.RULE,
+}
 _HOW: Final = {FlagKind.FAULT: "fault", FlagKind.STOP: "quick stop"}
 _ENTRIES: Final = {
     "stop": FlagKind.STOP,

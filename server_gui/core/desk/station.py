@@ -55,7 +55,7 @@ from server_gui.core.tuning.edits import Change, Edits
 from server_gui.core.tuning.flash import Flash
 from server_gui.core.tuning.lease import LeaseState
 from server_gui.core.tuning.link import LEASE_S
-from server_gui.core.tuning.stop import StopProgress, StopState
+from server_gui.core.tuning.stop import ENABLED, StopProgress, StopState
 from server_gui.core.tuning.storing import Storing
 from server_gui.core.tuning.taken_back import OVERDUE_S, TakenBack
 from server_gui.core.tuning.writing import WriteProgress, WriteState, written_line
@@ -275,6 +275,7 @@ class Station:
         self.predictions.take(news)
         if isinstance(news, Ruled):
             self.tell(NewsKind.WARNING, news.text)
+            self.flags.add(Flag(news.cause.prediction.stamp_ns, news.text, FlagKind.RULE))
         if isinstance(news, Endangered):
             level = Level.NONE if before is None else before.said.verdict.level
             if (happened := turn(level, news.verdict)) is not None:
@@ -312,7 +313,9 @@ class Station:
 
     def note_stop(self, future: "Future[Stopped]") -> None:
         """Follow what becomes of a STOP that was sent."""
-        number = self.stopping.sent()
+        joints = self.robot.names("joint") if self.is_live else ()
+        states = {joint: self.robot.word(f"{joint}.state") for joint in joints}
+        number = self.stopping.sent({joint for joint, word in states.items() if word not in (None, ENABLED)})
         when_done(
             future,
             self._deliver,

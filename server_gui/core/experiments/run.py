@@ -182,8 +182,9 @@ class Run:
 
     def _late(self) -> str:
         unread = f"{self.plan.name} could not be read"
+        unseen = f"{self._least()} of {LOOKS_AT} gait cycles were seen: nobody walks, or rows are missing"
         return {
-            State.LOOKING: unread if self._held is None else "nobody walks: no three gait cycles were seen",
+            State.LOOKING: unread if self._held is None else unseen,
             State.WRITING: "the robot has not answered a write in time",
             State.HOLDING: f"too few gait cycles came in {self.plan.dwell.limit_s:.0f} s",
         }.get(self.state, "the robot has not answered in time")

@@ -76,11 +76,12 @@ class RobotRecording:
                 self._recorder.journal(self._robot, event.journal.entries, event.head)
             case Described():
                 self._described(event.description)
-            case Identified() if not any(map(session_facts.is_identity, self._facts.setup)):
-                self._learn(setup=self._facts.setup | session_facts.identities(event.devices))
-            case Looked() if event.parameters is not None and not self._facts.parameters:
-                values = event.parameters.values.items()
-                self._learn(parameters={name: known.value for name, known in values})
+            case Identified():  # what was so first stays
+                self._learn(setup=session_facts.identities(event.devices) | self._facts.setup)
+            case Looked() if event.parameters is not None and self._lacks_parameters():
+                found = {name: known.value for name, known in event.parameters.values.items()}
+                known = {name: one for name, one in self._facts.parameters.items() if one is not None}
+                self._learn(parameters=found | known)
             case LinkChanged():
                 self._link_changed(event)
             case Refused():
@@ -93,6 +94,11 @@ class RobotRecording:
         if same != self._same:
             self._same, self._facts = same, found
             self.session, self.began_s = self._recorder.begin(self._robot, found), time.time()
+
+    def _lacks_parameters(self) -> bool:
+        """Whether a value is not known that the session began with: a busy robot tells some later."""
+        known = self._facts.parameters
+        return not known or None in known.values()
 
     def _learn(self, **known: object) -> None:
         """More is known of the session than when it began."""

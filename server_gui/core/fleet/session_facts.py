@@ -97,11 +97,6 @@ def identities(devices: Mapping[str, Mapping[str, str]]) -> dict[str, str]:
     }
 
 
-def is_identity(key: str) -> bool:
-    """Whether it is what a device says of itself."""
-    return key.partition("/")[0] in IDENTITY.values()
-
-
 def configuration_hash(description: Description) -> str:
     """SHA-256 of what the robot's file says, as far as the robot tells it, without what changes by itself."""
     parts = [

@@ -1,6 +1,7 @@
 """Follows one robot in the network's thread and tells its subscribers what it sees. It commands nothing."""
 
 import asyncio
+import contextlib
 import fnmatch
 import math
 import time
@@ -48,6 +49,7 @@ Tell = Callable[[Event], None]
 
 ONCE: Final = math.inf  # a period: once on every link
 AGAIN_S: Final = 5.0  # before a look that failed is tried again
+IDENTIFY_AGAIN_S: Final = (5.0, 15.0, 60.0)  # until what a device has not told is asked again
 DEPTH: Final = 8192  # notifications; more than one read of the socket can bring
 WHOLE_JOURNAL: Final = 1000  # entries; as many as a gateway gives at once
 METHOD_NOT_FOUND: Final = -32601  # JSON-RPC 2.0 §5.1: a gateway of before
@@ -234,24 +236,35 @@ class Feed:
         while True:
             await self._identify.wait()
             self._identify.clear()
-            found: dict[str, Mapping[str, str]] = {}
-            for name in names:
-                try:
-                    found[name] = await self._identity(name)
-                except (RemoteError, CallTimeout, ProtocolError) as error:
-                    self._tell(Failed(f"what {name} is", str(error)))
+            await self._identify_all(names)
+
+    async def _identify_all(self, names: Sequence[str]) -> None:
+        """Those that do not tell everything are asked again a few times: a robot may be busy."""
+        found: dict[str, Mapping[str, str]] = {}
+        missing = list(names)
+        for pause_s in (*IDENTIFY_AGAIN_S, None):
+            missing = [name for name in missing if not await self._identify_one(name, found)]
             try:
-                self._admit(Identified(found))
+                self._admit(Identified(dict(found)))
             except Unfit as error:
                 self._tell(Refused("what its devices are is refused", str(error)))
+            if not missing or pause_s is None:
+                return
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(self._identify.wait(), pause_s)
+                return  # all are to be asked anew
 
-    async def _identity(self, component: str) -> Mapping[str, str]:
-        listed = await self._client.objects(component, IDENTITY)
-        wanted = [one.object for one in listed.objects if one.object.upper() in ASKED]
-        if not wanted:
-            return {}
-        told = await self._client.read_objects(component, *wanted)
-        return {place.upper(): one.words for place, one in told.values.items() if not one.problem}
+    async def _identify_one(self, name: str, found: dict[str, Mapping[str, str]]) -> bool:
+        """Put what it tells into `found`; return whether that is all."""
+        try:
+            listed = await self._client.objects(name, IDENTITY)
+            wanted = [one.object for one in listed.objects if one.object.upper() in ASKED]
+            values = (await self._client.read_objects(name, *wanted)).values if wanted else {}
+        except (RemoteError, CallTimeout, ProtocolError) as error:
+            self._tell(Failed(f"what {name} is", str(error)))
+            return False
+        found[name] = {place.upper(): one.words for place, one in values.items() if not one.problem}
+        return len(found[name]) == len(values)
 
     async def _signed_head(self) -> SignedHead | None:
         """Without it the journal is kept all the same."""

@@ -1,7 +1,7 @@
 """What became of a STOP: sent, then confirmed by every drive, or NOT CONFIRMED. Silence is never success."""
 
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
@@ -29,14 +29,19 @@ class Proof:
     state: str
 
     @property
+    def was_so(self) -> bool:
+        """Whether the STOP has changed nothing of it."""
+        return self.after_ms <= 0
+
+    @property
     def when(self) -> str:
         """After the STOP."""
-        return f"{self.after_ms:.0f} ms" if self.after_ms > 0 else "before"
+        return "off before" if self.was_so else f"{self.after_ms:.0f} ms"
 
     @property
     def text(self) -> str:
-        """`switch on disabled after 34 ms`."""
-        return f"{self.state} {'after ' if self.after_ms > 0 else ''}{self.when}"
+        """`switch on disabled 34 ms after the STOP`."""
+        return f"{self.state} {'before' if self.was_so else f'{self.after_ms:.0f} ms after'} the STOP"
 
 
 @dataclass(slots=True)
@@ -58,6 +63,7 @@ class StopProgress:
     number: int = 0
     drives: int = 0  # that have confirmed it
     proofs: dict[str, Proof] = field(default_factory=dict)  # drive → what its state channel has shown
+    _off: Collection[str] = ()  # drives that were not enabled when it was sent
     _entry: int = 0  # of the journal: the newest that was read
 
     @property
@@ -70,12 +76,12 @@ class StopProgress:
         """Whether drives were told to stop and have not shown it: then "enabled" is no good state."""
         return self.state is StopState.NOT_CONFIRMED
 
-    def sent(self) -> int:
-        """Note that a STOP has gone out, and return its number."""
+    def sent(self, off: Collection[str] = ()) -> int:
+        """Note that a STOP has gone out, and return its number; `off` drives are seen not to be enabled."""
         self.number += 1
         self.state, self.text, self.at_ns = StopState.SENT, "STOP sent …", time.monotonic_ns()
         self.why, self.since_s, self.answered_ms, self.was_ended = "", time.time(), None, False
-        self.proofs = {}
+        self.proofs, self._off = {}, off
         return self.number
 
     def answered(self, number: int, stopped: Stopped) -> None:
@@ -149,12 +155,12 @@ class StopProgress:
         for stamp_ns, word in zip(stamps_ns, words, strict=True):
             after_ms = (stamp_ns - offset_ns - at_ns) / 1e6
             if after_ms >= 0.0 and word is not None and word != ENABLED:
-                self.proofs[drive] = Proof(after_ms, word)
+                self.proofs[drive] = Proof(0.0 if drive in self._off else after_ms, word)
                 return
 
     @property
     def proof(self) -> str:
-        """What each drive's own state has shown since: `left knee: switch on disabled after 34 ms`."""
+        """What each drive's own state has shown since: `all 6 switch on disabled within 34 ms`."""
         if not self.proofs:
             return ""
         slowest = max(proof.after_ms for proof in self.proofs.values())

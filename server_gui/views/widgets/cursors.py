@@ -20,6 +20,7 @@ FLAGS: Final = {
     FlagKind.WRITE: Mark("disc", "accent", "write"),
     FlagKind.TRIAL: Mark("half", "accent", "trial"),
     FlagKind.DANGER: Mark("triangle", "warn", "danger"),
+    FlagKind.RULE: Mark("half", "warn", "rule"),
     FlagKind.MARK: Mark("diamond", "text", "mark"),
     FlagKind.TRIGGER: Mark("ring", "accent", "trigger"),
 }
@@ -27,6 +28,7 @@ FIRST: Final = (
     FlagKind.FAULT,
     FlagKind.STOP,
     FlagKind.DANGER,
+    FlagKind.RULE,
     FlagKind.MARK,
     FlagKind.TRIAL,
     FlagKind.WRITE,

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPaintEvent, QPen
+from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPainterPath, QPaintEvent, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from server_gui.views.theme import Theme
@@ -93,8 +93,8 @@ class StickFigure(QWidget):
         self._draw_leg(painter, first, chains[first], hip, unit)
         self._draw_trunk(painter, hip, lean, unit)
         self._draw_leg(painter, last, chains[last], hip, unit)
+        self._name_sides(painter, {side: hip + points[-1] * unit for side, points in chains.items()})
         for side, points in chains.items():
-            self._name_side(painter, side, hip + points[-1] * unit)
             for joint, point in zip(JOINTS, (QPointF(), *points), strict=False):
                 if f"{side}_{joint}" in self._wrong:
                     self._name_joint(painter, f"{side} {joint}", hip + point * unit, unit)
@@ -108,12 +108,20 @@ class StickFigure(QWidget):
     def _is_wrong(self, side: str) -> bool:
         return any(joint.startswith(side) for joint in self._wrong)
 
-    def _name_side(self, painter: QPainter, side: str, toe: QPointF) -> None:
+    def _name_sides(self, painter: QPainter, toes: Mapping[str, QPointF]) -> None:
         """Which leg it is, before its toes: colour alone says nothing to some."""
         painter.setFont(self._theme.text_font(bold=True))
-        painter.setPen(self._theme.colour(side if self._live else "old"))
-        raised = 0 if side == "right" else painter.fontMetrics().height() * 0.7
-        painter.drawText(toe + QPointF(6, 3 - raised), side[0].upper())
+        metrics = painter.fontMetrics()
+        at = {side: toe + QPointF(6, 3) for side, toe in toes.items()}
+        left, right = at["left"], at["right"]
+        high, beside = metrics.ascent(), abs(left.x() - right.x()) > metrics.maxWidth()
+        if not beside and abs(left.y() - right.y()) < high:  # neither letter lies over the other
+            left.setY(right.y() - high)
+        for side, point in at.items():
+            letter = QPainterPath()
+            letter.addText(point, painter.font(), side[0].upper())
+            painter.strokePath(letter, QPen(self._theme.colour("card"), 3))  # it may stand on the other leg
+            painter.fillPath(letter, self._theme.colour(side if self._live else "old"))
 
     def _name_joint(self, painter: QPainter, name: str, point: QPointF, unit: float) -> None:
         painter.setFont(self._theme.text_font(bold=True))

@@ -204,6 +204,7 @@ def test_each_attempt_to_boot_is_counted(gait: CanDevice, drive: Drive, channel:
     with FakeNode(channel, 5, dict(OBJECTS), silent=True) as fake:
         gait.node.attach(drive, "drive")
         until(lambda: gait.node.boots_begun >= 2)
+        assert not gait.node.comes_up
         fake.silent = False
         until(lambda: gait.node.ready)
         begun = gait.node.boots_begun
@@ -248,8 +249,11 @@ def test_a_node_that_boots_anew_tells_nothing_of_what_was_wrong_before(
         until(lambda: drive.begun == 3)
         try:
             assert gait.node.problem(time.monotonic_ns()) == "it was not read yet: look again in a moment"
+            assert gait.node.comes_up
         finally:
             goes_on.set()
+        until(lambda: gait.node.ready)
+        assert not gait.node.comes_up
 
 
 def test_a_node_that_is_let_go_in_the_middle_of_its_boot_ends(

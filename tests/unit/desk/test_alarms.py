@@ -217,6 +217,19 @@ def test_a_robot_that_moves_after_an_unconfirmed_stop_is_to_be_stopped_again(ben
     assert bench.station.mark.word == "STOP NOT CONFIRMED"
 
 
+def test_a_stop_that_never_went_out_has_stopped_no_drive_that_was_off(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("server_gui.core.follow.robot.STALE_NS", 60_000_000_000)
+    bench.station.take([states(5.0, left_knee=4.0)])
+    bench.station.stop("test")
+    bench.first.fail(NotConnected("there is no link"))
+    bench.station.take([states(5.0)])
+    proofs = bench.station.stopping.proofs
+    assert {joint for joint, proof in proofs.items() if not proof.was_so} == {"left_knee"}
+    assert proofs["left_hip"].when == "off before"
+
+
 def test_the_result_of_a_stop_does_not_hide_a_fault(bench: Bench) -> None:
     fault(bench.station)
     bench.station.stop("test")

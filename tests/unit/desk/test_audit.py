@@ -69,11 +69,13 @@ def test_stores_and_stops_are_told_too(journal: RobotsJournal) -> None:
     audit = Audit()
     journal.say("store", component="left_knee")
     journal.say("store done", component="left_knee", result="stored")
+    journal.say("store refused", component="left_knee", result="it cannot")
     journal.say("stop", reason="STOP key")
     journal.say("stop answered", result={"left_hip": "confirmed", "left_knee": "unconfirmed"})
     audit.take(journal.told().journal.entries)
     assert done(audit) == [
         ("store", "left_knee", "store done: stored"),
+        ("store", "left_knee", "refused: it cannot"),
         ("stop", "", "STOP key"),
         ("stop answered", "", "left_hip: confirmed, left_knee: unconfirmed"),
     ]

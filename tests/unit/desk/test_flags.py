@@ -71,10 +71,14 @@ def test_the_journal_tells_stops_writes_and_trials_of_this_boot() -> None:
     assert [flag.at_ns for flag in of_recorded_journal(entries)] == [50, 60, 70, 80]
 
 
-def test_marks_of_a_recording_are_flags() -> None:
+def test_marks_and_rules_of_a_recording_are_flags() -> None:
     at = datetime.datetime(2026, 11, 23, tzinfo=datetime.UTC)
-    events = [{"kind": "marker", "utc": at, "text": "turns"}, {"kind": "gap", "utc": at, "text": ""}]
-    assert [(flag.text, flag.kind) for flag in of_events(events)] == [("turns", FlagKind.MARK)]
+    texts = {"marker": "turns", "gap": "", "rule": "rule fall (stop) holds"}
+    events = [{"kind": kind, "utc": at, "text": text} for kind, text in texts.items()]
+    assert [(flag.text, flag.kind) for flag in of_events(events)] == [
+        ("turns", FlagKind.MARK),
+        ("rule fall (stop) holds", FlagKind.RULE),
+    ]
 
 
 def test_flags_are_in_the_order_of_time_bounded_and_none_is_told_twice() -> None:

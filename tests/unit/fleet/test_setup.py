@@ -1,22 +1,25 @@
 """What is recorded of a robot when a session begins: its set-up, and what its devices say that they are."""
 
+import dataclasses
 from pathlib import Path
 from typing import Any
 
 import msgspec
+import pytest
 from msgspec.structs import replace
 
 from gateway.client import Address
 from gateway.wire.component import AngleInfo, ComponentInfo
+from gateway.wire.parameter import ParameterValue, ParameterValues
 from server_gui.core.fleet import session_facts
 from server_gui.core.fleet.robot_recording import RobotRecording
-from server_gui.core.follow.events import Described, Event, Identified
+from server_gui.core.follow.events import Described, Event, Identified, Looked
 from server_gui.core.follow.feed import Feed
 from server_gui.core.follow.network import Network
 from server_gui.core.recording.recorder import Recorder
 from server_gui.core.recording.spool import Spool
 from tests.fake_robot import FakeRobot
-from tests.support.desk import described
+from tests.support.desk import described, looked
 from tests.support.waiting import until
 from tests.unit.fleet.recording import FOLLOWING, Kept
 
@@ -41,7 +44,7 @@ def test_the_set_up_tells_eds_calibration_limits_and_the_robots_file() -> None:
     assert found["limits/left_knee.max_torque"] == "8 … 80 N·m, steps of 40"
     assert found["robot.toml/digest"] == "cd" * 6
     assert found["enabled/left_knee.state"] == "4"
-    assert not any(map(session_facts.is_identity, found))
+    assert not {key.partition("/")[0] for key in found} & set(session_facts.IDENTITY.values())
 
 
 def test_what_devices_are_is_kept_with_the_session_that_begins(tmp_path: Path) -> None:
@@ -62,6 +65,25 @@ def test_what_devices_are_is_kept_with_the_session_that_begins(tmp_path: Path) -
     assert (first["firmware/left_knee"], first["serial number/left_knee"]) == ("1.2", "77")
     assert second["firmware/left_knee"] == "1.3"
     assert second["EDS/left_knee"] == first["EDS/left_knee"]
+
+
+def told(**values: float | None) -> Looked:
+    """The parameters as the robot holds them; of those that are None it has not told yet."""
+    seen = looked()
+    values_ = {name: ParameterValue(value, "", None, None, 0) for name, value in values.items()}
+    return dataclasses.replace(seen, parameters=ParameterValues(values_))
+
+
+def test_what_a_busy_robot_tells_later_is_of_the_session_too(tmp_path: Path) -> None:
+    with Spool(tmp_path / "spool", reserve_bytes=0) as spool, Recorder(spool) as recorder:
+        keeping = RobotRecording("exo-01", recorder)
+        for event in (knee(), Identified({}), told(a=None, b=2.0), Identified(FIRMWARE)):
+            keeping.take(event)
+        keeping.take(told(a=1.0, b=3.0))
+        keeping.take(told(a=9.0, b=9.0))
+    newest = Kept.of(tmp_path / "spool").table("sessions", "exo-01")[-1]
+    assert msgspec.json.decode(newest["parameters"]) == {"a": 1.0, "b": 2.0}
+    assert msgspec.json.decode(newest["setup"])["firmware/left_knee"] == "1.2"
 
 
 def asked(robot: FakeRobot) -> None:
@@ -88,7 +110,14 @@ def thing(place: str) -> dict[str, Any]:
     return {"object": place, "name": "", "type": "UNSIGNED32", "access": "ro"} | missing
 
 
-def test_each_device_is_asked_once_a_link_for_what_its_eds_knows() -> None:
+def identities(heard: list[Event]) -> list[Identified]:
+    return [event for event in heard if isinstance(event, Identified)]
+
+
+def test_each_device_is_asked_for_what_its_eds_knows_until_it_has_told(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("server_gui.core.follow.feed.IDENTIFY_AGAIN_S", (0.05,) * 1000)
     heard: list[Event] = []
     with FakeRobot() as robot, Network() as network:
         asked(robot)
@@ -101,10 +130,18 @@ def test_each_device_is_asked_once_a_link_for_what_its_eds_knows() -> None:
         following = msgspec.structs.replace(FOLLOWING, identities=True, journal_s=None)
         feed = Feed(Address(host, int(port)), [heard.append], following)
         running = network.run(feed.run())
-        until(lambda: any(isinstance(event, Identified) for event in heard))
-        (found,) = (event for event in heard if isinstance(event, Identified))
-        assert found.devices == {"left_knee": {"0X100A:0": "1.2"}}, "what does not answer is not recorded"
-        assert robot.called("object.read") == [
-            {"component": "left_knee", "objects": ["0x100A:0", "0x1018:1"]}
-        ]
+        first = until(lambda: next(iter(identities(heard)), None))
+        assert first.devices == {"left_knee": {"0X100A:0": "1.2"}}, "what does not answer is not recorded"
+        assert robot.called("object.read")[0] == {
+            "component": "left_knee",
+            "objects": ["0x100A:0", "0x1018:1"],
+        }
+        robot.overrides["object.read"] = lambda params: {
+            "component": params["component"],
+            "values": {
+                place: {"value": None, "words": "1", "stamp_ns": 1, "problem": None}
+                for place in params["objects"]
+            },
+        }
+        until(lambda: len(identities(heard)[-1].devices["left_knee"]) == 2, "what was busy is asked again")
         running.cancel()

@@ -128,7 +128,8 @@ def test_a_device_that_says_it_cannot_is_not_asked(
     assert (error.kind, error.data["object"]) == ("not_allowed", "0x1010:1")
     assert words in str(error)
     assert resting.left.node.written() == []
-    assert journal(writer) == []
+    (told,) = journal(writer)
+    assert (told["what"], told["component"], told["result"]) == ("store refused", "left_knee", str(error))
 
 
 def test_a_device_without_the_object_says_so_itself(resting: Bench, writer: Client) -> None:

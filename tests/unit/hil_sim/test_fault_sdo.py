@@ -33,6 +33,22 @@ def test_sdo_late_leaves_the_node_as_quick_as_before_in_everything_else(shared: 
     assert shared.read(1, 0x6041)
 
 
+def test_a_node_that_answers_late_falls_silent_too(shared: Outside) -> None:
+    shared.faults.begin("sdo_late", "left_knee", params={"delay_ms": 300})
+    shared.faults.begin("sdo_silent", "left_knee")
+    assert shared.ask(KNEE, READ_PROFILE_VELOCITY, 0.5) == []
+
+
+def test_two_answers_that_are_late_are_two(shared: Outside) -> None:
+    for name in ("sdo_late", "sdo_duplicate"):
+        shared.faults.begin(name, "left_knee")
+    assert len(shared.ask(KNEE, READ_PROFILE_VELOCITY, 1.0)) == 2
+    shared.faults.clear()
+    for name in ("sdo_duplicate", "sdo_late"):
+        shared.faults.begin(name, "left_knee")
+    assert len(shared.ask(KNEE, READ_PROFILE_VELOCITY, 1.0)) == 2
+
+
 def test_sdo_silent_answers_nothing_and_takes_the_write_all_the_same(shared: Outside) -> None:
     before = shared.read(KNEE, 0x6081)
     shared.faults.begin("sdo_silent", "left_knee")
