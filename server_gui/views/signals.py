@@ -197,7 +197,11 @@ class Signals(QWidget):
     # --- how it is put together
 
     def _lay_out(self) -> None:
-        left, right = QWidget(), QWidget()
+        everything, splitter = QVBoxLayout(self), QSplitter()
+        everything.setContentsMargins(MARGIN, MARGIN, MARGIN, 0)
+        everything.addLayout(self.tools.rows)
+        everything.addWidget(splitter, 1)
+        left, right = QWidget(splitter), QWidget(splitter)
         left_box, right_box = QVBoxLayout(left), QVBoxLayout(right)
         left_box.setContentsMargins(0, 0, 0, 8)
         right_box.setContentsMargins(0, 0, 0, 8)
@@ -208,15 +212,8 @@ class Signals(QWidget):
             right_box.addWidget(bar)
         right_box.addWidget(self.area, 1)
         right_box.addWidget(self.measuring)
-        splitter = QSplitter()
-        splitter.addWidget(left)
-        splitter.addWidget(right)
         splitter.setStretchFactor(1, 1)
         splitter.setSizes([self._theme.px(190), self._theme.px(700)])
-        everything = QVBoxLayout(self)
-        everything.setContentsMargins(MARGIN, MARGIN, MARGIN, 0)
-        everything.addLayout(self.tools.rows)
-        everything.addWidget(splitter, 1)
 
     def _bind(self) -> None:
         tools = self.tools

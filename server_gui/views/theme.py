@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Final
 
-from PySide6.QtCore import QObject, Signal
+from PySide6.QtCore import QEvent, QObject, Signal
 from PySide6.QtGui import QColor, QFont, QFontDatabase, QPalette
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QWidget
 
 SMALLEST_SCALE, LARGEST_SCALE = 0.8, 2.0
 LOOSE: Final = 11  # px beside the name of a page, where there is room for that
@@ -232,8 +232,7 @@ class Theme(QObject):
             return  # every widget would take them anew, for a second
         self._application.setFont(font)
         self._application.setPalette(self._palette())
-        # Never without a sheet in between: Qt 6.11 then keeps widgets that are gone, and crashes later.
-        self._application.setStyleSheet(self._style())
+        _restyle(self._application, self._style())
         self.changed.emit()
         if self.scale != before:
             self.scaled.emit()
@@ -292,3 +291,20 @@ class Theme(QObject):
         for role, name in roles.items():
             palette.setColor(role, self.colour(name))
         return palette
+
+
+def _restyle(application: QApplication, sheet: str) -> None:
+    """Take another style sheet, and style every widget by it once.
+
+    Qt alone styles a widget once for itself and once for each that it is within, so eight times in the main
+    window. It does so with all that it remembers the style of, and so is made to forget that.
+    """
+    application.style().unpolish(application)
+    # Never without a sheet in between: Qt 6.11 then keeps widgets that are gone, and crashes later.
+    application.setStyleSheet(sheet)
+    style, changed = application.style(), QEvent(QEvent.Type.StyleChange)
+    for window in application.topLevelWidgets():
+        if window.parentWidget() is None:
+            for widget in (window, *window.findChildren(QWidget)):  # each behind what it is within
+                style.polish(widget)
+                application.sendEvent(widget, changed)

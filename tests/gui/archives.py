@@ -1,4 +1,4 @@
-"""A recorded session, and the window's two tabs that show recordings; fixtures for `conftest.py`."""
+"""A recorded session, and the window's tabs of what is kept; fixtures for `conftest.py`."""
 
 import dataclasses
 import time
@@ -21,9 +21,11 @@ from server_gui.core.recording.upload import send
 from server_gui.core.settings.server_file import RecordingSettings, ServerSettings, StoreSettings
 from server_gui.views.cloud.panel import Cloud
 from server_gui.views.main_window import USUAL, MainWindow
+from server_gui.views.models.panel import ModelsPage
+from server_gui.views.pace import SLOW
 from server_gui.views.recordings.panel import Recordings
 from server_gui.views.theme import Theme
-from tests.gui.fakes import Bench, destroy
+from tests.gui.fakes import Bench, destroy, draw_frames
 from tests.gui.foreseen import predicted
 from tests.gui.running import wait
 from tests.support.commissioning import Played
@@ -98,25 +100,27 @@ def full_window(
 
 
 class Tabs(QTabWidget):
-    """The two tabs without the rest of the window, which takes its time to be made."""
+    """These tabs without the rest of the window, which takes its time to be made."""
 
     def __init__(self, archive: Archive, bench: Bench, theme: Theme) -> None:
         super().__init__()
         self.recordings = Recordings(archive, bench.desk.recording, theme)
         self.cloud = Cloud(archive, bench.desk.recording, theme)
+        self.models = ModelsPage(archive.models, theme)
         self.tabs = self
         self.addTab(self.recordings, "Recordings")
         self.addTab(self.cloud, "Cloud")
+        self.addTab(self.models, "Models")
         self.resize(900, 700)
 
     def refresh(self) -> None:
         view = self.currentWidget()
-        if isinstance(view, Recordings | Cloud):
+        if isinstance(view, Recordings | Cloud | ModelsPage):
             view.refresh()
 
 
 class Shown:
-    """The window, or its two tabs, drawn with whatever threads have posted."""
+    """The window, or some of its tabs, drawn with whatever threads have posted."""
 
     def __init__(self, window: MainWindow | Tabs, posted: list[Callable[[], None]]) -> None:
         self.window = window
@@ -125,8 +129,11 @@ class Shown:
     def draw(self) -> None:
         while self._posted:
             self._posted.pop(0)()
-        for _ in range(7):
-            self.window.refresh()
+        if isinstance(self.window, MainWindow):
+            draw_frames(self.window)
+        else:
+            for _ in range(SLOW + 1):
+                self.window.refresh()
         QApplication.processEvents()
 
     def until(self, so: Callable[[], object], what: str) -> None:

@@ -25,7 +25,7 @@ from tests.gui.archives import (  # noqa: F401  # fixtures, for every test here
     shown,
     whole,
 )
-from tests.gui.fakes import Bench, destroy
+from tests.gui.fakes import Around, Bench, Parts, destroy
 from tests.support.desk import described, looked
 
 
@@ -102,5 +102,24 @@ def panel(theme: Theme, bench: Bench) -> Iterator[ParametersPanel]:
     made.resize(420, 900)
     made.show()
     made.refresh()
+    yield made
+    destroy(made)
+
+
+@pytest.fixture
+def parts(theme: Theme, bench: Bench) -> Iterator[Parts]:
+    """The page of edits and its bars."""
+    made = Parts(bench, theme)
+    made.show()
+    yield made
+    destroy(made)
+
+
+@pytest.fixture
+def around(theme: Theme, bench: Bench) -> Iterator[Around]:
+    """Header, alarms, robots and events."""
+    made = Around(bench, theme)
+    made.show()
+    bench.draw(made)
     yield made
     destroy(made)

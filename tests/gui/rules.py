@@ -38,18 +38,18 @@ def seen(window: QWidget) -> Iterator[QWidget]:
 
 def green(window: QWidget, theme: Theme) -> list[str]:
     """Everything that is drawn as good."""
-    good = theme.colour("good")
+    good, shown = theme.colour("good"), list(seen(window))
     found = [
         f"{_path(one)}: {one.accessibleName()}"
-        for one in seen(window)
+        for one in shown
         if isinstance(one, MarkIcon) and one._mark.colour == "good"
     ]
     found += [
         f"{_path(one)}: {one.text()}"
-        for one in seen(window)
+        for one in shown
         if isinstance(one, QLabel) and one.property("tone") == "good"
     ]
-    for view in seen(window):
+    for view in shown:
         if isinstance(view, QTableView):
             for row, column in _cells(view):
                 index = view.model().index(row, column)

@@ -13,6 +13,8 @@ from server_gui.core.settings.server_file import ServerSettings
 from tests.gui.fakes import destroy
 from tests.support.waiting import until
 
+FRAME_MS = 120  # rather than 33: to draw all the time leaves little to what is waited for
+
 
 @contextlib.contextmanager
 def running(
@@ -20,6 +22,7 @@ def running(
 ) -> Iterator[App]:
     """The window of these robots, shown."""
     with App(qt, settings, kept, FOLLOWING, record) as app:
+        app._timer.setInterval(FRAME_MS)
         app.window.show()
         yield app
         app.window.hide()

@@ -28,7 +28,7 @@ from server_gui.views.joint_table import JointTable
 from server_gui.views.main_window import MainWindow
 from server_gui.views.theme import Theme
 from tests.gui import rules
-from tests.gui.fakes import Bench, stop_is_whole
+from tests.gui.fakes import Around, Bench, stop_is_whole
 from tests.gui.foreseen import predicted
 from tests.support.desk import JOINTS, described, looked, telemetry, walking
 
@@ -47,7 +47,7 @@ def fault(bench: Bench) -> None:
     bench.look_again([telemetry([now_ns + 1], columns, now_ns), found])
 
 
-def settle(window: MainWindow, bench: Bench) -> None:
+def settle(window: MainWindow | Around, bench: Bench) -> None:
     """Frames, and Qt's layouts within layouts."""
     bench.draw(window)
     for _ in range(10):
@@ -67,7 +67,7 @@ def is_whole(label: QLabel) -> bool:
     return needs.height() <= label.height() and needs.width() <= label.width()
 
 
-def opened(window: MainWindow, bench: Bench) -> list[AlarmRow]:
+def opened(window: MainWindow | Around, bench: Bench) -> list[AlarmRow]:
     """The rows of the list of all alarms, which is opened."""
     bench.draw(window)
     window.alarms.more.click()
@@ -170,13 +170,13 @@ def test_the_joint_table_is_whole_beside_an_alarm(window: MainWindow, bench: Ben
         assert table.visibleRegion().boundingRect().height() == table.height(), size
 
 
-def test_without_an_alarm_the_strip_says_so_where_that_is_known(window: MainWindow, bench: Bench) -> None:
+def test_without_an_alarm_the_strip_says_so_where_that_is_known(around: Around, bench: Bench) -> None:
     bench.look_again([walking(100), looked()])
-    window.alarms.refresh()
-    assert window.alarms.headline.text() == "No alarms"
+    around.alarms.refresh()
+    assert around.alarms.headline.text() == "No alarms"
     bench.station.robot.parts.clear()
-    window.alarms.refresh()
-    assert window.alarms.headline.text() == "Alarms not known"
+    around.alarms.refresh()
+    assert around.alarms.headline.text() == "Alarms not known"
 
 
 def test_a_headline_is_whole_when_the_text_has_grown(window: MainWindow, bench: Bench, theme: Theme) -> None:
@@ -197,74 +197,74 @@ def test_a_headline_is_whole_when_the_text_has_grown(window: MainWindow, bench: 
         window.alarms.more.click()  # it is closed again
 
 
-def test_while_the_list_is_open_no_row_moves(window: MainWindow, bench: Bench) -> None:
+def test_while_the_list_is_open_no_row_moves(around: Around, bench: Bench) -> None:
     fault(bench)
-    (row,) = (row for row in opened(window, bench) if "left knee" in row.headline.text())
-    place = window.alarms.list.rows.index(row)
+    (row,) = (row for row in opened(around, bench) if "left knee" in row.headline.text())
+    place = around.alarms.list.rows.index(row)
     bench.station.stop("test")
     bench.first.fail(NotConnected(WHY))
-    settle(window, bench)
-    assert "left knee" in window.alarms.list.rows[place].headline.text(), "a worse one came before it"
+    settle(around, bench)
+    assert "left knee" in around.alarms.list.rows[place].headline.text(), "a worse one came before it"
     now_ns = time.monotonic_ns()
     bench.look_again([telemetry([now_ns + 5], {"left_knee.state": [5.0]}, now_ns), looked()])
-    settle(window, bench)
+    settle(around, bench)
     assert row.headline.text().endswith("(over)")
     assert not row.buttons.isVisible()
-    window.alarms.list.turn()
-    assert all("left knee" not in row.headline.text() for row in opened(window, bench))
+    around.alarms.list.turn()
+    assert all("left knee" not in row.headline.text() for row in opened(around, bench))
 
 
 def test_a_click_that_was_meant_for_another_alarm_acknowledges_none(
-    window: MainWindow, bench: Bench, monkeypatch: pytest.MonkeyPatch
+    around: Around, bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     fault(bench)
-    bench.draw(window)
+    bench.draw(around)
     monkeypatch.setattr("server_gui.views.alarms.HOLD_S", 0.0)
-    bench.draw(window)
-    assert window.alarms.buttons.acknowledge.isEnabled()
+    bench.draw(around)
+    assert around.alarms.buttons.acknowledge.isEnabled()
     monkeypatch.setattr("server_gui.views.alarms.HOLD_S", 1e9)
     bench.desk.recording.alarms.acknowledge((Kind.FAULT, ""))
     bench.station.alarms.acknowledge((Kind.FAULT, "left_knee"))
     bench.station.stop("test")
     bench.first.answer(Stopped(dict.fromkeys(JOINTS, "confirmed"), held=True))
-    bench.draw(window)
-    assert "STOPPED" in window.alarms.headline.text()
-    assert not window.alarms.buttons.acknowledge.isEnabled()
+    bench.draw(around)
+    assert "STOPPED" in around.alarms.headline.text()
+    assert not around.alarms.buttons.acknowledge.isEnabled()
 
 
-def test_a_fault_is_the_same_on_strip_card_header_and_events(window: MainWindow, bench: Bench) -> None:
+def test_a_fault_is_the_same_on_strip_card_header_and_events(around: Around, bench: Bench) -> None:
     fault(bench)
-    bench.draw(window)
+    bench.draw(around)
     mark = bench.station.mark
     assert (mark.shape, mark.colour, mark.word) == ("square", "bad", "fault")
-    assert window.alarms.texts[0].startswith(f"fault: left knee: {CAUSE}\nsince ")
-    assert "→ check that the joint moves freely" in window.alarms.texts[0]
-    assert window.robots.cards[0].texts[1] == f"fault: left knee: {CAUSE}"
-    assert CAUSE in window.alarms.headline.text()
-    assert window.events.pinned[0].mark == mark
+    assert around.alarms.texts[0].startswith(f"fault: left knee: {CAUSE}\nsince ")
+    assert "→ check that the joint moves freely" in around.alarms.texts[0]
+    assert around.robots.cards[0].texts[1] == f"fault: left knee: {CAUSE}"
+    assert CAUSE in around.alarms.headline.text()
+    assert around.events.pinned[0].mark == mark
 
 
 def test_an_active_alarm_stays_above_whatever_else_happens_and_is_chosen(
-    window: MainWindow, bench: Bench
+    around: Around, bench: Bench
 ) -> None:
     fault(bench)
     for number in range(600):
         bench.desk.news.add(NewsKind.STALE, "exo-01", f"right_insole {number} stale")
-    window.events.words.setText("nothing that there is")
-    bench.draw(window)
-    assert window.events.lines == window.events.pinned
-    assert f"left knee: {CAUSE}" in [line.text for line in window.events.lines]
+    around.events.words.setText("nothing that there is")
+    bench.draw(around)
+    assert around.events.lines == around.events.pinned
+    assert f"left knee: {CAUSE}" in [line.text for line in around.events.lines]
 
 
-def test_events_are_chosen_by_kind_and_word(window: MainWindow, bench: Bench) -> None:
+def test_events_are_chosen_by_kind_and_word(around: Around, bench: Bench) -> None:
     bench.desk.news.add(NewsKind.STALE, "exo-01", "right_insole stale")
     bench.desk.news.add(NewsKind.STOP, "exo-01", "STOP confirmed")
-    bench.draw(window)
-    window.events.kinds.setCurrentText("Faults and stops")
-    assert [line.text for line in window.events.lines[len(window.events.pinned) :]] == ["STOP confirmed"]
-    window.events.kinds.setCurrentText("Everything")
-    window.events.words.setText("insole")
-    assert [line.text for line in window.events.lines[len(window.events.pinned) :]] == ["right_insole stale"]
+    bench.draw(around)
+    around.events.kinds.setCurrentText("Faults and stops")
+    assert [line.text for line in around.events.lines[len(around.events.pinned) :]] == ["STOP confirmed"]
+    around.events.kinds.setCurrentText("Everything")
+    around.events.words.setText("insole")
+    assert [line.text for line in around.events.lines[len(around.events.pinned) :]] == ["right_insole stale"]
 
 
 def test_a_fault_is_cleared_after_a_question_and_enables_nothing(window: MainWindow, bench: Bench) -> None:
@@ -300,10 +300,10 @@ def test_the_signal_of_a_fault_is_shown_around_its_instant(window: MainWindow, b
     assert right <= 0.0
 
 
-def test_what_is_acknowledged_is_one_line_until_it_is_over(window: MainWindow, bench: Bench) -> None:
+def test_what_is_acknowledged_is_one_line_until_it_is_over(around: Around, bench: Bench) -> None:
     fault(bench)
-    opened(window, bench)[0].acknowledge.click()
-    (text,) = (text for text in window.alarms.texts if CAUSE in text)
+    opened(around, bench)[0].acknowledge.click()
+    (text,) = (text for text in around.alarms.texts if CAUSE in text)
     assert text.startswith("fault: left knee: ")
     assert text.partition("\n")[0].endswith("acknowledged)")
 
@@ -328,14 +328,14 @@ def test_a_stop_that_is_not_confirmed_is_whole_with_its_reason(
     assert stop_is_whole(window)
 
 
-def test_the_result_of_a_stop_leaves_the_alarms_in_sight(window: MainWindow, bench: Bench) -> None:
+def test_the_result_of_a_stop_leaves_the_alarms_in_sight(around: Around, bench: Bench) -> None:
     fault(bench)
     bench.station.stop("test")
     bench.first.answer(Stopped(dict.fromkeys(JOINTS, "confirmed"), held=True))
-    bench.draw(window)
-    assert window.header.outcome_text == "STOP confirmed"
-    assert CAUSE in window.alarms.headline.text()
-    assert len(window.alarms.texts) == 2
+    bench.draw(around)
+    assert around.header.outcome_text == "STOP confirmed"
+    assert CAUSE in around.alarms.headline.text()
+    assert len(around.alarms.texts) == 2
 
 
 def test_a_held_stop_is_reset_after_a_question_about_that_robot(window: MainWindow, bench: Bench) -> None:
@@ -365,16 +365,16 @@ def test_a_question_that_is_not_answered_does_nothing(window: MainWindow, bench:
     assert bench.first.named("reset") == []
 
 
-def test_each_stop_names_its_robot_and_all_says_all(window: MainWindow, bench: Bench) -> None:
+def test_each_stop_names_its_robot_and_all_says_all(around: Around, bench: Bench) -> None:
     other = bench.add("a-robot-with-quite-a-long-name-of-its-own", 7421)
     other.is_named = True
     other.take([described()])
-    settle(window, bench)
-    first, second = window.robots.cards
+    settle(around, bench)
+    first, second = around.robots.cards
     assert first.stop.text() == "STOP  exo-01"
     assert second.stop.text().startswith("STOP  a-robot")
     assert second.stop.accessibleName() == "STOP a-robot-with-quite-a-long-name-of-its-own"
-    assert window.robots.all_stop.text() == "STOP  ALL"
+    assert around.robots.all_stop.text() == "STOP  ALL"
 
 
 def test_a_robot_is_removed_after_a_question(window: MainWindow, bench: Bench) -> None:
@@ -391,12 +391,12 @@ def test_a_robot_is_removed_after_a_question(window: MainWindow, bench: Bench) -
     assert [card.station for card in window.robots.cards] == [bench.station]
 
 
-def test_alarms_of_two_robots_are_named(window: MainWindow, bench: Bench) -> None:
+def test_alarms_of_two_robots_are_named(around: Around, bench: Bench) -> None:
     fault(bench)
     other = bench.add("exo-02", 7421)
     other.take([LinkChanged(ConnectionState.WAITING, "gone", time.monotonic_ns())])
-    bench.draw(window)
-    assert [text.partition(" · ")[0] for text in window.alarms.texts] == ["exo-01", "exo-02"]
+    bench.draw(around)
+    assert [text.partition(" · ")[0] for text in around.alarms.texts] == ["exo-01", "exo-02"]
 
 
 def test_words_have_room_beside_the_buttons_that_come_with_them(window: MainWindow, bench: Bench) -> None:
@@ -413,7 +413,7 @@ def test_words_have_room_beside_the_buttons_that_come_with_them(window: MainWind
 
 
 def test_after_a_reset_how_to_go_on_stands_before_warnings_and_after_what_is_bad(
-    window: MainWindow, bench: Bench
+    around: Around, bench: Bench
 ) -> None:
     received_ns = time.monotonic_ns()
     columns: dict[str, list[float | None]] = {f"{joint}.state": [1.0] for joint in JOINTS}
@@ -422,10 +422,10 @@ def test_after_a_reset_how_to_go_on_stands_before_warnings_and_after_what_is_bad
     )
     bench.station.stopping.was_reset(held=False)
     bench.look_again([looked(state="stale", problem="late")])
-    settle(window, bench)
-    assert window.alarms.told[0][1].alarm.kind is Kind.RESET
-    assert "enable the drives" in " ".join(window.alarms.texts)
+    settle(around, bench)
+    assert around.alarms.told[0][1].alarm.kind is Kind.RESET
+    assert "enable the drives" in " ".join(around.alarms.texts)
     assert bench.station.mark.word == "component stale", "its mark is that of the worst"
     bench.look_again([looked(state="lost", problem="gone")])
-    settle(window, bench)
-    assert window.alarms.told[0][1].alarm.mark.word == "lost"
+    settle(around, bench)
+    assert around.alarms.told[0][1].alarm.mark.word == "lost"

@@ -17,7 +17,7 @@ from server_gui.views.main_window import MainWindow
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.framed import draw_frame
 from server_gui.views.widgets.stride_curves import CYCLE
-from tests.gui.fakes import Bench
+from tests.gui.fakes import Bench, Parts
 from tests.support.desk import looked
 from tests.unit.evidence.synthetic import cycles, spell
 from tests.unit.evidence.test_comparison import ERROR, times
@@ -47,19 +47,19 @@ def test_the_newest_edit_is_shown_with_its_word_and_its_strides(bench: Bench, wi
     assert described.startswith("40 strides before and 41 after, from ")
 
 
-def test_values_and_metrics_are_in_the_units_that_were_chosen(bench: Bench, window: MainWindow) -> None:
+def test_values_and_metrics_are_in_the_units_that_were_chosen(bench: Bench, parts: Parts) -> None:
     bench.station.take([looked()])
     one = worse()
     bench.station.take_evidence(
         replace(one, edit=replace(one.edit, changes=(Change("gait.step_length", 0.4, 0.43),)))
     )
-    window.edits.refresh()
-    assert "gait.step_length 400 → 430 mm: worse" in window.edits.verdict.text()
-    assert "0.05993 °)" in window.edits.words.text()
+    parts.edits.refresh()
+    assert "gait.step_length 400 → 430 mm: worse" in parts.edits.verdict.text()
+    assert "0.05993 °)" in parts.edits.words.text()
     bench.desk.shown.change(Units(by_si={"m": "m", "rad": "rad"}))
-    window.edits.refresh()
-    assert "gait.step_length 0.40 → 0.43 m: worse" in window.edits.verdict.text()
-    assert "0.001046 rad)" in window.edits.words.text()
+    parts.edits.refresh()
+    assert "gait.step_length 0.40 → 0.43 m: worse" in parts.edits.verdict.text()
+    assert "0.001046 rad)" in parts.edits.words.text()
 
 
 @pytest.mark.parametrize("scale", [1.0, 2.0])
@@ -76,21 +76,21 @@ def test_no_figure_lies_over_a_curve(theme: Theme, scale: float) -> None:
     assert area.width() > 0.4 * image.width()
 
 
-def test_who_looks_at_an_older_edit_keeps_looking_at_it(bench: Bench, window: MainWindow) -> None:
+def test_who_looks_at_an_older_edit_keeps_looking_at_it(bench: Bench, parts: Parts) -> None:
     for write in (1, 2):
         bench.station.take_evidence(worse(write))
-    window.edits.refresh()
-    assert window.edits.list.currentRow() == 0
-    window.edits.list.setCurrentRow(1)
+    parts.edits.refresh()
+    assert parts.edits.list.currentRow() == 0
+    parts.edits.list.setCurrentRow(1)
     bench.station.take_evidence(told(3))
-    window.edits.refresh()
-    assert window.edits.list.currentRow() == 2
-    assert window.edits.list.count() == 3
+    parts.edits.refresh()
+    assert parts.edits.list.currentRow() == 2
+    assert parts.edits.list.count() == 3
 
 
 @pytest.mark.parametrize("word", [Word.FEW, Word.WORSE, None])
 def test_a_trial_that_counts_down_says_what_it_does_so_far(
-    bench: Bench, window: MainWindow, word: Word | None
+    bench: Bench, parts: Parts, word: Word | None
 ) -> None:
     said = {
         Word.FEW: "too early to judge it: 49 gait cycles before, 3 since; it takes 8 of each leg",
@@ -105,8 +105,8 @@ def test_a_trial_that_counts_down_says_what_it_does_so_far(
         cycles = 3 if word is Word.FEW else known.evidence.cycles_after
         found = replace(known.evidence, word=word, cycles_after=cycles)
         bench.station.take_evidence(replace(known, evidence=found))
-    window.trial.refresh()
-    assert said[word] in window.trial.words.text()
+    parts.trial.refresh()
+    assert said[word] in parts.trial.words.text()
 
 
 @pytest.mark.parametrize(
@@ -122,7 +122,7 @@ def test_a_trial_that_counts_down_says_what_it_does_so_far(
     ],
 )
 def test_enough_strides_that_cannot_be_judged_say_why(
-    bench: Bench, window: MainWindow, left_out: dict[str, int], notes: tuple[str, ...], said: str
+    bench: Bench, parts: Parts, left_out: dict[str, int], notes: tuple[str, ...], said: str
 ) -> None:
     bench.station.writing.trial = Trial(
         1, {"gait.step_length": 0.4}, {"gait.step_length": 0.3}, time.monotonic_ns() + 10**10
@@ -130,12 +130,12 @@ def test_enough_strides_that_cannot_be_judged_say_why(
     known = worse(is_final=False)
     found = replace(known.evidence, word=Word.FEW, left_out=left_out, notes=notes)
     bench.station.take_evidence(replace(known, evidence=found))
-    window.trial.refresh()
-    assert f"cannot be judged so far: {said}" in window.trial.words.text()
+    parts.trial.refresh()
+    assert f"cannot be judged so far: {said}" in parts.trial.words.text()
 
 
 def test_an_edit_stands_at_the_time_of_this_place(
-    bench: Bench, window: MainWindow, monkeypatch: pytest.MonkeyPatch
+    bench: Bench, parts: Parts, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As all else in the window, and not in UTC."""
     monkeypatch.setenv("TZ", "UTC-05:30")  # east of it, as POSIX writes that
@@ -143,20 +143,20 @@ def test_an_edit_stands_at_the_time_of_this_place(
     try:
         known = worse()
         bench.station.take_evidence(replace(known, edit=replace(known.edit, utc_ns=1_700_000_000 * 10**9)))
-        window.edits.refresh()
+        parts.edits.refresh()
     finally:
         monkeypatch.undo()
         time.tzset()
-    assert window.edits.list.item(0).text().startswith("2023-11-15 03:43  ")
+    assert parts.edits.list.item(0).text().startswith("2023-11-15 03:43  ")
 
 
-def test_evidence_that_grows_lays_no_other_edit_out_again(bench: Bench, window: MainWindow) -> None:
+def test_evidence_that_grows_lays_no_other_edit_out_again(bench: Bench, parts: Parts) -> None:
     for write in (1, 2):
         bench.station.take_evidence(worse(write, is_final=False))
-    window.edits.refresh()
-    items = [window.edits.list.item(row) for row in (0, 1)]
+    parts.edits.refresh()
+    items = [parts.edits.list.item(row) for row in (0, 1)]
     bench.station.take_evidence(worse(2))
-    window.edits.refresh()
-    assert [window.edits.list.item(row) for row in (0, 1)] == items
+    parts.edits.refresh()
+    assert [parts.edits.list.item(row) for row in (0, 1)] == items
     assert ["so far" in item.text() for item in items] == [False, True]
-    assert "so far" not in window.edits.verdict.text()
+    assert "so far" not in parts.edits.verdict.text()

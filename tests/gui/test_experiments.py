@@ -12,7 +12,7 @@ from server_gui.core.evidence.file import Told
 from server_gui.core.experiments.machine import Event, State
 from server_gui.core.tuning.commands import ReadBack
 from server_gui.views.main_window import MainWindow
-from tests.gui.fakes import Bench
+from tests.gui.fakes import Bench, Parts
 from tests.gui.rules import settle
 from tests.gui.running import wait
 from tests.support.desk import looked
@@ -53,7 +53,7 @@ def swept() -> Told:
     return replace(told(), evidence=found, experiment=tried, curves=())
 
 
-def begun(bench: Bench, window: MainWindow) -> None:
+def begun(bench: Bench, window: MainWindow | Parts) -> None:
     """An A/B trial of two step lengths."""
     bench.station.take([looked()])
     window.edits.refresh()
@@ -66,11 +66,11 @@ def begun(bench: Bench, window: MainWindow) -> None:
     form.begin.click()
 
 
-def test_the_form_says_what_it_will_do_and_what_cannot_be(bench: Bench, window: MainWindow) -> None:
+def test_the_form_says_what_it_will_do_and_what_cannot_be(bench: Bench, parts: Parts) -> None:
     bench.station.take([looked()])
-    window.edits.refresh()
-    window.edits.ab.click()
-    form = window.edits.form
+    parts.edits.refresh()
+    parts.edits.ab.click()
+    form = parts.edits.form
     form.parameter.setCurrentText(NAME)
     assert not form.begin.isEnabled()
     assert form.words.text() == "B: type a number."
@@ -133,28 +133,28 @@ def test_from_a_trials_bar_both_of_its_values_are_asked_about(bench: Bench, wind
     assert f"seed {run.plan.seed}" in said, "what was said is what is begun"
 
 
-def test_the_form_begins_with_the_edit_that_is_looked_at(bench: Bench, window: MainWindow) -> None:
+def test_the_form_begins_with_the_edit_that_is_looked_at(bench: Bench, parts: Parts) -> None:
     bench.station.take([looked()])
     (change,) = told().edit.changes
     edit = replace(told().edit, changes=(replace(change, name=NAME, old=0.4, new=0.42),))
     bench.station.take_evidence(replace(told(), edit=edit))
-    window.edits.refresh()
-    window.edits.ab.click()
-    form = window.edits.form
+    parts.edits.refresh()
+    parts.edits.ab.click()
+    form = parts.edits.form
     assert form.parameter.currentText() == NAME
     assert [field.text() for field in form.fields.values()] == ["400", "420"]
     form.reject()
-    window.edits.sweep.click()
-    assert window.edits.form.parameter.currentText() == NAME
-    assert window.edits.form.fields["From"].text() == "400"
-    window.edits.form.reject()
+    parts.edits.sweep.click()
+    assert parts.edits.form.parameter.currentText() == NAME
+    assert parts.edits.form.fields["From"].text() == "400"
+    parts.edits.form.reject()
 
 
-def test_bounds_are_in_the_units_of_the_window(bench: Bench, window: MainWindow) -> None:
+def test_bounds_are_in_the_units_of_the_window(bench: Bench, parts: Parts) -> None:
     bench.station.take([looked()])
-    window.edits.refresh()
-    window.edits.ab.click()
-    form = window.edits.form
+    parts.edits.refresh()
+    parts.edits.ab.click()
+    form = parts.edits.form
     form.parameter.setCurrentText(NAME)
     form.fields["B"].setText("420")
     assert form.error.accessibleName() == "Most tracking error (°)"
@@ -165,28 +165,28 @@ def test_bounds_are_in_the_units_of_the_window(bench: Bench, window: MainWindow)
     form.reject()
 
 
-def test_a_trial_of_several_parameters_is_no_ab_trial(bench: Bench, window: MainWindow) -> None:
+def test_a_trial_of_several_parameters_is_no_ab_trial(bench: Bench, parts: Parts) -> None:
     several = {NAME: 0.4, "gait.cycle_time": 2.0}
     bench.station.writing.done(Written(7, several, several, 40.0))
-    window.trial.refresh()
-    assert window.trial.isVisible()
-    assert not window.trial.ab.isVisible()
-    window.edits.compare(bench.station)
+    parts.trial.refresh()
+    assert parts.trial.isVisible()
+    assert not parts.trial.ab.isVisible()
+    parts.edits.compare(bench.station)
     assert not bench.first.named("revert")
 
 
-def test_a_second_one_is_refused_while_one_goes_on(bench: Bench, window: MainWindow) -> None:
-    begun(bench, window)
-    window.edits.ab.click()
-    window.edits.form.parameter.setCurrentText(NAME)
-    window.edits.form.fields["B"].setText("430")
-    window.edits.form.begin.click()
-    assert "goes on" in window.edits.form.words.text()
+def test_a_second_one_is_refused_while_one_goes_on(bench: Bench, parts: Parts) -> None:
+    begun(bench, parts)
+    parts.edits.ab.click()
+    parts.edits.form.parameter.setCurrentText(NAME)
+    parts.edits.form.fields["B"].setText("430")
+    parts.edits.form.begin.click()
+    assert "goes on" in parts.edits.form.words.text()
 
 
 @pytest.mark.parametrize("is_back", [True, False])
 def test_a_sweep_is_told_with_its_response_and_without_its_parts(
-    bench: Bench, window: MainWindow, is_back: bool
+    bench: Bench, parts: Parts, is_back: bool
 ) -> None:
     one = swept()
     assert one.experiment is not None
@@ -195,11 +195,10 @@ def test_a_sweep_is_told_with_its_response_and_without_its_parts(
         part = told(write)
         bench.station.take_evidence(replace(part, edit=replace(part.edit, boot_id=one.edit.boot_id)))
     bench.station.take_evidence(replace(one, edit=replace(one.edit, id="ffff")))
-    window.tabs.setCurrentIndex(window._views.index(window.edits))
-    window.edits.refresh()
-    assert window.edits.list.count() == 1
-    assert "sweep 2800 … 3200" in window.edits.verdict.text()
-    assert ("NOT CONFIRMED" in window.edits.verdict.text()) is not is_back
-    assert "proposal: 3200" in window.edits.words.text()
-    assert "3200: 0.2349" in window.edits.response.accessibleDescription()
-    window.edits.response.grab()
+    parts.edits.refresh()
+    assert parts.edits.list.count() == 1
+    assert "sweep 2800 … 3200" in parts.edits.verdict.text()
+    assert ("NOT CONFIRMED" in parts.edits.verdict.text()) is not is_back
+    assert "proposal: 3200" in parts.edits.words.text()
+    assert "3200: 0.2349" in parts.edits.response.accessibleDescription()
+    parts.edits.response.grab()

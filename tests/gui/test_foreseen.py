@@ -3,9 +3,10 @@
 import dataclasses
 import re
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import pytest
+from PySide6.QtWidgets import QPushButton, QVBoxLayout, QWidget
 
 from gateway.client import ConnectionState
 from ml.registry.card import Source
@@ -18,9 +19,11 @@ from server_gui.core.prediction.news import Ruled, Serves
 from server_gui.core.prediction.state import Quality
 from server_gui.core.processing.gait_events import Leg
 from server_gui.core.settings.prediction import Action, RuleSettings
-from server_gui.views.main_window import MainWindow
+from server_gui.views.header import Header
+from server_gui.views.overview import Overview
 from server_gui.views.predictions import activity, lines, model_phases, status
-from tests.gui.fakes import Bench
+from server_gui.views.theme import Theme
+from tests.gui.fakes import Bench, destroy
 from tests.gui.foreseen import predicted
 from tests.gui.running import wait
 from tests.support.desk import JOINTS, looked, telemetry, walking
@@ -37,11 +40,41 @@ def station(bench: Bench) -> Station:
     return bench.station
 
 
-def chip(window: MainWindow) -> str:
+class Parts(QWidget):
+    """Header and overview without the rest of the window, which takes its time to be made."""
+
+    def __init__(self, bench: Bench, theme: Theme) -> None:
+        super().__init__()
+        self.header, self.overview = (
+            Header(bench.desk, theme, QPushButton("View")),
+            Overview(bench.desk, theme),
+        )
+        column = QVBoxLayout(self)
+        column.addWidget(self.header)
+        column.addWidget(self.overview, 1)
+        self.resize(1400, 900)
+
+    def refresh(self) -> None:
+        """Draw a frame in which all that is read is read."""
+        self.overview.read_now()
+        self.overview.refresh()
+        self.header.refresh()
+
+
+@pytest.fixture
+def window(theme: Theme, bench: Bench) -> Iterator[Parts]:
+    made = Parts(bench, theme)
+    made.show()
+    made.refresh()
+    yield made
+    destroy(made)
+
+
+def chip(window: Parts) -> str:
     return window.header._chips["status"].toolTip()
 
 
-def shown(window: MainWindow, so: Callable[[], bool]) -> None:
+def shown(window: Parts, so: Callable[[], bool]) -> None:
     def drawn() -> bool:
         window.refresh()
         return so()
@@ -50,7 +83,7 @@ def shown(window: MainWindow, so: Callable[[], bool]) -> None:
 
 
 def test_what_is_predicted_is_said_with_how_sure_and_what_else_it_may_be(
-    window: MainWindow, station: Station
+    window: Parts, station: Station
 ) -> None:
     station.take_prediction(predicted("walk", WALKS))
     said = f"{UNCHECKED} · else turn 4 %"
@@ -80,7 +113,7 @@ def test_how_right_the_model_was_of_late_stands_beside_it(station: Station) -> N
     ],
 )
 def test_a_model_that_does_not_know_says_so(
-    window: MainWindow, station: Station, label: str, novelty: float, said: str
+    window: Parts, station: Station, label: str, novelty: float, said: str
 ) -> None:
     station.take_prediction(predicted(label, {"walk": 0.41, "stand": 0.4}, novelty=novelty))
     shown(window, lambda: chip(window) == said)
@@ -117,7 +150,7 @@ def test_a_robot_that_differs_from_what_was_learned_is_said_to(station: Station)
     ],
 )
 def test_a_robot_that_does_not_drive_its_wearer_is_not_judged(
-    window: MainWindow, station: Station, states: dict[str, float], held: bool, why: str
+    window: Parts, station: Station, states: dict[str, float], held: bool, why: str
 ) -> None:
     drifted = Trust(600, 0.9, 0.0, 3.5, {"left_hip.position": 0.4})
     station.take_prediction(predicted("abnormal", {"walk": 0.41}, novelty=3.5, trust=drifted))
@@ -139,7 +172,7 @@ def test_a_robot_that_does_not_drive_its_wearer_is_not_judged(
     assert line.text == "Fall 97 %", "a fall is told of a stopped robot, too"
 
 
-def test_a_wearer_is_not_called_abnormal_where_a_part_is_lost(window: MainWindow, station: Station) -> None:
+def test_a_wearer_is_not_called_abnormal_where_a_part_is_lost(window: Parts, station: Station) -> None:
     station.take([looked(state="lost", problem="its heartbeat is missing")])
     station.take_prediction(predicted("abnormal", WALKS, novelty=3.1))
     assert activity(station).wordings[0] == "Not judged · nothing comes from left knee"
@@ -148,7 +181,7 @@ def test_a_wearer_is_not_called_abnormal_where_a_part_is_lost(window: MainWindow
     assert activity(station).text == "Walk 94 %"
 
 
-def test_a_prediction_that_is_old_is_not_shown_as_one(window: MainWindow, station: Station) -> None:
+def test_a_prediction_that_is_old_is_not_shown_as_one(window: Parts, station: Station) -> None:
     station.take_prediction(predicted("walk", WALKS))
     newest = station.predictions.by_task["activity"]
     station.predictions.by_task["activity"] = dataclasses.replace(
@@ -159,9 +192,7 @@ def test_a_prediction_that_is_old_is_not_shown_as_one(window: MainWindow, statio
     assert window.overview._ring._word == "Walking"
 
 
-def test_without_a_model_it_says_how_to_get_one_and_shows_the_steps(
-    window: MainWindow, station: Station
-) -> None:
+def test_without_a_model_it_says_how_to_get_one_and_shows_the_steps(window: Parts, station: Station) -> None:
     station.take_prediction(
         Serves("exo-01", {}, {"activity": "no model serves activity: gwrms models promote ID"})
     )
@@ -190,7 +221,7 @@ def test_steps_and_model_are_one_number_and_said_to_differ_where_they_do(station
         assert line.text.endswith(said)
 
 
-def test_the_model_s_phase_stands_beside_that_of_the_steps(window: MainWindow, station: Station) -> None:
+def test_the_model_s_phase_stands_beside_that_of_the_steps(window: Parts, station: Station) -> None:
     station.take_prediction(
         predicted("stride", {"stride": 0.9}, "gait_phase", values={"left": 0.25, "right": 0.75})
     )
@@ -209,7 +240,7 @@ def test_the_model_s_phase_stands_beside_that_of_the_steps(window: MainWindow, s
     assert model_phases(station) == dict.fromkeys(Leg)
 
 
-def test_rules_that_hold_and_devices_in_trouble_stand_beside(window: MainWindow, station: Station) -> None:
+def test_rules_that_hold_and_devices_in_trouble_stand_beside(window: Parts, station: Station) -> None:
     fall = predicted("fall", {"fall": 0.97, "steady": 0.03}, "falling")
     rule = RuleSettings("falling", "fall", 0.9, action=Action.ALARM)
     station.take_prediction(fall)
@@ -225,7 +256,7 @@ def test_rules_that_hold_and_devices_in_trouble_stand_beside(window: MainWindow,
     assert texts[2].endswith("i²t at 83 %")
 
 
-def test_nothing_is_predicted_of_a_robot_whose_link_is_gone(window: MainWindow, station: Station) -> None:
+def test_nothing_is_predicted_of_a_robot_whose_link_is_gone(window: Parts, station: Station) -> None:
     station.take_prediction(predicted("walk", WALKS))
     station.take([LinkChanged(ConnectionState.WAITING, "no route", 0)])
     assert status(station) is None
@@ -233,7 +264,7 @@ def test_nothing_is_predicted_of_a_robot_whose_link_is_gone(window: MainWindow, 
 
 
 def test_what_was_said_when_a_recording_was_made_is_said_to_be_of_then(
-    window: MainWindow, station: Station
+    window: Parts, station: Station
 ) -> None:
     walks = predicted("walk", WALKS).prediction
     station.predictions.recalled = {"activity": Recalled(walks, 0.1)}

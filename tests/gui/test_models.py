@@ -53,7 +53,7 @@ def both(registry: Registry) -> tuple[Card, Card]:
 
 def opened(whole: Shown) -> ModelsPage:
     whole.open("Models")
-    page = whole.window.models  # type: ignore[union-attr]
+    page = whole.window.models
     whole.until(lambda: page.rows.rows, "listed the models")
     whole.draw()
     return page
@@ -91,17 +91,17 @@ def figures(page: ModelsPage) -> dict[str, list[str]]:
 
 
 def test_models_are_listed_and_compared_by_names_instead_of_hashes(
-    whole: Shown, both: tuple[Card, Card]
+    shown: Shown, both: tuple[Card, Card]
 ) -> None:
-    page = opened(whole)
+    page = opened(shown)
     one, other = both
-    choose(whole, page, other)
-    shown = [
+    choose(shown, page, other)
+    cells = [
         str(page.rows.index(row, column).data())
         for row in range(page.rows.rowCount())
         for column in range(page.rows.columnCount())
     ]
-    words = " ".join([*shown, page.compare.said.text(), page.compare.other.currentText()])
+    words = " ".join([*cells, page.compare.said.text(), page.compare.other.currentText()])
     assert all(model.id not in words for model in both)
     assert "Falling of" in words
     rows = {entry.card.id: row for row, entry in enumerate(page.rows.rows)}
@@ -118,42 +118,42 @@ def test_models_are_listed_and_compared_by_names_instead_of_hashes(
 
 
 def test_a_model_serves_only_once_that_was_confirmed(
-    whole: Shown, both: tuple[Card, Card], registry: Registry, archive: Archive
+    shown: Shown, both: tuple[Card, Card], registry: Registry, archive: Archive
 ) -> None:
-    page, (one, other) = opened(whole), both
-    choose(whole, page, other)
+    page, (one, other) = opened(shown), both
+    choose(shown, page, other)
     click(page.promote)
-    whole.until(page.confirm.isVisible, "asked")
+    shown.until(page.confirm.isVisible, "asked")
     assert "Serves now: Falling of" in page.confirm.words.text()
     assert not page.promote.isEnabled()
     assert registry.serving("falling") == one.id
     click(page.confirm.no)
-    whole.until(lambda: not page.confirm.isVisible(), "changed nothing")
+    shown.until(lambda: not page.confirm.isVisible(), "changed nothing")
     click(page.promote)
-    whole.until(page.confirm.isVisible, "asked again")
+    shown.until(page.confirm.isVisible, "asked again")
     page.confirm.why.setText("judged better")
     click(page.confirm.yes)
-    whole.until(lambda: archive.models.tone is Tone.GOOD, "promoted it")
+    shown.until(lambda: archive.models.tone is Tone.GOOD, "promoted it")
     assert [each.model for each in registry.history("falling")] == [one.id, other.id]
     assert registry.history("falling")[-1].why == "judged better"
     click(page.back)
-    whole.until(page.confirm.isVisible, "asked before it went back")
+    shown.until(page.confirm.isVisible, "asked before it went back")
     assert page.confirm.yes.text() == "Roll back"
     click(page.confirm.yes)
-    whole.until(lambda: registry.serving("falling") == one.id, "rolled back")
+    shown.until(lambda: registry.serving("falling") == one.id, "rolled back")
 
 
 def test_what_serves_already_is_said_and_a_refusal_is_a_sentence(
-    whole: Shown, both: tuple[Card, Card], archive: Archive
+    shown: Shown, both: tuple[Card, Card], archive: Archive
 ) -> None:
-    page, (one, _) = opened(whole), both
-    choose(whole, page, one)
+    page, (one, _) = opened(shown), both
+    choose(shown, page, one)
     click(page.promote)
-    whole.until(lambda: "nothing changes" in page.said.text(), "said that it serves")
+    shown.until(lambda: "nothing changes" in page.said.text(), "said that it serves")
     assert not page.confirm.isVisible()
     page.robot.setCurrentIndex(page.robot.findData("exo-01"))
     click(page.back)
-    whole.until(lambda: page.said.property("tone") == "bad", "refused")
+    shown.until(lambda: page.said.property("tone") == "bad", "refused")
     assert "exo-01: falling has no model of its own" in page.said.text()
 
 
@@ -162,7 +162,7 @@ def test_a_training_shows_how_far_it_is_while_the_window_draws_and_serves_nobody
 ) -> None:
     put(settings.store.url, tmp_path / "walks", [day(f"s{n}", n, each_s=5.0) for n in range(4)])
     whole.open("Models")
-    page = whole.window.models  # type: ignore[union-attr]
+    page = whole.window.models
     click(page.new)
     page.form.held_out.setText("s3")
     click(page.form.begin)
@@ -182,29 +182,29 @@ def test_a_training_shows_how_far_it_is_while_the_window_draws_and_serves_nobody
 
 
 def test_too_few_wearers_are_said_in_words(
-    whole: Shown, settings: ServerSettings, archive: Archive, registry: Registry, tmp_path: Path
+    shown: Shown, settings: ServerSettings, archive: Archive, registry: Registry, tmp_path: Path
 ) -> None:
     put(settings.store.url, tmp_path / "walks", [day("s0", 0, each_s=5.0)])
-    whole.open("Models")
-    page = whole.window.models  # type: ignore[union-attr]
+    shown.open("Models")
+    page = shown.window.models
     click(page.new)
     click(page.form.begin)
-    whole.until(lambda: archive.models.jobs.jobs[0].is_over, "gave up")
-    whole.until(lambda: "it takes two to learn from and one to judge by" in page.said.text(), "said why")
+    shown.until(lambda: archive.models.jobs.jobs[0].is_over, "gave up")
+    shown.until(lambda: "it takes two to learn from and one to judge by" in page.said.text(), "said why")
     assert page.said.property("tone") == "bad"
 
 
 def test_a_store_that_is_gone_is_a_sentence_above_the_list(
-    whole: Shown, both: tuple[Card, Card], archive: Archive, monkeypatch: pytest.MonkeyPatch
+    shown: Shown, both: tuple[Card, Card], archive: Archive, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    page = opened(whole)
+    page = opened(shown)
 
     def away(self: Registry, task: str | None = None) -> list[Card]:
         raise OSError("s3://lab cannot be reached: Connection refused")
 
     monkeypatch.setattr(Registry, "entries", away)
     archive.models.look(now=True)
-    whole.until(lambda: "Connection refused" in page.state.text(), "said so")
+    shown.until(lambda: "Connection refused" in page.state.text(), "said so")
     assert page.state.isVisible()
     assert page.chosen is None
     assert not page.promote.isEnabled()

@@ -29,7 +29,7 @@ from server_gui.views.main_window import MainWindow
 from server_gui.views.pairing import PairingDialog
 from server_gui.views.reset import ask_reset
 from server_gui.views.theme import Theme
-from tests.gui.fakes import Bench, destroy
+from tests.gui.fakes import Around, Bench, destroy
 from tests.support.desk import described
 from tests.support.waiting import until
 from tests.unit.gateway import keyed as keys
@@ -87,20 +87,20 @@ def ended(dialog: PairingDialog) -> None:
 
 
 def test_a_robot_is_paired_by_address_and_code_and_followed(
-    window: MainWindow, bench: Bench, shown: Shown
+    around: Around, bench: Bench, shown: Shown
 ) -> None:
     added: list[str] = []
-    window.robots.added.connect(added.append)
-    window.robots.address.setText(shown.where)
-    window.robots.pair.click()
-    (dialog,) = window.findChildren(PairingDialog)
+    around.robots.added.connect(added.append)
+    around.robots.address.setText(shown.where)
+    around.robots.pair.click()
+    (dialog,) = around.findChildren(PairingDialog)
     assert not dialog.isModal()
     assert dialog.address.text() == shown.where
     dialog.code.setText(CODE.lower())
     dialog.act.click()
     assert not dialog.act.isEnabled()
     assert "Waiting until somebody confirms" in dialog.said.text()
-    window.header.stop.click()  # nothing of the window waits for it
+    around.header.stop.click()  # nothing of the window waits for it
     shown.confirm()
     ended(dialog)
     assert dialog.said.text() == "Paired with exo-07: it calls this desk anna, as operator."
@@ -108,10 +108,10 @@ def test_a_robot_is_paired_by_address_and_code_and_followed(
     assert pin_of(Address("127.0.0.1", 7499)) == keys.pin(keys.ROBOT)
 
 
-def test_a_link_that_is_pasted_as_an_address_opens_it(window: MainWindow, shown: Shown) -> None:
-    window.robots.address.setText(link(shown.where, CODE))
-    QTest.keyClick(window.robots.address, Qt.Key.Key_Return)
-    (dialog,) = window.findChildren(PairingDialog)
+def test_a_link_that_is_pasted_as_an_address_opens_it(around: Around, shown: Shown) -> None:
+    around.robots.address.setText(link(shown.where, CODE))
+    QTest.keyClick(around.robots.address, Qt.Key.Key_Return)
+    (dialog,) = around.findChildren(PairingDialog)
     dialog.act.click()
     shown.confirm()
     ended(dialog)
@@ -135,8 +135,8 @@ def test_what_was_mistyped_is_named_and_nothing_sent(theme: Theme, where: str, c
     destroy(window)
 
 
-def test_a_wrong_code_is_named_and_another_one_can_be_typed(window: MainWindow, shown: Shown) -> None:
-    dialog = window.robots.begin_pairing(shown.where)
+def test_a_wrong_code_is_named_and_another_one_can_be_typed(around: Around, shown: Shown) -> None:
+    dialog = around.robots.begin_pairing(shown.where)
     dialog.code.setText(WRONG)
     dialog.act.click()
     ended(dialog)
@@ -149,8 +149,8 @@ def test_a_wrong_code_is_named_and_another_one_can_be_typed(window: MainWindow, 
     assert "Paired with exo-07" in dialog.said.text()
 
 
-def test_who_cancels_waits_for_nothing_and_nothing_is_pinned(window: MainWindow, shown: Shown) -> None:
-    dialog = window.robots.begin_pairing(link(shown.where, CODE))
+def test_who_cancels_waits_for_nothing_and_nothing_is_pinned(around: Around, shown: Shown) -> None:
+    dialog = around.robots.begin_pairing(link(shown.where, CODE))
     dialog.act.click()
     candidate = shown.proved.result()
     attempt = dialog.attempt
@@ -212,11 +212,11 @@ def test_who_one_is_is_shown_and_who_may_all_finds_nothing_grey(window: MainWind
     assert window.parameters.store_button.isEnabled()
 
 
-def test_another_robot_s_key_is_said_loudly(window: MainWindow, bench: Bench) -> None:
+def test_another_robot_s_key_is_said_loudly(around: Around, bench: Bench) -> None:
     why = "ANOTHER ROBOT ANSWERS AT 127.0.0.1:7420, or somebody in between: its key is 12, and that …"
     bench.look_again([LinkChanged(ConnectionState.WAITING, why, time.monotonic_ns(), is_another=True)])
-    bench.draw(window)
+    bench.draw(around)
     worst = bench.station.alarms.worst
     assert worst is not None
     assert worst.kind is Kind.ANOTHER
-    assert window.robots.cards[0].texts[1].startswith("ANOTHER ROBOT ANSWERS")
+    assert around.robots.cards[0].texts[1].startswith("ANOTHER ROBOT ANSWERS")

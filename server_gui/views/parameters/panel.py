@@ -55,10 +55,6 @@ class ParametersPanel(QWidget):
         self.filters, self.file = FilterBar(desk, theme), FileBar(desk)
         self.storing = StorePage(desk, theme)
         self.pages = QStackedWidget()
-        self.pages.addWidget(Scrolled(self._edit_page()))  # what leads on, below, stays in sight
-        for page in (Scrolled(self.review), Scrolled(self.storing)):
-            page.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Ignored)
-            self.pages.addWidget(page)
         self.banner = PlainLabel()
         self.banner.setObjectName("banner")
         self.banner.setWordWrap(True)
@@ -66,6 +62,10 @@ class ParametersPanel(QWidget):
         everything.setContentsMargins(8, 8, 8, 8)
         everything.addWidget(self.control)
         everything.addWidget(self.pages, 1)
+        self.pages.addWidget(Scrolled(self._edit_page()))  # what leads on, below, stays in sight
+        for page in (Scrolled(self.review), Scrolled(self.storing)):
+            page.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Ignored)
+            self.pages.addWidget(page)
         everything.addWidget(self.banner)
         everything.addWidget(self.trial)
         self._below = QWidget()

@@ -22,12 +22,12 @@ class Sheet(QFrame):
         words.setObjectName("page")
         scrolled = self._scrolled = QScrollArea()
         scrolled.setWidgetResizable(True)
-        scrolled.setWidget(words)
         scrolled.setAccessibleName(name)
         self.close_button = QPushButton("Close")
         self.close_button.clicked.connect(self.turn)
         everything = QVBoxLayout(self)
         everything.addWidget(scrolled, 1)
+        scrolled.setWidget(words)  # at its place: Qt styles all of it anew wherever it is put into another
         everything.addWidget(self.close_button, 0, Qt.AlignmentFlag.AlignRight)
         away = QShortcut(QKeySequence(Qt.Key.Key_Escape), self, self.turn)
         away.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
