@@ -8,6 +8,8 @@ from typing import Final
 import numpy as np
 
 from ml.errors import UnusableData
+from ml.features.recipe import Features
+from ml.features.windows import Samples
 from ml.neural import fixed_epochs
 from ml.robot.learn import BATCH, pointers
 from ml.robot.learned import Learned, scaled
@@ -57,8 +59,13 @@ def divided(parts: Sequence[Part], minute_s: float = MINUTE_S) -> Divided:
 def adapted(base: Learned, parts: Sequence[Part], seed: int = 0) -> Learned:
     """A copy that has also learned from these decisions; how far it trusts itself stays as it was."""
     features = np.concatenate([each.features for each in parts])
+    return taught(base, features, np.concatenate([each.truth for each in parts]), seed)
+
+
+def taught(base: Learned, features: Features, phases: Samples, seed: int = 0) -> Learned:
+    """The same, of a row of features and of phases (n, 2) for each decision."""
     inputs = np.clip(scaled(base.parts["scale"], features), -FAR, FAR)
-    targets = pointers(np.concatenate([each.truth for each in parts]))
+    targets = pointers(phases)
     network = copy.deepcopy(base.parts["network"])
     random = np.random.default_rng(seed)
     with fixed_epochs():
