@@ -17,7 +17,8 @@ from hil_sim.drive.mechanics import Joint, JointConstants
 from hil_sim.errors import SimulatorError
 from hil_sim.gait.posture import STANDING
 from hil_sim.gait.subject import subject
-from hil_sim.gait.timetable import Entry, timetable
+from hil_sim.gait.timetable import Entry, Pace, timetable
+from hil_sim.gait.walks import NAMES, ORDINARY, WALKS
 from hil_sim.gait.wearer import Wearer
 from hil_sim.hands import Hands
 from hil_sim.mounting import Mounting
@@ -26,6 +27,7 @@ from hil_sim.node.node import Node
 from hil_sim.sensors.suite import FEET, PERIOD_NS, TRUNK, SensorChoice, SensorSuite
 
 JOINTS = {"left_hip": 1, "left_knee": 2, "left_ankle": 3, "right_hip": 4, "right_knee": 5, "right_ankle": 6}
+SIDES = ("left", "right")
 CONTROLLER, CONTROLLER_NODE = "gait", 16
 SENSORS = (*FEET, TRUNK)
 
@@ -58,7 +60,10 @@ class Exoskeleton:
     The wearer is the subject of number `person`. `drives` gives joints another EDS or DCF than our own
     drive's; `mountings` says how joints are built in otherwise than ours. The nodes named in `without` are
     somebody else's and never switched on; the drives of the joints in `unconfigured` have no node id yet, and
-    wait for LSS. What is in `measured` is called after each cycle of the sensors.
+    wait for LSS. The wearer walks as `walk` says, one of `hil_sim.gait.walks.NAMES`, at a pace of that walk.
+    A robot that `assists` one side alone has that leg's drives, and both insoles: no PDO or SDO of the
+    controller ever goes to the other leg's node ids. What is in `measured` is called after each cycle of the
+    sensors.
 
     Raises `hil_sim.errors.SimulatorError` for a file that cannot be used, and where the controller would lead
     a drive that is not simulated.
@@ -74,9 +79,14 @@ class Exoskeleton:
         without: Collection[str] = (),
         unconfigured: Collection[str] = (),
         mountings: Mapping[str, Mounting] | None = None,
+        walk: str = ORDINARY,
+        assists: str | None = None,
     ) -> None:
         _refuse_to_lead_others(without)
-        self.without = frozenset(without)
+        self.walk = _known("walk", walk, NAMES)
+        self.assists = None if assists is None else _known("side", assists, SIDES)
+        self.absent = frozenset(joint for joint in JOINTS if not joint.startswith(assists or ""))
+        self.without = frozenset(without) | self.absent
         self.seed = seed
         self.measured: list[Callable[[], None]] = []
         self.clock = Clock()
@@ -93,6 +103,7 @@ class Exoskeleton:
         self.hands = Hands()
         self._entries = timetable(scenario, seed)
         self._next_entry: Event | None = None
+        self._take_own_pace()
 
     def power_on(self) -> None:
         """Switch everything on: the nodes boot, the sensors send."""
@@ -127,10 +138,23 @@ class Exoskeleton:
         entry = next(self._entries, None)
         if entry is None:
             return
-        self.controller.go(entry.activity, entry.pace)
+        self.controller.go(entry.activity, self._own(entry.pace))
         self.controller.dictionary[controller.ACTIVITY].default = int(entry.activity)
         if math.isfinite(entry.seconds):
             self._next_entry = self.clock.after(round(entry.seconds * SECOND_NS), self._go_on)
+
+    def _own(self, pace: Pace | None) -> Pace | None:
+        """What this wearer makes of a pace that ordinary ones are told to walk at."""
+        return pace if pace is None or self.walk == ORDINARY else WALKS[self.walk].pace(*pace)
+
+    def _take_own_pace(self) -> None:
+        """Walk as fast as this walk usually is, until an operator or the timetable says otherwise."""
+        keys = (controller.STEP_LENGTH, controller.CYCLE_TIME)
+        entries = [self.controller.dictionary[key] for key in keys]
+        pace = self._own((entries[0].number() / 1e3, entries[1].number() / 1e3))
+        for entry, value in zip(entries, pace or (), strict=True):
+            entry.take(round(value * 1e3))
+            entry.default = entry.value
 
     def _drive(self, name: str, mounting: Mounting, file: Path) -> JointDrive:
         description = personality.describe(file, mounting.node_id)
@@ -156,9 +180,14 @@ class Exoskeleton:
             description,
             tuple(self.mountings.values()),
             next(iter(self.drives.values())).counts_per_radian,
-            subject(person),
+            subject(person, self.walk),
             random.Random(f"{self.seed} gait"),
-            [drive.node_id for drive in self.drives.values() if drive.description.path.name != DRIVE_EDS],
+            [
+                drive.node_id
+                for name, drive in self.drives.items()
+                if name not in self.absent and drive.description.path.name != DRIVE_EDS
+            ],
+            [place for place, joint in enumerate(JOINTS) if joint in self.absent],
         )
 
     def _measure(self) -> None:
@@ -174,6 +203,12 @@ class Exoskeleton:
         self.sensors.measure(*feet, trunk)
         for watch in self.measured:
             watch()
+
+
+def _known(what: str, name: str, names: Collection[str]) -> str:
+    if name not in names:
+        raise SimulatorError(f"there is no {what} {name!r}: {', '.join(names)}")
+    return name
 
 
 def _refuse_to_lead_others(without: Collection[str]) -> None:

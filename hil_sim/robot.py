@@ -13,6 +13,7 @@ from hil_sim.control_socket import ControlSocket
 from hil_sim.errors import SimulatorError
 from hil_sim.exoskeleton import Exoskeleton, Scenario
 from hil_sim.faults.injector import Faults
+from hil_sim.gait.walks import ORDINARY
 from hil_sim.housing import Housing
 from hil_sim.loop import Loop
 from hil_sim.mistakes import computer, registry
@@ -32,14 +33,14 @@ class SimulatedRobot(Housing):
         with SimulatedRobot(tmp_path, virtual_channel="bench") as robot:
             bus = can.Bus(interface="virtual", channel="bench")
 
-    The wearer is subject `person`; the ground truth is written to `truth`; `drives` names the files of joints
-    with other drives than ours. With `interface` the bus is that CAN interface of Linux; the nodes named in
-    `without` are not simulated, the drives of those in `unconfigured` have no node id yet; `mountings` says
-    how joints are built in. `guard` is that table of robot.toml. `mistakes` are made by their names; with
-    them, or an empty list, the files of the robot's computer are written to `computer` in the folder. `say`
-    is told when the interface goes and comes back, and when the bus is overloaded. `faults` and `operator`
-    belong to the thread that runs it; others use the control socket in the folder. For the rest see
-    `Housing`.
+    The wearer is subject `person`, who walks as `walk` says, in a robot that may assist one side alone; the
+    ground truth is written to `truth`; `drives` names the files of joints with other drives than ours. With
+    `interface` the bus is that CAN interface of Linux; the nodes named in `without` are not simulated, the
+    drives of those in `unconfigured` have no node id yet; `mountings` says how joints are built in. `guard`
+    is that table of robot.toml. `mistakes` are made by their names; with them, or an empty list, the files of
+    the robot's computer are written to `computer` in the folder. `say` is told when the interface goes and
+    comes back, and when the bus is overloaded. `faults` and `operator` belong to the thread that runs it;
+    others use the control socket in the folder. For the rest see `Housing`.
     """
 
     def __init__(
@@ -61,9 +62,11 @@ class SimulatedRobot(Housing):
         unconfigured: Collection[str] = (),
         mountings: Mapping[str, Mounting] | None = None,
         mistakes: Collection[str] | None = None,
+        walk: str = ORDINARY,
+        assists: str | None = None,
     ) -> None:
         self.exoskeleton = Exoskeleton(
-            scenario, seed, sensors, person, drives, without, unconfigured, mountings
+            scenario, seed, sensors, person, drives, without, unconfigured, mountings, walk, assists
         )
         super().__init__(folder, self.exoskeleton.bus, virtual_channel, speed, epoch_s)
         self.faults = Faults(self.exoskeleton, self.folder.path, seed)

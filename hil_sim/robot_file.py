@@ -94,6 +94,10 @@ _NOT_SIMULATED = """
 # Not simulated, so nobody here knows them: {names}. gwrms docs wire-a-joint tells how to describe them.
 """
 
+_ONE_SIDE = """
+# This robot assists the {side} leg alone. The other one walks by itself: nobody knows its joints.
+"""
+
 _CONTROLLER_TABLE = """
 [device.{controller}]                   # any other CANopen device that has parameters
 bus = "main"
@@ -222,7 +226,7 @@ def text(folder: Path, bus: str, robot: Exoskeleton, guard: Mapping[str, Any] | 
     """Return the file for the simulator in `folder` (absolute), with the tables of bus, sensors and guard."""
     drives = robot.simulated_drives
     templates = (_FIRST_JOINT, *[_JOINT] * (len(drives) - 1))
-    led = CONTROLLER not in robot.without
+    led, others = CONTROLLER not in robot.without, robot.without - robot.absent
     return "".join(
         (
             _HEAD.format(path=folder / "robot.toml", bus=bus + _OUR_NODE * ("heartbeat_ms" in (guard or {}))),
@@ -230,7 +234,8 @@ def text(folder: Path, bus: str, robot: Exoskeleton, guard: Mapping[str, Any] | 
                 _joint(one, drive, robot.mountings[drive.name])
                 for one, drive in zip(templates, drives, strict=True)
             ),
-            _NOT_SIMULATED.format(names=", ".join(sorted(robot.without))) if robot.without else "",
+            "" if robot.assists is None else _ONE_SIDE.format(side=robot.assists),
+            _NOT_SIMULATED.format(names=", ".join(sorted(others))) if others else "",
             _controller_table() if led else "",
             "\n",
             tables(robot.sensors.choice, folder),

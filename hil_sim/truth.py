@@ -38,7 +38,7 @@ COLUMNS = {
     **{f"{joint}.position": "rad" for joint in JOINTS},
     **{f"{joint}.velocity": "rad/s" for joint in JOINTS},
     **{f"{foot}.{name}": unit for foot in _FEET for name, unit in _LOAD.items()},
-    "support.force": "N",  # of a seat, or of the ground under a fallen body
+    "support.force": "N",  # of a seat, of crutches, or of the ground under a fallen body
     **{f"trunk.{name}": "rad" for name in ("roll", "pitch", "yaw")},
     **{f"trunk.acceleration_{axis}": "m/s²" for axis in "xyz"},  # of the world
 }

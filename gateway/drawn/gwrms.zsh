@@ -572,9 +572,9 @@ _shtab_gwrms_enable_defaults_added=0
 
 _shtab_gwrms_evaluate_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--benchmark[one of those below]:NAME:(ipol-status ipol-phase ipol-adapt ipol-events sisfall-prefall aust-mode sim-activity sim-phase sim-falling sim-danger)"
+  "--benchmark[one of those below]:NAME:(ipol-status ipol-phase ipol-adapt ipol-events sisfall-prefall aust-mode sim-activity sim-phase sim-walks sim-falling sim-danger)"
   "--data[the recordings]:FILE:_files"
-  "--json[the figures as one JSON object, in the last line]"
+  "--json[the figures, of groups too, as one JSON object, in the last line]"
   "--report[also write a page with tables and pictures]:FILE.html:_files"
   "--search[choose the settings again, by training subjects alone]"
 )
@@ -1263,6 +1263,8 @@ _shtab_gwrms_sim_options=(
   "--speed[times as fast as real time\; max for as fast as it goes (default\: 1)]:N:"
   "--seed[of noise, losses and strides\; same seed, same bytes (default\: 0)]:S:"
   "--subject[who wears the robot (default\: 0, nominal)]:N:"
+  "--walks[how they walk\: ordinary, slow, hemiparetic, crouch, steppage, crutches_two_point, crutches_three_point (default\: ordinary)]:NAME:(ordinary slow hemiparetic crouch steppage crutches_two_point crutches_three_point)"
+  "--assists[the only leg that the robot is on, left or right]:SIDE:(left right)"
   "*--drive[the EDS or DCF of the drives, or of one joint\'s (again for another one)]:[JOINT=]FILE:"
   "*--mount[a drive\'s node id, 1 or -1 (its motor built in the other way round), counts at zero]:JOINT=NODE[,DIRECTION[,ZERO]]:"
   "*--mistake[make a mistake for gwrms doctor to find (again for more)\; none\: make none]:NAME:(none bit_rate terminator double_node_id second_sdo_client bus_load sync eds_product gear counts sign joints_swapped insoles_swapped zero heartbeat_slow velocity_unit imu_axes heartbeat pdo_mapping mode current_limit following_window reaction coasting sync_slow insole_scale imu_frozen latency_timer clock governor realtime txqueuelen)"
@@ -1298,6 +1300,8 @@ _shtab_gwrms_sim_record_options=(
   "--minutes[of each wearer (default\: 6)]:M:"
   "--subjects[who wears the robot (default\: 0)]:N[-N]:"
   "--scenario[default\: practice]:scenario:(practice dangers walk stand sit sit_to_stand stairs_up stairs_down ramp_up ramp_down turn_left turn_right stumble fall day)"
+  "--walks[how they walk\: ordinary, slow, hemiparetic, crouch, steppage, crutches_two_point, crutches_three_point (default\: ordinary)]:NAME:(ordinary slow hemiparetic crouch steppage crutches_two_point crutches_three_point)"
+  "--assists[the only leg that the robot is on, left or right]:SIDE:(left right)"
   "--seed[same seed, same recording (default\: 0)]:S:"
 )
 

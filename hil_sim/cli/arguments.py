@@ -3,6 +3,23 @@
 import argparse
 import math
 
+from hil_sim.exoskeleton import SIDES
+from hil_sim.gait.walks import NAMES, ORDINARY
+
+
+def add_wearer(parser: argparse.ArgumentParser) -> None:
+    """How the wearer walks, and which legs the robot is on."""
+    parser.add_argument(
+        "--walks",
+        choices=NAMES,
+        default=ORDINARY,
+        metavar="NAME",
+        help=f"how they walk: {', '.join(NAMES)} (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--assists", choices=SIDES, metavar="SIDE", help="the only leg that the robot is on, left or right"
+    )
+
 
 def speed(text: str) -> float | None:
     """Simulated over real time; `None` for `max`, as fast as it goes."""

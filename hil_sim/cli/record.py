@@ -6,18 +6,20 @@ import json
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
+from itertools import compress
 from pathlib import Path
 from typing import BinaryIO, Final
 
 from hil_sim.bare import BareExoskeleton
 from hil_sim.channels import JOINT_UNITS, UNITS, joints_reported, reported
-from hil_sim.cli.arguments import number
+from hil_sim.cli.arguments import add_wearer, number
 from hil_sim.clock import SECOND_NS
 from hil_sim.controller.objects import ControllerState
 from hil_sim.dangerous_course import Course
 from hil_sim.dangers import DANGERS
 from hil_sim.errors import SimulatorError
 from hil_sim.exoskeleton import Exoskeleton, Scenario
+from hil_sim.gait.walks import ORDINARY
 from hil_sim.practice import practice
 from hil_sim.sensors.suite import PERIOD_NS
 from hil_sim.truth import phases
@@ -30,11 +32,11 @@ times as fast as real time. Models learn from it: see gwrms docs explanation/pre
 
 _EPILOG = """\
 what is written
-  JSON lines. For each wearer an object: `session`, `subject`, `seed`, `scenario`, `period_s`, `columns`,
-  `units` and `wearer`; then an array for each cycle of the sensors, 100 a second, with what its `columns`
-  name: time since switching on, label, phase of each leg (null where it does not step), and the channels
-  (null: no centre of pressure while a foot is in the air). Files can be joined by putting one behind the
-  other. A FILE that ends in .gz is compressed.
+  JSON lines. For each wearer an object: `session`, `subject`, `seed`, `scenario`, `walks`, `period_s`,
+  `columns`, `units` and `wearer`; then an array for each cycle of the sensors, 100 a second, with what its
+  `columns` name: time since switching on, label, phase of each leg (null where it does not step), and the
+  channels (null: no centre of pressure while a foot is in the air). Files can be joined by putting one behind
+  the other. A FILE that ends in .gz is compressed. --assists leaves out the other leg's joints.
 
 scenarios
   practice         rounds of everything, each in another order, at every step length, cycle time, toe height
@@ -48,8 +50,9 @@ scenarios
 exit status
   0 written, 1 it cannot be written, 2 wrong usage
 
-example
+examples
   gwrms sim-record --out sim.jsonl.gz --subjects 1-24 --minutes 6 --seed 1
+  gwrms sim-record --out slow.jsonl.gz --walks slow --subjects 1-4 --minutes 2
 """
 
 PRACTICE: Final = "practice"
@@ -72,27 +75,41 @@ _ROUNDED: Final = tuple(_DIGITS[unit] for unit in UNITS.values())
 class Recording:
     """One wearer's session: writes a line to `file` after each cycle of the sensors, once the robot moves."""
 
-    def __init__(self, file: BinaryIO, scenario: str, seed: int, person: int) -> None:
+    def __init__(
+        self,
+        file: BinaryIO,
+        scenario: str,
+        seed: int,
+        person: int,
+        walk: str = ORDINARY,
+        assists: str | None = None,
+    ) -> None:
         # Every wearer has strides, noise and an order of things of their own.
         own = seed * 1000 + person
         self._file = file
         self._dangerous = scenario == DANGEROUS
         self._seed = own
         self._robot = (BareExoskeleton if self._dangerous else Exoskeleton)(
-            Scenario.STAND if scenario in (PRACTICE, DANGEROUS) else Scenario(scenario), own, person=person
+            Scenario.STAND if scenario in (PRACTICE, DANGEROUS) else Scenario(scenario),
+            own,
+            person=person,
+            walk=walk,
+            assists=assists,
         )
         self._course: Course | None = None
         columns = {**COLUMNS, **(DANGER_COLUMNS if self._dangerous else {})}
+        self._kept = [name.partition(".")[0] not in self._robot.absent for name in columns]
         self._entries = practice(self._robot, own) if scenario == PRACTICE else None
         self._write(
             {
-                "session": f"sim-{seed}-{person}",
+                "session": f"sim-{seed}-{person}" + (walk != ORDINARY) * f"-{walk}",
                 "subject": person,
                 "seed": seed,
                 "scenario": scenario,
                 "period_s": PERIOD_NS / SECOND_NS,
-                "columns": list(columns),
-                "units": list(columns.values()),
+                "walks": walk,
+                "columns": list(compress(columns, self._kept)),
+                "units": list(compress(columns.values(), self._kept)),
                 **({"dangers": list(DANGERS)} if self._dangerous else {}),
                 "wearer": asdict(self._robot.controller.generator.wearer),
             }
@@ -116,7 +133,8 @@ class Recording:
         rounded = (None if value is None else round(value, digits) for value, digits in values)
         generator = robot.controller.generator
         stepping = (None if phase is None else round(phase, 5) for phase in phases(generator))
-        self._write([robot.clock.now_ns, generator.label, *stepping, *rounded, *self._danger()])
+        row = [robot.clock.now_ns, generator.label, *stepping, *rounded, *self._danger()]
+        self._write(list(compress(row, self._kept)))
 
     def _danger(self) -> list[float]:
         """What is written of dangers, in the order of `DANGER_COLUMNS`."""
@@ -181,6 +199,7 @@ def _parser() -> argparse.ArgumentParser:
         default=PRACTICE,
         help="default: %(default)s",
     )
+    add_wearer(parser)
     parser.add_argument(
         "--seed", type=int, default=0, metavar="S", help="same seed, same recording (default: 0)"
     )
@@ -189,11 +208,16 @@ def _parser() -> argparse.ArgumentParser:
 
 def main(argv: list[str]) -> int:
     """Record; returns the exit status."""
+    parser = _parser()
     try:
-        arguments = _parser().parse_args(argv)
+        arguments = parser.parse_args(argv)
+        if arguments.scenario == DANGEROUS and (arguments.walks, arguments.assists) != (ORDINARY, None):
+            parser.error("--scenario dangers is of ordinary walks on both legs: no --walks, no --assists")
     except SystemExit as leave:
         return 2 if leave.code else 0
     with _opened(arguments.out) as file:
         for person in arguments.subjects:
-            Recording(file, arguments.scenario, arguments.seed, person).run(60.0 * arguments.minutes)
+            Recording(
+                file, arguments.scenario, arguments.seed, person, arguments.walks, arguments.assists
+            ).run(60.0 * arguments.minutes)
     return 0

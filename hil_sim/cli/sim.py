@@ -7,8 +7,9 @@ from pathlib import Path
 
 from hil_sim import mounting, personality
 from hil_sim.cli import replay, run, running
-from hil_sim.cli.arguments import seconds, speed
+from hil_sim.cli.arguments import add_wearer, seconds, speed
 from hil_sim.exoskeleton import CONTROLLER, CONTROLLER_NODE, JOINTS, Scenario
+from hil_sim.gait.walks import NAMES
 from hil_sim.mistakes.registry import MISTAKES, NONE
 from hil_sim.robot import SimulatedRobot
 from hil_sim.scenario.runner import schedule
@@ -66,6 +67,11 @@ the wearer
   and one in four has an impaired leg. --truth writes what is really so, as JSON lines: simulated and real
   time, label, phase of each leg, events, joints, forces under the feet, trunk. The first line names columns
   and units.
+  --walks NAME is how they walk; the affected leg is the left one of even N, the right one of odd N, and how
+  much each has of it is their own. gwrms docs bench says what is so in which:
+    {walks}
+  --assists left, or right, is a robot on one leg alone: its three drives, both insoles and the IMU. The other
+  leg walks by itself. No PDO or SDO of the gait controller goes to the other three node ids.
 
 the drives
   Nodes 1–6: left hip, knee, ankle, right hip, knee, ankle; node 16 is the gait controller and master of the
@@ -137,7 +143,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="gwrms sim",
         description=_DESCRIPTION,
-        epilog=_EPILOG.replace("{mistakes}", _mistakes()),
+        epilog=_EPILOG.replace("{mistakes}", _mistakes()).replace("{walks}", ", ".join(NAMES)),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument(
@@ -194,6 +200,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--subject", type=int, default=0, metavar="N", help="who wears the robot (default: 0, nominal)"
     )
+    add_wearer(parser)
     parser.add_argument(
         "--drive",
         action="append",
@@ -230,6 +237,7 @@ def _parse(argv: list[str]) -> tuple[argparse.Namespace, Script]:
         scenario=script.scenario,
         seed=script.seed,
         subject=script.subject,
+        walks=script.walks,
         imu=script.sensors.imu,
         insole=script.sensors.insole,
     )
@@ -268,6 +276,8 @@ def main(argv: list[str]) -> int:
         guard=script.guard,
         mountings=mounting.choose(arguments.mount, JOINTS, [CONTROLLER_NODE]),
         mistakes=arguments.mistake,
+        walk=arguments.walks,
+        assists=arguments.assists,
     )
 
     return running.run(robot, arguments.seconds, lambda: schedule(script.lines, robot))

@@ -35,6 +35,7 @@ _TAKE_OVER_S = 1.0  # how long the way from where the joints are to the motion t
 class GaitController(Node):
     """Node that runs the gait; `joints` are the mountings of the drives in the order of its sub-indices.
 
+    Those in `absent`, by their places in it, are not there: no PDO or SDO ever goes to them.
     `counts_per_radian` holds for every drive; those that are `foreign` are set up before they are started.
     The motion is that of `wearer`; its strides vary by `source`.
     """
@@ -51,13 +52,18 @@ class GaitController(Node):
         wearer: WearerSettings = NOMINAL,
         source: random.Random | None = None,
         foreign: Collection[int] = (),
+        absent: Collection[int] = (),
     ) -> None:
         super().__init__(clock, bus, name, node_id, description)
         self.controller_state = ControllerState.IDLE
         self._counts_per_radian = counts_per_radian
         self._joints = joints
-        self._drives = [Seen(joint.node_id, clock) for joint in joints]
-        objects.listen_to(self.dictionary, [joint.node_id for joint in joints])
+        self._led = [place for place in range(len(joints)) if place not in absent]
+        self._drives = [Seen(joints[place].node_id, clock) for place in self._led]
+        objects.listen_to(
+            self.dictionary,
+            [None if place in absent else joint.node_id for place, joint in enumerate(joints)],
+        )
         self._commissionings = {
             node: Commissioning(clock, self.send, node, partial(self._start_node, node)) for node in foreign
         }
@@ -83,8 +89,8 @@ class GaitController(Node):
         dictionary[objects.HOLDER].source = lambda: self._holder
         dictionary[objects.COMMAND].source = lambda: int(self.controller_state in COMMANDING)
         dictionary[objects.COMMAND].on_write = self._command
-        for number, seen in enumerate(self._drives, 1):
-            dictionary[objects.STATUSWORDS, number].on_write = seen.take
+        for place, seen in zip(self._led, self._drives, strict=True):
+            dictionary[objects.STATUSWORDS, place + 1].on_write = seen.take
 
     def go(self, activity: Activity, pace: tuple[float, float] | None = None) -> None:
         """Want an activity from now on, as a client who writes 2005h; `pace`: step length (m), cycle (s).
@@ -204,7 +210,7 @@ class GaitController(Node):
     def _take_over(self) -> None:
         """Begin the motion where the joints are: what they differ from it fades out."""
         self._go(ControllerState.RUNNING)
-        numbers = range(1, len(self._drives) + 1)
+        numbers = range(1, len(self._joints) + 1)
         counts = [self.dictionary[objects.POSITIONS, number].number() for number in numbers]
         actual = [
             joint.angle(one, self._counts_per_radian) for joint, one in zip(self._joints, counts, strict=True)
@@ -227,8 +233,9 @@ class GaitController(Node):
     def _move(self) -> None:
         dt = self._period_s()
         self.step_motion(dt)
-        for number, target in enumerate(self.set_points(), 1):
-            self._set(number, ENABLE_OPERATION, target)
+        targets = self.set_points()
+        for place in self._led:
+            self._set(place + 1, ENABLE_OPERATION, targets[place])
 
     def step_motion(self, dt: float) -> None:
         """Move the wearer's motion on by `dt` seconds."""
@@ -247,7 +254,8 @@ class GaitController(Node):
     def _command_where_they_are(self) -> None:
         """A drive that moves when nobody leads it is slowed down; only ENABLING brings one up."""
         enabling = self.controller_state is ControllerState.ENABLING
-        for number, seen in enumerate(self._drives, 1):
+        for place, seen in zip(self._led, self._drives, strict=True):
+            number = place + 1
             controlword = seen.way_up if enabling else QUICK_STOP
             self._set(number, controlword, self.dictionary[objects.POSITIONS, number].number())
 

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from enum import IntEnum
 
+from hil_sim.node.cob_id import INVALID
 from hil_sim.node.dictionary import Dictionary
 
 COMMAND = (0x2000, 0)
@@ -36,12 +37,28 @@ _HEARTBEAT_MS = 250
 _RPDO, _TPDO, _OWN_TPDOS = 0x1400, 0x1800, 1
 
 
-def listen_to(dictionary: Dictionary, nodes: Sequence[int]) -> None:
-    """Have the drives of these node ids behind its PDOs and heartbeats, in the order of its sub-indices."""
+_NOT_VALID = 0x8000_0000  # bit 31 of a PDO's COB-ID
+
+
+def listen_to(dictionary: Dictionary, nodes: Sequence[int | None]) -> None:
+    """Have the drives of these node ids behind its PDOs and heartbeats, in the order of its sub-indices.
+
+    Where there is None, no frame goes to a drive, and none is listened to.
+    """
     for number, node in enumerate(nodes):
+        if node is None:
+            _leave_alone(dictionary, number)
+            continue
         for key, value in (
             ((0x1016, number + 1), node << 16 | _HEARTBEAT_MS),
             ((_RPDO + number, 1), 0x180 + node),
             ((_TPDO + _OWN_TPDOS + number, 1), 0x200 + node),
         ):
             dictionary[key].commissioned = dictionary[key].value = value
+
+
+def _leave_alone(dictionary: Dictionary, number: int) -> None:
+    for key in ((_RPDO + number, 1), (_TPDO + _OWN_TPDOS + number, 1)):
+        entry = dictionary[key]
+        entry.default = entry.commissioned = entry.value = int(entry.number()) | INVALID
+    dictionary[0x1016, number + 1].commissioned = dictionary[0x1016, number + 1].value = 0

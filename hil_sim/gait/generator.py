@@ -34,6 +34,11 @@ class Generator:
         self, shape: Shape, wearer: WearerSettings = NOMINAL, source: random.Random | None = None
     ) -> None:
         self.wearer = wearer
+        self.walk = wearer.walk
+        self._standing = (
+            (STANDING, STANDING) if self.walk is None else tuple(limb.standing for limb in self.walk.limbs)
+        )
+        self._half_way = 0.5 if self.walk is None else 0.5 - self.walk.late  # from the left strike's phase
         self.heading = 0.0  # yaw of the way (rad, to the left); goes on over full turns
         self.moment = 0  # another number after each step
         self._source = source
@@ -176,7 +181,7 @@ class Generator:
 
     def leg_phase(self, side: int) -> float:
         """Of one leg's own stride."""
-        phase = self._rhythm.phase + (0.5 if side == RIGHT else 0.0)
+        phase = self._rhythm.phase + (self._half_way if side == RIGHT else 0.0)
         if self.stumble.active and self.stumble.side == side:
             phase -= self.stumble.lag
         return phase % 1.0
@@ -184,7 +189,8 @@ class Generator:
     def stance_share(self, side: int) -> float:
         """Of one leg's stride; an impaired leg hands some of it to the other."""
         impaired = self.impairment
-        return stance_share(self.shape.speed) + 0.03 * (impaired[1 - side] - impaired[side])
+        share = stance_share(self.shape.speed) + 0.03 * (impaired[1 - side] - impaired[side])
+        return share if self.walk is None else self.walk.stance_share(side, share)
 
     @property
     def yaw_rate(self) -> float:
@@ -221,7 +227,8 @@ class Generator:
 
     def _leg(self, side: int) -> Leg:
         walking, sitting, fallen = self.walking, self.sitting, self.fall.share
-        pose = STANDING if walking == 0.0 else mix(STANDING, self._stepping(side), walking)
+        standing = self._standing[side]
+        pose = standing if walking == 0.0 else mix(standing, self._stepping(side), walking)
         pose = mix(pose, SITTING, sitting)
         pose = pose._replace(hip=pose.hip + self.trunk)
         if self.stumble.active and self.stumble.side == side:
@@ -234,6 +241,9 @@ class Generator:
         impaired = self.impairment[side]
         asymmetry = 1.0 + (0.5 - side) * self.asymmetry
         step = self._lag.values[side] * asymmetry * (1.0 - 0.2 * impaired)
+        limb = None if self.walk is None else self.walk.limbs[side]
+        if limb is not None:
+            step *= limb.step
         parts = [
             (gait.leg(phase, step * gait.steps[side], wearer.leg_length), share) for gait, share in self.gaits
         ]
@@ -241,8 +251,9 @@ class Generator:
         swinging = swing(phase, self.stance_share(side))
         pose = lifted(pose, self.shape.toe_height, swinging)
         hip, knee, ankle = wearer.habits
-        return Leg(
+        stepping = Leg(
             pose.hip + hip(phase),
             (pose.knee + knee(phase)) * (1.0 - 0.4 * impaired * swinging),
             pose.ankle + ankle(phase) - 0.2 * impaired * swinging,
         )
+        return stepping if limb is None else limb.changed(stepping, phase, swinging)

@@ -31,10 +31,17 @@ class Humps(NamedTuple):
     @property
     def mean(self) -> float:
         """Mean over stance: every way between two values is symmetric."""
-        first = self.first * (_FIRST_AT - (self.strike * _STRIKE_END + (1 - self.strike) * _FIRST_AT) / 2)
-        down = (self.first + self.valley) / 2 * (_VALLEY_AT - _FIRST_AT)
-        up = (self.valley + self.second) / 2 * (_SECOND_AT - _VALLEY_AT)
-        return first + down + up + self.second / 2 * (1 - _SECOND_AT)
+        first, down, up, last = self.parts()
+        return first + down + up + last
+
+    def parts(self) -> tuple[float, float, float, float]:
+        """Return what each way gives to the mean: all are symmetric."""
+        return (
+            self.first * (_FIRST_AT - (self.strike * _STRIKE_END + (1 - self.strike) * _FIRST_AT) / 2),
+            (self.first + self.valley) / 2 * (_VALLEY_AT - _FIRST_AT),
+            (self.valley + self.second) / 2 * (_SECOND_AT - _VALLEY_AT),
+            self.second / 2 * (1 - _SECOND_AT),
+        )
 
     def at(self, stance: float) -> float:
         """Force at a share of stance (0 … 1)."""
@@ -46,6 +53,28 @@ class Humps(NamedTuple):
         if stance < _SECOND_AT:
             return self.valley + (self.second - self.valley) * _way(stance, _VALLEY_AT, _SECOND_AT)
         return self.second * (1.0 - _way(stance, _SECOND_AT, 1.0))
+
+
+class Transfer(NamedTuple):
+    """Shares of stance in which the weight comes to this foot and leaves it again: both are down then."""
+
+    coming: float
+    leaving: float
+
+    def force(self, stance: float, humps: Humps) -> float:
+        """Force of `humps` at a share of stance (0 … 1): their flanks are as long as the transfer."""
+        if stance < self.coming:
+            return humps.at(stance / self.coming * _FIRST_AT)
+        if stance > 1.0 - self.leaving:
+            return humps.at(1.0 - (1.0 - stance) / self.leaving * (1.0 - _SECOND_AT))
+        alone = 1.0 - self.coming - self.leaving
+        return humps.at(_FIRST_AT + (stance - self.coming) / alone * (_SECOND_AT - _FIRST_AT))
+
+    def mean(self, humps: Humps) -> float:
+        """Of `force` over stance."""
+        first, down, up, last = humps.parts()
+        alone = (1.0 - self.coming - self.leaving) / (_SECOND_AT - _FIRST_AT)
+        return first * self.coming / _FIRST_AT + (down + up) * alone + last * self.leaving / (1 - _SECOND_AT)
 
 
 def level_humps(speed: float) -> Humps:

@@ -6,8 +6,10 @@ standard deviations between subjects in Schwartz et al. 2008 are 4° to 7°, mos
 
 import math
 import random
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
+
+from hil_sim.gait.walks import ORDINARY, OwnWalk, own_walk
 
 NOMINAL_LEG_LENGTH = 0.80  # m, hip to ground
 _MACHINE_KG = 16.0
@@ -39,6 +41,7 @@ class WearerSettings:
     `mass` is kg with the machine. `asymmetry` is by what share the left step is longer than the right.
     `impairment` (0 none … 1) stiffens a leg's swing, drops its foot and takes load off it. `variability`
     scales how much one stride differs from the next; 1 is a healthy adult. `sway` scales the trunk's motion.
+    `walk` is None where it is the ordinary one.
     """
 
     mass: float = 90.0
@@ -50,16 +53,32 @@ class WearerSettings:
     lean: float = 0.0
     foot_roll: float = 0.0  # m, how far the centre of pressure lies outside its usual place
     habits: tuple[Habit, Habit, Habit] = (Habit(), Habit(), Habit())  # hip, knee, ankle
+    walk: OwnWalk | None = None
 
 
 NOMINAL = WearerSettings()
 
 
-def subject(number: int) -> WearerSettings:
+def subject(number: int, walk: str = ORDINARY) -> WearerSettings:
     """Return the person with this number, always the same one; 0 is the nominal wearer.
 
-    Every fourth on average has an impaired leg.
+    Every fourth on average has an impaired leg; nobody, where another `walk` than the ordinary one says how
+    they walk.
     """
+    person = _person(number)
+    if walk == ORDINARY:
+        return person
+    own = own_walk(walk, number)
+    return replace(
+        person,
+        walk=own,
+        impairment=(0.0, 0.0),
+        lean=person.lean + own.lean,
+        variability=person.variability * own.variability,
+    )
+
+
+def _person(number: int) -> WearerSettings:
     if number == 0:
         return NOMINAL
     source = random.Random(f"subject {number}")

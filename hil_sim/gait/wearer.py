@@ -1,8 +1,8 @@
 """What ground, trunk and joints feel of the motion: foot loads, attitude and acceleration, joint loads.
 
-Newton holds at every moment: all vertical forces (feet, seat, ground under a fallen body) less the weight are
-mass times the trunk's vertical acceleration, the body taken as a mass in its trunk. Over a stride the feet
-carry the weight.
+Newton holds at every moment: all vertical forces (feet, crutches, seat, ground under a fallen body) less the
+weight are mass times the trunk's vertical acceleration, the body taken as a mass in its trunk. Over a stride
+feet and crutches carry the weight.
 """
 
 import math
@@ -12,7 +12,8 @@ from typing import NamedTuple
 from hil_sim.gait import posture
 from hil_sim.gait.gaits import LEFT, RIGHT
 from hil_sim.gait.generator import Generator
-from hil_sim.gait.ground import outward, shear, vertical_grf
+from hil_sim.gait.ground import Humps, outward, shear, vertical_grf
+from hil_sim.gait.walk import swing
 
 GRAVITY = 9.80665
 
@@ -60,8 +61,11 @@ class _Contact(NamedTuple):
 _STANDING = _Contact(0.5, 0.0, 0.110, 0.0)
 
 
-def _sway(amounts: tuple[float, ...], now_s: float) -> float:
-    return sum(
+def _sway(share: float, amounts: tuple[float, ...], now_s: float) -> float:
+    """So much of it."""
+    if not share:
+        return 0.0
+    return share * sum(
         amount * math.sin(math.tau * hertz * now_s) for amount, hertz in zip(amounts, _SWAY_HZ, strict=True)
     )
 
@@ -82,20 +86,32 @@ class Wearer:
         """Left and right foot at `now_s` (s, for the sway of standing)."""
         carried = self._carried() * (1.0 - self._support())
         swaying = self._generator.wearer.sway * self._standing()
-        load, place = (swaying * _sway(amounts, now_s) for amounts in (_SWAY_LOAD, _SWAY_COP))
+        load, place = (_sway(swaying, amounts, now_s) for amounts in (_SWAY_LOAD, _SWAY_COP))
         left, right = self._contacts()
+        on_left, on_right = (1.0 - share for share in self._crutches())
         return (
-            Foot(carried * (left.load + load), left.cop_x + place, left.cop_y),
-            Foot(carried * (right.load - load), right.cop_x + place, right.cop_y),
+            Foot(carried * (on_left * left.load + load), left.cop_x + place, left.cop_y),
+            Foot(carried * (on_right * right.load - load), right.cop_x + place, right.cop_y),
         )
+
+    def _crutches(self) -> tuple[float, float]:
+        """Share of each leg's load that a crutch takes; nobody leans on one who sits or falls."""
+        generator = self._generator
+        if generator.walk is None:
+            return 0.0, 0.0
+        leans = (1.0 - generator.sitting) * (1.0 - generator.fall.share)
+        left, right = generator.walk.limbs
+        return leans * left.crutch, leans * right.crutch
 
     def _standing(self) -> float:
         """1 standing … 0 walking or sitting."""
         return (1.0 - self._generator.walking) * (1.0 - self._generator.sitting)
 
     def support(self) -> float:
-        """Return what the seat, or the ground under hands and body, carries (N)."""
-        return self._carried() * self._support()
+        """Return what seat, crutches, or the ground under hands and body carry (N)."""
+        leaning = zip(self._contacts(), self._crutches(), strict=True)
+        crutches = sum(contact.load * share for contact, share in leaning)
+        return self._carried() * (self._support() + (1.0 - self._support()) * crutches)
 
     def _carried(self) -> float:
         """Weight and what the posture's acceleration adds (N)."""
@@ -134,9 +150,24 @@ class Wearer:
         takes = 1.0 + _IMPAIRED_LOAD * (impaired[1 - side] - impaired[side])
         load = place = 0.0
         for gait, part in generator.gaits:
-            load += part * takes * vertical_grf(stance, gait.humps(speed), share)
+            load += part * takes * self._force(side, stance, share, gait.humps(speed))
             place += part * gait.path.at(stance)
+        if generator.walk is not None:
+            place += generator.walk.limbs[side].heel * (1.0 - stance)
         return _Contact(load, shear(stance, speed), place, outward(stance))
+
+    def _force(self, side: int, stance: float, share: float, humps: Humps) -> float:
+        """Of a foot, crutch and all, in body weights, at a share of its stance."""
+        generator = self._generator
+        if generator.walk is None:
+            return vertical_grf(stance, humps, share)
+        if stance >= 1.0:
+            return 0.0
+        shares = (generator.stance_share(LEFT), generator.stance_share(RIGHT))
+        both = [generator.walk.transfer(one, shares) for one in (LEFT, RIGHT)]
+        takes = [limb.takes for limb in generator.walk.limbs]
+        whole = sum(k * s * one.mean(humps) for k, s, one in zip(takes, shares, both, strict=True))
+        return takes[side] * both[side].force(stance, humps) / whole
 
     # -- trunk ------------------------------------------------------------------------------------------
 
@@ -145,12 +176,22 @@ class Wearer:
         generator = self._generator
         upright = (1.0 - generator.fall.share) * generator.wearer.sway
         moving, angle = generator.walking * upright, math.tau * generator.phase
-        swaying, aside = (upright * _sway(amounts, now_s) for amounts in (_SWAY_PITCH, _SWAY_ROLL))
+        swaying, aside = (_sway(upright, amounts, now_s) for amounts in (_SWAY_PITCH, _SWAY_ROLL))
         return Trunk(
-            roll=moving * _ROLL * math.sin(angle) + generator.fall.roll + aside,
+            roll=moving * (_ROLL * math.sin(angle) + self._hike()) + generator.fall.roll + aside,
             pitch=generator.trunk + moving * _PITCH * math.sin(2.0 * angle) + swaying,
             yaw=generator.heading + moving * _YAW * math.cos(angle),
             acceleration=self._acceleration(),
+        )
+
+    def _hike(self) -> float:
+        """How far the trunk is tilted so that a leg can swing (rad, right side down)."""
+        generator = self._generator
+        if generator.walk is None:
+            return 0.0
+        return sum(
+            hike * swing(generator.leg_phase(side), generator.stance_share(side))
+            for side, hike in zip((LEFT, RIGHT), generator.walk.hikes, strict=True)
         )
 
     def _acceleration(self) -> tuple[float, float, float]:

@@ -93,6 +93,7 @@ def _run(script: Script, folder: Path, speed: float | None) -> Outcome:
         person=script.subject,
         drives=script.drives,
         guard=script.guard,
+        walk=script.walks,
     )
     with ExitStack() as stack:
         robot.open()

@@ -7,6 +7,7 @@ from hil_sim import operator
 from hil_sim.exoskeleton import Scenario
 from hil_sim.faults.registry import FAULTS
 from hil_sim.gait.activity import Activity
+from hil_sim.gait.walks import NAMES
 from hil_sim.scenario.expect_table import COMPONENTS, STATES, SUBJECTS, TIMINGS
 from hil_sim.scenario.expectation import When
 from hil_sim.scenario.script import GATEWAY_LINES, ROBOT_KEYS
@@ -35,6 +36,7 @@ _ROBOT: Final[Mapping[str, Schema]] = {
     "seconds": _TIME,
     "seed": _WHOLE,
     "subject": _WHOLE,
+    "walks": _one_of(NAMES),
     "imu": _one_of(IMUS),
     "insole": _one_of(INSOLES),
     "drive": {"anyOf": [_TEXT, {"type": "array", "items": _TEXT}]},

@@ -1,8 +1,8 @@
 """A scenario file: the robot, what happens to it and when, and what is expected (docs/how-to/scenarios.md).
 
-`[robot]` has scenario, seconds, seed, subject, imu, insole and drive; `[guard]` is that of the robot's file,
-which the gateway judges; each `[[at]]` is a time and one thing that happens; each `[[expect]]` what is looked
-at, what it must be, and when.
+`[robot]` has scenario, seconds, seed, subject, walks, imu, insole and drive; `[guard]` is that of the robot's
+file, which the gateway judges; each `[[at]]` is a time and one thing that happens; each `[[expect]]` what is
+looked at, what it must be, and when.
 """
 
 import contextlib
@@ -16,6 +16,7 @@ from typing import Any, TypeVar
 from hil_sim import operator, personality, robot_file
 from hil_sim.errors import SimulatorError
 from hil_sim.exoskeleton import JOINTS, Exoskeleton, Scenario
+from hil_sim.gait.walks import NAMES, ORDINARY
 from hil_sim.scenario import expect_table
 from hil_sim.scenario.expectation import Expectation
 from hil_sim.scenario.table import Mistake, ScenarioError, Table, Unusable, is_number, meant
@@ -24,7 +25,7 @@ from hil_sim.sensors.suite import IMUS, INSOLES, SensorChoice
 T = TypeVar("T")
 
 TABLES = ("at", "expect", "guard", "robot", "title")
-ROBOT_KEYS = ("scenario", "seconds", "seed", "subject", "imu", "insole", "drive")
+ROBOT_KEYS = ("scenario", "seconds", "seed", "subject", "walks", "imu", "insole", "drive")
 _AFTER_S = 1.0  # how long a scenario goes on after the last time that it names
 # What a gateway is asked for: the line's key → method of the wire and the name of the parameter.
 GATEWAY_LINES = {"stop": ("robot.stop", "reason"), "set": ("parameter.write", "changes")}
@@ -54,6 +55,7 @@ class Script:
     seconds: float = 0.0
     seed: int = 0
     subject: int = 0
+    walks: str = ORDINARY
     sensors: SensorChoice = field(default_factory=SensorChoice)
     drives: Mapping[str, Path] = field(default_factory=dict)
     guard: Mapping[str, Any] | None = None  # as robot.toml has it
@@ -129,6 +131,7 @@ class _Reading:
             seconds=_duration(robot, least_s),
             seed=robot.whole("seed", 0),
             subject=robot.whole("subject", 0, least=0),
+            walks=robot.choice("walks", NAMES, ORDINARY),
             sensors=SensorChoice(
                 robot.choice("imu", IMUS, SensorChoice().imu),
                 robot.choice("insole", tuple(INSOLES), SensorChoice().insole),

@@ -55,6 +55,8 @@ class SerialSensor(Generic[M]):
             soon = self._faults.wraps_soon
             self._number, self._started_ns = (-_SOON_FRAMES, now_ns + _SOON_NS) if soon else (0, now_ns)
         self._number += 1
+        if self.line.port is None:
+            return  # nobody hears it
         since_ns = now_ns - self._started_ns
         tick = Tick(self._number, since_ns + round(_CLOCK_ERROR * since_ns))
         self.line.send((self._language.banner if started else b"") + self._language.encode(measured, tick))

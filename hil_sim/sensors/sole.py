@@ -52,13 +52,15 @@ class Sole:
         self._drifted = self._drifted + faults.drift * dt if faults.drift else 0.0
         if self._last is None or not faults.frozen:
             foot = Foot(other.force, other.cop_x, -other.cop_y) if faults.swapped else own
-            felt = [self._felt(number, truth) for number, truth in enumerate(self.pressures(foot))]
+            felt = self._felt(self.pressures(foot))
             end = _SATURATED_PA if faults.saturated else math.inf
             self._last = Pressures(self._right, tuple(min(one, end) for one in felt), max(felt) >= end)
         return self._last
 
     def pressures(self, foot: Foot) -> list[float]:
         """True pressure of each cell (Pa): the force, spread around the centre of pressure."""
+        if not foot.force:
+            return [0.0] * len(self.cells)
         shares = [cell.area * self._nearness(cell, foot) for cell in self.cells]
         total = sum(shares)
         return [
@@ -70,14 +72,19 @@ class Sole:
         x, y = (cell.x - foot.cop_x) / _SPREAD_X, (cell.y - foot.cop_y) / _SPREAD_Y
         return math.exp(-0.5 * (x * x + y * y))
 
-    def _felt(self, number: int, truth: float) -> float:
-        noise = self._random.gauss(0.0, 1.0)
-        if number == self._faults.stuck_cell:
-            return _STUCK_PA
-        if number in self._faults.dead_cells:
-            return 0.0
-        felt = truth * (1.0 + _NOISE_SHARE * noise) + _NOISE_PA * noise + self._drifted
-        return max(felt, 0.0) * self._faults.scale
+    def _felt(self, truths: list[float]) -> list[float]:
+        """What the cells make of the true pressures (Pa)."""
+        faults, drifted, gauss = self._faults, self._drifted, self._random.gauss
+        noises = [gauss(0.0, 1.0) for _ in truths]
+        felt = [
+            max(truth * (1.0 + _NOISE_SHARE * noise) + _NOISE_PA * noise + drifted, 0.0) * faults.scale
+            for truth, noise in zip(truths, noises, strict=True)
+        ]
+        if faults.dead_cells:
+            felt = [0.0 if number in faults.dead_cells else one for number, one in enumerate(felt)]
+        if faults.stuck_cell is not None:
+            felt = [_STUCK_PA if number == faults.stuck_cell else one for number, one in enumerate(felt)]
+        return felt
 
 
 def calibration_text(pascal_per_count: float) -> str:

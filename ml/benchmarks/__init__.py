@@ -4,6 +4,7 @@ catalogue.py                their names, questions and goals
 status.py, phase.py, adapt.py, fall.py, terrain.py    one each
 ipol.py, sisfall.py, arrays.py    how recordings are read and checked
 sim_activity.py, sim_phase.py, sim_falling.py    those on simulated people, one each
+sim_walks.py                the shipped models on simulated people who walk differently
 sim.py                      what these share: folds, missing sensors, noise
 strides.py                  decisions within strides, for phase.py and adapt.py
 folds.py, search.py, metrics.py   splits, tuning on training subjects alone, figures

@@ -14,6 +14,7 @@ from ml.benchmarks import (
     sim_activity,
     sim_falling,
     sim_phase,
+    sim_walks,
     status,
     terrain,
 )
@@ -109,6 +110,13 @@ BENCHMARKS: Final = {
             recipe_of(GAIT_PHASE, WHOLE),
             sim_phase.evaluate,
             {},
+        ),
+        Benchmark(
+            "sim-walks",
+            "synthetic: the shipped models on people who walk differently, and after a minute of each",
+            recipe_of(GAIT_PHASE, WHOLE),
+            sim_walks.evaluate,
+            {"worst_third_adaptation_cut": Goal(0.5)},
         ),
         Benchmark(
             "sim-falling",

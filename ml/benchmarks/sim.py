@@ -15,7 +15,7 @@ import numpy.typing as npt
 from ml.benchmarks import folds
 from ml.errors import UnusableData
 from ml.features.recipe import Recipe
-from ml.robot.groups import GROUPS, unit
+from ml.robot.groups import GROUPS, present, unit
 from ml.robot.task import Task
 from ml.training import simulated
 from ml.training.simulated import Examples, Session
@@ -34,6 +34,7 @@ _DISTURBED: Final = {"rad": (0.03, 0.005), "N": (20.0, 8.0), "m/s²": (0.3, 0.15
 _LATER: Final = 1  # rows by which insoles come behind: 10 ms
 
 T = TypeVar("T")
+Flags = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +63,19 @@ def people(path: Path) -> list[Session]:
             f"{path} holds {count} simulated people: {FOLDS} are needed (gwrms sim-record --subjects 1-12)"
         )
     return sessions
+
+
+def robot(sessions: Sequence[Session], variants: Sequence[Variant]) -> tuple[Variant, list[Variant]]:
+    """The robot with every sensor that all sessions have, and those of `variants` that lack some of them."""
+    channels = set(sessions[0].channels).intersection(*(session.channels for session in sessions))
+    whole = replace(WHOLE, groups=present(channels))
+    return whole, [one for one in variants if set(one.groups) < set(whole.groups)]
+
+
+def by_walks(seen: Examples, figures: Callable[[Flags], dict[str, float]]) -> dict[str, dict[str, float]]:
+    """The figures of the rows of each walk; none where all walk alike."""
+    names = np.unique(seen.walks)
+    return {str(one): figures(seen.walks == one) for one in names} if len(names) > 1 else {}
 
 
 def recipe_of(task: Task, variant: Variant) -> Recipe:

@@ -1,6 +1,6 @@
 """`sim-activity`: what simulated wearers do, and whether a model knows what it does not know."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -17,13 +17,14 @@ from ml.benchmarks.sim import (
     NO_TRUNK,
     NOISE,
     SETTINGS,
-    WHOLE,
     WHY,
     Variant,
+    by_walks,
     examples_of,
     in_folds,
     people,
     recipe_of,
+    robot,
 )
 from ml.registry.judged import calibrated
 from ml.robot.learn import learn
@@ -65,10 +66,12 @@ class Judged:
 def evaluate(path: Path, search: Search) -> Outcome:  # noqa: ARG001 - there is nothing to choose
     """Folds of people, by people; then robots that lack sensors, and other people's noise."""
     sessions = people(path)
-    whole = examples_of(ACTIVITY, WHOLE, sessions, STEP)
-    judged = _judged(WHOLE, whole, whole)
-    others = {NOISE.name: _judged(WHOLE, whole, examples_of(ACTIVITY, NOISE, sessions, STEP))}
-    for variant in VARIANTS:
+    every, variants = robot(sessions, VARIANTS)
+    whole = examples_of(ACTIVITY, every, sessions, STEP)
+    judged = _judged(every, whole, whole)
+    noisy = examples_of(ACTIVITY, replace(every, noisy=True), sessions, STEP)
+    others = {NOISE.name: _judged(every, whole, noisy)}
+    for variant in variants:
         seen = examples_of(ACTIVITY, variant, sessions, STEP)
         others[variant.name] = _judged(variant, seen, seen)
     everything = np.ones(len(whole.subject), dtype=bool)
@@ -81,7 +84,17 @@ def evaluate(path: Path, search: Search) -> Outcome:  # noqa: ARG001 - there is 
     counts = metrics.confusion(
         judged.truth[judged.known], judged.likeliest[judged.known], len(judged.classes)
     )
-    return Outcome(figures, len(by_subject), by_subject, "subject", judged.classes, counts, SETTINGS, (WHY,))
+    walks = by_walks(
+        whole,
+        lambda rows: {
+            "macro_f1": judged.macro_f1(rows),
+            "unknown_fraction": float((judged.label[rows & judged.known] == NONE).mean()),
+        },
+    )
+    if walks:
+        figures["worst_walks_macro_f1"] = min(one["macro_f1"] for one in walks.values())
+    groups, by = (walks, "walks") if walks else (by_subject, "subject")
+    return Outcome(figures, len(by_subject), groups, by, judged.classes, counts, SETTINGS, (WHY,))
 
 
 def _judged(variant: Variant, taught: Examples, seen: Examples) -> Judged:
@@ -119,7 +132,7 @@ def _figures(judged: Judged, seen: Examples) -> dict[str, float]:
         "worst_subject_macro_f1": float("nan"),
         "steady_macro_f1": judged.macro_f1(_steady(seen)),
         "accuracy": float(right[known].mean()),
-        "said_accuracy": float(right[known & said].mean()),
+        "said_accuracy": float(right[known & said].mean()) if (known & said).any() else float("nan"),
         "unknown_fraction": float(1.0 - said[known].mean()),
         "calibration_error": sum(abs(one.said - one.right) * one.count for one in bins) / int(known.sum()),
         "abnormal_false_fraction": float(strange[known].mean()),

@@ -1,5 +1,6 @@
 """`sim-phase`: where in the stride simulated legs are, and whether a model knows when they do not step."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -16,13 +17,14 @@ from ml.benchmarks.sim import (
     NO_FEET,
     NOISE,
     SETTINGS,
-    WHOLE,
     WHY,
     Variant,
+    by_walks,
     examples_of,
     in_folds,
     people,
     recipe_of,
+    robot,
 )
 from ml.registry.judged import calibrated
 from ml.robot import learn
@@ -40,14 +42,16 @@ Flags = npt.NDArray[np.bool_]
 def evaluate(path: Path, search: Search) -> Outcome:  # noqa: ARG001 - there is nothing to choose
     """Folds of people, by people; then robots that lack sensors, and other people's noise."""
     sessions = people(path)
-    whole = examples_of(GAIT_PHASE, WHOLE, sessions, STEP)
+    every, variants = robot(sessions, VARIANTS)
+    whole = examples_of(GAIT_PHASE, every, sessions, STEP)
     truth, known = stepping(whole.label, whole.phase)
     steps = known & ~np.isnan(truth).any(axis=1)
-    error, sure, said = _judged(WHOLE, whole, whole, truth, known)
+    error, sure, said = _judged(every, whole, whole, truth, known)
     figures = _figures(error, sure, said, steps, known)
-    noisy = _judged(NOISE, whole, examples_of(GAIT_PHASE, NOISE, sessions, STEP), truth, known)[0]
-    figures["noise_rmse_percent"] = percent(noisy[steps].ravel())
-    for variant in VARIANTS:
+    noise = replace(every, noisy=True)
+    noisy = _judged(noise, whole, examples_of(GAIT_PHASE, noise, sessions, STEP), truth, known)[0]
+    figures[f"{NOISE.name}rmse_percent"] = percent(noisy[steps].ravel())
+    for variant in variants:
         seen = examples_of(GAIT_PHASE, variant, sessions, STEP)
         figures[f"{variant.name}rmse_percent"] = percent(
             _judged(variant, seen, seen, truth, known)[0][steps].ravel()
@@ -57,7 +61,17 @@ def evaluate(path: Path, search: Search) -> Outcome:  # noqa: ARG001 - there is 
         for one in np.unique(whole.subject)
     }
     figures["worst_subject_rmse_percent"] = max(one["rmse_percent"] for one in by_subject.values())
-    return Outcome(figures, len(by_subject), by_subject, settings=SETTINGS, notes=(WHY,))
+    walks = by_walks(
+        whole,
+        lambda rows: {
+            "rmse_percent": percent(error[steps & rows].ravel()),
+            "unknown_fraction": float(1.0 - said[steps & rows].mean()),
+        },
+    )
+    if walks:
+        figures["worst_walks_rmse_percent"] = max(one["rmse_percent"] for one in walks.values())
+    groups, by = (walks, "walks") if walks else (by_subject, "subject")
+    return Outcome(figures, len(by_subject), groups, by, settings=SETTINGS, notes=(WHY,))
 
 
 def _judged(
@@ -90,7 +104,7 @@ def _figures(error: Floats, sure: Floats, said: Flags, steps: Flags, known: Flag
         "rmse_percent": percent(error[steps].ravel()),
         "worst_subject_rmse_percent": float("nan"),
         "accuracy": float((np.abs(error[steps]) <= WITHIN).mean()),
-        "said_accuracy": float(right[known & said].mean()),
+        "said_accuracy": float(right[known & said].mean()) if (known & said).any() else float("nan"),
         "unknown_fraction": float(1.0 - said[steps].mean()),
         "false_stride_fraction": float(said[known & ~steps].mean()),
         "calibration_error": sum(abs(one.said - one.right) * one.count for one in bins) / int(known.sum()),

@@ -40,9 +40,14 @@ def synchronise(files: Iterable[Path]) -> None:
     """Make these files and their names last, up to the folder above the table's."""
     found = [file for file in files if file.exists()]  # what was compacted since is in another commit
     folders = {folder for file in found for folder in list(file.parents)[:_LEVELS]}
-    with ThreadPoolExecutor(min(_AT_ONCE, max(1, len(found)))) as pool:
-        list(pool.map(_sync, found))
-        list(pool.map(_sync_names, folders))
+    if len(found) < _AT_ONCE:  # threads would cost more than they gain
+        for file in found:
+            _sync(file)
+    else:
+        with ThreadPoolExecutor(_AT_ONCE) as pool:
+            list(pool.map(_sync, found))
+    for folder in folders:
+        _sync_names(folder)
 
 
 def sync(path: Path) -> None:

@@ -3,6 +3,7 @@
 A wearer is known by the session's own field or by a label, however that is spelled (`labels.person`).
 """
 
+import contextlib
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -71,7 +72,7 @@ def counted(store: Store, sessions: Sequence[Name]) -> dict[str, int]:
     """Return how many rows of these sessions the newest version of each location has."""
     found: Counter[str] = Counter()
     for location, mine in _locations(store, sessions):
-        with translated(f"{store.url}/{location} cannot be read"):
+        with contextlib.suppress(NoSuchTable), translated(f"{store.url}/{location} cannot be read"):
             found[location] += store.dataset(location).count_rows(filter=_of(mine))
     return {location: rows for location, rows in found.items() if rows}
 
@@ -100,13 +101,15 @@ def delete(store: Store, sessions: Sequence[Name]) -> None:
         StoreError: it is not known what is deleted; call it again.
 
     """
-    for location, mine in _locations(store, sessions):
+    there = {location: mine for location, mine in _locations(store, sessions) if _is_there(store, location)}
+    for location, mine in there.items():
         store.mend(location)
         with translated(f"{store.url}/{location} cannot be changed"):
             for at in range(0, len(mine), AT_ONCE):
                 upkeep.remove(store, location, _is_of(mine[at : at + AT_ONCE]))
-    there = {location for location, _ in _locations(store, sessions)}
-    concerned = [table for table in TABLES if there & set(table.locations(store.about.shards))]
+    concerned = [
+        table for table in TABLES if not there.keys().isdisjoint(table.locations(store.about.shards))
+    ]
     upkeep.vacuum(store, concerned, timedelta(0))
     for path in left(store, sessions):
         store.objects.remove(path)
@@ -150,17 +153,20 @@ def _holds(store: Store, path: str, sessions: Sequence[Name]) -> bool:
 
 
 def _locations(store: Store, sessions: Sequence[Name]) -> Iterator[tuple[str, Sequence[Name]]]:
-    """Where rows of theirs may be, and of which of them."""
+    """Where rows of theirs may be if there is such a table, and of which of them."""
     for table in TABLES:
         by_location: dict[str, list[Name]] = {}
         for robot, name in sessions:
             by_location.setdefault(table.location(robot, store.about.shards), []).append((robot, name))
-        for location, mine in sorted(by_location.items()):
-            try:
-                store.table(location)
-            except NoSuchTable:
-                continue
-            yield location, mine
+        yield from sorted(by_location.items())
+
+
+def _is_there(store: Store, location: str) -> bool:
+    try:
+        store.table(location)
+    except NoSuchTable:
+        return False
+    return True
 
 
 def _of(sessions: Sequence[Name]) -> pyarrow.dataset.Expression:

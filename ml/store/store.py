@@ -349,8 +349,9 @@ class Store:
 
 
 def _known(schema: DeltaSchema) -> dict[str, Known]:
+    fields = msgspec.json.decode(schema.to_json())["fields"]  # asked one by one, each is decoded twice
     return {
-        each.name: Known(each.metadata.get("unit"), each.metadata.get("channel")) for each in schema.fields
+        each["name"]: Known(each["metadata"].get("unit"), each["metadata"].get("channel")) for each in fields
     }
 
 

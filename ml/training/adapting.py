@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
 from ml.errors import UnusableData
 from ml.features.recipe import Features
+from ml.features.windows import Samples
 from ml.robot.learn import BATCH, pointers
 from ml.robot.learned import Learned, scaled
 from ml.robot.network import FAR
@@ -19,8 +19,6 @@ MINUTE_S: Final = 60.0  # of steps
 LEAST_LATER_S: Final = 20.0  # of steps, to judge by
 EPOCHS: Final = 20
 
-Phases = npt.NDArray[np.float64]
-
 
 @dataclass(frozen=True, slots=True)
 class Divided:
@@ -28,14 +26,6 @@ class Divided:
 
     early: list[Part]
     later: list[Part]
-
-    @property
-    def lesson(self) -> tuple[Features, Phases]:
-        """What adapts: features (n, features) and phases (n, 2)."""
-        return (
-            np.concatenate([each.features for each in self.early]),
-            np.concatenate([each.truth for each in self.early]),
-        )
 
 
 def divided(parts: Sequence[Part], minute_s: float = MINUTE_S) -> Divided:
@@ -65,16 +55,21 @@ def divided(parts: Sequence[Part], minute_s: float = MINUTE_S) -> Divided:
     return Divided([each for each in early if len(each.truth)], [each for each in later if len(each.truth)])
 
 
-def adapted(
-    base: Learned, features: Features, truth: Phases, seed: int = 0, told: Callable[[], None] = lambda: None
-) -> Learned:
-    """A copy that has also learned from these decisions; how far it trusts itself stays as it was.
+def adapted(base: Learned, parts: Sequence[Part], seed: int = 0) -> Learned:
+    """A copy that has also learned from these decisions; how far it trusts itself stays as it was."""
+    features = np.concatenate([each.features for each in parts])
+    return taught(base, features, np.concatenate([each.truth for each in parts]), seed)
 
-    `features` (n, features) of the base's recipe, `truth` (n, 2) phases, NaN where the legs do not step.
+
+def taught(
+    base: Learned, features: Features, phases: Samples, seed: int = 0, told: Callable[[], None] = lambda: None
+) -> Learned:
+    """The same, of a row of features and of phases (n, 2) for each decision.
+
     `told` is called every few milliseconds, so that who learns in a thread can let others work.
     """
     inputs = np.clip(scaled(base.parts["scale"], features), -FAR, FAR)
-    targets = pointers(truth)
+    targets = pointers(phases)
     network = copy.deepcopy(base.parts["network"])
     random = np.random.default_rng(seed)
     for _ in range(EPOCHS):  # a `partial_fit` warns of nothing, so that any thread may learn

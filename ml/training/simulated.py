@@ -20,6 +20,7 @@ Floats = npt.NDArray[np.float64]
 TRUTH: Final = ("time", "label", "left_phase", "right_phase")
 LOST: Final = frozenset({"fall", "lying", "get_up"})  # in which a phase means nothing
 STANDING: Final = "stand"
+ORDINARY: Final = "ordinary"  # the walks of recordings that do not say whose they are
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,6 +34,7 @@ class Session:
     values: Floats  # (n, channels)
     label: npt.NDArray[np.str_]  # (n,)
     phase: Floats  # (n, 2) of the left and the right leg; NaN where it does not step
+    walks: str = ORDINARY  # how the wearer walks, as `gwrms sim-record --walks`
 
     def of(self, channels: tuple[str, ...]) -> Floats:
         """The values of these channels, in this order."""
@@ -48,12 +50,14 @@ class Examples:
     phase: Floats  # (n, 2)
     subject: npt.NDArray[np.str_]
     time_ns: npt.NDArray[np.int64]
+    walks: npt.NDArray[np.str_]
 
 
 class _Head(msgspec.Struct):
     session: str
     subject: int
     columns: list[str]
+    walks: str = ORDINARY
 
 
 # What reading raises for bytes that are none of ours: also packed ones, numbers too large, lists too deep.
@@ -140,6 +144,7 @@ def _session(line: bytes, rows: list[list[Any]]) -> Session:
         numbers[:, 2:],
         np.array([row[1] for row in rows], dtype=np.str_),
         numbers[:, :2],
+        head.walks,
     )
 
 
@@ -157,4 +162,5 @@ def _decisions(task: Task, recipe: Recipe, session: Session, step: int) -> Itera
             session.phase[row],
             np.full(len(ends), session.subject),
             grid_ns[ends],
+            np.full(len(ends), session.walks),
         )

@@ -120,7 +120,7 @@ def _personal(registry: Registry, found: Material, wish: Wish) -> Trained:
     parts, left_out = found.parts(base.learned.recipe)
     walk = divided([each for each in parts if not each.regression])
     found.told("learning", 0, 1)
-    learned = adapted(base.learned, *walk.lesson, SEED)
+    learned = adapted(base.learned, walk.early, SEED)
     found.told("judging", 0, 1)
     serves = _serving(registry, found.task, wish.robot, base.learned.recipe)
     serving = serves or base

@@ -3,7 +3,9 @@
 import argparse
 import math
 import time
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from gateway.cli.text import say, say_json, table
 from ml.benchmarks import BENCHMARKS, Benchmark, Outcome
@@ -68,10 +70,15 @@ def _text(benchmark: Benchmark, outcome: Outcome, seconds: float) -> str:
     )
 
 
-def _answer(benchmark: Benchmark, outcome: Outcome, seconds: float) -> dict[str, str | float | None]:
-    figures = {name: None if math.isnan(value) else value for name, value in outcome.figures.items()}
-    about = {"subjects": outcome.subjects, "seconds": round(seconds, 1)}
-    return {"benchmark": benchmark.name, **figures, **about}
+def _answer(benchmark: Benchmark, outcome: Outcome, seconds: float) -> dict[str, Any]:
+    groups = {name: _finite(figures) for name, figures in outcome.by_group.items()}
+    by = f"by_{outcome.grouped_by.replace(' ', '_')}"
+    about = {"subjects": outcome.subjects, "seconds": round(seconds, 1), by: groups}
+    return {"benchmark": benchmark.name, **_finite(outcome.figures), **about}
+
+
+def _finite(figures: Mapping[str, float]) -> dict[str, float | None]:
+    return {name: None if math.isnan(value) else value for name, value in figures.items()}
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -87,7 +94,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--data", required=True, type=Path, metavar="FILE", help="the recordings")
     parser.add_argument(
-        "--json", action="store_true", help="the figures as one JSON object, in the last line"
+        "--json", action="store_true", help="the figures, of groups too, as one JSON object, in the last line"
     )
     parser.add_argument(
         "--report", type=Path, metavar="FILE.html", help="also write a page with tables and pictures"

@@ -70,6 +70,13 @@ def assert_unharmed(phase: Phase) -> None:
     assert (phase.streams["ended"], phase.streams["gaps"]) == (0, 0)
 
 
+def test_a_web_page_changes_no_parameter(tmp_path: Path) -> None:
+    """First, before there is the robot of the others."""
+    with robot(tmp_path, rate=RATE) as walking:  # nobody has stopped it: a write would be done
+        barrage(Target(walking.address, SECONDS), 1, Manner(strangers.HTTP, pause_s=0.3))
+        assert walking.bus.wrote == 0
+
+
 @pytest.mark.parametrize("name", ["idle", "slow-loris", "odd-numbers", "tls", "ssh"])
 def test_who_says_little_costs_nobody_a_stop_or_a_row(victim: Robot, name: str) -> None:
     phase, said = struck(victim, name)
@@ -108,15 +115,6 @@ def test_a_hostile_sensor_harms_no_other_and_is_taken_up_again(victim: Robot) ->
         assert state("trunk") == state("right_insole") == "ok"
         victim.sensors.say("hostile none")
         until(lambda: state("left_insole") == "ok", "the insole is heard again")
-
-
-# What has no limit yet
-
-
-def test_a_web_page_changes_no_parameter(tmp_path: Path) -> None:
-    with robot(tmp_path, rate=RATE) as walking:  # nobody has stopped it: a write would be done
-        barrage(Target(walking.address, SECONDS), 1, Manner(strangers.HTTP, pause_s=0.3))
-        assert walking.bus.wrote == 0
 
 
 @pytest.mark.parametrize("name", ["http", "tls", "ssh"])

@@ -20,7 +20,7 @@ def _explore(*options: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-@pytest.mark.parametrize("seconds", [6, NIGHT_S])
+@pytest.mark.parametrize("seconds", [3, NIGHT_S])
 def test_no_play_loses_doubles_or_misnames_what_was_acknowledged(seconds: int) -> None:
     done = _explore("--seconds", str(seconds))
     assert done.returncode == 0, done.stdout + done.stderr

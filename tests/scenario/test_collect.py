@@ -18,7 +18,7 @@ from tests.scenario.collecting import Collecting, Kept
 from tests.scenario.processes import Bench, gwrms
 from tests.support.waiting import WAIT_S, until
 
-FAST_S = int(os.environ.get("GWRMS_SIMULATED_S", "60"))
+FAST_S = (20, int(os.environ.get("GWRMS_SIMULATED_S", "60")))
 SIMULATED_S = int(os.environ.get("GWRMS_SIMULATED_S", "10"))
 SIMULATOR = tuple(os.environ.get("GWRMS_SIMULATOR", "").split())
 ROBOTS = ("exo-a", "exo-b", "exo-c")
@@ -142,17 +142,20 @@ def check_whole(kept: Kept) -> None:
 
 
 @pytest.fixture
-def fast_robots() -> Iterator[dict[str, str]]:
+def fast_robots(seconds: int) -> Iterator[dict[str, str]]:
     """Three robots whose time passes as fast as they are followed."""
-    with served("--fast", "--seconds", str(FAST_S)) as robots:
+    with served("--fast", "--seconds", str(seconds)) as robots:
         yield robots
 
 
-@pytest.mark.timeout(300 + FAST_S)
-def test_however_much_comes_at_once_there_is_no_gap(fast_robots: dict[str, str], start: Start) -> None:
+@pytest.mark.timeout(300 + max(FAST_S))
+@pytest.mark.parametrize("seconds", FAST_S)
+def test_however_much_comes_at_once_there_is_no_gap(
+    fast_robots: dict[str, str], start: Start, seconds: int
+) -> None:
     collecting = start(fast_robots)
-    expected = dict.fromkeys(fast_robots, 100 * FAST_S)
-    until(lambda: collecting.rows() == expected, collecting.rows, within_s=120 + FAST_S)
+    expected = dict.fromkeys(fast_robots, 100 * seconds)
+    until(lambda: collecting.rows() == expected, collecting.rows, within_s=120 + seconds)
     report = collecting.report()
     assert (report.recorder.lost, report.recorder.alarms) == (0, ())
     assert collecting.end() == 0
@@ -160,6 +163,6 @@ def test_however_much_comes_at_once_there_is_no_gap(fast_robots: dict[str, str],
         kept = collecting.kept(robot)
         stamps_ns = [row["stamp_ns"] for row in kept.rows]
         assert [stamp_ns - stamps_ns[0] for stamp_ns in stamps_ns] == [
-            number * PERIOD_NS for number in range(100 * FAST_S)
+            number * PERIOD_NS for number in range(100 * seconds)
         ]
         assert kept.events == []

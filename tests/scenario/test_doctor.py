@@ -21,6 +21,13 @@ class Ill(Bench):
     simulator_options = tuple(word for name in MISTAKES for word in ("--mistake", name))
 
 
+def test_a_file_that_cannot_be_read_is_trouble_and_no_finding(tmp_path: Path) -> None:
+    (tmp_path / "robot.toml").write_text("[robot]\n")
+    done = gwrms("doctor", str(tmp_path / "robot.toml"))
+    assert done.returncode == 2
+    assert "[robot] name" in done.stderr
+
+
 @pytest.fixture(scope="module")
 def ill(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ill]:
     folder = tmp_path_factory.mktemp("ill")
@@ -75,10 +82,3 @@ def test_what_is_safe_is_mended_and_what_the_file_does_not_allow_is_refused_in_w
     rows = [json.loads(line) for line in records.splitlines()]
     assert [row["rule"] for row in rows if "done" in row] == ["gear"]
     assert any("right_knee.object_6065" in row.get("refused", "") for row in rows)
-
-
-def test_a_file_that_cannot_be_read_is_trouble_and_no_finding(tmp_path: Path) -> None:
-    (tmp_path / "robot.toml").write_text("[robot]\n")
-    done = gwrms("doctor", str(tmp_path / "robot.toml"))
-    assert done.returncode == 2
-    assert "[robot] name" in done.stderr

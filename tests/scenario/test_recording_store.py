@@ -18,19 +18,20 @@ from tests.stores import BUCKET, SeaweedFS
 from tests.support.waiting import WAIT_S, until
 from tests.unit.recording.robots import batch
 
-WRITERS, COMMITS = 4, 10
+COMMITS = 10
 HERE = TELEMETRY.location("exo-01", 1)
 
 
-def test_four_servers_that_write_at_once_lose_no_commit(store_url: str) -> None:
+@pytest.mark.parametrize("servers", [2, 4])
+def test_servers_that_write_at_once_lose_no_commit(store_url: str, servers: int) -> None:
     module = "tests.scenario.recording_writer"
     writers = [
         subprocess.Popen([sys.executable, "-m", module, store_url, f"exo-{number}", str(COMMITS)])
-        for number in range(WRITERS)
+        for number in range(servers)
     ]
-    assert [writer.wait(150) for writer in writers] == [0] * WRITERS
+    assert [writer.wait(150) for writer in writers] == [0] * servers
     rows = Store(store_url).dataset("events").to_table(columns=["robot", "number"]).to_pylist()
-    expected = [(f"exo-{writer}", number) for writer in range(WRITERS) for number in range(1, COMMITS + 1)]
+    expected = [(f"exo-{writer}", number) for writer in range(servers) for number in range(1, COMMITS + 1)]
     assert sorted((row["robot"], row["number"]) for row in rows) == sorted(expected)
 
 

@@ -16,6 +16,7 @@ import msgspec
 from ml.store import Store, durable, forgetting, upkeep
 from ml.store.forgetting import Name, Worn
 from ml.store.labels import person
+from ml.store.snapshot import Snapshot
 from ml.store.tables import EVENTS, LABELS, SESSIONS
 from ml.store.upkeep import Pin
 from server_gui.core.cloud import exports, mend, spool_reader
@@ -63,6 +64,7 @@ def plan(store: Store, spool: Path, name: str, learned: Callable[[Sequence[Name]
     """
     if not person(name):
         raise CannotForget(f"{name!r} is nobody's name")
+    store = Snapshot.existing(store.url)  # each table is opened once
     found = _worn(store, spool, name)
     if found.shared:
         shared = ", ".join(f"{session} of {robot}" for robot, session in found.shared)

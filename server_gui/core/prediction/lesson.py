@@ -83,9 +83,9 @@ class Lesson:
 
 def learn(base: Model, robot: str, wearer: str, rows: Sequence[Row], told: Callable[[], None]) -> Model:
     """Return a copy of the model that has learned from these rows, too; no rule may stop a robot by it."""
-    from ml.training.adapting import adapted  # brings scikit-learn
+    from ml.training.adapting import taught  # brings scikit-learn
 
-    learned = adapted(base.learned, _features(rows), _truth(rows), told=told)
+    learned = taught(base.learned, _features(rows), _truth(rows), told=told)
     name = f"{base.card.id}{ADAPTED}{_digest(robot, learned)}"
     card = msgspec.structs.replace(base.card, id=name, robot=robot, parent=base.card.id)
     objection = f"{name} was learned from its wearer's walk just now, and nobody has promoted it"

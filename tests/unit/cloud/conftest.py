@@ -1,25 +1,24 @@
 """What the tests of the store's commands share."""
 
-import shutil
-from pathlib import Path
-
 import pytest
 
-from tests.unit.cloud.damages import Place, fill
+from tests.unit.cloud import damages
+from tests.unit.cloud.damages import Place
+from tests.unit.cloud.filled import Filled
 
 
 @pytest.fixture(scope="session")
-def filled(store_libraries: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Recorded once, because a copy takes a tenth of the time."""
-    folder = tmp_path_factory.mktemp("filled")
-    fill(folder / "now")
-    shutil.copytree(folder / "now", folder / "first")
-    return folder
+def filled(store_libraries: None, tmp_path_factory: pytest.TempPathFactory) -> Filled:
+    return Filled(tmp_path_factory.mktemp("filled"), damages.fill)
+
+
+@pytest.fixture(scope="session")
+def worn(store_libraries: None, tmp_path_factory: pytest.TempPathFactory) -> Filled:
+    from tests.unit.cloud import test_forget
+
+    return Filled(tmp_path_factory.mktemp("worn"), test_forget.fill)
 
 
 @pytest.fixture
-def place(filled: Path, capsys: pytest.CaptureFixture[str]) -> Place:
-    """As it was recorded, and where: a spool knows the address of its store."""
-    shutil.rmtree(filled / "now")
-    shutil.copytree(filled / "first", filled / "now")
-    return Place(filled / "now", capsys)
+def place(filled: Filled, capsys: pytest.CaptureFixture[str]) -> Place:
+    return Place(filled.anew(), capsys)

@@ -22,6 +22,7 @@ from server_gui.core.recording.records import Facts, Worn
 from server_gui.core.recording.rows import Record
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.upload import send
+from tests.unit.cloud.filled import Filled
 from tests.unit.training import walkers
 from tests.unit.training.walkers import BEGAN_UTC, S, day, put
 
@@ -39,15 +40,7 @@ class Server:
         self.config = folder / "server.toml"
         self.config.write_text(f'[recorder]\nspool = "{self.spool}"\n[store]\nurl = "{self.url}"\n')
         self._capsys = capsys
-        put(self.url, self.spool, [day(HERS, 1, each_s=2, wearer="P01"), day(HIS, 2, each_s=2, wearer="P02")])
         self.store = Store.existing(self.url)
-        with Spool(self.spool, reserve_bytes=0) as opened:
-            opened.append([run(HERS_TOO)], recorded(HERS_TOO, "p01 "))
-            opened.freeze()
-            for number in opened.waiting():
-                send(opened, number, self.store)
-            opened.append([run(WAITS)], [*recorded(WAITS, "P-1")])
-            opened.freeze()
 
     def run(self, *words: str, status: int = 0) -> str:
         assert main(["cloud", *words, "--config", str(self.config)]) == status
@@ -97,9 +90,22 @@ def recorded(session: str, wearer: str) -> list[Record]:
     ]
 
 
+def fill(folder: Path) -> None:
+    """Record the four sessions; one of them waits in the spool."""
+    url, spool = (folder / "store").as_uri(), folder / "spool"
+    put(url, spool, [day(HERS, 1, each_s=2, wearer="P01"), day(HIS, 2, each_s=2, wearer="P02")])
+    with Spool(spool, reserve_bytes=0) as opened:
+        opened.append([run(HERS_TOO)], recorded(HERS_TOO, "p01 "))
+        opened.freeze()
+        for number in opened.waiting():
+            send(opened, number, Store.existing(url))
+        opened.append([run(WAITS)], [*recorded(WAITS, "P-1")])
+        opened.freeze()
+
+
 @pytest.fixture
-def server(store_libraries: None, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Server:
-    return Server(tmp_path, capsys)
+def server(worn: Filled, capsys: pytest.CaptureFixture[str]) -> Server:
+    return Server(worn.anew(), capsys)
 
 
 def test_consent_and_wearer_are_told_with_a_session(server: Server) -> None:

@@ -63,20 +63,20 @@ class DeviceBench:
 
     def ask(self, cob_id: int) -> list[bytes]:
         """Send a remote frame; the frames that answer it."""
-        before = len(self.of(cob_id))
+        before = len(self.heard)
         self.bus.send(Frame(cob_id, remote=True), self)
         self.run(2)
-        return self.of(cob_id)[before:]
+        return self.of(cob_id, before)
 
-    def of(self, cob_id: int) -> list[bytes]:
-        """The data of all frames heard with this identifier."""
-        return [heard.data for heard in self.heard if heard.cob_id == cob_id]
+    def of(self, cob_id: int, first: int = 0) -> list[bytes]:
+        """The data of all frames heard with this identifier, but for those before the `first` of all."""
+        return [heard.data for heard in self.heard[first:] if heard.cob_id == cob_id]
 
     def sdo(self, request: str) -> str | None:
         """Ask the SDO server; hexadecimal as in a manual, `None` for silence."""
-        before = len(self.of(0x580 + NODE))
+        before = len(self.heard)
         self.send(0x600 + NODE, request)
-        answers = self.of(0x580 + NODE)[before:]
+        answers = self.of(0x580 + NODE, before)
         return answers[0].hex(" ").upper() if answers else None
 
     def read(self, index: int, subindex: int = 0, signed: bool = False) -> int:

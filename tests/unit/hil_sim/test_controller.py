@@ -62,6 +62,16 @@ class Robot:
 
 @pytest.fixture
 def robot() -> Robot:
+    return running()
+
+
+@pytest.fixture(scope="module")
+def shared() -> Robot:
+    """For what changes nothing that another test looks at."""
+    return running()
+
+
+def running() -> Robot:
     robot = Robot()
     robot.until(lambda: robot.exo.controller.controller_state is ControllerState.RUNNING)
     return robot
@@ -115,7 +125,7 @@ def test_a_drive_stopped_by_another_hand_stops_them_all_until_start_is_written(r
     assert robot.exo.controller.controller_state is ControllerState.HELD
     assert robot.states() == {PowerState.SWITCH_ON_DISABLED}
     assert struct.unpack("<BHB", robot.heard_last(0x190))[0::2] == (4, 2)
-    robot.run(5.0)
+    robot.run(2.0)
     assert robot.states() == {PowerState.SWITCH_ON_DISABLED}
     assert robot.download(16, 0x2000, 1, 1) == "ok"
     robot.run(1.0)
@@ -225,8 +235,8 @@ def test_where_the_drive_stays_in_quick_stop_the_controllers_next_command_wins(r
         (0x2005, 1, 11, "06090031"),
     ],
 )
-def test_gait_parameters_have_limits(robot: Robot, index: int, size: int, value: int, answer: str) -> None:
-    assert robot.download(16, index, value, size) == answer
+def test_gait_parameters_have_limits(shared: Robot, index: int, size: int, value: int, answer: str) -> None:
+    assert shared.download(16, index, value, size) == answer
 
 
 def test_the_hip_swings_further_with_longer_steps(robot: Robot) -> None:

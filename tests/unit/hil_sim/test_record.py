@@ -17,9 +17,11 @@ from hil_sim.gait.activity import Activity
 from hil_sim.practice import practice
 
 
-def recorded(scenario: str, seconds: float, seed: int = 1, person: int = 2) -> list[str]:
+def recorded(
+    scenario: str, seconds: float, seed: int = 1, person: int = 2, assists: str | None = None
+) -> list[str]:
     file = io.BytesIO()
-    Recording(file, scenario, seed, person).run(seconds)
+    Recording(file, scenario, seed, person, assists=assists).run(seconds)
     return file.getvalue().decode().splitlines()
 
 
@@ -35,6 +37,15 @@ def test_a_session_has_a_head_and_a_line_each_cycle() -> None:
     weight = [row["left_insole.force"] + row["right_insole.force"] for row in rows[-150:]]
     assert sum(weight) / len(weight) == pytest.approx(9.81 * head["wearer"]["mass"], rel=0.08)
     assert min(row["trunk.acceleration_z"] for row in rows) > 5.0
+
+
+def test_a_robot_on_one_leg_has_that_legs_joints_both_insoles_and_both_phases() -> None:
+    head, *lines = (json.loads(line) for line in recorded("walk", 3.0, assists="right"))
+    assert len(head["columns"]) == len(head["units"]) == len(lines[-1]) == len(COLUMNS) - 6
+    assert not [name for name in head["columns"] if name.startswith(("left_hip", "left_knee", "left_ankle"))]
+    last = dict(zip(head["columns"], lines[-1], strict=True))
+    assert {"right_knee.position", "left_insole.force", "right_insole.force"} <= set(last)
+    assert None not in (last["left_phase"], last["right_phase"])
 
 
 def test_who_stands_has_no_phase() -> None:
@@ -63,15 +74,26 @@ def test_practice_is_everything_at_every_setting() -> None:
 
 def test_the_command_writes_every_wearer(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "sim.jsonl.gz"
-    assert main(["sim-record", "--out", str(file), "--subjects", "3-4", "--minutes", "0.01"]) == 0
+    command = ["sim-record", "--out", str(file), "--subjects", "3-4", "--minutes", "0.01"]
+    assert main([*command, "--walks", "crouch"]) == 0
     with gzip.open(file, "rt", encoding="utf-8") as lines:
         heads = [json.loads(line) for line in lines if line.startswith("{")]
     assert [head["subject"] for head in heads] == [3, 4]
+    assert {(head["walks"], head["wearer"]["walk"]["name"]) for head in heads} == {("crouch", "crouch")}
     assert list(heads[0]["columns"][4:]) == list(UNITS)
 
 
 @pytest.mark.parametrize(
-    "wrong", [["--subjects", "4-3"], ["--subjects", "all"], ["--minutes", "0"], ["--minutes", "x"]]
+    "wrong",
+    [
+        ["--subjects", "4-3"],
+        ["--subjects", "all"],
+        ["--minutes", "0"],
+        ["--minutes", "x"],
+        ["--walks", "moonwalk"],
+        ["--assists", "both"],
+        ["--walks", "crouch", "--scenario", "dangers"],
+    ],
 )
 def test_wrong_usage_is_refused(wrong: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["sim-record", "--out", str(tmp_path / "x"), *wrong]) == 2

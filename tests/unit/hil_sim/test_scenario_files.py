@@ -68,6 +68,11 @@ def test_a_scenario_lasts_a_second_longer_than_the_last_time_it_names(tmp_path: 
     assert script(tmp_path, "[robot]\nseconds = 60").seconds == 60
 
 
+def test_a_scenario_may_say_how_its_wearer_walks(tmp_path: Path) -> None:
+    assert script(tmp_path, "").walks == "ordinary"
+    assert script(tmp_path, '[robot]\nwalks = "steppage"').walks == "steppage"
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
@@ -76,6 +81,7 @@ def test_a_scenario_lasts_a_second_longer_than_the_last_time_it_names(tmp_path: 
         ("robot = 1", r"one.toml: \[robot\]: this must be a table"),
         ("[robot]\nspeed = 1", r"\[robot\] speed: is not known: did you mean 'seed'"),
         ('[robot]\nscenario = "swim"', "scenario: 'swim' is not known: allowed are walk, stand"),
+        ('[robot]\nwalks = "crouched"', "walks: 'crouched' is not known: did you mean 'crouch'"),
         ('[robot]\nseed = "x"', "seed: 'x' must be a whole number"),
         ('[robot]\nimu = "x"', "imu: 'x' is not known: allowed are bno08x-rvc, microstrain"),
         ('[robot]\nseconds = 1\n[[at]]\ntime_s = 2\nactivity = "sit"', "seconds: 1 ends before something"),

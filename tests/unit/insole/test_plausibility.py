@@ -127,19 +127,20 @@ class Robot:
         return replace(felt, pascal=tuple(self.fault.cells(list(felt.pascal), self.now_s)))
 
 
-@pytest.mark.parametrize("tens_of_minutes", [1, 3])
-def test_half_an_hour_of_a_normal_wearer_raises_no_alarm(tens_of_minutes: int) -> None:
+@pytest.mark.parametrize(("rounds", "minutes"), [(1, 3), (3, 10)])
+def test_half_an_hour_of_a_normal_wearer_raises_no_alarm(rounds: int, minutes: int) -> None:
+    """Half of it is walking."""
     robot = Robot(Seeded())
     said: list[str] = []
-    for _ in range(tens_of_minutes):
-        said += robot.live(Activity.WALK, 300)
+    for _ in range(rounds):
+        said += robot.live(Activity.WALK, 30 * minutes)
         robot.sample(10)
-        said += robot.live(Activity.STAND, 150)
-        said += robot.live(Activity.SIT, 120)
-        said += robot.live(Activity.STAND, 30)
+        said += robot.live(Activity.STAND, 15 * minutes)
+        said += robot.live(Activity.SIT, 12 * minutes)
+        said += robot.live(Activity.STAND, 3 * minutes)
         robot.sample(25)
     assert said == []
-    assert robot.insoles[0].check.landings > 165 * tens_of_minutes
+    assert robot.insoles[0].check.landings > 16 * minutes * rounds
 
 
 def cell(number: int, value: Callable[[float], float]) -> CellFault:

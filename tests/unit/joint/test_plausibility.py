@@ -1,6 +1,6 @@
 """A joint that cannot be believed is named; whatever a wearer does with a good one is no alarm.
 
-The robot is the simulator's, in simulated time; what is judged is what its PDOs say.
+The robot is the simulator's, in simulated time; what is judged is what its drives' objects say.
 """
 
 from pathlib import Path
@@ -22,7 +22,7 @@ def test_whatever_a_wearer_does_raises_no_alarm(tmp_path: Path, scenario: Scenar
 
 @pytest.mark.parametrize("fault", ["gear_slip", "sto", "overcurrent", "drift", "runaway"])
 def test_other_faults_of_a_drive_are_none_of_its_encoder(tmp_path: Path, fault: str) -> None:
-    robot = WatchedRobot(tmp_path, Scenario.WALK)
+    robot = WatchedRobot(tmp_path, Scenario.WALK, whole=True)
     robot.run(4)
     robot.faults.begin(fault, "left_knee")
     assert robot.run(8) == {}

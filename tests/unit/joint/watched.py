@@ -1,13 +1,14 @@
-"""The simulated robot in simulated time, each joint judged by what its PDOs say 20 times a second."""
+"""The simulated robot in simulated time, each joint judged by its drive's objects 20 times a second."""
 
 import math
-import struct
 from pathlib import Path
 
 from drivers.joint.cia402 import DriveState, drive_state
 from drivers.joint.plausibility import JointCheck, Motion
-from hil_sim.bus.can_bus import Frame
+from hil_sim.bare import BareExoskeleton
 from hil_sim.clock import MILLISECOND_NS, SECOND_NS
+from hil_sim.drive import objects as od
+from hil_sim.drive.drive import JointDrive
 from hil_sim.exoskeleton import JOINTS, Exoskeleton, Scenario
 from hil_sim.faults.injector import Faults
 
@@ -17,20 +18,28 @@ LOOK_MS = 50
 
 
 class WatchedRobot:
-    """`said` is what was said of any joint, by its name, in the order in which it was first said."""
+    """`said` is what was said of any joint, by its name, in the order in which it was first said.
 
-    def __init__(self, folder: Path, scenario: Scenario, seed: int = 0, mirrored: str | None = None) -> None:
-        self.robot = Exoskeleton(scenario, seed)
+    Without `whole` there is no bus, and no controller that stops the others when a drive fails.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        scenario: Scenario,
+        seed: int = 0,
+        mirrored: str | None = None,
+        *,
+        whole: bool = False,
+    ) -> None:
+        self.robot = (Exoskeleton if whole else BareExoskeleton)(scenario, seed)
         self.faults = Faults(self.robot, folder, seed)
         self.checks = {name: JointCheck(name) for name in JOINTS}
         self.said: dict[str, str] = {}
         self._mirrored = mirrored
-        self._names = {node_id: name for name, node_id in JOINTS.items()}
-        self._newest: dict[str, dict[str, float]] = {name: {} for name in JOINTS}
         for name, check in self.checks.items():
             check.loaded.rated = RATED
             check.compare_with(_other(name))
-        self.robot.bus.attach(self, self._receive)
         vars(self.robot.sensors)["measure"] = _nothing  # soles and trunk are none of this, and cost a sixth
         self.robot.power_on()
         self.robot.clock.every(LOOK_MS * MILLISECOND_NS, self._look)
@@ -43,39 +52,32 @@ class WatchedRobot:
         """What is said of a joint now."""
         return "; ".join(finding.text(self.robot.clock.now_ns) for finding in self.checks[name].findings)
 
-    def _receive(self, frame: Frame, _sender: object) -> None:
-        name = self._names.get(frame.cob_id & 0x7F)
-        if name is None:
-            return
-        found, sign = self._newest[name], -1.0 if name == self._mirrored else 1.0
-        match frame.cob_id & 0x780:
-            case 0x180:
-                word, counts = struct.unpack("<Hi", frame.data)
-                found |= {"word": word, "position": sign * counts / COUNTS, "stamp": self.robot.clock.now_ns}
-            case 0x280:
-                velocity, torque, _current = struct.unpack("<ihh", frame.data)
-                found |= {"velocity": sign * velocity / COUNTS, "torque": sign * torque * RATED / 1000}
-            case 0x380:
-                error, _temperature, mode = struct.unpack("<ihb", frame.data)
-                found |= {"error": sign * error / COUNTS, "mode": mode}
-
     def _look(self) -> None:
-        for name, found in self._newest.items():
-            if "stamp" not in found:
-                continue
-            mode = found.get("mode")
-            now = Motion(
-                round(found["stamp"]),
-                found["position"],
-                found.get("velocity"),
-                found.get("torque"),
-                found.get("error"),
-                None if mode is None else round(mode),
-                drive_state(round(found["word"])) is DriveState.OPERATION_ENABLED,
+        for name, drive in self.robot.drives.items():
+            self.checks[name].update(
+                self._motion(name, drive),
+                lambda name=name: self._position(_other(name)),  # type: ignore[misc]
             )
-            self.checks[name].update(now, lambda name=name: self._newest[_other(name)].get("position"))  # type: ignore[misc]
             for finding in self.checks[name].findings:
                 self.said.setdefault(name, finding.words)
+
+    def _motion(self, name: str, drive: JointDrive) -> Motion:
+        number = drive.dictionary.number
+        return Motion(
+            self.robot.clock.now_ns,
+            self._position(name),
+            self._sign(name) * number(od.VELOCITY_ACTUAL) / COUNTS,
+            self._sign(name) * number(od.TORQUE_ACTUAL) * RATED / 1000,
+            self._sign(name) * number(od.FOLLOWING_ERROR_ACTUAL) / COUNTS,
+            number(od.MODE_DISPLAY),
+            drive_state(number(od.STATUSWORD)) is DriveState.OPERATION_ENABLED,
+        )
+
+    def _position(self, name: str) -> float:
+        return self._sign(name) * self.robot.drives[name].dictionary.number(od.POSITION_ACTUAL) / COUNTS
+
+    def _sign(self, name: str) -> float:
+        return -1.0 if name == self._mirrored else 1.0
 
 
 def _nothing(*_felt: object) -> None:

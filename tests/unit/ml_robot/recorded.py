@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Sequence
+from itertools import compress
 from pathlib import Path
 from typing import Any, Final
 
@@ -28,16 +29,23 @@ ROUND: Final = (
 Array = npt.NDArray[np.float64]
 
 
-def written(path: Path, people: Sequence[int], rounds: int = 2) -> Path:
-    """A file of these people's sessions."""
-    with path.open("w", encoding="utf-8") as file:
+def written(path: Path, people: Sequence[int], rounds: int = 2, walks: str = "", lacks: str = "") -> Path:
+    """A file of these people's sessions, behind what is there; without joints of the side that it `lacks`."""
+    with path.open("a", encoding="utf-8") as file:
         for person in people:
-            for line in lines(person, rounds):
+            for line in _without(lacks, lines(person, rounds, walks)):
                 file.write(json.dumps(line) + "\n")
     return path
 
 
-def lines(person: int, rounds: int) -> list[Any]:
+def _without(side: str, lines: list[Any]) -> list[Any]:
+    head, *rows = lines
+    columns = head["columns"]
+    kept = [not (side and name.startswith(side) and name.endswith(".position")) for name in columns]
+    return [head | {"columns": list(compress(columns, kept))}, *(list(compress(row, kept)) for row in rows)]
+
+
+def lines(person: int, rounds: int, walks: str = "") -> list[Any]:
     """The head of a session, and its rows."""
     random = np.random.default_rng(person)
     labels = [label for label, seconds in ROUND * rounds for _ in range(round(seconds * HZ))]
@@ -54,7 +62,8 @@ def lines(person: int, rounds: int) -> list[Any]:
     ]
     columns = [*TRUTH, *CHANNELS]
     units = ["ns", "", "stride", "stride", *(unit(channel) for channel in CHANNELS)]
-    head = {"session": f"made-{person}", "subject": person, "columns": columns, "units": units}
+    head = {"session": f"made-{person}{walks}", "subject": person, "columns": columns, "units": units}
+    head |= {"walks": walks} if walks else {}
     return [head, *rows]
 
 

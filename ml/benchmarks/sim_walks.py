@@ -1,0 +1,170 @@
+"""`sim-walks`: the shipped models on people who walk otherwise than those they learned from, group by group.
+
+Nothing is learned from the recording, but for what a minute of each wearer adapts; what comes later judges
+the phase before and after. The worst group and the worst third of the wearers count, not the mean.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+from threadpoolctl import threadpool_limits
+
+from ml.benchmarks import metrics
+from ml.benchmarks.outcome import Outcome
+from ml.benchmarks.phase import percent
+from ml.benchmarks.search import Search
+from ml.benchmarks.sim import WHOLE, recipe_of
+from ml.errors import UnusableData
+from ml.registry.card import Card
+from ml.registry.registry import SHIPPED, Registry
+from ml.robot.learned import ABNORMAL_FROM, NONE, Learned
+from ml.robot.task import ACTIVITY, GAIT_PHASE, SIDES, Task
+from ml.training.adapting import taught
+from ml.training.simulated import Session, examples, read, stepping
+
+MINUTE_NS: Final = 60_000_000_000  # of a recording, whatever its wearer does in it
+LEAST_LATER: Final = 100  # decisions in steps, to judge an adapted model by
+STEPS: Final = {"activity": 10, "gait_phase": 3}  # grid samples between decisions: 200 and 60 ms
+WHY: Final = (
+    "synthetic: simulated people (gwrms sim-record --walks), judged by the shipped models, which have learned"
+    " from ordinary walks alone. adapted: the phase after the first minute of each recording has taught it."
+)
+
+Floats = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Found:
+    """One session: of its decisions whose activity is known, and of those in which both legs step."""
+
+    walks: str
+    truth: npt.NDArray[np.int_]  # index into the classes
+    likeliest: npt.NDArray[np.int_]
+    unknown: npt.NDArray[np.bool_]  # nothing, or "abnormal", is said
+    error: Floats  # (m, 2) of the phases, of the cycle
+    before: Floats  # (k, 2) the same after the first minute; none where too little comes then
+    after: Floats  # (k, 2) of the adapted model
+
+
+def evaluate(path: Path, search: Search) -> Outcome:  # noqa: ARG001 - there is nothing to choose
+    """Every session by itself, then by groups of walks."""
+    sessions = sorted(read(path), key=lambda session: session.walks)
+    registry = Registry(SHIPPED.as_uri())
+    activity, phase = (_shipped(registry, task, sessions) for task in (ACTIVITY, GAIT_PHASE))
+    with threadpool_limits(1):  # the same bits on every computer
+        found = [_found(session, activity, phase) for session in sessions]
+    classes = len(activity.classes)
+    groups = {
+        name: _figures(list(of_it), classes) for name, of_it in groupby(found, key=lambda one: one.walks)
+    }
+    macro_f1 = [one["macro_f1"] for one in groups.values()]
+    rmse = [one["rmse_percent"] for one in groups.values() if not math.isnan(one["rmse_percent"])]
+    figures = {
+        "worst_walks_macro_f1": min(macro_f1),
+        "worst_walks_rmse_percent": max(rmse, default=math.nan),
+        "macro_f1": float(np.mean(macro_f1)),
+        "rmse_percent": float(np.mean(rmse)) if rmse else math.nan,
+    }
+    people = len({session.subject for session in sessions})
+    settings = "none: the models are those that come with GWRMS"
+    return Outcome(figures | _adaptation(found), people, groups, "walks", settings=settings, notes=(WHY,))
+
+
+def _shipped(registry: Registry, task: Task, sessions: Sequence[Session]) -> Learned:
+    """The model of a robot with every sensor.
+
+    Raises:
+        UnusableData: a session lacks a sensor, or its wearer is one whom the model has learned from.
+
+    """
+    model = registry.serving(task.name, channels=set(recipe_of(task, WHOLE).channels))
+    if model is None:
+        raise UnusableData(f"no model of {task.name} is shipped: ./dev models makes it")
+    card, state = registry.load(model)
+    _check_people(card, sessions)
+    return Learned.restored(state)
+
+
+def _check_people(card: Card, sessions: Sequence[Session]) -> None:
+    known = {name.rpartition("-")[2] for name in (*card.learned, *card.held_out)}
+    both = sorted({session.subject for session in sessions} & known, key=int)
+    if both:
+        raise UnusableData(
+            f"{card.task} has learned from simulated people {', '.join(both)}: record others, as in"
+            " gwrms sim-record --subjects 101-104"
+        )
+
+
+def _found(session: Session, activity: Learned, phase: Learned) -> Found:
+    doing = examples(ACTIVITY, activity.recipe, [session], STEPS["activity"])
+    names = np.array([ACTIVITY.fold.get(label, "") for label in doing.label])
+    rows = np.isin(names, activity.classes)
+    said = activity.judge(doing.features[rows])
+    place = {name: number for number, name in enumerate(activity.classes)}
+
+    seen = examples(GAIT_PHASE, phase.recipe, [session], STEPS["gait_phase"])
+    truth, known = stepping(seen.label, seen.phase)
+    steps = known & ~np.isnan(truth).any(axis=1)
+    early = seen.time_ns - session.stamps_ns[0] < MINUTE_NS
+    later = steps & ~early
+    error = _errors(phase, seen.features[steps], truth[steps])
+    before = after = np.zeros((0, 2))
+    if later.sum() >= LEAST_LATER:
+        own = taught(phase, seen.features[known & early], truth[known & early])
+        before = error[later[steps]]
+        after = _errors(own, seen.features[later], truth[later])
+    return Found(
+        session.walks,
+        np.array([place[name] for name in names[rows]], dtype=np.int_),
+        said.probabilities.argmax(axis=1),
+        (said.label == NONE) | (said.novelty >= ABNORMAL_FROM),
+        error,
+        before,
+        after,
+    )
+
+
+def _errors(model: Learned, features: npt.NDArray[np.float32], truth: Floats) -> Floats:
+    verdicts = model.judge(features)
+    phases = np.stack([verdicts.values[side] for side in SIDES], axis=1)
+    return metrics.circular_error(phases, truth)
+
+
+def _figures(found: Sequence[Found], classes: int) -> dict[str, float]:
+    truth, likeliest, unknown = (
+        np.concatenate([getattr(one, name) for one in found]) for name in ("truth", "likeliest", "unknown")
+    )
+    right = truth == likeliest
+    return {
+        "macro_f1": metrics.macro_f1(truth, likeliest, classes),
+        "said_accuracy": float(right[~unknown].mean()) if not unknown.all() else float("nan"),
+        "unknown_fraction": float(unknown.mean()),
+        "rmse_percent": percent(np.concatenate([one.error for one in found]).ravel()),
+        "later_rmse_percent": percent(np.concatenate([one.before for one in found]).ravel()),
+        "adapted_rmse_percent": percent(np.concatenate([one.after for one in found]).ravel()),
+        "people": len(found),
+    }
+
+
+def _adaptation(found: Sequence[Found]) -> dict[str, float]:
+    """Errors before and after a minute of the wearer: of all, and of the third that was worst before."""
+    pairs = [(percent(one.before.ravel()), percent(one.after.ravel())) for one in found if len(one.before)]
+    if not pairs:
+        return {}
+    worst = sorted(pairs, reverse=True)[: math.ceil(len(pairs) / 3)]
+    return _cut("", pairs) | _cut("worst_third_", worst)
+
+
+def _cut(name: str, pairs: Sequence[tuple[float, float]]) -> dict[str, float]:
+    before, after = (float(np.mean(column)) for column in zip(*pairs, strict=True))
+    return {
+        f"{name}later_rmse_percent": before,
+        f"{name}adapted_rmse_percent": after,
+        f"{name}adaptation_cut": 1.0 - after / before,
+    }
