@@ -35,16 +35,16 @@ from server_gui.processes.file_gateway import FileGateway
 from server_gui.processes.own_robot import OwnRobot
 from server_gui.processes.sim_control import SimControl
 from server_gui.processes.talking import talk
-from server_gui.views.application import application, kept_settings, kept_theme
-from server_gui.views.closing import wait_closed
 from server_gui.views.first_run.demo_bar import DemoBar
 from server_gui.views.first_run.opening import Opening
-from server_gui.views.kept import kept_units
-from server_gui.views.main_window import MainWindow
+from server_gui.views.frame.application import application, kept_settings, kept_theme
+from server_gui.views.frame.closing import wait_closed
+from server_gui.views.frame.kept import kept_units
+from server_gui.views.frame.main_window import MainWindow
+from server_gui.views.frame.stop_keys import StopKeys
+from server_gui.views.frame.x11_keys import NoX, X11Keys
 from server_gui.views.pace import SLOW
-from server_gui.views.stop_keys import StopKeys
 from server_gui.views.theme import Look, Theme
-from server_gui.views.x11_keys import NoX, X11Keys
 
 FRAME_MS: Final = 33
 SWITCH_S: Final = 0.0005  # a thread that wakes up gets Python within this, however busy the window is

@@ -81,8 +81,8 @@ def run(options: Options) -> int:
 
 def _window(own: OwnRobot, options: Options, folder: Path, check: Callable[[], None]) -> int:
     """What it records stays in the demo's folder: nothing simulated comes among real recordings."""
-    from server_gui.views.application import application, kept_settings, kept_theme
     from server_gui.views.first_run.splash import Splash
+    from server_gui.views.frame.application import application, kept_settings, kept_theme
 
     steps = FirstSteps(_tell, [step for step in Step if step is not Step.WALK or options.scenario == WALKS])
     qt = application()

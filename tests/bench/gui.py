@@ -29,12 +29,12 @@ from server_gui.core.desk.soles import cells_of
 from server_gui.core.desk.station import Station
 from server_gui.core.workspace.layouts import Layouts
 from server_gui.core.workspace.workspace import PlotSpec
-from server_gui.views.main_window import MainWindow
-from server_gui.views.signals import Signals
+from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.figure import Pose, StickFigure
 from server_gui.views.widgets.plot import Curve, Plot
 from server_gui.views.widgets.pressure_map import PressureMap
+from server_gui.views.workspace.page import Signals
 from tests.gui.fakes import Bench
 from tests.support.desk import described, looked, resources, walking
 

@@ -15,7 +15,7 @@ from PySide6.QtWidgets import QApplication
 
 from server_gui.app import FOLLOWING, App, stop_keys
 from server_gui.core.settings.server_file import ServerSettings, add_robots
-from server_gui.views.main_window import MainWindow
+from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.parameters.tree import NEW
 
 LOOK_S = 0.005

@@ -13,7 +13,7 @@ from PySide6.QtCore import QEventLoop, QSettings, QtMsgType, qInstallMessageHand
 from PySide6.QtWidgets import QApplication
 
 from server_gui.core.desk.desk import Desk
-from server_gui.views.main_window import USUAL, MainWindow
+from server_gui.views.frame.main_window import USUAL, MainWindow
 from server_gui.views.parameters.panel import ParametersPanel
 from server_gui.views.theme import Look, Theme
 from tests.gui.archives import (  # noqa: F401  # fixtures, for every test here

@@ -3,15 +3,15 @@
 from PySide6.QtCore import QEvent
 from PySide6.QtWidgets import QApplication, QPushButton, QVBoxLayout, QWidget
 
-from server_gui.views.alarms import AlarmStrip
-from server_gui.views.edits import Edits
-from server_gui.views.events_panel import EventsPanel
+from server_gui.views.alarms.events_panel import EventsPanel
+from server_gui.views.alarms.strip import AlarmStrip
+from server_gui.views.edits.page import Edits
 from server_gui.views.experiments.bar import ExperimentBar
-from server_gui.views.header import Header
-from server_gui.views.main_window import MainWindow
+from server_gui.views.frame.header import Header
+from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.pace import SLOW, Pace
 from server_gui.views.parameters.trial_bar import TrialBar
-from server_gui.views.robots_panel import RobotsPanel
+from server_gui.views.robots.panel import RobotsPanel
 from server_gui.views.theme import Theme
 from tests.support import desk
 

@@ -18,7 +18,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from server_gui.views.robots_panel import RobotCard
+from server_gui.views.robots.panel import RobotCard
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.elided import ElidedLabel, PathLabel
 from server_gui.views.widgets.fitted import FittedLabel

@@ -22,10 +22,10 @@ from server_gui.core.alarms.texts import Kind
 from server_gui.core.follow.events import LinkChanged, Looked
 from server_gui.core.follow.news import NewsKind
 from server_gui.core.tuning.stop import StopProgress
-from server_gui.views.alarm_list import AlarmRow
+from server_gui.views.alarms.full_list import AlarmRow
 from server_gui.views.ask import Question
-from server_gui.views.joint_table import JointTable
-from server_gui.views.main_window import MainWindow
+from server_gui.views.frame.main_window import MainWindow
+from server_gui.views.overview.joint_table import JointTable
 from server_gui.views.theme import Theme
 from tests.gui import rules
 from tests.gui.fakes import Around, Bench, stop_is_whole
@@ -219,10 +219,10 @@ def test_a_click_that_was_meant_for_another_alarm_acknowledges_none(
 ) -> None:
     fault(bench)
     bench.draw(around)
-    monkeypatch.setattr("server_gui.views.alarms.HOLD_S", 0.0)
+    monkeypatch.setattr("server_gui.views.alarms.strip.HOLD_S", 0.0)
     bench.draw(around)
     assert around.alarms.buttons.acknowledge.isEnabled()
-    monkeypatch.setattr("server_gui.views.alarms.HOLD_S", 1e9)
+    monkeypatch.setattr("server_gui.views.alarms.strip.HOLD_S", 1e9)
     bench.desk.recording.alarms.acknowledge((Kind.FAULT, ""))
     bench.station.alarms.acknowledge((Kind.FAULT, "left_knee"))
     bench.station.stop("test")

@@ -20,7 +20,7 @@ from server_gui.core.recording.recorder import Recorder
 from server_gui.core.recording.spool import Spool
 from server_gui.core.settings.server_file import ServerSettings
 from server_gui.core.tuning.stop import StopState
-from server_gui.views.main_window import MainWindow
+from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.recordings.timeline import clock_text
 from server_gui.views.theme import Look, Theme
 from tests.gui.archives import RATE_HZ, SECONDS, Shown, cell, play, record

@@ -11,7 +11,7 @@ from gateway.units import Units
 from server_gui.core.archive.collected_journals import Found, Kept, KeptJournals
 from server_gui.core.audit.chains import chained, problem
 from server_gui.core.follow.events import Journalled
-from server_gui.views.acts_model import (
+from server_gui.views.audit.acts_model import (
     NEW,
     OLD,
     OUTCOME,
@@ -24,7 +24,7 @@ from server_gui.views.acts_model import (
     WHAT,
     WHO,
 )
-from server_gui.views.audit import Audit
+from server_gui.views.audit.page import Audit
 from server_gui.views.theme import Theme
 from tests.gui.fakes import Bench, destroy
 from tests.support.desk import described

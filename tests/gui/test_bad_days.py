@@ -16,7 +16,7 @@ from server_gui.app import App
 from server_gui.core.follow.events import LinkChanged
 from server_gui.core.follow.news import NewsKind
 from server_gui.core.settings.server_file import ServerSettings, add_robots
-from server_gui.views.main_window import MainWindow
+from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.widgets.files import ask_open, ask_save
 from tests.fake_robot import FakeRobot
 from tests.gui.fakes import Bench

@@ -9,9 +9,9 @@ from msgspec.structs import replace
 from gateway.wire.bus import BusInfo, NodeInfo, TalkInfo
 from server_gui.core.follow.events import BusesSeen
 from server_gui.core.processing.bus_health import TAKEN
-from server_gui.views.bus_health import NOT_NOW, TOO_OLD, BusHealthView
-from server_gui.views.main_window import MainWindow
+from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.pace import SLOW
+from server_gui.views.resources.bus_health import NOT_NOW, TOO_OLD, BusHealthView
 from server_gui.views.theme import Theme
 from tests.gui.fakes import Bench, destroy
 

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QApplication
 
 from server_gui.core.desk.ending import Ending
 from server_gui.core.desk.feeds import Feeds
-from server_gui.views.closing import Closing, wait_closed
+from server_gui.views.frame.closing import Closing, wait_closed
 from server_gui.views.theme import Theme
 
 LONG_S = 60.0
@@ -81,7 +81,7 @@ def test_what_ends_at_once_is_not_worth_a_word(theme: Theme, feeds: SlowFeeds) -
 def test_what_hangs_although_it_was_hurried_is_left_to_the_end_of_the_process(
     theme: Theme, feeds: SlowFeeds, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("server_gui.views.closing.HURRIED_S", 0.05)
+    monkeypatch.setattr("server_gui.views.frame.closing.HURRIED_S", 0.05)
     stuck = threading.Event()
 
     def hang() -> None:

@@ -12,7 +12,7 @@ from server_gui.core.commissioning.stages import Stage
 from server_gui.core.commissioning.wish import SUFFIX
 from server_gui.views.ask import Question
 from server_gui.views.commissioning.page import CommissionPage
-from server_gui.views.main_window import MainWindow
+from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.theme import Look, Theme
 from tests.gui import rules
 from tests.gui.fakes import destroy

@@ -13,7 +13,7 @@ from server_gui.core.evidence.curves import Curves, Side
 from server_gui.core.evidence.edits import Change
 from server_gui.core.evidence.file import Told
 from server_gui.core.tuning.writing import Trial
-from server_gui.views.main_window import MainWindow
+from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.framed import draw_frame
 from server_gui.views.widgets.stride_curves import CYCLE

@@ -11,7 +11,7 @@ from server_gui.core.evidence.experiment import Experiment, Period, Point, Respo
 from server_gui.core.evidence.file import Told
 from server_gui.core.experiments.machine import Event, State
 from server_gui.core.tuning.commands import ReadBack
-from server_gui.views.main_window import MainWindow
+from server_gui.views.frame.main_window import MainWindow
 from tests.gui.fakes import Bench, Parts
 from tests.gui.rules import settle
 from tests.gui.running import wait

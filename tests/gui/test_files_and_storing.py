@@ -9,8 +9,8 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QDialog
 
 from gateway.wire.parameter import Stored, Written
-from server_gui.views.docks import STACK
-from server_gui.views.main_window import MainWindow
+from server_gui.views.frame.docks import STACK
+from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.parameters.panel import ParametersPanel
 from server_gui.views.parameters.store_page import SETTLE_MS
 from server_gui.views.parameters.tree import DEFAULT, FILE, NAME, NEW, TITLES

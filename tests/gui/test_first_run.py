@@ -18,8 +18,8 @@ from server_gui.views.first_run.fault_menu import fill, grouped
 from server_gui.views.first_run.opening import Opening
 from server_gui.views.first_run.splash import Splash
 from server_gui.views.first_run.tour import STOPS
-from server_gui.views.main_window import MainWindow
-from server_gui.views.pairing import PairingDialog
+from server_gui.views.frame.main_window import MainWindow
+from server_gui.views.robots.pairing import PairingDialog
 from server_gui.views.theme import Theme
 from tests.gui.fakes import Bench, destroy, stop_is_whole
 from tests.gui.running import wait

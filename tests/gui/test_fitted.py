@@ -4,7 +4,7 @@ import pytest
 from PySide6.QtGui import QFontMetrics
 from PySide6.QtWidgets import QApplication
 
-from server_gui.views.joint_table import ERROR, TORQUE, JointModel, JointTable
+from server_gui.views.overview.joint_table import ERROR, TORQUE, JointModel, JointTable
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card
 from server_gui.views.widgets.fitted import FittedLabel

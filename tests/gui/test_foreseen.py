@@ -19,8 +19,8 @@ from server_gui.core.prediction.news import Ruled, Serves
 from server_gui.core.prediction.state import Quality
 from server_gui.core.processing.gait_events import Leg
 from server_gui.core.settings.prediction import Action, RuleSettings
-from server_gui.views.header import Header
-from server_gui.views.overview import Overview
+from server_gui.views.frame.header import Header
+from server_gui.views.overview.page import Overview
 from server_gui.views.predictions import activity, lines, model_phases, status
 from server_gui.views.theme import Theme
 from tests.gui.fakes import Bench, destroy

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 import pytest
 from PySide6.QtWidgets import QApplication, QPushButton, QWidget
 
-from server_gui.views.header import Header
+from server_gui.views.frame.header import Header
 from server_gui.views.theme import Theme
 from tests.gui import rules
 from tests.gui.fakes import Bench, destroy

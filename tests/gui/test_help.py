@@ -7,7 +7,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QDockWidget
 
 from server_gui.core.desk import manual
-from server_gui.views.main_window import MainWindow
+from server_gui.views.frame.main_window import MainWindow
 
 DOCS = Path(__file__).parents[2] / "docs" / "reference" / "window.md"
 

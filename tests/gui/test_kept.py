@@ -9,9 +9,9 @@ from PySide6.QtWidgets import QApplication
 
 from gateway.units import Units
 from server_gui.core.settings.server_file import ServerSettings
-from server_gui.views.docks import Area
-from server_gui.views.kept import keep_bytes, kept_bytes, kept_look, kept_scale, kept_units, sha256
-from server_gui.views.main_window import MainWindow
+from server_gui.views.frame.docks import Area
+from server_gui.views.frame.kept import keep_bytes, kept_bytes, kept_look, kept_scale, kept_units, sha256
+from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.theme import Look, Theme
 from tests.gui.fakes import Bench, destroy, stop_is_whole
 from tests.gui.running import running

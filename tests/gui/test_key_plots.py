@@ -14,9 +14,9 @@ from PySide6.QtWidgets import QApplication
 from gateway.wire.robot import GuardInfo, GuardRuleInfo
 from server_gui.core.desk.flags import Flag, FlagKind
 from server_gui.core.follow.events import Described
-from server_gui.views.key_plot import SECONDS, KeyPlot
-from server_gui.views.main_window import MainWindow
-from server_gui.views.overview import Overview
+from server_gui.views.frame.main_window import MainWindow
+from server_gui.views.overview.key_plot import SECONDS, KeyPlot
+from server_gui.views.overview.page import Overview
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.cursors import told
 from server_gui.views.widgets.time_axis import PAUSED

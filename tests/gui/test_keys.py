@@ -11,10 +11,10 @@ from PySide6.QtWidgets import QAbstractButton, QApplication
 from gateway.wire.resource import ProcessUse
 from server_gui.core.processing.process_names import arguments_of
 from server_gui.core.tuning.writing import Trial
-from server_gui.views.keys_sheet import KEYS
-from server_gui.views.main_window import MainWindow
+from server_gui.views.frame.keys_sheet import KEYS
+from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.parameters.tree import NEW, SAID
-from server_gui.views.processes import COMMAND, CPU, NAME, ProcessTable
+from server_gui.views.resources.processes import COMMAND, CPU, NAME, ProcessTable
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.sort_header import SortHeader
 from server_gui.views.widgets.stop_button import StopButton

@@ -10,9 +10,9 @@ from PySide6.QtWidgets import QLineEdit
 from server_gui.core.desk.station import Station
 from server_gui.core.prediction.adaptation import NEXT, Adapting, Happening, State, Tried
 from server_gui.views.ask import Question
-from server_gui.views.main_window import MainWindow
+from server_gui.views.frame.main_window import MainWindow
+from server_gui.views.frame.recording_chip import ask_name
 from server_gui.views.predictions import LEARNED, lines
-from server_gui.views.recording_chip import ask_name
 from tests.gui.fakes import Bench
 from tests.gui.foreseen import predicted
 from tests.support.desk import looked, walking

@@ -13,10 +13,10 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
 from server_gui.core.desk.measuring import Measured, measure, nearest, row_at
-from server_gui.views.measuring import TITLES, Measuring
-from server_gui.views.signals import Signals
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.plot import Plot
+from server_gui.views.workspace.measuring import TITLES, Measuring
+from server_gui.views.workspace.page import Signals
 from tests.gui.fakes import Bench, destroy
 from tests.support.desk import telemetry
 

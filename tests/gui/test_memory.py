@@ -17,7 +17,7 @@ from gateway.wire.parameter import Written
 from gateway.wire.resource import ProcessUse
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.events import LinkChanged, Telemetry
-from server_gui.views.main_window import MainWindow
+from server_gui.views.frame.main_window import MainWindow
 from tests.gui.fakes import Bench
 from tests.support.desk import described, looked, resources, walking
 

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import pytest
 
 from server_gui.core.follow import moment, robot
-from server_gui.views.main_window import MainWindow
+from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.widgets.mark import MarkIcon
 from tests.gui.fakes import Bench
 from tests.support.desk import described, looked, walking

@@ -23,7 +23,7 @@ from gateway.wire.parameter import Confirmed, Reverted, Stored, Written
 from gateway.wire.resource import ProcessUse
 from gateway.wire.stop import Reset, Stopped
 from server_gui.core.follow.events import LinkChanged
-from server_gui.views.main_window import MainWindow
+from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.theme import Theme
 from tests.gui.fakes import Bench
 from tests.gui.monkey import Monkey

@@ -7,8 +7,8 @@ from PySide6.QtWidgets import QApplication
 
 from gateway.client import NotConnected
 from server_gui.core.tuning.stop import Proof
-from server_gui.views.joint_table import STOP, JointModel
-from server_gui.views.main_window import MainWindow
+from server_gui.views.frame.main_window import MainWindow
+from server_gui.views.overview.joint_table import STOP, JointModel
 from server_gui.views.parameters.panel import ParametersPanel
 from server_gui.views.parameters.tree import NAME, NEW
 from server_gui.views.predictions import lines

@@ -16,7 +16,7 @@ from gateway.wire.parameter import PARAMETER_WRITE
 from gateway.wire.robot import Hello
 from server_gui.core.follow.events import Described, LinkChanged
 from server_gui.core.objects.rows import Kind
-from server_gui.views.main_window import MainWindow
+from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.objects.choice_bar import READ_NO_MORE
 from server_gui.views.objects.objects_model import AGE, HOLDS, NAME, OTHER, PARAMETER
 from server_gui.views.objects.panel import ObjectsPage

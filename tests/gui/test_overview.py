@@ -24,9 +24,9 @@ from server_gui.core.follow.robot import STALE_NS
 from server_gui.core.processing.gait_events import EventKind, Leg
 from server_gui.core.tuning.stop import Proof
 from server_gui.core.tuning.writing import Trial
-from server_gui.views.joint_table import ERROR, STATE, STOP, TORQUE, JointModel
-from server_gui.views.now_line import NowLine
-from server_gui.views.overview import Overview
+from server_gui.views.overview.joint_table import ERROR, STATE, STOP, TORQUE, JointModel
+from server_gui.views.overview.now_line import NowLine
+from server_gui.views.overview.page import Overview
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.figure import ANKLE, SHANK, THIGH, Pose, chain
 from server_gui.views.widgets.gait_ring import GaitRing, Phases

@@ -25,9 +25,9 @@ from gateway.wire.robot import Hello
 from gateway.wire.role import Role
 from server_gui.core.alarms.texts import Kind
 from server_gui.core.follow.events import LinkChanged
-from server_gui.views.main_window import MainWindow
-from server_gui.views.pairing import PairingDialog
-from server_gui.views.reset import ask_reset
+from server_gui.views.frame.main_window import MainWindow
+from server_gui.views.robots.pairing import PairingDialog
+from server_gui.views.robots.reset import ask_reset
 from server_gui.views.theme import Theme
 from tests.gui.fakes import Around, Bench, destroy
 from tests.support.desk import described

@@ -11,12 +11,12 @@ from PySide6.QtWidgets import QApplication, QMessageBox, QWidget
 import server_gui.views
 from gateway.units import Units
 from gateway.wire.resource import ProcessUse
-from server_gui.views.processes import ProcessModel
+from server_gui.views.resources.processes import ProcessModel
 from server_gui.views.theme import Theme
-from server_gui.views.unit_plot import Drawn, UnitPlot
 from server_gui.views.widgets.elided import ElidedLabel
 from server_gui.views.widgets.files import _unless_there
 from server_gui.views.widgets.plain import PlainLabel, rich, set_tip, tip
+from server_gui.views.workspace.unit_plot import Drawn, UnitPlot
 
 BAD = '<img src="x"><b>left</b> [/b] & \x1b\u202e'
 SHOWN = '<img src="x"><b>left</b> [/b] & \\x1b\\u202e'

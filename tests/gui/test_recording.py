@@ -37,7 +37,7 @@ from server_gui.core.settings.server_file import (
     add_robots,
 )
 from server_gui.views.ask import Question
-from server_gui.views.main_window import MainWindow
+from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.widgets.fitted import FittedLabel
 from tests.fake_robot import FakeRobot
 from tests.gui.fakes import Bench

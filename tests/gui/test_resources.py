@@ -16,11 +16,11 @@ from gateway.wire.cost import BudgetInfo, ClientCost, GatewayCost
 from gateway.wire.resource import ProcessUse, Throttling
 from server_gui.core.desk.busiest import Busiest, busiest
 from server_gui.core.follow.events import Costs, LinkChanged, without_processes
-from server_gui.views.computer import held_back
-from server_gui.views.processes import CPU, MEMORY, NAME, PID
-from server_gui.views.resources import Resources
+from server_gui.views.resources.computer import held_back
+from server_gui.views.resources.page import Resources
+from server_gui.views.resources.processes import CPU, MEMORY, NAME, PID
+from server_gui.views.resources.trend import Trend
 from server_gui.views.theme import Theme
-from server_gui.views.trend import Trend
 from server_gui.views.widgets.plot import Curve
 from server_gui.views.widgets.wrapped import Wrapped
 from tests.gui.fakes import Bench, destroy

@@ -14,7 +14,7 @@ import pytest
 from PySide6.QtGui import QImage
 
 from gateway.wire.resource import ProcessUse
-from server_gui.views.main_window import MainWindow
+from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.theme import Look, Theme
 from tests.gui.archives import Shown, play, record
 from tests.gui.fakes import Bench, stop_is_whole

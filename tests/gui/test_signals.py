@@ -9,9 +9,9 @@ import pytest
 from gateway.units import Units
 from server_gui.core.desk.flags import Flag, FlagKind
 from server_gui.core.workspace.workspace import MOST_CURVES
-from server_gui.views.signals import Signals
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.time_axis import NOW, PAUSED
+from server_gui.views.workspace.page import Signals
 from tests.gui.fakes import Bench, destroy
 from tests.support.desk import JOINTS, telemetry, walking
 

@@ -11,9 +11,9 @@ from PySide6.QtWidgets import QApplication, QPushButton
 from gateway.client import LinkLost, NotConnected
 from gateway.wire.stop import Reset, Stopped
 from server_gui.core.tuning.stop import StopProgress, StopState
-from server_gui.views.header import Header
-from server_gui.views.main_window import MainWindow
-from server_gui.views.stop_keys import StopKeys
+from server_gui.views.frame.header import Header
+from server_gui.views.frame.main_window import MainWindow
+from server_gui.views.frame.stop_keys import StopKeys
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.stop_button import StopButton
 from tests.gui.fakes import Bench, destroy, stop_is_whole

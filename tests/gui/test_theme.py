@@ -7,8 +7,8 @@ import pytest
 from PySide6.QtCore import QSettings
 from PySide6.QtWidgets import QApplication, QHBoxLayout, QLabel, QWidget
 
-from server_gui.views.application import kept_theme
-from server_gui.views.main_window import MainWindow
+from server_gui.views.frame.application import kept_theme
+from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.theme import PALETTES, Look, Theme
 from tests.gui.fakes import Bench, destroy
 

@@ -9,8 +9,8 @@ from PySide6.QtGui import QImage
 from gateway.client import ConnectionState
 from server_gui.core.desk.soles import cells_of
 from server_gui.core.follow.events import LinkChanged
-from server_gui.views.alarm_words import quiet
-from server_gui.views.header import _WORDS
+from server_gui.views.alarms.words import quiet
+from server_gui.views.frame.header import _WORDS
 from server_gui.views.predictions import lines
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.pressure_map import (

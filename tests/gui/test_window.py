@@ -12,9 +12,9 @@ from PySide6.QtWidgets import QAbstractButton, QLineEdit, QTabBar, QWidget
 from gateway.client import ConnectionState, NotConnected
 from server_gui.core.desk.desk import Desk
 from server_gui.core.follow.events import LinkChanged
-from server_gui.views.main_window import USUAL, MainWindow, opening_size
+from server_gui.views.frame.main_window import USUAL, MainWindow, opening_size
 from server_gui.views.parameters.tree import DEFAULT, RANGE
-from server_gui.views.robots_panel import RobotsPanel
+from server_gui.views.robots.panel import RobotsPanel
 from server_gui.views.theme import PALETTES, Look, Theme
 from tests.gui.fakes import Bench, destroy, stop_is_whole
 from tests.support.desk import described, looked, walking

@@ -15,11 +15,11 @@ from server_gui.core.desk.flags import FlagKind
 from server_gui.core.workspace.layouts import Layouts
 from server_gui.core.workspace.trigger import Condition, Mode, On, State
 from server_gui.views.ask import Question
-from server_gui.views.signals import Signals
 from server_gui.views.theme import Theme
-from server_gui.views.unit_plot import EmptyPlot, UnitPlot
 from server_gui.views.widgets.dragging import CURVES, dragged, dropped
 from server_gui.views.workspace.expression_bar import EXAMPLE
+from server_gui.views.workspace.page import Signals
+from server_gui.views.workspace.unit_plot import EmptyPlot, UnitPlot
 from server_gui.views.workspace.xy_plot import XYPlot
 from tests.gui.fakes import Bench, destroy
 from tests.gui.rules import nameless, out_of_reach

@@ -12,7 +12,7 @@ from server_gui.processes.own_robot import OwnRobot
 from server_gui.processes.sim_control import Listed, SimControl, SimulatorRefuses
 from server_gui.views.first_run.fault_menu import fill, words
 from server_gui.views.first_run.tour import Tour
-from server_gui.views.main_window import MainWindow
+from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.plain import PlainLabel, set_tip

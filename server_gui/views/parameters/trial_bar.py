@@ -5,7 +5,7 @@ from PySide6.QtWidgets import QFrame, QHBoxLayout, QProgressBar, QPushButton, QV
 
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
-from server_gui.views.trial_words import TO_AB, changes, ends, so_far
+from server_gui.views.edits.trial_words import TO_AB, changes, ends, so_far
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.plain import PlainLabel, set_tip
 

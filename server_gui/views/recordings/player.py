@@ -24,16 +24,16 @@ from server_gui.core.archive.recorded_notes import RecordedNotes
 from server_gui.core.cloud.actions import FORMATS, export
 from server_gui.core.cloud.selection import Choice
 from server_gui.core.cloud.tape import Tape, as_time
-from server_gui.views.overview import Overview
+from server_gui.views.overview.page import Overview
 from server_gui.views.predictions import status
 from server_gui.views.recordings.label_bar import LabelBar
 from server_gui.views.recordings.timeline import SECOND_NS, Timeline, clock_text, day_text
-from server_gui.views.signals import Signals
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.files import ask_save
 from server_gui.views.widgets.plain import PlainLabel, set_tip
 from server_gui.views.widgets.scrolled import Scrolled
+from server_gui.views.workspace.page import Signals
 
 ROOMY: Final = 440  # high, at text of 100 %: what is lower shows the robot rather than what labels it
 ALL: Final = 960  # high, likewise: from there on all of the robot is seen above the labels

@@ -10,9 +10,9 @@ from server_gui.core.workspace.meaning import BESIDE
 from server_gui.core.workspace.scene import Scene
 from server_gui.core.workspace.series import Floats
 from server_gui.core.workspace.trigger import WINDOWS, On, State
-from server_gui.views.unit_plot import EmptyPlot, UnitPlot
 from server_gui.views.widgets.plot import PlacedFlag
 from server_gui.views.widgets.time_axis import time_text
+from server_gui.views.workspace.unit_plot import EmptyPlot, UnitPlot
 from server_gui.views.workspace.xy_plot import XYPlot
 
 AnyPlot = UnitPlot | XYPlot | EmptyPlot

@@ -9,11 +9,11 @@ from PySide6.QtWidgets import QFrame, QMenu, QVBoxLayout
 from server_gui.core.workspace.scene import Scene
 from server_gui.core.workspace.workspace import Refused
 from server_gui.views.theme import Theme
-from server_gui.views.unit_plot import Drawn, EmptyPlot, UnitPlot
 from server_gui.views.widgets.dragging import dropped
 from server_gui.views.widgets.plain import PlainLabel
 from server_gui.views.workspace.curve_menus import channel_menu, plot_menu
 from server_gui.views.workspace.drawing import AnyPlot
+from server_gui.views.workspace.unit_plot import Drawn, EmptyPlot, UnitPlot
 from server_gui.views.workspace.xy_plot import XYPlot
 
 

@@ -11,11 +11,11 @@ from PySide6.QtWidgets import QMenu
 
 from gateway.units import Unit
 from server_gui.views.theme import Theme
-from server_gui.views.unit_plot import Drawn, colours_of, legend_row
 from server_gui.views.widgets.dragging import TakesCurves
 from server_gui.views.widgets.plot import css
 from server_gui.views.widgets.value_axis import ValueAxis
 from server_gui.views.widgets.wrapped import Wrapped
+from server_gui.views.workspace.unit_plot import Drawn, colours_of, legend_row
 
 Floats = npt.NDArray[np.float64]
 BANDS: Final = 5  # shades of age

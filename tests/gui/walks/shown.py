@@ -29,8 +29,8 @@ from PySide6.QtWidgets import (
 )
 
 from gateway.main import main
-from server_gui.views.application import application
-from server_gui.views.main_window import MainWindow
+from server_gui.views.frame.application import application
+from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.widgets.fitted import FittedLabel
 from tests.gui import rules
 

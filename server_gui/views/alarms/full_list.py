@@ -6,7 +6,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QBoxLayout, QFrame, QHBoxLayout, QPushButton, QSizePolicy, QVBoxLayout, QWidget
 
 from server_gui.core.alarms.texts import Kind
-from server_gui.views.alarm_words import Key, Told, details, headline, key_of, now_s
+from server_gui.views.alarms.words import Key, Told, details, headline, key_of, now_s
 from server_gui.views.marks import Mark
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text, set_tone

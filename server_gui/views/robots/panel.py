@@ -20,7 +20,7 @@ from server_gui.core.desk.station import Station
 from server_gui.core.settings.server_file import name_of
 from server_gui.views.ask import ask
 from server_gui.views.marks import age_text
-from server_gui.views.pairing import PairingDialog, show_pairing
+from server_gui.views.robots.pairing import PairingDialog, show_pairing
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.choosable import Choosable

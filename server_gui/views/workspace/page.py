@@ -21,24 +21,24 @@ from server_gui.core.workspace.notes import LiveNotes, Notes
 from server_gui.core.workspace.scene import Scene, layout_of
 from server_gui.core.workspace.trigger import Condition
 from server_gui.core.workspace.workspace import MOST_CURVES
-from server_gui.views.channel_tree import NAME_ROLE, ChannelTree
 from server_gui.views.marks import old_text
-from server_gui.views.measuring import Measuring
 from server_gui.views.theme import Theme
-from server_gui.views.unit_plot import UnitPlot
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.elided import ElidedLabel
 from server_gui.views.widgets.files import ask_save, save_whole
 from server_gui.views.widgets.plain import PlainLabel, set_tip
 from server_gui.views.widgets.scrolled import bring_into_sight
 from server_gui.views.workspace.beside_menu import BesideMenu, others_of
+from server_gui.views.workspace.channel_tree import NAME_ROLE, ChannelTree
 from server_gui.views.workspace.drawing import AnyPlot, draw, flag, read
 from server_gui.views.workspace.expression_bar import ExpressionBar
 from server_gui.views.workspace.layout_menu import LayoutMenu
+from server_gui.views.workspace.measuring import Measuring
 from server_gui.views.workspace.note import ask_note
 from server_gui.views.workspace.plot_area import PlotArea
 from server_gui.views.workspace.tools import SPANS_S, Tools
 from server_gui.views.workspace.trigger_bar import TriggerBar
+from server_gui.views.workspace.unit_plot import UnitPlot
 
 Floats = npt.NDArray[np.float64]
 LIST, MARGIN = 150, 8  # wide: the channels at least, at text of 100 %; beside everything

@@ -15,11 +15,11 @@ from server_gui.core.desk.soles import Load, Sole, loads, sole
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.moment import now_ns
 from server_gui.core.processing.gait_events import Leg
-from server_gui.views.joint_table import JointModel, JointTable
-from server_gui.views.key_plot import SECONDS, KeyPlot, Kind
-from server_gui.views.learned_offer import LearnedOffer
 from server_gui.views.marks import age_text, old_text
-from server_gui.views.now_line import NowLine
+from server_gui.views.overview.joint_table import JointModel, JointTable
+from server_gui.views.overview.key_plot import SECONDS, KeyPlot, Kind
+from server_gui.views.overview.learned_offer import LearnedOffer
+from server_gui.views.overview.now_line import NowLine
 from server_gui.views.pace import READ_NS
 from server_gui.views.predictions import STOPPED, activity, lines, model_phases
 from server_gui.views.theme import Theme

@@ -9,10 +9,10 @@ from PySide6.QtWidgets import QFrame, QGridLayout, QHBoxLayout, QPushButton, QSi
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.tuning.writing import Trial
+from server_gui.views.edits.trial_words import TO_AB, changes, ends, so_far, wordings
 from server_gui.views.marks import Mark, drives_mark, enabled_text
 from server_gui.views.predictions import STOPPED, activity
 from server_gui.views.theme import Theme
-from server_gui.views.trial_words import TO_AB, changes, ends, so_far, wordings
 from server_gui.views.widgets.fitted import FittedLabel
 from server_gui.views.widgets.mark import MarkIcon
 from server_gui.views.widgets.plain import set_tip

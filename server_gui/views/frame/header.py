@@ -12,10 +12,10 @@ from server_gui.core.alarms.found import remedy
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.tuning.stop import StopState
-from server_gui.views.chip import Chip, Words
+from server_gui.views.frame.chip import Chip, Words
+from server_gui.views.frame.recording_chip import NAME, RecordingChip
 from server_gui.views.marks import Mark, age_text, drives_mark, enabled_text
 from server_gui.views.predictions import status
-from server_gui.views.recording_chip import NAME, RecordingChip
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.plain import PlainLabel, set_tip
 from server_gui.views.widgets.stop_button import StopButton

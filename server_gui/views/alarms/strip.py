@@ -9,8 +9,8 @@ from PySide6.QtWidgets import QHBoxLayout, QPushButton, QScrollArea, QVBoxLayout
 
 from server_gui.core.alarms.texts import Kind
 from server_gui.core.desk.desk import Desk
-from server_gui.views.alarm_list import AlarmButtons, AlarmList, style
-from server_gui.views.alarm_words import Told, details, headline, key_of, now_s, quiet
+from server_gui.views.alarms.full_list import AlarmButtons, AlarmList, style
+from server_gui.views.alarms.words import Told, details, headline, key_of, now_s, quiet
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text, set_tone
 from server_gui.views.widgets.choosable import Choosable

@@ -12,15 +12,15 @@ from server_gui.core.desk.station import Station
 from server_gui.core.follow.moment import now_ns
 from server_gui.core.processing.process_names import told_apart
 from server_gui.core.processing.resource import DEVICES, SERIES
-from server_gui.views.computer import facts, held_back
 from server_gui.views.marks import age_text
-from server_gui.views.processes import ProcessTable
+from server_gui.views.resources.computer import facts, held_back
+from server_gui.views.resources.processes import ProcessTable
+from server_gui.views.resources.trend import Trend, since_restart
 from server_gui.views.theme import Theme
-from server_gui.views.trend import Trend, since_restart
-from server_gui.views.unit_plot import OTHERS
 from server_gui.views.widgets.card import Card, set_text
 from server_gui.views.widgets.plain import PlainLabel
 from server_gui.views.widgets.plot import Curve
+from server_gui.views.workspace.unit_plot import OTHERS
 
 GIB: Final = 1 << 30
 KIB: Final = 1 << 10

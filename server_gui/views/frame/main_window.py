@@ -33,40 +33,40 @@ from server_gui.core.commissioning.stages import Stage
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.moment import one_moment
-from server_gui.views.alarms import AlarmStrip
+from server_gui.views.alarms.events_panel import EventsPanel
+from server_gui.views.alarms.strip import AlarmStrip
 from server_gui.views.ask import ask
-from server_gui.views.audit import Audit
-from server_gui.views.bus_health import BusHealthView
-from server_gui.views.closing import COMMISSIONING
+from server_gui.views.audit.page import Audit
 from server_gui.views.cloud.panel import Cloud
 from server_gui.views.commissioning.page import CommissionPage
-from server_gui.views.docks import Area, Docks
-from server_gui.views.edits import Edits
-from server_gui.views.empty import EmptyView
-from server_gui.views.events_panel import EventsPanel
+from server_gui.views.edits.page import Edits
 from server_gui.views.experiments.bar import ExperimentBar
-from server_gui.views.header import Header
-from server_gui.views.help import Help
-from server_gui.views.kept import keep_bytes, kept_bytes
-from server_gui.views.keys_sheet import KeysSheet
+from server_gui.views.frame.closing import COMMISSIONING
+from server_gui.views.frame.docks import Area, Docks
+from server_gui.views.frame.empty import EmptyView
+from server_gui.views.frame.header import Header
+from server_gui.views.frame.help import Help
+from server_gui.views.frame.kept import keep_bytes, kept_bytes
+from server_gui.views.frame.keys_sheet import KeysSheet
+from server_gui.views.frame.page_bar import PageBar
+from server_gui.views.frame.recording_chip import ask_recording
+from server_gui.views.frame.status_bar import StatusBar
 from server_gui.views.models.panel import ModelsPage
 from server_gui.views.objects.panel import ObjectsPage
-from server_gui.views.overview import Overview
+from server_gui.views.overview.page import Overview
 from server_gui.views.pace import Pace
-from server_gui.views.page_bar import PageBar
 from server_gui.views.parameters.panel import ParametersPanel
 from server_gui.views.parameters.trial_bar import TrialBar
-from server_gui.views.recording_chip import ask_recording
 from server_gui.views.recordings.panel import Recordings
-from server_gui.views.reset import ask_clear, ask_reset
-from server_gui.views.resources import Resources
-from server_gui.views.robots_panel import RobotsPanel
-from server_gui.views.signals import Signals
-from server_gui.views.status_bar import StatusBar
+from server_gui.views.resources.bus_health import BusHealthView
+from server_gui.views.resources.page import Resources
+from server_gui.views.robots.panel import RobotsPanel
+from server_gui.views.robots.reset import ask_clear, ask_reset
 from server_gui.views.theme import Look, Theme
 from server_gui.views.widgets.scrolled import Scrolled
 from server_gui.views.widgets.seen import has_focus_in, is_seen
 from server_gui.views.workspace.beside_menu import others_of
+from server_gui.views.workspace.page import Signals
 
 OF_A_ROBOT: Final = ("&Overview", "&Signals", "&Resources", "&Bus", "Ob&jects", "&Audit", "&Edits")
 SCALES: Final = (80, 90, 100, 125, 150, 175, 200)

@@ -12,8 +12,8 @@ from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.recording import Tone
 from server_gui.core.desk.station import Station
 from server_gui.core.processing.bus_health import Level, worst
-from server_gui.views.bus_health import LEVELS
-from server_gui.views.recording_chip import TONES
+from server_gui.views.frame.recording_chip import TONES
+from server_gui.views.resources.bus_health import LEVELS
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.fitted import FittedLabel

@@ -22,7 +22,7 @@ from server_gui.core.archive.histories import History, histories
 from server_gui.core.desk.desk import Desk
 from server_gui.core.follow.news import NewsKind
 from server_gui.core.tuning.edits import unit_of
-from server_gui.views.acts_model import ROBOT, TIME, ActsModel, Line
+from server_gui.views.audit.acts_model import ROBOT, TIME, ActsModel, Line
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.files import ask_save, save_whole

@@ -1,0 +1,1 @@
+"""The page Overview: what is so now, in one glance."""

@@ -1,0 +1,1 @@
+"""The list of robots: add, pair, remove, stop and reset one."""
