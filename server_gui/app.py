@@ -3,6 +3,7 @@
 import collections
 import concurrent.futures
 import contextlib
+import gc
 import os
 import signal
 import sys
@@ -39,6 +40,7 @@ from server_gui.views.first_run.demo_bar import DemoBar
 from server_gui.views.first_run.opening import Opening
 from server_gui.views.frame.application import application, kept_settings, kept_theme
 from server_gui.views.frame.closing import wait_closed
+from server_gui.views.frame.garbage import Garbage
 from server_gui.views.frame.kept import kept_units
 from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.frame.stop_keys import StopKeys
@@ -111,6 +113,7 @@ class App:
         opening: Opening | None = None,
         theme: Theme | None = None,
     ) -> None:
+        self._garbage = Garbage()
         self.desk = Desk()
         self._qt = qt
         self._followed: list[Followed] = []
@@ -264,6 +267,7 @@ class App:
         self.commissioning.look()
         self._look_at_gateway()
         self.window.refresh()
+        self._garbage.look()
 
     def first_look(self) -> None:
         """Fill in everything, so that nothing is empty that is shown for the first time."""
@@ -345,6 +349,7 @@ def run(
         if signals:
             app.window.show_signals(signals)
         app.first_look()
+        gc.freeze()  # what was made so far lives as long as the window, and there is much of it
         app.window.show()
         if seconds is not None:
             QTimer.singleShot(round(seconds * 1000), app.window.end)

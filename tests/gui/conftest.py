@@ -1,5 +1,6 @@
 """Qt without a screen for every test here; a mistake in a slot fails the test that made it."""
 
+import gc
 import os
 import sys
 from collections.abc import Iterator
@@ -13,6 +14,7 @@ from PySide6.QtCore import QEventLoop, QSettings, QtMsgType, qInstallMessageHand
 from PySide6.QtWidgets import QApplication
 
 from server_gui.core.desk.desk import Desk
+from server_gui.views.frame.garbage import Garbage
 from server_gui.views.frame.main_window import USUAL, MainWindow
 from server_gui.views.parameters.panel import ParametersPanel
 from server_gui.views.theme import Look, Theme
@@ -45,8 +47,18 @@ def qt() -> QApplication:
     return application
 
 
+@pytest.fixture(scope="package", autouse=True)
+def garbage() -> Iterator[Garbage]:
+    """As in a process with a window: widgets that another thread's collection destroys end in a deadlock."""
+    yield Garbage()
+    gc.collect()
+    gc.enable()
+
+
 @pytest.fixture(autouse=True)
-def slots_raise_nothing(qt: QApplication, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def slots_raise_nothing(
+    qt: QApplication, garbage: Garbage, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[None]:
     """What a slot raises reaches nobody: here it fails the test."""
     raised: list[str] = []
     monkeypatch.setattr(
@@ -54,6 +66,7 @@ def slots_raise_nothing(qt: QApplication, monkeypatch: pytest.MonkeyPatch) -> It
     )
     yield
     qt.processEvents(QEventLoop.ProcessEventsFlag.AllEvents)
+    garbage.look()
     assert raised == []
 
 
