@@ -85,7 +85,7 @@ def _shipped(registry: Registry, task: Task, sessions: Sequence[Session]) -> Lea
     """
     model = registry.serving(task.name, channels=set(recipe_of(task, WHOLE).channels))
     if model is None:
-        raise UnusableData(f"no model of {task.name} is shipped: ./dev models makes it")
+        raise UnusableData(f"no model of {task.name} comes with this installation")
     card, state = registry.load(model)
     _check_people(card, sessions)
     return Learned.restored(state)

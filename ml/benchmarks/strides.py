@@ -45,7 +45,8 @@ class Decisions:
 
 def lessons(trials: Sequence[ipol.Trial]) -> Decisions:
     """What is learned from: every trial as it was, and as slower and faster people would have walked it."""
-    other = [ipol.stretched(trial, factor) for factor in PACES for trial in trials]
+    stretched = (ipol.stretched(trial, factor) for factor in PACES for trial in trials)
+    other = [one for one in stretched if len(one.samples)]  # of a single sample, faster, none is left
     made = (decisions(trials), decisions(other, PACES_STEP))
     columns = {field.name: [getattr(one, field.name) for one in made] for field in fields(Decisions)}
     stride = _apart(columns.pop("stride"))

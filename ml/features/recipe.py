@@ -38,8 +38,8 @@ def features(recipe: Recipe, samples: Samples, ends: npt.NDArray[np.intp]) -> Fe
 
     Before a recording's first sample there is nothing to know: that sample is held.
     """
-    if not len(ends):  # as many columns as ever, also of a recording without a sample
-        return features(recipe, np.zeros((1, samples.shape[1])), np.zeros(1, dtype=np.intp))[:0]
+    if not len(ends):
+        return features(recipe, samples, np.zeros(1, dtype=np.intp))[:0]
     parts = [
         recipe.compute(windows(samples, ends[at : at + CHUNK], recipe.look_back))
         for at in range(0, len(ends), CHUNK)

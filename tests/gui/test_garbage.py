@@ -21,4 +21,3 @@ def test_a_widget_that_nobody_needs_ends_in_the_windows_thread(garbage: Garbage)
     assert ended == []
     garbage.look()
     assert ended == [threading.current_thread()]
-

@@ -83,6 +83,11 @@ def test_falls_at_any_moment_of_recordings_of_any_length(rows: int, impact: int)
     assert np.isfinite(data.features).all()
 
 
+def test_a_walk_of_one_sample_leaves_nothing_to_the_faster() -> None:
+    walks = [made(subject, rows, [60, 40] * 4, 0) for subject, rows in ((1, 420), (2, 420), (2, 1))]
+    assert judged_or_refused(lambda: strides.lessons(walks))
+
+
 @pytest.mark.parametrize("late", range(1, 6))
 def test_a_strike_just_before_the_end_is_none_beyond_it(late: int) -> None:
     """`ipol-phase` once ended with a shape error there."""
