@@ -1,9 +1,10 @@
 """A recipe's regular grid: rows as robots stamp them → samples at multiples of the recipe's period.
 
 A grid point is a multiple of the period on the robot's monotonic clock. Its sample holds each channel's
-newest value that is not after it and at most `OLDEST_NS` old; where a channel has none there is no sample: a
-gap. What a point holds depends on the rows' stamps alone, and not on how late one source's rows come behind
-another's (up to `OLDEST_NS`): a recording gives the samples that there were live.
+newest value that is not after it and at most `OLDEST_NS` old (of several at one instant the first); where a
+channel has none there is no sample: a gap. What a point holds depends on the rows' stamps alone, and not on
+how late one source's rows come behind another's (up to `OLDEST_NS`): a recording gives the samples that there
+were live.
 """
 
 import collections
@@ -47,7 +48,7 @@ class Grid:
         or when a row is `OLDEST_NS` newer. Points that are further apart than the period have a gap between.
         """
         for channel, value in enumerate(values):
-            if value is not None and math.isfinite(value) and stamp_ns >= self._newest_ns[channel]:
+            if value is not None and math.isfinite(value) and stamp_ns > self._newest_ns[channel]:
                 self._newest_ns[channel] = stamp_ns
                 self._held[channel].append((stamp_ns, value))
         self._row_ns = max(self._row_ns, stamp_ns)
@@ -93,10 +94,11 @@ def on_grid(recipe: Recipe, stamps_ns: Stamps, values: Samples) -> list[Piece]:
     settled_ns = max(min(int(stamps[-1]) for stamps in channels), int(stamps_ns[-1]) - OLDEST_NS - 1)
     grid_ns = _points(stamps_ns, period_ns(recipe), settled_ns)
     samples = np.full((len(grid_ns), len(channels)), np.nan)
-    for channel, stamps in enumerate(channels):
+    for channel, all_stamps in enumerate(channels):
+        stamps, first = np.unique(all_stamps, return_index=True)
         newest = np.searchsorted(stamps, grid_ns, side="right") - 1
         known = (newest >= 0) & (grid_ns - stamps[newest] <= OLDEST_NS)
-        samples[known, channel] = values[there[:, channel], channel][newest[known]]
+        samples[known, channel] = values[there[:, channel], channel][first[newest[known]]]
     whole = np.isfinite(samples).all(axis=1)
     grid_ns, samples = grid_ns[whole], samples[whole]
     breaks = np.flatnonzero(np.diff(grid_ns) != period_ns(recipe)) + 1

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from ml.features.recipe import Recipe
@@ -106,6 +106,7 @@ def test_live_and_replay_agree_sample_by_sample_however_late_a_source_is_behind_
 
 
 @given(start_ns=st.integers(0, 2**40), found=st.lists(st.tuples(step, value, value, value), max_size=80))
+@example(start_ns=0, found=[(0, 0.0, 0.0, 1.0), (0, None, None, 0.0)])  # two values of one instant
 def test_live_and_replay_agree_sample_by_sample_where_a_row_is_a_tick(
     start_ns: int, found: list[tuple[int, float | None, float | None, float | None]]
 ) -> None:
