@@ -274,7 +274,8 @@ def _said(told: Told) -> list[str]:
         lines.append(f"and {len(strong) - MOST} more: gwrms edits show {told.edit.id}")
     same = sum(one.word is Word.SAME for one in evidence.metrics)
     if same:
-        lines.append(f"No difference seen in {counted(same, 'metric')}.")
+        others = "the other " if differing else ""
+        lines.append(f"No difference seen in {others}{counted(same, 'metric')}.")
     few = sum(one.word is Word.FEW for one in evidence.metrics)
     if few:
         lines.append(f"Not enough cycles for {counted(few, 'metric')}.")

@@ -50,7 +50,8 @@ STOPS: Final = (
     ),
     Stop(
         "afterwards",
-        "everything is recorded: Recordings plays it, Audit says who changed what, F1 explains each tab.",
+        "everything is recorded: Recordings plays it, Edits tells what a change did to the walk, Audit who "
+        "changed what. F1 explains each tab.",
         lambda window: window.page_bar,
     ),
 )
