@@ -10,8 +10,10 @@ import threading
 import time
 import tty
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
+from types import FrameType
+from typing import Self
 
 import msgspec
 
@@ -78,19 +80,19 @@ def record(options: argparse.Namespace) -> int:
     if options.file.exists():
         raise FileExistsError(f"{options.file} is there already: give another name, or remove it")
     baudrate, format_name = (options.baud or DEFAULT_BAUDRATE, None) if options.raw else _recognised(options)
-    with options.file.open("xb", buffering=0) as file:  # what has come is there, whatever ends this
+    # What has come is in the file, whatever ends this.
+    with _Ended() as ended, options.file.open("xb", buffering=0) as file:
 
         def keep(data: bytes, _stamp_ns: int) -> None:
             file.write(data)
 
         port = SerialPort(options.port, baudrate, keep)
         began = time.monotonic()
-        with _terminated_as_by_ctrl_c():
-            port.start()
-            try:
-                problem = _watch(port, options.seconds)
-            finally:
-                port.stop()
+        port.start()
+        try:
+            problem = _watch(port, options.seconds, ended)
+        finally:
+            port.stop()
         size = file.tell()
     if not size:
         options.file.unlink()
@@ -102,27 +104,39 @@ def record(options: argparse.Namespace) -> int:
     return 0 if problem is None else 1
 
 
-@contextmanager
-def _terminated_as_by_ctrl_c() -> Iterator[None]:
-    """However it is ended, what describes the bytes is written beside them. For the main thread."""
-    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
+class _Ended:
+    """Inside, Ctrl-C and SIGTERM are only noted, so that what describes the bytes is written beside them.
+
+    For the main thread.
+    """
+
+    def __init__(self) -> None:
+        self._asked = False
+
+    def __enter__(self) -> Self:
+        self._before = {one: signal.signal(one, self._note) for one in (signal.SIGINT, signal.SIGTERM)}
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for one, before in self._before.items():
+            signal.signal(one, before)
+
+    def __bool__(self) -> bool:
+        return self._asked
+
+    def _note(self, _signal: int, _frame: FrameType | None) -> None:
+        self._asked = True  # and no Event: its lock may be held where the signal comes
 
 
-def _watch(port: SerialPort, seconds: float | None) -> str | None:
+def _watch(port: SerialPort, seconds: float | None, ended: _Ended) -> str | None:
     """Wait for the end; say what goes wrong before it at once, and return the last of that."""
     ends_s = time.monotonic() + (math.inf if seconds is None else seconds)
     told: str | None = None
-    never = threading.Event()
-    with suppress(KeyboardInterrupt):
-        while (left_s := ends_s - time.monotonic()) > 0:
-            never.wait(min(left_s, LOOK_S))
-            if port.problem not in (None, told):
-                told = port.problem
-                sys.stderr.write(f"gwrms sensor: {told}\n")
+    while not ended and (left_s := ends_s - time.monotonic()) > 0:
+        time.sleep(min(left_s, LOOK_S))
+        if port.problem not in (None, told):
+            told = port.problem
+            sys.stderr.write(f"gwrms sensor: {told}\n")
     return port.problem or told
 
 

@@ -3,7 +3,9 @@
 import io
 import json
 import math
+import os
 import random
+import signal
 import subprocess
 import sys
 import threading
@@ -17,6 +19,7 @@ import pytest
 from drivers.cli import listen, live, sensor
 from drivers.errors import SettingsError, Unavailable
 from drivers.identify import Match
+from drivers.port import SerialPort
 from tests.support.waiting import WAIT_S, until
 from tests.unit.port.terminals import Terminal, send_until
 from tests.unit.sensor_cli.streams import capture, streams
@@ -230,6 +233,24 @@ def test_a_recording_that_is_terminated_is_whole(terminal: Terminal, tmp_path: P
     assert recording.returncode == 0
     assert told.startswith(f"{file.stat().st_size} bytes in ".encode())
     assert json.loads((tmp_path / "walk.bin.json").read_text())["baudrate"] == 115200
+
+
+@pytest.mark.parametrize("signal_", [signal.SIGINT, signal.SIGTERM])
+def test_a_recording_that_is_ended_while_it_begins_is_whole(
+    terminal: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, signal_: signal.Signals
+) -> None:
+    file = tmp_path / "walk.bin"
+    start = SerialPort.start
+
+    def ended_while_starting(port: SerialPort) -> None:
+        start(port)
+        until(lambda: file.stat().st_size > 0)
+        os.kill(os.getpid(), signal_)
+
+    monkeypatch.setattr(SerialPort, "start", ended_while_starting)
+    with Talking(terminal, streams()["witmotion"]):
+        assert sensor.main(["record", str(terminal.path), str(file), "--raw"]) == 0
+    assert (tmp_path / "walk.bin.json").exists()
 
 
 def test_recording_never_overwrites(terminal: Terminal, tmp_path: Path) -> None:
