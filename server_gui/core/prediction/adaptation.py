@@ -6,7 +6,8 @@ Anything of that changes, and everything begins anew; the general model serves f
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from enum import Enum
 from types import MappingProxyType
 from typing import Final
@@ -144,11 +145,28 @@ class Adapting:
     tried: Tried | None = None
     why: str = ""
     model: str = ""  # the adapted one's id, while it serves
+    since_s: float | None = field(default=None, compare=False)  # UTC, in this state
 
     @property
     def choices(self) -> tuple[Happening, ...]:
         """What a person may say now."""
         return tuple(one for one in BY_PERSON if one in NEXT[self.state])
+
+    @property
+    def standing(self) -> str:
+        """Whether a copy serves or is tried, for whom, since when, and how to end that; else empty."""
+        whom = f"learned from {self.wearer}"
+        since = "" if self.since_s is None else f" since {_time_of_day(self.since_s)}"
+        worth = "" if self.tried is None else f" ({self.tried.text})"
+        match self.state:
+            case State.SERVING:
+                return f"{whom}: serves{since}{worth}; window, Overview: Take back"
+            case State.OFFERED:
+                return f"{whom}: offered{since}{worth}, does not serve; window, Overview: Use it"
+            case State.TRYING:
+                return f"{whom}: tried{since} beside the general model, does not serve"
+            case _:
+                return ""
 
     @property
     def text(self) -> str:
@@ -177,3 +195,8 @@ class Adapting:
                 return f"learned from {self.wearer}, {self.state.value}: the general model serves"
             case State.FAILED:
                 return f"not learned from {self.wearer}: {self.why}"
+
+
+def _time_of_day(utc_s: float) -> str:
+    """Of this place."""
+    return f"{datetime.fromtimestamp(utc_s, UTC).astimezone():%H:%M}"
