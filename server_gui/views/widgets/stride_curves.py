@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from gateway.units import Unit
 from server_gui.core.evidence.curves import Curves, Side
 from server_gui.views.theme import Theme
-from server_gui.views.widgets.framed import draw_frame
+from server_gui.views.widgets.framed import GAP, draw_frame
 
 Floats = npt.NDArray[np.float64]
 
@@ -94,7 +94,7 @@ class StrideCurves(QWidget):
         if self._curves is not None:
             low, high = self._range(self._curves)
             up = (self._unit.text(low), self._unit.text(high))
-            title = self.read or self.title
+            title = self._head(painter)
             self._area = area = draw_frame(painter, self._theme, QRectF(self.rect()), title, up, CYCLE)
             for side, colour in ((self._curves.before, "dim"), (self._curves.after, "accent")):
                 if side is not None:
@@ -104,6 +104,13 @@ class StrideCurves(QWidget):
                 painter.setPen(QPen(self._theme.colour("text"), 1.0))
                 painter.drawLine(QPointF(x, area.top()), QPointF(x, area.bottom()))
         painter.end()
+
+    def _head(self, painter: QPainter) -> str:
+        """The title, and what is read; that alone where both have no room."""
+        both = f"{self.title}  {self.read}".rstrip()
+        painter.setFont(self._theme.text_font(0.85))
+        has_room = painter.fontMetrics().horizontalAdvance(both) < self.width() - 2 * GAP
+        return both if has_room or not self.read else self.read
 
     def _draw(self, painter: QPainter, area: QRectF, side: Side, name: str, low: float, high: float) -> None:
         mean, deviation = np.array(side.mean), np.array(side.deviation)
