@@ -10,9 +10,10 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from enum import Enum
 from types import MappingProxyType
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
-from server_gui.core.prediction.model_loading import Model
+if TYPE_CHECKING:  # who only shows it has no registry of models
+    from server_gui.core.prediction.model_loading import Model
 
 GAIT_PHASE: Final = "gait_phase"  # the one task that is adapted
 ADAPTED: Final = ".w"  # in an adapted model's id, between that of the general model and its own digits
@@ -100,7 +101,7 @@ class Context:
     boot_id: str | None
     links: int
     is_linked: bool
-    model: Model | None
+    model: "Model | None"
     bar: str = ""
     silences: int = 0
 
