@@ -125,11 +125,23 @@ class Tried:
     before: float
     after: float
     strides: int
+    missed: tuple[float, float] | None = (
+        None  # shares of the decisions that are said, and off by over a tenth
+    )
 
     @property
     def text(self) -> str:
         """In few words."""
         return f"{self.before:.1f} → {self.after:.1f} %"
+
+    @property
+    def on(self) -> str:
+        """What the error is of, and on how much; how often what was said was wrong."""
+        strides = f" of the stride, on {self.strides} later strides"
+        if self.missed is None:
+            return strides
+        before, after = (100.0 * each for each in self.missed)
+        return f"{strides}; off by more than a tenth: {before:.1f} → {after:.1f} % of the time"
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,7 +166,7 @@ class Adapting:
     def text(self) -> str:
         """In words."""
         tried = "" if self.tried is None else self.tried.text
-        strides = "" if self.tried is None else f" of the stride, on {self.tried.strides} later strides"
+        strides = "" if self.tried is None else self.tried.on
         match self.state:
             case State.OFF:
                 return self.why
