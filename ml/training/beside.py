@@ -66,7 +66,7 @@ def beside(
 
 
 def _squares(learned: Learned, features: Features, truth: Floats) -> tuple[Floats, Flags, Flags]:
-    """The squared error of each decision (n,), over both legs; whether it is not said; whether it is, and wrong."""
+    """Of each decision (n,): the squared error over both legs; whether it is unsaid, or said and wrong."""
     found = learned.judge(features)
     phases = np.stack([found.values[side] for side in SIDES], axis=1)
     error = (phases - truth + 0.5) % 1.0 - 0.5
