@@ -18,7 +18,7 @@ import numpy.typing as npt
 Floats = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 
-COVERED: Final = 0.97  # of a wearer's decisions: those whose set holds the truth
+COVERED: Final = 0.95  # of a wearer's decisions: those whose set holds the truth
 WEARERS: Final = 0.9  # of new wearers, of whom so many are covered
 MOST_ABSTAINED: Final = 0.1  # of all decisions: where it would take more, less is promised, and that is told
 LEAST_SURE: Final = 0.5  # what is as likely wrong as right is never said, however little is promised

@@ -18,7 +18,7 @@ from tests.gui.foreseen import predicted
 from tests.support.desk import looked, walking
 
 HOUR_S = 3600.0
-OFFERED = Adapting("exo-01", 7, State.OFFERED, "P01", tried=Tried(3.4, 2.1, 34))
+OFFERED = Adapting("exo-01", 7, State.OFFERED, "P01", tried=Tried(3.4, 2.1, 34, (0.031, 0.002)))
 STRIDE = predicted("stride", {"stride": 0.97}, "gait_phase", values={"left": 0.2, "right": 0.7})
 
 

@@ -135,13 +135,12 @@ class Tried:
         return f"{self.before:.1f} → {self.after:.1f} %"
 
     @property
-    def on(self) -> str:
-        """What the error is of, and on how much; how often what was said was wrong."""
-        strides = f" of the stride, on {self.strides} later strides"
+    def wrong(self) -> str:
+        """How often what was said was wrong; nothing where that is not known."""
         if self.missed is None:
-            return strides
+            return ""
         before, after = (100.0 * each for each in self.missed)
-        return f"{strides}; off by more than a tenth: {before:.1f} → {after:.1f} % of the time"
+        return f"off by more than a tenth of the stride: {before:.1f} → {after:.1f} % of the time"
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,10 +162,15 @@ class Adapting:
         return tuple(one for one in BY_PERSON if one in NEXT[self.state])
 
     @property
+    def tip(self) -> str:
+        """In words, and how often what was said was wrong."""
+        return "\n".join(filter(None, (self.text, self.tried and self.tried.wrong)))
+
+    @property
     def text(self) -> str:
         """In words."""
         tried = "" if self.tried is None else self.tried.text
-        strides = "" if self.tried is None else self.tried.on
+        strides = "" if self.tried is None else f" of the stride, on {self.tried.strides} later strides"
         match self.state:
             case State.OFF:
                 return self.why
