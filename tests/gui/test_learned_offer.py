@@ -58,6 +58,13 @@ def test_an_offer_is_accepted_and_taken_back_with_a_click_each(
     assert offer.isHidden(), "there is nothing to decide"
 
 
+def test_the_tip_says_how_often_each_was_wrong() -> None:
+    wrong = "off by more than a tenth of the stride: 3.1 → 0.2 % of the time"
+    assert OFFERED.tip == f"{OFFERED.text}\n{wrong}"
+    unknown = Adapting("exo-01", 7, State.OFFERED, "P01", tried=Tried(3.4, 2.1, 34))
+    assert unknown.tip == unknown.text
+
+
 def test_meanwhile_a_line_says_how_it_goes(station: Station) -> None:
     station.take_prediction(Adapting("exo-01", 1, State.COLLECTING, "P01", 35.2))
     line = list(lines(station))[-1]

@@ -164,7 +164,8 @@ class Adapting:
     @property
     def tip(self) -> str:
         """In words, and how often what was said was wrong."""
-        return "\n".join(filter(None, (self.text, self.tried and self.tried.wrong)))
+        wrong = "" if self.tried is None else self.tried.wrong
+        return "\n".join(filter(None, (self.text, wrong)))
 
     @property
     def text(self) -> str:

@@ -60,7 +60,7 @@ def test_where_too_much_would_be_left_unsaid_less_is_promised() -> None:
 
 def test_what_is_as_likely_wrong_as_right_is_never_said() -> None:
     certain = np.tile([0.9, 0.1, 0.0], (DECISIONS, 1)), np.zeros(DECISIONS, dtype=np.int_)
-    assert promise_of([certain, certain]) == Promise(LEAST_SURE, 1.0, pytest.approx(2 / 3))
+    assert promise_of([certain, certain]) == Promise(LEAST_SURE, 1.0, 2 / 3)
 
 
 def test_a_set_holds_the_likeliest_until_they_reach_the_threshold() -> None:
