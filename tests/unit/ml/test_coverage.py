@@ -13,7 +13,7 @@ def test_an_interval_of_a_subject_holds_what_the_others_keep_within() -> None:
     spread = np.repeat(random.uniform(1.0, 2.0, 12), 100)
     spread[SUBJECT == 5] = 8.0
     covered, width = coverage.of_intervals(random.normal(size=len(SUBJECT)) * spread, SUBJECT)
-    shares = np.array([covered[one == SUBJECT].mean() for one in range(12)])
+    shares = np.array([covered[np.equal(SUBJECT, one)].mean() for one in range(12)])
     assert (shares >= 0.95).sum() == 11
     assert shares[5] < 0.7, "nobody else errs so much"
     assert width[SUBJECT == 5].max() < width[SUBJECT == 6].max(), "its own errors do not count for it"
@@ -27,7 +27,9 @@ def test_a_set_of_a_subject_is_as_wide_as_the_others_need() -> None:
     probabilities = np.exp(scores) / np.exp(scores).sum(axis=1, keepdims=True)
     covered, said = coverage.of_sets(probabilities, truth, SUBJECT)
     by_subject = {
-        str(one): coverage.of_rows(covered, said, probabilities.argmax(axis=1) == truth, one == SUBJECT)
+        str(one): coverage.of_rows(
+            covered, said, probabilities.argmax(axis=1) == truth, np.equal(SUBJECT, one)
+        )
         for one in range(12)
     }
     assert by_subject["3"]["covered"] < 0.2
