@@ -9,12 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from ml.danger.creep import Creep
-from ml.danger.detector import Detector
 from ml.danger.memory import Memory
 from ml.danger.now import CHANNELS, Now
 
 Floats = npt.NDArray[np.float64]
 Change = Callable[[float, dict[str, float]], None]
+Kind = Callable[[], Memory | Creep]
 
 STEP_S = 0.08
 LEARNED_S = 40.0
@@ -42,7 +42,7 @@ def moment(at_s: float, row: dict[str, float], now: Now) -> Now:
 
 
 @cache
-def learned(kind: type[Memory | Creep]) -> tuple[Detector, Now, Floats]:
+def learned(kind: Kind) -> tuple[Memory | Creep, Now, Floats]:
     """A detector that knows somebody who walks, and its numbers of the last seconds (n, keys)."""
     detector, now = kind(), Now()
     times = np.arange(0.0, LEARNED_S, STEP_S).tolist()
@@ -50,7 +50,7 @@ def learned(kind: type[Memory | Creep]) -> tuple[Detector, Now, Floats]:
     return detector, now, np.array(found[-100:])
 
 
-def seen(kind: type[Memory | Creep], key: str, change: Change, seconds: float = 4.0) -> tuple[float, Floats]:
+def seen(kind: Kind, key: str, change: Change, seconds: float = 4.0) -> tuple[float, Floats]:
     """The largest number of a key before a change, and its numbers after it began, NaN where unknown."""
     detector, now, before = copy.deepcopy(learned(kind))
     at, after = list(detector.keys).index(key), []
