@@ -7,6 +7,8 @@ that a device was silent; how old a value is, is judged all the same.
 from drivers.noted import Noted
 
 STOOD_NS = 100_000_000  # without a look at the bus; it waits half as long for a frame at most
+GAP_NS = 60_000_000  # likewise: too short to miss a device, long enough for a joint to be elsewhere
+EVEN_NS = 75_000_000  # after a gap what comes has come evenly again: a tick later
 TOLD_S = 0.3  # shorter ones are told only where they are many
 MANY = 5
 SHOWN_S = 10.0
@@ -21,6 +23,7 @@ class Standstill(Noted):
     def __init__(self) -> None:
         super().__init__()
         self.times = 0  # since it was made
+        self.gap: tuple[int, int] | None = None  # the last time without a look, however short (ns)
         self._passed_ns: int | None = None  # None: nobody is to read
         self._listening_since_ns = 0
         self._settled_ns = 0
@@ -37,8 +40,10 @@ class Standstill(Noted):
         passed_ns = self._passed_ns
         if passed_ns is None:
             self._listening_since_ns = now_ns
-        elif now_ns - passed_ns > STOOD_NS:
-            self._stood(passed_ns, now_ns)
+        elif now_ns - passed_ns > GAP_NS:
+            self.gap = passed_ns, now_ns
+            if now_ns - passed_ns > STOOD_NS:
+                self._stood(passed_ns, now_ns)
         elif self.finding is not None and now_ns - self._before_ns > SHOWN_S * 1e9:
             self.clear()
         self._passed_ns = now_ns  # last: who reads meanwhile takes it for standing still, not for a silence
@@ -62,6 +67,18 @@ class Standstill(Noted):
     def is_settled(self, now_ns: int) -> bool:
         """Whether what comes now has not waited, so that its time is its own."""
         return now_ns >= self._settled_ns
+
+    def is_even(self, now_ns: int) -> bool:
+        """Whether what is sampled now and what was before it have no gap between them, nor just before."""
+        return self.gap is None or now_ns - self.gap[1] > EVEN_NS
+
+    def explains(self) -> None:
+        """The last gap explains what looked wrong elsewhere: so it is told, however short it was."""
+        if self.gap is not None and self.finding is None:
+            began_ns, self._before_ns = self.gap
+            self.note(
+                began_ns, f"this computer stood still for {(self._before_ns - began_ns) / 1e9:.2f} s", CHECK
+            )
 
     def words(self, now_ns: int, since_ns: int | None, allowed_s: float) -> str | None:
         """Why nothing has come since `since_ns`: it stands still, or has just begun anew, with what to check.

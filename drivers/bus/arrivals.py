@@ -33,6 +33,23 @@ class Arrivals(Noted):
         """What came last has waited: begin to count anew; what was found stays."""
         self.stamps.clear()
 
+    def excuse(self, began_ns: int, ended_ns: int) -> None:
+        """Nobody read meanwhile: frames that have no stamp then are not missing; all others are."""
+        known = list(self.stamps)
+        around = [
+            place
+            for place, (before, after) in enumerate(pairwise(known))
+            if before < ended_ns and after > began_ns
+        ]
+        if len(known) < 3 or not around:
+            return
+        place = max(around, key=lambda one: known[one + 1] - known[one])
+        usual = sorted(later - earlier for earlier, later in pairwise(known))[(len(known) - 1) // 2]
+        excess = min(known[place + 1] - known[place] - usual, ended_ns - began_ns)
+        if excess > usual / 2:
+            self.stamps.clear()
+            self.stamps.extend([*(stamp + excess for stamp in known[: place + 1]), *known[place + 1 :]])
+
     def look(self, now_ns: int) -> None:
         """Judge what came until now; in the thread that appends."""
         if now_ns - self._looked_ns < LOOK_S * 1e9:

@@ -269,8 +269,11 @@ class Node(BusUser):
             self._booting.retry(now_ns)
         if self.ready:
             self._asking.tick(now_ns)
-        settled = self.bus.standstill.is_settled(now_ns)
+        standstill = self.bus.standstill
+        settled, gap = standstill.is_settled(now_ns), standstill.gap
         for arrivals in self.arrivals:
+            if gap is not None and not standstill.is_even(now_ns):
+                arrivals.excuse(*gap)
             arrivals.look(now_ns) if settled else arrivals.skip()
 
     def _on_heartbeat(self, stamp_ns: int, data: bytes) -> None:

@@ -18,7 +18,7 @@ MOVING = 0.1  # rad/s that the velocity says on average meanwhile
 VELOCITY_S = 1.0  # over so long
 
 JUMP = math.radians(1.5)  # beyond what the speed before and after, and a jerk in between, explain
-FASTEST = 10.0  # rad/s where the drive does not tell its velocity
+FASTEST = 10.0  # rad/s where the drive does not tell its velocity, or nobody has looked
 JERK = 15.0  # rad/s² by which a joint may have started and stopped in between
 MARGIN = 1.5  # of a speed in between over those before and after
 LATE_S = 0.05  # by which a sample's stamp may be wrong
@@ -113,11 +113,16 @@ class FrozenCheck(Noted):
 
 
 class JumpCheck(Noted):
-    """The position changes from one sample to the next by more than the joint's speed explains."""
+    """The position changes from one sample to the next by more than the joint's speed explains.
+
+    Across a gap in sampling nobody knows its speed: what it can have gone at its fastest is no jump then.
+    """
 
     def __init__(self) -> None:
         super().__init__()
+        self.was_gap = False  # whether only that has kept the last step from being told as a jump
         self._before: Motion | None = None
+        self._is_across = False
         self._jumped_ns = 0
 
     def restart(self) -> None:
@@ -125,22 +130,25 @@ class JumpCheck(Noted):
         self._before = None
 
     def skip(self) -> None:
-        """Nobody knows how far it went since the last time; what was found stays."""
-        self._before = None
+        """Nobody has seen how it went since the last time; what was found stays."""
+        self._is_across = True
 
     def update(self, now: Motion) -> None:
         before, self._before = self._before, now
+        across, self._is_across, self.was_gap = self._is_across, False, False
         if self.finding is not None and now.stamp_ns - self._jumped_ns > JUMP_SHOWN_S * 1e9:
             self.clear()
         if before is None or HOMING in (before.mode, now.mode):
             return
         step_s = (now.stamp_ns - before.stamp_ns) / 1e9
-        if not 0.0 < step_s <= LONGEST_STEP_S:
+        if not 0.0 < step_s <= (UNSEEN_S if across else LONGEST_STEP_S):
             return
         step = now.position - before.position
-        if abs(step) > JUMP + JERK * step_s**2 / 4 + _explained(
-            before, now, math.copysign(1.0, step), step_s
-        ):
+        way = math.copysign(1.0, step)
+        usual = JUMP + JERK * step_s**2 / 4 + _explained(before, now, way, step_s)
+        most = max(usual, JUMP + FASTEST * step_s) if across else usual
+        self.was_gap = usual < abs(step) <= most
+        if abs(step) > most:
             self._jumped_ns = now.stamp_ns
             jump = f"{abs(math.degrees(step)):.1f}° within {step_s * 1e3:.0f} ms"
             self.note(
@@ -220,12 +228,18 @@ class JointCheck:
             self.mirror.restart()
 
     def skip(self) -> None:
-        """What came last may have waited: at what time it was so is not known."""
+        """What came last may have waited, or nobody has looked: how it moved until now is not known."""
         self._jump.skip()
+
+    @property
+    def was_gap(self) -> bool:
+        """Whether only a gap in sampling explains where the joint is now."""
+        return self._jump.was_gap
 
     def update(self, now: Motion, other: Callable[[], float | None]) -> None:
         """What is known now; a position that is as old as the last time says nothing new."""
         if now.stamp_ns == self._last_ns:
+            self._jump.was_gap = False
             return
         unseen_ns, self._last_ns = now.stamp_ns - self._last_ns, now.stamp_ns
         for check in self._own:

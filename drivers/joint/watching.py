@@ -51,6 +51,8 @@ class JointWatch(BusUser):
         if not self._standstill.is_settled(now_ns):
             self.check.skip()
             return
+        if not self._standstill.is_even(now_ns):
+            self.check.skip()  # it is judged all the same: how far a joint can go meanwhile is known
         position, stamp_ns = self._latest.read(self._index[POSITION], now_ns)
         if position is None or stamp_ns is None:
             return
@@ -65,6 +67,8 @@ class JointWatch(BusUser):
             state == DriveState.OPERATION_ENABLED,
         )
         self.check.update(now, lambda: self._other(now_ns))
+        if self.check.was_gap:
+            self._standstill.explains()
 
     def _newest(self, quantity: str, now_ns: int) -> float | None:
         index = self._index.get(quantity)

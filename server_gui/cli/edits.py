@@ -14,7 +14,7 @@ from server_gui.cli.cloud_options import parser, spool
 from server_gui.core.evidence.comparison import Measured, Word
 from server_gui.core.evidence.experiment import Experiment
 from server_gui.core.evidence.file import Told, folder_beside, read_all
-from server_gui.core.evidence.wording import number, share
+from server_gui.core.evidence.wording import interval, number, share, strides
 from server_gui.core.experiments.plan import Kind
 from server_gui.core.experiments.wording import chart, record, what, whole
 
@@ -134,7 +134,7 @@ def shown(told: Told) -> Iterator[str]:
     yield ""
     before, after = evidence.cycles_before, evidence.cycles_after
     if tried is None:
-        yield f"{evidence.word}: {counted(before, 'gait cycle')} before, {after} after"
+        yield f"{evidence.word}: {strides(evidence)}"
     elif rows := list(chart(tried)):
         yield table(_columns(tried), rows, right=(0, 1, 4)).rstrip()
     elif tried.kind == Kind.AB:
@@ -169,14 +169,13 @@ def _order(one: Measured) -> float:
 
 def metric_row(one: Measured) -> tuple[str, ...]:
     """Return a row of `COLUMNS`."""
-    interval = NONE if one.low is None else f"{number(one.low)} … {number(one.high)}"
     return (
         one.title,
         str(one.word),
         number(one.before),
         number(one.after),
         share(one),
-        interval,
+        interval(one),
         NONE if one.size is None else f"{one.size:+.1f}",
         one.unit,
     )

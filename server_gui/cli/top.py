@@ -1,15 +1,19 @@
 """`gwrms top`: one robot in the terminal, live; its parameters changed, stopped, reset."""
 
 import argparse
+import contextlib
 import math
 import sys
 import time
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from gateway.cli.arguments import seconds
 from gateway.cli.connect import add_robot
 from gateway.cli.text import warn
 from server_gui.core.tuning.stop import StopProgress, StopState
+
+if TYPE_CHECKING:
+    from server_gui.core.settings.server_file import ServerSettings
 
 EPILOG: Final = """keys
   s, space     STOP: quick stop on every drive (software, not safety-rated)
@@ -22,6 +26,8 @@ EPILOG: Final = """keys
 What one may not do on this robot is grey, with the reason below; STOP is for everybody.
 Angles are in degrees and lengths in millimetres, as in the window. What is old is grey, and says
 how old. q waits until it is known what became of a STOP.
+Where a window on this computer records the robot, and what was learned from its wearer serves or
+is tried, a line says so, and since when.
 With danger = true in [prediction] of the server's file, danger is foreseen as in the window.
 Without a terminal: gwrms watch, gwrms describe.
 
@@ -40,14 +46,19 @@ def main(argv: list[str]) -> int:
     from server_gui.terminal.controls import Controls
     from server_gui.terminal.dashboard import Dashboard
     from server_gui.terminal.followed_robot import EVERY_PARAMETER, FollowedRobot
+    from server_gui.terminal.learned import Learned
 
+    settings = _settings()
     ends_s = math.inf if arguments.seconds is None else time.monotonic() + arguments.seconds
-    followed_robot = FollowedRobot(arguments.robot, EVERY_PARAMETER, foresees=_foresees())
-    with Ending() as ending, followed_robot as followed:
+    followed_robot = FollowedRobot(arguments.robot, EVERY_PARAMETER, foresees=_foresees(settings))
+    learned = None if settings is None else Learned(settings.recorder.spool)
+    with Ending() as ending, followed_robot as followed, learned or contextlib.nullcontext():
 
         def tick() -> bool:
             ending.check()
             followed.update()
+            if learned is not None:
+                learned.look(followed.station)
             return time.monotonic() < ends_s
 
         try:
@@ -58,16 +69,20 @@ def main(argv: list[str]) -> int:
         return _tell(followed.station.stopping)
 
 
-def _foresees() -> bool:
-    """Whether the server's file wants danger foreseen; one that cannot be read hinders nobody."""
+def _settings() -> "ServerSettings | None":
+    """What the server's file says; one that cannot be read hinders nobody."""
     from server_gui.core.settings.server_file import SettingsError, load
 
     try:
-        prediction = load().prediction
+        return load()
     except SettingsError as error:
         warn("top", f"danger is not foreseen: {error}")
-        return False
-    return prediction.enabled and prediction.danger
+        return None
+
+
+def _foresees(settings: "ServerSettings | None") -> bool:
+    """Whether the server's file wants danger foreseen."""
+    return settings is not None and settings.prediction.enabled and settings.prediction.danger
 
 
 def _tell(stopping: StopProgress) -> int:

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from rich.console import Console, RenderableType
+from rich.console import Console, Group, RenderableType
 from rich.layout import Layout
 from rich.live import Live
 
@@ -29,13 +29,15 @@ def draw(station: Station, controls: Controls, where: str, size: tuple[int, int]
     """
     columns, lines = size
     look = panels.WIDE if columns >= WIDE_COLUMNS and lines >= WIDE_LINES else panels.NARROW
-    above, below = 3 if look.roomy else 1, 2
+    learned = station.predictions.elsewhere
+    above, below = (3 if look.roomy else 1) + bool(learned), 2
     room, footer = lines - above - below, panels.footer(station, controls, where)
     if room <= 0:
         return footer
     page = Layout()
+    header = panels.header(station, where, look)
     page.split_column(
-        Layout(panels.header(station, where, look), size=above),
+        Layout(Group(header, panels.learned(learned)) if learned else header, size=above),
         Layout(name="body"),
         Layout(footer, size=below),
     )

@@ -93,6 +93,11 @@ def header(station: Station, where: str, look: Look) -> RenderableType:
     return Panel(row, title="[bold]GWRMS[/]", title_align="left", box=box.ROUNDED, border_style=DIM)
 
 
+def learned(text: str) -> Text:
+    """Return what was learned from the wearer, where that serves or may: in one line."""
+    return Text(plain(text), style=WARN, no_wrap=True, overflow="ellipsis")
+
+
 def _danger(station: Station) -> Text:
     """The level of danger, or that it is not known; nothing where nobody foresees it, or it is no sign."""
     shown = station.predictions.danger

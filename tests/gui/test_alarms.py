@@ -214,6 +214,31 @@ def test_while_the_list_is_open_no_row_moves(around: Around, bench: Bench) -> No
     assert all("left knee" not in row.headline.text() for row in opened(around, bench))
 
 
+def test_under_the_pointer_no_row_moves_because_a_text_grows_or_buttons_go(
+    around: Around, bench: Bench
+) -> None:
+    fault(bench)
+    bench.station.stop("test")
+    bench.first.answer(Stopped(dict.fromkeys(JOINTS, "confirmed"), held=True))
+    rows = opened(around, bench)
+    assert len(rows) > 1
+    settle(around, bench)
+    around.alarms.list.setAttribute(Qt.WidgetAttribute.WA_UnderMouse)
+    settle(around, bench)
+    before = [row.geometry() for row in rows]
+    words = "the drive is in fault: " + "which took some time to say what has happened to it, " * 12
+    bench.look_again([looked(state="fault", problem=words)])
+    rows[0].acknowledge.click()
+    settle(around, bench)
+    assert [row.geometry() for row in rows] == before
+    for row in rows:
+        assert is_whole(row.details) or row.details.isHidden()
+    assert any(row.toolTip() for row in rows), "what has no room stands nowhere"
+    around.alarms.list.setAttribute(Qt.WidgetAttribute.WA_UnderMouse, False)
+    settle(around, bench)
+    assert not any(row.toolTip() for row in rows)
+
+
 def test_a_click_that_was_meant_for_another_alarm_acknowledges_none(
     around: Around, bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:

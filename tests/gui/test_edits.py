@@ -4,13 +4,14 @@ import time
 
 import pytest
 from msgspec.structs import replace
-from PySide6.QtCore import QRectF
-from PySide6.QtGui import QImage, QPainter
+from PySide6.QtCore import QEvent, QPointF, QRectF, Qt
+from PySide6.QtGui import QImage, QMouseEvent, QPainter
+from PySide6.QtWidgets import QApplication
 
 from gateway.units import Units
 from server_gui.core.evidence.comparison import Word, compare
 from server_gui.core.evidence.curves import Curves, Side
-from server_gui.core.evidence.edits import Change
+from server_gui.core.evidence.edits import Change, State
 from server_gui.core.evidence.file import Told
 from server_gui.core.tuning.writing import Trial
 from server_gui.views.frame.main_window import MainWindow
@@ -55,11 +56,12 @@ def test_values_and_metrics_are_in_the_units_that_were_chosen(bench: Bench, part
     )
     parts.edits.refresh()
     assert "gait.step_length 400 → 430 mm: worse" in parts.edits.verdict.text()
-    assert "0.05993 °)" in parts.edits.words.text()
+    assert "0.05993 °" in parts.edits.words.toolTip()
+    assert "(95 % interval +17.5 to +20.9 %); means 0.2867 → 0.3433 °" in parts.edits.words.text()
     bench.desk.shown.change(Units(by_si={"m": "m", "rad": "rad"}))
     parts.edits.refresh()
     assert "gait.step_length 0.40 → 0.43 m: worse" in parts.edits.verdict.text()
-    assert "0.001046 rad)" in parts.edits.words.text()
+    assert "0.001046 rad" in parts.edits.words.toolTip()
 
 
 @pytest.mark.parametrize("scale", [1.0, 2.0])
@@ -94,7 +96,7 @@ def test_a_trial_that_counts_down_says_what_it_does_so_far(
 ) -> None:
     said = {
         Word.FEW: "too early to judge it: 49 gait cycles before, 3 since; it takes 8 of each leg",
-        Word.WORSE: "so far worse (left knee tracking",
+        Word.WORSE: "so far worse: left knee tracking error RMS +19.2 %",
         None: "once somebody",
     }
     bench.station.writing.trial = Trial(
@@ -160,3 +162,50 @@ def test_evidence_that_grows_lays_no_other_edit_out_again(bench: Bench, parts: P
     assert [parts.edits.list.item(row) for row in (0, 1)] == items
     assert ["so far" in item.text() for item in items] == [False, True]
     assert "so far" not in parts.edits.verdict.text()
+
+
+def running(write: int, state: State = State.ON_TRIAL) -> Told:
+    """A trial, as evidence of it grows."""
+    known = worse(write, is_final=False)
+    return replace(known, edit=replace(known.edit, state=state))
+
+
+def test_a_trial_that_begins_is_looked_at_until_somebody_chooses_another(bench: Bench, parts: Parts) -> None:
+    chosen = parts.edits.list
+    for write in (1, 2):
+        bench.station.take_evidence(worse(write))
+    parts.edits.refresh()
+    chosen.setCurrentRow(1)
+    bench.station.take_evidence(running(3))
+    parts.edits.refresh()
+    assert chosen.currentRow() == 0
+    assert "on trial · worse so far" in chosen.item(0).text()
+    chosen.setCurrentRow(2)
+    bench.station.take_evidence(replace(running(3), curves=()))
+    parts.edits.refresh()
+    assert chosen.currentRow() == 2, "who chose it after the trial had begun keeps looking at it"
+
+
+def test_what_has_ended_is_told_as_over_and_its_later_strides_as_such(bench: Bench, parts: Parts) -> None:
+    known = running(1, State.REVERTED)
+    counts = replace(known.evidence, cycles_before=49, cycles_after=41, cycles_back=9)
+    bench.station.take_evidence(replace(known, evidence=counts))
+    parts.edits.refresh()
+    assert parts.edits.list.item(0).text().endswith("reverted · was worse")
+    said = parts.edits.verdict.text()
+    assert said.endswith("was worse (40 gait cycles before and 9 since it was taken back, 41 with it)")
+    assert "strides since it was taken back are grey, too" in parts.edits._legend.text()
+
+
+def test_strides_are_read_where_the_pointer_is(bench: Bench, parts: Parts) -> None:
+    bench.station.take_evidence(worse())
+    parts.edits.refresh()
+    QApplication.processEvents()  # what has come to a layout is shown then
+    parts.edits.grab()  # only what is drawn has a place for each value
+    knee = parts.edits.curves["left_knee.position"]
+    where = QPointF(knee._area.center())
+    none, no_keys = Qt.MouseButton.NoButton, Qt.KeyboardModifier.NoModifier
+    QApplication.sendEvent(knee, QMouseEvent(QEvent.Type.MouseMove, where, where, none, none, no_keys))
+    assert {one.read for one in parts.edits.curves.values()} == {"50 %: 5.7 → 11.5 °"}
+    QApplication.sendEvent(knee, QEvent(QEvent.Type.Leave))
+    assert knee.read == ""

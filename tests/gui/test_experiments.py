@@ -170,7 +170,9 @@ def test_a_trial_of_several_parameters_is_no_ab_trial(bench: Bench, parts: Parts
     bench.station.writing.done(Written(7, several, several, 40.0))
     parts.trial.refresh()
     assert parts.trial.isVisible()
-    assert not parts.trial.ab.isVisible()
+    assert parts.trial.ab.isVisible()
+    assert not parts.trial.ab.isEnabled()
+    assert "of one parameter, and 2 are on trial" in parts.trial.ab.toolTip()
     parts.edits.compare(bench.station)
     assert not bench.first.named("revert")
 

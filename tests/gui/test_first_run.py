@@ -24,6 +24,7 @@ from server_gui.views.theme import Theme
 from tests.gui.fakes import Bench, destroy, stop_is_whole
 from tests.gui.running import wait
 from tests.gui.test_alarms import fault
+from tests.support.desk import walking
 
 LEGS = ("left_knee", "right_knee")
 KINDS = {
@@ -108,6 +109,17 @@ def below(menu: QMenu, *path: str) -> QMenu:
         assert isinstance(found, QMenu)
         menu = found
     return menu
+
+
+def test_what_walks_already_is_not_offered_to_start(demo: Demo, bench: Bench) -> None:
+    assert demo.bar.walk.isEnabled(), "nobody knows yet whether it walks"
+    bench.station.take([walking(600)])
+    demo.draw()
+    assert not demo.bar.walk.isEnabled()
+    assert "It walks" in demo.bar.walk.toolTip()
+    fault(bench)
+    demo.draw()
+    assert demo.bar.walk.isEnabled()
 
 
 # --- without a robot

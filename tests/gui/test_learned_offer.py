@@ -12,6 +12,7 @@ from server_gui.core.prediction.adaptation import NEXT, Adapting, Happening, Sta
 from server_gui.views.ask import Question
 from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.frame.recording_chip import ask_name
+from server_gui.views.overview.learned_offer import wordings
 from server_gui.views.predictions import LEARNED, lines
 from tests.gui.fakes import Bench
 from tests.gui.foreseen import predicted
@@ -87,3 +88,13 @@ def test_a_recording_is_begun_of_who_is_named(window: MainWindow) -> None:
     wearer.setText(" P02 ")
     question.act.click()
     assert begun == [("stairs", "P02")]
+
+
+@pytest.mark.parametrize(
+    ("state", "word"),
+    [(State.NO_BETTER, "No better"), (State.SERVING, "erve"), (State.TAKEN_BACK, "aken back")],
+)
+def test_however_little_room_there_is_figures_are_not_taken_for_better(state: State, word: str) -> None:
+    one = dataclasses.replace(OFFERED, state=state, wearer="Participant-0017")
+    assert all(word in text or word.lower() in text for text in wordings(one)), wordings(one)
+    assert len(wordings(one)[-1]) < 12

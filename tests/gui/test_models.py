@@ -1,5 +1,6 @@
 """The page of models: listed by names, compared, trained, and promoted only when that is confirmed."""
 
+import dataclasses
 from pathlib import Path
 
 import pytest
@@ -12,10 +13,13 @@ from ml.registry.registry import Registry
 from server_gui.core.archive.archive import Archive
 from server_gui.core.cloud.jobs import Job, JobState
 from server_gui.core.models.models import Tone
+from server_gui.core.prediction.adaptation import Adapting, State, Tried
 from server_gui.core.settings.server_file import ServerSettings
 from server_gui.views.models.models_table import SIGNED
 from server_gui.views.models.panel import ModelsPage
+from server_gui.views.theme import Theme
 from tests.gui.archives import Shown
+from tests.gui.fakes import Bench, destroy
 from tests.unit.registry.models import card, learned
 from tests.unit.registry.test_registry import NOWHERE
 from tests.unit.training.walkers import day, put
@@ -230,3 +234,21 @@ def test_every_control_of_the_page_fits_into_its_width_at_large_text(
 def test_the_jobs_of_training_hold_up_no_other(archive: Archive) -> None:
     assert archive.models.jobs is not archive.jobs
     assert isinstance(archive.models.jobs.add("Train", lambda job: "done"), Job)
+
+
+def test_a_copy_that_has_learned_from_the_wearer_is_told_with_since_when_and_how_to_end_it(
+    theme: Theme, archive: Archive, bench: Bench
+) -> None:
+    page = ModelsPage(archive.models, theme, bench.desk)
+    page.show()
+    serving = Adapting("exo-01", 7, State.SERVING, "P01", tried=Tried(3.4, 2.1, 34), since_s=0.0)
+    for state, said in ((State.SERVING, "serves since"), (State.TRYING, "does not serve"), (State.OFF, "")):
+        bench.station.take_prediction(dataclasses.replace(serving, state=state))
+        page._show_learned()
+        assert said in page.learned.text()
+        assert ("exo-01: learned from P01" in page.learned.text()) is bool(said)
+        assert page.learned.isVisible() is bool(said)
+    bench.station.take_prediction(serving)
+    page._show_learned()
+    assert "window, Overview: Take back" in page.learned.text()
+    destroy(page)

@@ -1,5 +1,6 @@
 """The overview shows what is so, in the units of choice, and how old it is when it is so no more."""
 
+import dataclasses
 import itertools
 import math
 import re
@@ -9,6 +10,7 @@ from collections.abc import Iterator
 import numpy as np
 import numpy.typing as npt
 import pytest
+from msgspec.structs import replace
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QWidget
@@ -325,6 +327,32 @@ def test_a_trial_is_never_shown_without_its_value(theme: Theme, bench: Bench, ot
             assert now.keep.isVisible() is is_offered
     assert now.trial.main.shown.startswith("On trial: gait step length 400 → 420 mm")
     destroy(now)
+
+
+def test_a_leg_that_the_robot_does_not_have_is_nowhere(theme: Theme, bench: Bench) -> None:
+    """It assists the left one alone, and has both insoles: no zero and no dash for the other's joints."""
+    full, rows = described(), walking(600, -3600.0)
+    mine = [one for one in full.description.components if not is_of_right_leg(one.name)]
+    columns = {name: list(each) for name, each in rows.batch.columns.items() if not is_of_right_leg(name)}
+    bench.station.take([dataclasses.replace(full, description=replace(full.description, components=mine))])
+    bench.station.take([telemetry(list(rows.batch.stamps_ns), columns, rows.batch.received_ns)])
+    overview = Overview(bench.desk, theme)
+    overview.resize(660, 560)
+    overview.show()
+    overview.refresh()
+    overview.grab()
+    assert [plot.channels for plot in overview._plots[:2]] == [("left_knee.position",), ("left_knee.torque",)]
+    assert "right" not in overview._plots[0].plot.accessibleDescription()
+    assert set(overview._figure._legs) == {"left"}
+    assert "right" not in overview._figure.accessibleDescription()
+    assert set(overview._model._joints) == {"left_hip", "left_knee", "left_ankle"}
+    assert overview._maps["right"].isVisible()
+    destroy(overview)
+
+
+def is_of_right_leg(name: str) -> bool:
+    """Not of its insole."""
+    return name.startswith("right_") and "insole" not in name
 
 
 @pytest.mark.parametrize("happened", ["nothing", "link lost", "old"])

@@ -10,6 +10,7 @@ from gateway.client import RemoteError
 from gateway.units import Units
 from gateway.wire.control import Lease
 from gateway.wire.parameter import Confirmed, Reverted, Written
+from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.parameters.panel import ParametersPanel
 from server_gui.views.parameters.review import NUMBERS, SETTLE_MS
 from server_gui.views.parameters.tree import NAME, NEW, ROBOT, SAID, TITLES
@@ -86,6 +87,37 @@ def test_a_value_that_changed_elsewhere_is_flagged_before_it_is_overwritten(
     settle(panel)
     panel.review.write_it.click()
     assert bench.first.named("write") == [({"gait.step_length": 0.43}, None)]
+
+
+def test_a_review_has_the_keyboard_and_so_has_what_comes_after_it(window: MainWindow, bench: Bench) -> None:
+    panel = window.parameters
+    bench.station.take([looked()])
+    panel.stage_text("gait.step_length", "430")
+    bench.draw(window)
+    window.activateWindow()
+    panel.tree.setFocus()
+    panel.review_button.click()
+    bench.draw(window)
+    assert QApplication.focusWidget() is panel.review.table
+    QTest.keyClick(panel.review.table, Qt.Key.Key_Escape)
+    bench.draw(window)
+    focus = QApplication.focusWidget()
+    assert focus is not None
+    assert panel.isAncestorOf(focus)
+
+
+def test_a_value_is_typed_where_it_and_what_is_allowed_have_room(panel: ParametersPanel) -> None:
+    panel.resize(300, 900)
+    QApplication.processEvents()
+    panel.tree.edit_name("left_knee.max_torque")
+    field = panel.tree.findChild(QLineEdit)
+    assert field is not None
+    wide = field.fontMetrics().horizontalAdvance
+    for text in (field.text(), field.placeholderText()):
+        assert text
+        assert field.width() >= wide(text)
+    assert field.placeholderText() == "8 … 80"
+    assert panel.tree.viewport().rect().contains(field.geometry())
 
 
 def test_what_the_robot_would_refuse_cannot_be_written(panel: ParametersPanel) -> None:

@@ -8,7 +8,7 @@ import pytest
 from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtGui import QContextMenuEvent, QDragEnterEvent, QDropEvent
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QLineEdit, QMenu, QWidget
+from PySide6.QtWidgets import QApplication, QLineEdit, QMenu, QTreeWidget, QWidget
 
 from gateway.units import Units
 from server_gui.core.desk.flags import FlagKind
@@ -74,7 +74,7 @@ def drop(on: QWidget, texts: list[str], at: QPoint | None = None) -> bool:
 def said(signals: Signals) -> str:
     signals._frame = 0
     signals.refresh()
-    return signals.said.text()
+    return f"{signals.said.text()}{signals.refused.text()}"
 
 
 def state(signals: Signals) -> State:
@@ -104,6 +104,29 @@ def test_another_unit_is_refused_where_it_is_dropped_and_nothing_changes(signals
     drop(signals.cards[1], [HIP])
     assert curves(signals) == [[KNEE], [TORQUE]]
     assert "left_hip.position is in °, plot 2 in N·m" in said(signals)
+    assert signals.refused.isVisible()
+    signals.resize(500, 700)
+    QApplication.processEvents()
+    assert signals.refused.height() >= signals.refused.heightForWidth(signals.refused.width()), "it is cut"
+    drop(signals.cards[0], [HIP])
+    assert not signals.refused.isVisible()
+
+
+def test_while_a_channel_is_dragged_there_is_room_below_the_lowest_plot(
+    signals: Signals, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    below, seen = signals.area.below, []
+
+    def dragging(_tree: QTreeWidget, _actions: object) -> None:
+        seen.append(below.isVisible())
+        QApplication.processEvents()
+        drop(signals.area, [HIP], below.geometry().center())
+
+    monkeypatch.setattr(QTreeWidget, "startDrag", dragging)
+    signals.channels.startDrag(EVERYTHING)
+    assert seen == [True]
+    assert curves(signals) == [[KNEE], [TORQUE], [HIP]]
+    assert not below.isVisible()
 
 
 def test_the_tree_hands_over_what_is_dragged_and_nothing_else_is_taken(signals: Signals) -> None:

@@ -1,6 +1,7 @@
 """The journal's entries as what people did: for each parameter old, new, read back, and what came of it."""
 
 import dataclasses
+import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
@@ -9,6 +10,7 @@ from gateway.wire.method import Number
 
 Entry = Mapping[str, Any]
 OPEN: Final = "NOT KNOWN how it ended"
+_LEASE: Final = re.compile(r"\b(?:the |a )?lease\b")  # as the wire and the journal call the right to write
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +54,13 @@ def _begun(entry: Entry, what: str) -> Iterable[Act]:
     after, before = _numbers(entry, "after"), _numbers(entry, "before")
     said = OPEN if what in _LASTING else _words(entry.get("result") or entry.get("reason") or "")
     base = Act(
-        entry["n"], entry["hash"], int(entry.get("utc_ns") or 0), str(entry.get("who")), what, "", said
+        entry["n"],
+        entry["hash"],
+        int(entry.get("utc_ns") or 0),
+        str(entry.get("who")),
+        _LEASE.sub("control", what),
+        "",
+        said,
     )
     if what in ("write", "write refused"):
         trial_s = entry.get("trial_s")
@@ -85,10 +93,12 @@ def _confirmed(act: Act, _entry: Entry) -> Act:
 
 def _other_end(act: Act, entry: Entry) -> Act:
     """Taken back, or not; in the robot's words."""
-    said = entry.get("outcome")
-    own = said.get(act.thing) if isinstance(said, Mapping) else None
+    told = entry.get("outcome")
+    own = told.get(act.thing) if isinstance(told, Mapping) else None
     why = own or entry.get("result") or entry.get("reason") or ""
-    return dataclasses.replace(act, outcome=f"{entry['what']}: {why}")
+    said = str(entry["what"])
+    outcome = f"{said}: {_LEASE.sub('control', str(why))}" if why not in ("", said) else said
+    return dataclasses.replace(act, outcome=outcome)
 
 
 def _told(act: Act, entry: Entry) -> Act:
@@ -116,7 +126,7 @@ _ENDINGS: Final[Mapping[str, Callable[[Act, Entry], Act]]] = {
 def _words(said: object) -> str:
     if isinstance(said, Mapping):
         return ", ".join(f"{name}: {one}" for name, one in said.items())
-    return str(said)
+    return _LEASE.sub("control", str(said))
 
 
 def _numbers(entry: Entry, key: str) -> dict[str, Number]:

@@ -73,6 +73,7 @@ class Evidence(Struct, frozen=True):
     cycles_after: int
     left_out: Mapping[str, int] = {}  # cycles by what was wrong with them, with their joint
     notes: tuple[str, ...] = ()
+    cycles_back: int = 0  # of those before: since it was taken back, with the old values again
 
 
 Spans = Sequence[tuple[int, int]]  # from, to (ns)
@@ -177,6 +178,7 @@ def compare(
         cycles_after=told[1],
         left_out=left_out,
         notes=tuple(_notes(most, there[most_leg])),
+        cycles_back=sum(_since_back(legs[leg] if legs[leg].cycles else there[leg], spell) for leg in Leg),
     )
 
 
@@ -200,6 +202,12 @@ def _sorted_out(cycles: Iterable[Cycle], spell: Spell) -> tuple[list[Cycle], dic
         taken.append(cycle)
         counted.update(f"{joint}: {why}" for joint, why in cycle.left_out.items())
     return taken, dict(counted)
+
+
+def _since_back(sided: _Sided, spell: Spell) -> int:
+    """How many have the old values because these are in force again."""
+    ended_ns = max((until_ns for _, until_ns in spell.after), default=None)
+    return 0 if ended_ns is None else sum(cycle.began_ns >= ended_ns for cycle in sided.cycles)
 
 
 def _all_of(cycles: Sequence[Cycle], spell: Spell) -> _Sided:

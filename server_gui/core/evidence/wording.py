@@ -4,9 +4,10 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final
 
-from gateway.amounts import NONE
-from server_gui.core.evidence.comparison import Measured
-from server_gui.core.evidence.edits import Edit
+from gateway.amounts import NONE, counted
+from server_gui.core.evidence.comparison import Evidence, Measured, Word
+from server_gui.core.evidence.edits import Edit, State
+from server_gui.core.evidence.file import Told
 
 NO_UNITS: Final[Mapping[str, str]] = MappingProxyType({})
 
@@ -30,9 +31,42 @@ def share(one: Measured) -> str:
     """The difference, in percent of what was before where that says something."""
     if one.difference is None:
         return NONE
-    if not one.before or abs(one.difference / one.before) > 10.0:
+    if not one.before or not _is_share(one):
         return f"{one.difference:+.3g}"
     return f"{one.difference / abs(one.before):+.1%}".replace("%", " %")
+
+
+def _is_share(one: Measured) -> bool:
+    """Whether a percentage of what was before says something."""
+    return bool(one.before) and abs((one.difference or 0.0) / (one.before or 1.0)) <= 10.0
+
+
+def interval(one: Measured) -> str:
+    """The 95 % interval of `share`, in the same kind: percent beside percent, else in the metric's unit."""
+    if one.low is None or one.high is None:
+        return NONE
+    if not _is_share(one):
+        return f"{one.low:+.3g} to {one.high:+.3g} {one.unit}".rstrip()
+    low, high = (100.0 * end / abs(one.before or 1.0) for end in (one.low, one.high))
+    return f"{low:+.1f} to {high:+.1f} %"
+
+
+def word(told: Told) -> str:
+    """What an edit did, and in which tense: what has ended was so, however many strides still come."""
+    found = told.evidence.word
+    if told.edit.state in (State.REVERTED, State.TAKEN_OVER) and told.experiment is None:
+        return f"was {found}" if found in (Word.BETTER, Word.WORSE, Word.MIXED) else str(found)
+    return str(found) if told.is_final else f"{found} so far"
+
+
+def strides(evidence: Evidence) -> str:
+    """How many were compared; those since it was taken back have the old values, too."""
+    before, after, back = evidence.cycles_before, evidence.cycles_after, evidence.cycles_back
+    if not back:
+        return f"{counted(before, 'gait cycle')} before, {after} after"
+    return (
+        f"{counted(before - back, 'gait cycle')} before and {back} since it was taken back, {after} with it"
+    )
 
 
 def number(value: float | None) -> str:

@@ -6,12 +6,14 @@ Anything of that changes, and everything begins anew; the general model serves f
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from enum import Enum
 from types import MappingProxyType
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
-from server_gui.core.prediction.model_loading import Model
+if TYPE_CHECKING:  # who only shows it has no registry of models
+    from server_gui.core.prediction.model_loading import Model
 
 GAIT_PHASE: Final = "gait_phase"  # the one task that is adapted
 ADAPTED: Final = ".w"  # in an adapted model's id, between that of the general model and its own digits
@@ -99,7 +101,7 @@ class Context:
     boot_id: str | None
     links: int
     is_linked: bool
-    model: Model | None
+    model: "Model | None"
     bar: str = ""
     silences: int = 0
 
@@ -144,11 +146,28 @@ class Adapting:
     tried: Tried | None = None
     why: str = ""
     model: str = ""  # the adapted one's id, while it serves
+    since_s: float | None = field(default=None, compare=False)  # UTC, in this state
 
     @property
     def choices(self) -> tuple[Happening, ...]:
         """What a person may say now."""
         return tuple(one for one in BY_PERSON if one in NEXT[self.state])
+
+    @property
+    def standing(self) -> str:
+        """Whether a copy serves or is tried, for whom, since when, and how to end that; else empty."""
+        whom = f"learned from {self.wearer}"
+        since = "" if self.since_s is None else f" since {_time_of_day(self.since_s)}"
+        worth = "" if self.tried is None else f" ({self.tried.text})"
+        match self.state:
+            case State.SERVING:
+                return f"{whom}: serves{since}{worth}; window, Overview: Take back"
+            case State.OFFERED:
+                return f"{whom}: offered{since}{worth}, does not serve; window, Overview: Use it"
+            case State.TRYING:
+                return f"{whom}: tried{since} beside the general model, does not serve"
+            case _:
+                return ""
 
     @property
     def text(self) -> str:
@@ -177,3 +196,8 @@ class Adapting:
                 return f"learned from {self.wearer}, {self.state.value}: the general model serves"
             case State.FAILED:
                 return f"not learned from {self.wearer}: {self.why}"
+
+
+def _time_of_day(utc_s: float) -> str:
+    """Of this place."""
+    return f"{datetime.fromtimestamp(utc_s, UTC).astimezone():%H:%M}"

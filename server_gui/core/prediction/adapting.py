@@ -144,8 +144,10 @@ class _Attempts:
         model = self.adapted.card.id if self.adapted is not None and state is State.SERVING else ""
         number = self.now.number if number is None else number
         wearer = self.context.wearing.wearer
+        is_same = (state, number) == (self.now.state, self.now.number)
+        since_s = self.now.since_s if is_same else time.time()
         is_known = state is State.OFF and (self.now.state, self.now.why) == (state, why)
-        self.now = Adapting(self.now.robot, number, state, wearer, stepped_s, found, why, model)
+        self.now = Adapting(self.now.robot, number, state, wearer, stepped_s, found, why, model, since_s)
         if not is_known:  # while there is no link, each attempt is a change
             self._tell(self.now)
 

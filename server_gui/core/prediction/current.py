@@ -95,6 +95,7 @@ class StationPredictions:
     recalled: dict[str, Recalled] = field(default_factory=dict)
     danger: ShownDanger | None = None
     adapting: Adapting | None = None  # None: nobody learns from walks here
+    elsewhere: str = ""  # what another program here says of what it has learned; empty: nothing
     why: dict[str, str] = field(default_factory=dict)
     off: bool = False
     foresees: bool = False  # whether danger is to be foreseen: then nothing said is not known, and no silence

@@ -116,7 +116,9 @@ class PredictionService:
             self._tracking.figures,
             self._judged,
             self._skipped + self._inbox.lost,
-            {} if self._adapting is None else {name: one.text for name, one in self._adapting.now.items()},
+            {}
+            if self._adapting is None
+            else {name: one.standing or one.text for name, one in self._adapting.now.items()},
         )
 
     def _powerless(self) -> Iterator[str]:

@@ -2,7 +2,7 @@
 
 from typing import Final, Protocol
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import QRect, QSize, Qt, Signal
 from PySide6.QtWidgets import QBoxLayout, QFrame, QHBoxLayout, QPushButton, QSizePolicy, QVBoxLayout, QWidget
 
 from server_gui.core.alarms.texts import Kind
@@ -11,11 +11,16 @@ from server_gui.views.marks import Mark
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text, set_tone
 from server_gui.views.widgets.mark import MarkIcon
+from server_gui.views.widgets.plain import set_tip
 from server_gui.views.widgets.sheet import Sheet
 from server_gui.views.widgets.whole import WholeLabel
 
 WIDEST: Final = 900  # at text of 100 %
 AROUND_BUTTONS: Final = 24  # pixels, of a row
+SPACE: Final = 6  # pixels above the buttons of a row
+MOST_PX: Final = 16_777_215  # what Qt takes for no end
+MORE: Final = "… more: rest the pointer here, or move it out of the list"
+WRAPPED: Final = Qt.TextFlag.TextWordWrap.value
 OVER: Final = Mark("ring", "dim", "over")
 
 
@@ -43,7 +48,11 @@ class Deeds(Protocol):
 
 
 class AlarmRow(QFrame):
-    """One alarm in full, as it stands in the list."""
+    """One alarm in full, as it stands in the list; while it is held, as high as it is.
+
+    What has no room then is left out, the last line first, and stands in its tip: the row would push those
+    below it from under the pointer.
+    """
 
     cleared = Signal()
     signal = Signal()
@@ -52,6 +61,7 @@ class AlarmRow(QFrame):
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self._theme = theme
+        self._held: QSize | None = None
         self.setObjectName("alarm")
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Maximum)
         self._icon = MarkIcon(theme, 13)
@@ -72,7 +82,7 @@ class AlarmRow(QFrame):
         self.acknowledge.clicked.connect(self.acknowledged)
         column = QVBoxLayout(self)
         column.setContentsMargins(9, 5, 8, 5)
-        column.setSpacing(6)
+        column.setSpacing(SPACE)
         column.addLayout(said)
         column.addWidget(self.buttons, 0, Qt.AlignmentFlag.AlignLeft)
         theme.changed.connect(self._restyle)
@@ -85,11 +95,39 @@ class AlarmRow(QFrame):
         self._icon.show_mark(mark)
         set_tone(self, mark.colour)
         set_text(self.headline, headline(told, named=named, more="over" if is_over else ""))
-        set_text(self.details, "\n".join(details(one, now_s(station), each=True)))
+        said = details(one, now_s(station), each=True)
         self.buttons.offer(told)
         self.buttons.setVisible(not is_over)
         self.setAccessibleName(self.headline.text())
-        self.setAccessibleDescription(self.details.text())
+        self.setAccessibleDescription("\n".join(said))
+        shown = said if self._held is None else self._fitting(said)
+        set_text(self.details, "\n".join(shown))
+        set_tip(self, "\n".join(said) if shown != said else "")
+
+    def hold(self, wanted: bool) -> None:
+        """Be as high as now from now on; not where another width needs another height."""
+        wanted = wanted and (self._held is None or self._held.width() == self.width())
+        if wanted and self._held is None:
+            self._held = self.size()
+            self.setFixedHeight(self.height())
+        elif not wanted and self._held is not None:
+            self._held = None
+            self.setMinimumHeight(0)
+            self.setMaximumHeight(MOST_PX)
+
+    def _fitting(self, said: list[str]) -> list[str]:
+        """As many of these lines as have room below the headline, and above the buttons."""
+        column = self.layout()
+        around = 0 if column is None else self.height() - column.contentsRect().height()
+        below = 0 if self.buttons.isHidden() else self.buttons.sizeHint().height() + SPACE
+        above = self.headline.heightForWidth(self.headline.width()) + 1
+        room, width = self.height() - around - below - above, max(self.details.width(), 1)
+        box = QRect(0, 0, width, MOST_PX)
+        for count in range(len(said), 0, -1):
+            shown = said if count == len(said) else [*said[:count], MORE]
+            if self.details.fontMetrics().boundingRect(box, WRAPPED, "\n".join(shown)).height() <= room:
+                return shown
+        return []
 
     def _restyle(self) -> None:
         self.headline.setFont(self._theme.text_font(bold=True))
@@ -132,7 +170,10 @@ class AlarmButtons(QWidget):
 
 
 class AlarmList(Sheet):
-    """Every alarm in full. While it is open no row moves: new ones come last, and what is over stays."""
+    """Every alarm in full. While it is open no row moves: new ones come last, and what is over stays.
+
+    Texts grow and buttons go; as long as the pointer is over the list, no row changes its height by that.
+    """
 
     def __init__(self, strip: Deeds, theme: Theme, below: QWidget) -> None:
         words = QWidget()
@@ -150,6 +191,8 @@ class AlarmList(Sheet):
 
     def turn(self) -> None:
         self._shown.clear()
+        for row in self.rows:
+            row.hold(False)
         super().turn()
         self.refresh()
 
@@ -159,6 +202,9 @@ class AlarmList(Sheet):
             return
         now = {key_of(told): told for told in self._strip.told}
         self._shown |= now
+        is_used = self.underMouse()
+        for row in self.rows:
+            row.hold(is_used and row.isVisible())
         while len(self.rows) < len(self._shown):
             self._add_row()
         for row, (key, told) in zip(self.rows, self._shown.items(), strict=False):

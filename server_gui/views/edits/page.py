@@ -18,21 +18,22 @@ from PySide6.QtWidgets import (
 
 from gateway.amounts import NONE as NO_TIME
 from gateway.amounts import counted
+from gateway.units import with_minus
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.evidence.comparison import Measured, Word
 from server_gui.core.evidence.cycles import DRAWN
-from server_gui.core.evidence.edits import Edit
+from server_gui.core.evidence.edits import Edit, State
 from server_gui.core.evidence.file import Told
 from server_gui.core.evidence.shown import in_units, symbols
-from server_gui.core.evidence.wording import changes, from_to, number, share
+from server_gui.core.evidence.wording import changes, from_to, interval, number, share, strides, word
 from server_gui.core.experiments.plan import Kind
 from server_gui.core.experiments.wording import record, what, whole
 from server_gui.views.experiments.form import ExperimentForm, Tried
 from server_gui.views.experiments.response_plot import ResponsePlot
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text, set_tone
-from server_gui.views.widgets.plain import PlainLabel
+from server_gui.views.widgets.plain import PlainLabel, set_tip
 from server_gui.views.widgets.stride_curves import StrideCurves
 
 LIST: Final = 240  # wide, at text of 100 %
@@ -47,7 +48,8 @@ NONE: Final = (
     "No edit is known yet. Change a parameter while somebody walks: what that does to tracking, current, "
     "torque and gait is judged here, stride by stride, before and after."
 )
-COLOURS: Final = "grey before, in colour after; the bands are one standard deviation of the strides"
+COLOURS: Final = "grey before, in colour after; {}the bands are one standard deviation of the strides"
+BACK: Final = "strides since it was taken back are grey, too: they have the old value; "
 
 
 class Edits(QWidget):
@@ -61,13 +63,14 @@ class Edits(QWidget):
         self._units: dict[str, dict[str, str]] = {}  # symbols of each edit, by parameter
         self._shown: list[Told] = []
         self._drawn: Told | None = None
+        self._followed = ""  # the trial that was chosen because it had begun
         self.setAccessibleName("Edits")
         self.list = QListWidget()
         self.list.setObjectName("framed")
         self.list.setAccessibleName("Edits, newest first")
         self.list.setWordWrap(True)
         self.list.currentRowChanged.connect(lambda _row: self._choose())
-        self.verdict, self.words, self._legend = PlainLabel(), PlainLabel(NONE), PlainLabel(COLOURS)
+        self.verdict, self.words, self._legend = PlainLabel(), PlainLabel(NONE), PlainLabel()
         self.verdict.setObjectName("title")
         self._legend.setObjectName("dim")
         for label in (self.verdict, self.words, self._legend):
@@ -109,7 +112,18 @@ class Edits(QWidget):
             self._grow(known)
         else:
             self._list(known)
+        self._follow()
         self._choose()
+
+    def _follow(self) -> None:
+        """A trial that has begun is looked at, until somebody chooses another edit."""
+        running = (place for place, one in enumerate(self._shown) if one.edit.state is State.ON_TRIAL)
+        place = next(running, None)
+        if place is not None and self._shown[place].edit.id != self._followed:
+            self._followed = self._shown[place].edit.id
+            self.list.blockSignals(True)
+            self.list.setCurrentRow(place)
+            self.list.blockSignals(False)
 
     def _in_units(self, known: list[Told], station: Station | None) -> list[Told]:
         """Return them as people read values, whose symbols are kept."""
@@ -198,7 +212,9 @@ class Edits(QWidget):
         else:
             set_text(self.verdict, self._verdict(told))
             set_tone(self.verdict, TONES.get(told.evidence.word, ""))
-            set_text(self.words, "\n".join(_said(told)))
+            set_text(self.words, with_minus("\n".join(_said(told))))
+            set_text(self._legend, COLOURS.format(BACK if told.evidence.cycles_back else ""))
+        set_tip(self.words, "" if told is None else with_minus("\n".join(map(_in_unit, _strong(told)))))
         tried = None if told is None else told.experiment
         self.response.setVisible(tried is not None and self.response.show_response(tried))
         self._draw(told)
@@ -215,9 +231,15 @@ class Edits(QWidget):
             joint, _, quantity = channel.rpartition(".")
             if channel not in self.curves:
                 self.curves[channel] = StrideCurves(self._theme)
+                self.curves[channel].hovered.connect(self._hover)
             widget = self.curves[channel]
             self._grid.addWidget(widget, joints.index(joint), DRAWN.index(quantity))
             widget.show_curves(one, self._desk.shown.units.unit(quantity, UNIT[quantity]))
+
+    def _hover(self, at: float | None) -> None:
+        """All are read at the same percent of the stride."""
+        for one in self.curves.values():
+            one.show_hover(at)
 
     def _what(self, told: Told) -> str:
         """What was changed, in its unit."""
@@ -226,20 +248,17 @@ class Edits(QWidget):
         return f"{what(told)} {told.experiment.unit}".rstrip()
 
     def _line(self, told: Told) -> str:
-        word = told.evidence.word if told.is_final else f"{told.evidence.word} so far"
         ended = told.edit.state if told.experiment is None else told.experiment.kind
         values = self._what(told).replace(" → ", ARROW)  # no line ends within them
-        return f"{_when(told.edit)}  {values}\n{ended} · {word}"
+        return f"{_when(told.edit)}  {values}\n{ended} · {word(told)}"
 
     def _verdict(self, told: Told) -> str:
         evidence, tried = told.evidence, told.experiment
         if tried is not None:
-            word = f"{counted(len(tried.periods), 'period')}" if tried.responses else str(evidence.word)
+            said = f"{counted(len(tried.periods), 'period')}" if tried.responses else str(evidence.word)
             back = "" if tried.is_back else "; NOT CONFIRMED that it is back"
-            return f"{self._what(told)}: {word}{back}"
-        strides = f"{counted(evidence.cycles_before, 'gait cycle')} before, {evidence.cycles_after} after"
-        so_far = "" if told.is_final else " so far"
-        return f"{self._what(told)}: {evidence.word}{so_far} ({strides})"
+            return f"{self._what(told)}: {said}{back}"
+        return f"{self._what(told)}: {word(told)} ({strides(evidence)})"
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
@@ -267,14 +286,13 @@ def _when(edit: Edit) -> str:
 def _said(told: Told) -> list[str]:
     evidence, tried = told.evidence, told.experiment
     done = [] if tried is None else list(record(tried))
-    differing = [one for one in evidence.metrics if one.word in (Word.BETTER, Word.WORSE, Word.CHANGED)]
-    strong = sorted(differing, key=lambda one: -abs(one.size or 0.0))
+    strong = _strong(told)
     lines = [*done, *(_metric(one) for one in strong[:MOST])]
     if len(strong) > MOST:
         lines.append(f"and {len(strong) - MOST} more: gwrms edits show {told.edit.id}")
     same = sum(one.word is Word.SAME for one in evidence.metrics)
     if same:
-        others = "the other " if differing else ""
+        others = "the other " if strong else ""
         lines.append(f"No difference seen in {others}{counted(same, 'metric')}.")
     few = sum(one.word is Word.FEW for one in evidence.metrics)
     if few:
@@ -287,8 +305,19 @@ def _said(told: Told) -> list[str]:
     return lines
 
 
+def _strong(told: Told) -> list[Measured]:
+    """What differs, the strongest first."""
+    found = (one for one in told.evidence.metrics if one.word in (Word.BETTER, Word.WORSE, Word.CHANGED))
+    return sorted(found, key=lambda one: -abs(one.size or 0.0))
+
+
 def _metric(one: Measured) -> str:
     name = one.title.replace("_", " ")
-    interval = f"{number(one.low)} to {number(one.high)} {one.unit}".rstrip()
     means = f"{from_to(one.before, one.after)} {one.unit}".rstrip()
-    return f"{name} {one.word}: {share(one)} (95 % interval {interval}); means {means}"
+    return f"{name} {one.word}: {share(one)} (95 % interval {interval(one)}); means {means}"
+
+
+def _in_unit(one: Measured) -> str:
+    """The difference in the metric's unit."""
+    ends = f"{number(one.low)} to {number(one.high)} {one.unit}".rstrip()
+    return f"{one.title.replace('_', ' ')}: {number(one.difference)} {one.unit}, 95 % interval {ends}"

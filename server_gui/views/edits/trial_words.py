@@ -13,6 +13,7 @@ from server_gui.core.tuning.edits import unit_of
 from server_gui.core.tuning.writing import Trial
 
 TO_AB: Final = "Take it back now, and ask about an A/B trial of both values"
+AB_OF_ONE: Final = "An A/B trial is of one parameter, and {} are on trial: take them back, and try one"
 UNLIKE: Final = "too few strides of both sides are alike"
 
 
@@ -32,16 +33,32 @@ def wordings(station: Station, trial: Trial, units: Units) -> tuple[str, ...]:
     return f"On trial: {full}", full, *some, f"{len(said)} values"
 
 
-def so_far(edit: Told | None) -> str:
-    """Return what it did until now, in one clause."""
+def why_no_ab(trial: Trial) -> str:
+    """Return why it cannot become an A/B trial; empty where it can."""
+    count = len(trial.values)
+    return "" if count == 1 else AB_OF_ONE.format(count)
+
+
+def so_far(edit: Told | None) -> tuple[str, ...]:
+    """Return what it did until now in one clause: `so far worse: left knee tracking error RMS +45.0 %`.
+
+    Then the same for where there is less and less room.
+    """
     if edit is None:
-        return "what it does is seen once somebody walks"
+        return "what it does is seen once somebody walks", "not judged yet"
     evidence = edit.evidence
     if evidence.word is Word.FEW:
-        return _not_enough(evidence)
+        said = _not_enough(evidence)
+        return said, said.partition(":")[0]
+    brief = f"so far {evidence.word}"
     strongest = next((one for one in evidence.metrics if one.series == evidence.strongest), None)
-    what = "" if strongest is None else f" ({strongest.title.replace('_', ' ')} {share(strongest)})"
-    return f"so far {evidence.word}{what}"
+    if strongest is None:
+        return (brief,)
+    return (
+        f"{brief}: {strongest.title.replace('_', ' ')} {share(strongest)}",
+        f"{brief}: {share(strongest)}",
+        brief,
+    )
 
 
 def _not_enough(evidence: Evidence) -> str:

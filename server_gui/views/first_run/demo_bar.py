@@ -5,6 +5,7 @@ from typing import Final
 
 from PySide6.QtWidgets import QHBoxLayout, QMenu, QPushButton, QToolBar, QVBoxLayout, QWidget
 
+from server_gui.core.alarms.marks import ENABLED
 from server_gui.core.desk.station import Station
 from server_gui.core.threads.answers import Deliver, when_done
 from server_gui.core.threads.background import Background
@@ -19,7 +20,15 @@ from server_gui.views.widgets.plain import PlainLabel, set_tip
 
 TOURED: Final = "toured"  # kept: the tour begins by itself only until somebody has left it
 HELD: Final = "A stop is held: end it first with “Reset stop…” above. Then this lets the robot walk again."
+WALKING: Final = "It walks, with every drive enabled"
 WALKS: Final = "Tells the simulated controller to start and the wearer to walk, as after a stop or a fault"
+
+
+def walks(station: Station) -> bool:
+    """Whether there is nothing to start: its wearer walks, and every drive is enabled, as far as is known."""
+    robot = station.robot
+    words = {robot.word(f"{joint}.state") for joint in robot.names("joint")}
+    return station.is_live and bool(station.processing.derived().gait.walking) and words == {ENABLED}
 
 
 class DemoBar(QToolBar):
@@ -71,8 +80,9 @@ class DemoBar(QToolBar):
     def refresh(self) -> None:
         """Show how it is now."""
         held = self._station.stopping.held
-        self.walk.setEnabled(not held and self._own.is_running)
-        set_tip(self.walk, HELD if held else WALKS)
+        why_not = HELD if held else WALKING if walks(self._station) else ""
+        self.walk.setEnabled(not why_not and self._own.is_running)
+        set_tip(self.walk, why_not or WALKS)
         self.breaking.setEnabled(bool(self._listed.faults) and self._own.is_running)
         self.mend.setEnabled(bool(self._listed.active) and self._own.is_running)
         set_text(self.said, self._words(held=held))

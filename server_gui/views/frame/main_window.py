@@ -181,7 +181,7 @@ class MainWindow(QMainWindow):
         if archive is not None:
             self.recordings = Recordings(archive, desk.recording, theme)
             self.cloud = Cloud(archive, desk.recording, theme)
-            self.models = ModelsPage(archive.models, theme)
+            self.models = ModelsPage(archive.models, theme, desk)
             self._views += (self.recordings, self.cloud, self.models)
             self.tabs.addTab(self.recordings, "Re&cordings")
             self._add_tab(self.cloud, "C&loud")

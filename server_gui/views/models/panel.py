@@ -6,6 +6,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QBoxLayout, QComboBox, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
+from server_gui.core.desk.desk import Desk
 from server_gui.core.models.catalogue import Entry
 from server_gui.core.models.models import Models
 from server_gui.core.models.training import TrainingWish
@@ -30,9 +31,10 @@ EMPTY: Final = (
 class ModelsPage(QWidget):
     """Nothing here waits: the store is read in a thread, and a training is a process of its own."""
 
-    def __init__(self, models: Models, theme: Theme) -> None:
+    def __init__(self, models: Models, theme: Theme, desk: Desk | None = None) -> None:
         super().__init__()
         self._models = models
+        self._desk = desk
         self._theme = theme
         self._frame = 0
         self._revision = -1
@@ -46,6 +48,9 @@ class ModelsPage(QWidget):
         self.said.setWordWrap(True)
         self.said.setObjectName("banner")
         self.said.hide()
+        self.learned = PlainLabel()
+        self.learned.setWordWrap(True)
+        self.learned.hide()
         self.robot = QComboBox()
         self.robot.setAccessibleName("For which robot")
         self.robot.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToContents)
@@ -79,6 +84,7 @@ class ModelsPage(QWidget):
         for offered in (self.robot, self.form.robot):
             offer_robots(offered, models.robots())
         self._show_state()
+        self._show_learned()
         entry = self.chosen
         self.compare.show_entry(entry, models.found)
         self.confirm.refresh()
@@ -107,6 +113,7 @@ class ModelsPage(QWidget):
         self._actions.addLayout(row, 1)
         self._list = Card("Models")
         self._list.body.addWidget(self.state)
+        self._list.body.addWidget(self.learned)
         self._list.body.addWidget(self.table, 1)
         self._list.body.addLayout(self._actions)
         everything = QVBoxLayout(self)
@@ -162,6 +169,13 @@ class ModelsPage(QWidget):
         if self.said.property("tone") != tone:
             self.said.setProperty("tone", tone)
             self.said.style().polish(self.said)
+
+    def _show_learned(self) -> None:
+        """What is no model of the store, and serves or may: copies that have learned from who walks now."""
+        known = [(one.title, one.predictions.adapting) for one in self._desk or ()]
+        lines = [f"◆ {title}: {one.standing}" for title, one in known if one is not None and one.standing]
+        set_text(self.learned, "\n".join(lines))
+        self.learned.setVisible(bool(lines))
 
     def _show_actions(self, entry: Entry | None) -> None:
         asked = self._models.change is not None

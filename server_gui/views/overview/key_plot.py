@@ -45,10 +45,10 @@ class KeyPlot(Card):
         self._desk = desk
         self._theme = theme
         self._kind = kind
-        self.channels = tuple(channel for channel, _, _ in kind.curves)
+        self._curves = kind.curves  # of what the robot that is looked at has
         self.legend = Wrapped(f"Values of {kind.title}")
         self.plot = Plot(theme, SECONDS, self._unit.scale * kind.least, Mouse.TIME)
-        self.plot.set_curves([Curve(channel, colour) for channel, colour, _ in kind.curves])
+        self.plot.set_curves([Curve(channel, colour) for channel, colour, _ in self._curves])
         self.plot.setAccessibleName(kind.title)
         self.plot.setToolTip("Wheel: time · double click: all of it · click: open in Signals")
         self.body.addWidget(self.legend)
@@ -57,6 +57,11 @@ class KeyPlot(Card):
         theme.changed.connect(self._resize)
         self._resize()
 
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """What is plotted."""
+        return tuple(channel for channel, _, _ in self._curves)
+
     def show_hover(self, at: float | None) -> None:
         """Read the values at this time (s until the newest row), None: the newest."""
         self._hover = at
@@ -64,6 +69,7 @@ class KeyPlot(Card):
 
     def refresh(self, station: Station, flags: Sequence[PlacedFlag], *, slow: bool) -> None:
         """Draw the past of the channels."""
+        self._show_curves(station)
         unit, rings = self._unit, station.rings
         times = rings.times(SECONDS)
         columns = [rings.values(name, len(times)) for name in self.channels]
@@ -74,14 +80,22 @@ class KeyPlot(Card):
         if slow or self._hover is not None:
             self._say(station, unit, flags, live=live)
 
+    def _show_curves(self, station: Station) -> None:
+        """Leave out what the robot does not have, such as its other leg: all where it has none of it."""
+        parts = station.robot.parts
+        there = tuple(one for one in self._kind.curves if one[0].partition(".")[0] in parts)
+        if (there or self._kind.curves) != self._curves:
+            self._curves = there or self._kind.curves
+            self.plot.set_curves([Curve(channel, colour) for channel, colour, _ in self._curves])
+
     def _say(self, station: Station, unit: Unit, flags: Sequence[PlacedFlag], *, live: bool) -> None:
         self.set_title(f"{self._kind.title} ({unit.symbol})", whole=True)
         values = self._values(station)
-        told = {word: unit.text(value) for (_, _, word), value in zip(self._kind.curves, values, strict=True)}
-        inks = [colour if live else "old" for _, colour, _ in self._kind.curves]
+        told = {word: unit.text(value) for (_, _, word), value in zip(self._curves, values, strict=True)}
+        inks = [colour if live else "old" for _, colour, _ in self._curves]
         parts = [
             (css(self._theme, ink), "━", f"{word} {told[word]}")
-            for ink, (_, _, word) in zip(inks, self._kind.curves, strict=True)
+            for ink, (_, _, word) in zip(inks, self._curves, strict=True)
         ]
         limits = _limit_texts(self._limits(station), unit)
         if limits:

@@ -75,12 +75,17 @@ class LearnedOffer(QWidget):
 
 
 def wordings(adapting: Adapting) -> tuple[str, ...]:
-    """Return what there is to say, the fullest first."""
+    """Return what there is to say, the fullest first. Each says how it stands: figures alone look better."""
     tried = "" if adapting.tried is None else adapting.tried.text
-    short = {
-        State.OFFERED: f"Learned from {adapting.wearer}: {tried}",
-        State.SERVING: f"Served by what was learned from {adapting.wearer}: {tried}",
-        State.NO_BETTER: f"No better than the general model: {tried}",
-    }.get(adapting.state, "")
+    of = {
+        State.OFFERED: (f"Learned from {adapting.wearer}", "Learned", ""),
+        State.SERVING: (f"Served by what was learned from {adapting.wearer}", "Learned, serves", "Serves"),
+        State.NO_BETTER: ("No better than the general model", "No better"),
+        State.DECLINED: ("Declined: the general model serves", "Declined"),
+        State.TAKEN_BACK: ("Taken back: the general model serves", "Taken back"),
+        State.FAILED: (f"Not learned from {adapting.wearer}", "Not learned"),
+    }.get(adapting.state, ())
+    told = tried if adapting.state in (State.OFFERED, State.SERVING, State.NO_BETTER) else ""
+    short = [": ".join(filter(None, (words, told))) for words in of]
     text = adapting.text[:1].upper() + adapting.text[1:]
-    return tuple(filter(None, (text, short, tried and f"From {adapting.wearer}: {tried}", tried)))
+    return tuple(dict.fromkeys(filter(None, (text, *short, of[-1] if of else ""))))

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QFrame, QGridLayout, QHBoxLayout, QPushButton, QSi
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.tuning.writing import Trial
-from server_gui.views.edits.trial_words import TO_AB, changes, ends, so_far, wordings
+from server_gui.views.edits.trial_words import TO_AB, changes, ends, so_far, why_no_ab, wordings
 from server_gui.views.marks import Mark, drives_mark, enabled_text
 from server_gui.views.predictions import STOPPED, activity
 from server_gui.views.theme import Theme
@@ -49,6 +49,11 @@ class Fact(QWidget):
         self.detail.say(*detail)
         self.setAccessibleDescription(f"{main[0]}, {detail[0]}")
         set_tip(self, "\n".join(filter(None, (main[0], detail[0], tip))))
+
+    @property
+    def wide(self) -> int:
+        """How wide it is with its first line whole (pixels)."""
+        return self._icon.sizeHint().width() + self.row.spacing() + self.main.sizeHint().width()
 
     def _restyle(self) -> None:
         self.main.setFont(self._theme.text_font(1.15, bold=True))
@@ -130,21 +135,23 @@ class NowLine(QFrame):
         units = self._desk.shown.units
         tip = "\n".join(changes(station, trial, units))
         back = ends(trial)
-        seen = (f"{back}; {so_far(station.trial_evidence)}",) if self._is_offered else ()
+        seen = tuple(f"{back}; {words}" for words in so_far(station.trial_evidence))
         self.trial.say(ON_TRIAL, wordings(station, trial, units), (*seen, back), tip)
-        self.ab.setVisible(len(trial.values) == 1)
+        why_not = why_no_ab(trial)
+        self.ab.setEnabled(not why_not)
+        set_tip(self.ab, why_not or TO_AB)
 
     def _fit(self, *, on_trial: bool) -> None:
         """What is on trial stands beside the other facts where all its words have room, else below them.
 
-        So it does where it is judged: those words change with each stride, and nothing may move with them.
+        How it is judged changes with each stride, and nothing may move with that: it has what room there is.
         """
         a_fact, around = self._theme.px(A_FACT), self.width() - self._grid.contentsRect().width()
-        needed = 2 * a_fact + 2 * self._grid.horizontalSpacing() + self.trial.sizeHint().width() + around
+        needed = 2 * a_fact + 2 * self._grid.horizontalSpacing() + self.trial.wide + around
         is_beside = on_trial and not self._is_offered and self.width() >= needed
         columns = 3 if is_beside else min(max(self.width() // a_fact, 1), 2)
         self._arrange(columns, on_trial=on_trial)
-        self._grid.setColumnMinimumWidth(2, self.trial.sizeHint().width() if columns > 2 else 0)
+        self._grid.setColumnMinimumWidth(2, self.trial.wide if columns > 2 else 0)
 
     def _arrange(self, columns: int, *, on_trial: bool) -> None:
         if (columns, on_trial) == self._placed:

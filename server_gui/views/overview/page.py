@@ -228,7 +228,7 @@ class Overview(QWidget):
         values = station.robot.values
         legs = {
             side: Pose(*(values.get(f"{side}_{joint}.position") for joint in ("hip", "knee", "ankle")))
-            for side in SIDES
+            for side in legs_of(station)
         }
         wrong = frozenset(part.name for part in station.robot.not_ok())
         live = station.is_live
@@ -271,6 +271,12 @@ class Overview(QWidget):
         sources = "; ".join(dict.fromkeys(known.source for known in self._soles.values()))
         count = f"{max(known.count for known in self._soles.values())} cells"
         self._pressure.set_note(*((sources, count, "") if live else old_text(station)))
+
+
+def legs_of(station: Station) -> tuple[str, ...]:
+    """Return the sides of which the robot has a joint; both where that is not known."""
+    joints = station.robot.names("joint")
+    return tuple(side for side in SIDES if any(one.startswith(side) for one in joints)) or SIDES
 
 
 def placed_flags(station: Station, seconds: float) -> list[PlacedFlag]:

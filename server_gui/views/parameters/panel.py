@@ -156,6 +156,8 @@ class ParametersPanel(QWidget):
         if station is not None:
             self.review.show_changes(station.difference(self._desk.shown.units))
             self.pages.setCurrentIndex(REVIEW)
+            # The button that led here gives way: else the next one in the window would have the keyboard.
+            self.review.table.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def find_parameter(self) -> None:
         """Let words be typed that filter the parameters."""

@@ -36,22 +36,38 @@ IF_ROOM: Final = (FILE, RANGE, DEFAULT, STORED)  # shown while they fit; the cho
 REFUSED: Final = "✕ limit"  # the robot would refuse what is staged
 WRONG: Final = ("✕", REFUSED, "⚠ changed")
 BEGINS: Final = "0123456789+-.,"  # a number
+AROUND_TEXT: Final = 24  # pixels beside the text of a field: its frame, and the cursor
 NAME_PX: Final = 110  # that a name has at least; whole names where all else has room beside them
 
 
 class NewValue(QStyledItemDelegate):
-    """Lets a new value be typed: what is in the field at first is exact, to the last digit."""
+    """Lets a new value be typed: what is in the field at first is exact, to the last digit.
+
+    The field is as wide as that, and as what is allowed (`allowed`), which it shows once it is empty; where
+    its column is narrower it lies over its neighbours.
+    """
 
     typed = Signal(str, str)  # name, text
 
-    def __init__(self, exact: Callable[[str], str], parent: QWidget) -> None:
+    def __init__(self, exact: Callable[[str], str], allowed: Callable[[str], str], parent: QWidget) -> None:
         super().__init__(parent)
-        self._exact = exact
+        self._exact, self._allowed = exact, allowed
 
     def createEditor(self, parent: QWidget, option: QStyleOptionViewItem, index: Index) -> QWidget:
         field = QLineEdit(parent)
         field.setAccessibleName(f"New value of {index.data(NAME_ROLE)}")
+        field.setPlaceholderText(self._allowed(str(index.data(NAME_ROLE))))
         return field
+
+    def updateEditorGeometry(self, editor: QWidget, option: QStyleOptionViewItem, index: Index) -> None:
+        name, place, parent = str(index.data(NAME_ROLE)), option.rect, editor.parentWidget()
+        wide = editor.fontMetrics().horizontalAdvance
+        needed = max(wide(self._exact(name)), wide(self._allowed(name))) + AROUND_TEXT
+        place.setWidth(max(place.width(), needed))
+        if parent is not None:
+            place.moveRight(min(place.right(), parent.width() - 1))
+        place.setLeft(max(place.left(), 0))
+        editor.setGeometry(place)
 
     def setEditorData(self, editor: QWidget, index: Index) -> None:
         if isinstance(editor, QLineEdit):
@@ -98,7 +114,7 @@ class ParameterTree(QTreeView):
             | QAbstractItemView.EditTrigger.EditKeyPressed
             | QAbstractItemView.EditTrigger.AnyKeyPressed
         )
-        delegate = NewValue(self._exact, self)
+        delegate = NewValue(self._exact, self._allowed, self)
         delegate.typed.connect(self.typed)
         self.setItemDelegateForColumn(NEW, delegate)
         self.selectionModel().currentChanged.connect(self._chosen)
@@ -291,6 +307,13 @@ class ParameterTree(QTreeView):
         staged, held = station.edits.staged.get(name), station.robot.parameters.get(name)
         value = staged.value if staged is not None else (None if held is None else held.value)
         return "" if value is None else unit.editable(value)
+
+    def _allowed(self, name: str) -> str:
+        station = self._desk.selected
+        info = None if station is None else station.known.get(name)
+        if info is None:
+            return ""
+        return range_text(info.min, info.max, unit_of(name, info.unit, self._desk.shown.units))
 
     def _pin(self) -> None:
         if self.current_name is not None:

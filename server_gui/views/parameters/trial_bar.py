@@ -5,7 +5,7 @@ from PySide6.QtWidgets import QFrame, QHBoxLayout, QProgressBar, QPushButton, QV
 
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
-from server_gui.views.edits.trial_words import TO_AB, changes, ends, so_far
+from server_gui.views.edits.trial_words import TO_AB, changes, ends, so_far, why_no_ab
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.plain import PlainLabel, set_tip
 
@@ -60,7 +60,9 @@ class TrialBar(QFrame):
         self.setVisible(trial is not None)
         if station is None or trial is None:
             return
-        self.ab.setVisible(len(trial.values) == 1)
+        why_not = why_no_ab(trial)
+        self.ab.setEnabled(not why_not)
+        set_tip(self.ab, why_not or TO_AB)
         left_s = trial.left_s()
         if (station.name, trial.write) != self._write:
             self._write = station.name, trial.write
@@ -68,7 +70,7 @@ class TrialBar(QFrame):
         self._bar.setValue(round(left_s * 10))
         whose = "" if station is self._desk.selected else f"{station.title}: "
         said = ", ".join(changes(station, trial, self._desk.shown.units))
-        seen = so_far(station.trial_evidence)
+        seen = so_far(station.trial_evidence)[0]
         set_text(self.words, f"{whose}on trial: {said}; {ends(trial)}; {seen}")
 
     def _whose(self, *, shown: bool) -> Station | None:

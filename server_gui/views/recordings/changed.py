@@ -15,12 +15,12 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from gateway.amounts import NONE, counted
+from gateway.amounts import counted
 from gateway.plain import plain
 from server_gui.core.archive.archive import Archive
 from server_gui.core.cloud.changed import Changes, not_known
 from server_gui.core.evidence.comparison import Evidence, Measured, Word
-from server_gui.core.evidence.wording import number, share
+from server_gui.core.evidence.wording import interval, number, share
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_text
 from server_gui.views.widgets.plain import PlainLabel, set_tip
@@ -115,9 +115,8 @@ class ChangedPage(QWidget):
 
 
 def _cells(one: Measured) -> tuple[str, ...]:
-    interval = NONE if one.low is None else f"{number(one.low)} … {number(one.high)} {one.unit}".rstrip()
     values = (f"{number(value)} {one.unit}".rstrip() for value in (one.before, one.after))
-    return (one.title, str(one.word), *values, share(one), interval)
+    return (one.title, str(one.word), *values, share(one), interval(one))
 
 
 def _words() -> PlainLabel:

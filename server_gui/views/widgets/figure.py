@@ -58,7 +58,10 @@ class StickFigure(QWidget):
         *,
         live: bool,
     ) -> None:
-        """Draw this; `wrong` names the joints to be ringed, `texts` are each side's angles in words."""
+        """Draw this: a leg that is not among `legs` is none of the robot's.
+
+        `wrong` names the joints to be ringed, `texts` are each side's angles in words.
+        """
         self._legs, self._tilt, self._wrong, self._live = legs, tilt, wrong, live
         self._texts = texts
         told = [f"{side} {' '.join(texts[side])}" for side in texts] if live else ["not known now"]
@@ -81,18 +84,19 @@ class StickFigure(QWidget):
         above = 0 if beside else 3 * metrics.height()  # the words
         unit = min((self.height() - above) * 0.94 / REACH, self.width() * 1.25)
         lean = self._tilt or 0.0
-        chains = {
-            side: chain(self._legs.get(side, Pose(None, None, None)), lean) for side in ("left", "right")
-        }
-        drop = max(point.y() for points in chains.values() for point in points)
+        chains = {side: chain(pose, lean) for side, pose in self._legs.items()}
+        stands = chain(Pose(None, None, None), 0.0)  # of a robot without legs
+        drop = max(point.y() for points in chains.values() or (stands,) for point in points)
         ground = self.height() * 0.95
         hip = QPointF(self.width() / 2, ground - drop * unit)
         painter.setPen(QPen(self._theme.colour("border"), 2))
         painter.drawLine(QPointF(self.width() * 0.06, ground), QPointF(self.width() * 0.94, ground))
         first, last = ("right", "left") if self._is_wrong("left") and not self._is_wrong("right") else SIDES
-        self._draw_leg(painter, first, chains[first], hip, unit)
+        if first in chains:
+            self._draw_leg(painter, first, chains[first], hip, unit)
         self._draw_trunk(painter, hip, lean, unit)
-        self._draw_leg(painter, last, chains[last], hip, unit)
+        if last in chains:
+            self._draw_leg(painter, last, chains[last], hip, unit)
         self._name_sides(painter, {side: hip + points[-1] * unit for side, points in chains.items()})
         for side, points in chains.items():
             for joint, point in zip(JOINTS, (QPointF(), *points), strict=False):
@@ -113,10 +117,11 @@ class StickFigure(QWidget):
         painter.setFont(self._theme.text_font(bold=True))
         metrics = painter.fontMetrics()
         at = {side: toe + QPointF(6, 3) for side, toe in toes.items()}
-        left, right = at["left"], at["right"]
-        high, beside = metrics.ascent(), abs(left.x() - right.x()) > metrics.maxWidth()
-        if not beside and abs(left.y() - right.y()) < high:  # neither letter lies over the other
-            left.setY(right.y() - high)
+        if len(at) == len(SIDES):
+            left, right = at["left"], at["right"]
+            high, beside = metrics.ascent(), abs(left.x() - right.x()) > metrics.maxWidth()
+            if not beside and abs(left.y() - right.y()) < high:  # neither letter lies over the other
+                left.setY(right.y() - high)
         for side, point in at.items():
             letter = QPainterPath()
             letter.addText(point, painter.font(), side[0].upper())
@@ -170,7 +175,7 @@ class StickFigure(QWidget):
     def _draw_leg(
         self, painter: QPainter, side: str, points: tuple[QPointF, ...], hip: QPointF, unit: float
     ) -> None:
-        pose = self._legs.get(side, Pose(None, None, None))
+        pose = self._legs[side]
         knee, ankle, heel, toe = (hip + point * unit for point in points)
         colour = self._theme.colour(side if self._live else "old")
         for known, (begin, end), width in (

@@ -165,6 +165,12 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
         left, right = self.getViewBox().viewRange()[0]
         return left, right
 
+    @property
+    def range_shown(self) -> float:
+        """How much of the other axis is shown; 0 while no value is."""
+        low, high = self.getViewBox().viewRange()[1]
+        return 0.0 if self._is_blank else float(high - low)
+
     def choose_by_box(self, on: bool) -> None:
         """Whether a drag chooses what is shown by a box, or moves it."""
         box = self.getViewBox()

@@ -26,6 +26,7 @@ class ChannelTree(QTreeWidget):
     """
 
     asked = Signal(str, QPoint)
+    dragging = Signal(bool)  # one has begun, or is over
 
     def __init__(self) -> None:
         super().__init__()
@@ -89,6 +90,13 @@ class ChannelTree(QTreeWidget):
                 _open_group(item)
         for group in self._groups:
             group.setHidden(all(item.isHidden() for item in _within(group)))
+
+    def startDrag(self, actions: Qt.DropAction) -> None:
+        self.dragging.emit(True)
+        try:
+            super().startDrag(actions)  # which returns when it is over
+        finally:
+            self.dragging.emit(False)
 
     def mimeTypes(self) -> list[str]:
         return [CURVES]

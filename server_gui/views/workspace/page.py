@@ -36,6 +36,7 @@ from server_gui.views.workspace.layout_menu import LayoutMenu
 from server_gui.views.workspace.measuring import Measuring
 from server_gui.views.workspace.note import ask_note
 from server_gui.views.workspace.plot_area import PlotArea
+from server_gui.views.workspace.refusal import Refusal
 from server_gui.views.workspace.tools import SPANS_S, Tools
 from server_gui.views.workspace.trigger_bar import TriggerBar
 from server_gui.views.workspace.unit_plot import UnitPlot
@@ -83,6 +84,7 @@ class Signals(QWidget):
         self.channels = ChannelTree()
         self.channels.itemChanged.connect(self._ticked)
         self.channels.asked.connect(self.area.offer)
+        self.channels.dragging.connect(self.area.offer_below)
         self._words = QLineEdit()
         self._words.setPlaceholderText("Filter channels")
         self._words.setAccessibleName("Filter of the channels")
@@ -192,7 +194,7 @@ class Signals(QWidget):
 
     def tell(self, text: str) -> None:
         """Say what came of something."""
-        self._told, self._frame = f" · {text}", 0
+        self._told, self._frame = self.refused.take(text), 0
 
     # --- how it is put together
 
@@ -208,7 +210,8 @@ class Signals(QWidget):
         left_box.addWidget(self._words)
         left_box.addWidget(self.channels, 1)
         self.beside_said = ElidedLabel("dim")
-        for bar in (self.expression, self.trigger, self.beside_said):
+        self.refused = Refusal()
+        for bar in (self.expression, self.trigger, self.beside_said, self.refused):
             right_box.addWidget(bar)
         right_box.addWidget(self.area, 1)
         right_box.addWidget(self.measuring)
@@ -265,8 +268,7 @@ class Signals(QWidget):
 
     def _looked_again(self, refused: str = "") -> None:
         """After something was arranged, or refused."""
-        if refused:
-            self.tell(f"▲ {refused}")
+        self.refused.take(f"▲ {refused}" if refused else "")
         if self._desk.selected is not None:
             self.scene.look(self._desk.selected)
         self.channels.choose(self.scene.workspace.curves)

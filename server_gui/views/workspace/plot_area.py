@@ -41,7 +41,17 @@ class PlotArea(QFrame):
         self._stack = QVBoxLayout(self)
         self._stack.setContentsMargins(0, 0, 0, 0)
         self._stack.addWidget(self.empty)
+        self.below = PlainLabel("Drop it here for a plot of its own")
+        self.below.setObjectName("banner")
+        self.below.setProperty("tone", "plain")
+        self.below.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self.below.hide()
+        self._stack.addWidget(self.below)
         self.setAcceptDrops(True)
+
+    def offer_below(self, wanted: bool) -> None:
+        """Have room below the lowest plot, to drop a curve there."""
+        self.below.setVisible(wanted and bool(self.cards))
 
     def build(self, seconds: float, window: tuple[float, float] | None) -> None:
         """Make a card for each plot, of the last `seconds`, of which the `window` is in sight."""
@@ -51,7 +61,7 @@ class PlotArea(QFrame):
             card.deleteLater()
         self.cards = [self._card(place, seconds) for place in range(len(self._scene.workspace.plots))]
         for place, card in enumerate(self.cards):
-            self._stack.addWidget(card, 1)
+            self._stack.insertWidget(place, card, 1)
             self._bind(card, place)
             if isinstance(card, UnitPlot):
                 for signal, mine in (

@@ -8,7 +8,8 @@ from typing import Final
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QHBoxLayout, QMenu, QToolButton, QWidget
 
-from gateway.units import Unit
+from gateway.units import Unit, rounded
+from server_gui.core.workspace.legible import places
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.dragging import TakesCurves
 from server_gui.views.widgets.plot import Curve, Mouse, Plot, css
@@ -73,6 +74,7 @@ class UnitPlot(TakesCurves):
             [*self._curves, *(Curve(one.channel, one.colour, dashed=True) for one in self._curves if beside)]
         )
         self.plot.setAccessibleName(self.accessibleName())
+        self._places = unit.digits
         self._names = {curve.text: curve.name for curve in curves}
         self._legend = Wrapped(f"Values of {self.accessibleName()}")
         self.body.addLayout(legend_row(theme, self._legend, self.menu, f"Plot {place + 1}: curves and kind"))
@@ -88,17 +90,21 @@ class UnitPlot(TakesCurves):
         when: str = "",
     ) -> None:
         """Show a value of each curve behind its name, `theirs` of what is beside; `when` tells the time."""
+        self._places = places(self.unit.digits, self.plot.range_shown, self._places)
         told = []
         for number, (curve, value) in enumerate(zip(self._curves, values, strict=True)):
             ink = css(self._theme, curve.colour if live else "old")
-            told.append((ink, "━", f"{self._names[curve.channel]} {self.unit.text(value)}"))
+            told.append((ink, "━", f"{self._names[curve.channel]} {self._text(value)}"))
             if theirs:
-                told.append((ink, BESIDE, self.unit.text(theirs[number])))
+                told.append((ink, BESIDE, self._text(theirs[number])))
         bad = css(self._theme, "bad")
         told += [(bad, "▲", f"{one.name}: {one.problem}") for one in self.curves if one.problem]
         self._legend.say(told)
         self.set_note(when)
         self.plot.setAccessibleDescription(self._legend.accessibleDescription())
+
+    def _text(self, value: float | None) -> str:
+        return "–" if value is None else rounded(value * self.unit.scale, self._places)
 
 
 class EmptyPlot(TakesCurves):

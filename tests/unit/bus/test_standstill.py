@@ -7,6 +7,7 @@ import can
 import pytest
 
 import eds
+from drivers.bus.arrivals import Arrivals
 from drivers.bus.bus import CanBus
 from drivers.bus.interfaces.socketcand import server_ns, waited_stamps
 from drivers.bus.life import NodeLife
@@ -179,6 +180,67 @@ def test_a_joint_whose_frames_have_waited_has_not_jumped() -> None:
     reader.stands(600)
     reader.runs(1000, joint.late(0))
     assert "its position jumped by" in joint.said, "and is not forgotten over a standstill"
+
+
+SHORT_MS = 20  # beside a tick: 70 ms without a look, which is no standstill yet
+
+
+@pytest.mark.parametrize(("moved", "said"), [(0.3, False), (0.7, False), (0.8, True), (-0.8, True)])
+def test_across_a_short_gap_only_what_no_joint_can_go_is_a_jump(moved: float, said: bool) -> None:
+    reader = Reader()
+    joint = Joint(reader, speed=0.0)
+    reader.runs(500, joint.late(0))
+    reader.stands(SHORT_MS)
+    joint.offset = moved
+    reader.runs(1000, joint.late(0))
+    assert reader.standstill.times == 0
+    assert ("its position jumped by" in joint.said) is said
+    assert reader.said == (None if said else "this computer stood still for 0.07 s")
+    reader.runs(round(SHOWN_S * 1000) + 100, joint.late(0))
+    assert reader.said is None
+
+
+def test_a_jump_before_or_after_a_short_gap_is_found_as_ever() -> None:
+    reader = Reader()
+    joint = Joint(reader, speed=0.0)
+    for way in (1, -1):
+        reader.stands(SHORT_MS)
+        reader.runs(200, joint.late(0))
+        joint.offset += 0.3 * way
+        reader.runs(50, joint.late(0))
+        assert "its position jumped by 17.2°" in joint.said
+        assert reader.said is None, "no gap explains it"
+        joint.watch.restart()
+
+
+def test_a_jump_while_it_stood_still_is_no_secret() -> None:
+    reader = Reader()
+    joint = Joint(reader, speed=0.0)
+    reader.runs(500, joint.late(0))
+    reader.stands(100)
+    joint.offset = 6.3  # a turn of its encoder
+    reader.runs(1000, joint.late(0))
+    assert "its position jumped by" in joint.said
+
+
+@pytest.mark.parametrize(("every", "told"), [(1, False), (8, True)])
+def test_pdos_that_did_not_come_while_nobody_read_are_not_missing(every: int, told: bool) -> None:
+    """A PDO each 10 ms, none in 70 ms of each half second; `every` so many one is lost besides."""
+    reader, arrivals = Reader(), Arrivals()
+    for _ in range(20):
+        reader.stands(SHORT_MS)
+        reader.now_ns += TICK_MS * MS
+        reader.standstill.passed(reader.now_ns)
+        for number in range(43):
+            if every == 1 or number % every:
+                arrivals.stamps.append(reader.now_ns)
+            gap = reader.standstill.gap
+            if gap is not None and not reader.standstill.is_even(reader.now_ns):
+                arrivals.excuse(*gap)
+            arrivals.look(reader.now_ns)
+            reader.now_ns += 10 * MS
+            reader.standstill.passed(reader.now_ns)
+    assert (arrivals.finding is not None) is told
 
 
 def test_the_thread_of_a_bus_tells_when_it_did_not_run(bus: CanBus, channel: str) -> None:

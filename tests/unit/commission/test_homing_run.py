@@ -5,6 +5,7 @@ from contextlib import contextmanager
 
 import can
 import pytest
+from msgspec.structs import replace
 
 import eds
 from drivers.bus.settings import CanSettings
@@ -16,7 +17,7 @@ from gateway.commission import homing_run, power, powered_run
 from gateway.commission.bench import CanBench
 from gateway.commission.homing_run import HomingRun, Plan
 from gateway.commission.powered_run import Outcome
-from tests.support.waiting import until
+from tests.support.waiting import WAIT_S, until
 from tests.unit.commission.homing_drive import ATTAINED, COMPLETE, FAILED, NOT_STARTED, UNDER_WAY, HomingDrive
 from tests.unit.joint.standard import S
 
@@ -27,9 +28,10 @@ SETTINGS = JointSettings(
     eds="joint_drive.eds",
     counts_per_revolution=4096,
     gear_ratio=100,
-    stop_timeout_s=0.3,
-    sdo_timeout_s=0.2,
+    stop_timeout_s=3.0,
+    sdo_timeout_s=2.0,
 )
+IMPATIENT = replace(SETTINGS, stop_timeout_s=0.3, sdo_timeout_s=0.5)  # of drives that never do what is asked
 WAY = Plan(Setup(17, 5000, 1000, 20_000), -1000, 100_000, fastest=1e9, lag=5000, time_s=20.0)
 ENABLING = {0x000F, 0x001F}
 
@@ -40,6 +42,7 @@ def soon(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(drive_power, "RESET_S", 0.3)
     monkeypatch.setattr(homing_run, "SETTLED_S", 0.02)
     monkeypatch.setattr(homing_run, "BEGIN_S", 0.2)
+    monkeypatch.setattr(powered_run, "KEEP_S", WAIT_S)
 
 
 @pytest.fixture
@@ -48,10 +51,10 @@ def channel(request: pytest.FixtureRequest) -> str:
 
 
 @contextmanager
-def begun(channel: str, plan: Plan = WAY) -> Iterator[HomingRun]:
+def begun(channel: str, plan: Plan = WAY, settings: JointSettings = SETTINGS) -> Iterator[HomingRun]:
     """A run under power; whoever is in the block keeps it."""
     bench = CanBench("main", CanSettings(interface="virtual", channel=channel))
-    with bench.power(SETTINGS, eds.load(eds.locate("joint_drive.eds", None), NODE)) as found:
+    with bench.power(settings, eds.load(eds.locate("joint_drive.eds", None), NODE)) as found:
         run = HomingRun(found, plan)
         run.start()
         try:
@@ -72,6 +75,7 @@ def finished(run: HomingRun) -> Outcome:
 def until_it_homes(run: HomingRun, drive: HomingDrive) -> None:
     def homes() -> bool:
         run.keep()
+        assert not run.done, run.end()
         return drive.words[-1:] == [0x1F]
 
     until(homes)
@@ -250,7 +254,8 @@ def test_one_that_was_not_begun_has_nothing_to_confirm(channel: str) -> None:
 
 
 def test_a_drive_that_answers_no_more_is_not_taken_for_stopped(channel: str) -> None:
-    with HomingDrive(channel, NODE, home=None, step=0, on_look=errs(silent=True)), begun(channel) as run:
+    silent = HomingDrive(channel, NODE, home=None, step=0, on_look=errs(silent=True))
+    with silent, begun(channel, settings=IMPATIENT) as run:
         outcome = finished(run)
         assert not outcome.off
         assert "NOT confirmed" in outcome.text
@@ -258,7 +263,10 @@ def test_a_drive_that_answers_no_more_is_not_taken_for_stopped(channel: str) -> 
 
 def test_a_drive_that_follows_no_stop_is_told_as_not_disabled(channel: str) -> None:
     deaf = {0x0000, 0x0002}
-    with HomingDrive(channel, NODE, home=None, step=0, deaf_to_words=deaf) as drive, begun(channel) as run:
+    with (
+        HomingDrive(channel, NODE, home=None, step=0, deaf_to_words=deaf) as drive,
+        begun(channel, settings=IMPATIENT) as run,
+    ):
         until_it_homes(run, drive)
         run.stop("STOP was pressed")
         outcome = finished(run)

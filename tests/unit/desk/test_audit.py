@@ -56,7 +56,7 @@ def test_every_way_that_a_write_can_end_is_told(journal: RobotsJournal) -> None:
     audit.take(journal.told().journal.entries)
     assert done(audit) == [
         ("trial of 20 s", STEP, "kept after its trial"),
-        ("trial of 20 s", STEP, "taken back: taken back"),
+        ("trial of 20 s", STEP, "taken back"),
         ("write", STEP, "write taken back: it holds 0.429"),
         ("trial of 20 s", STEP, "claimed by the stop: left as the stop set it"),
         ("write", STEP, "refused: above the maximum 0.6 m"),
@@ -78,6 +78,19 @@ def test_stores_and_stops_are_told_too(journal: RobotsJournal) -> None:
         ("store", "left_knee", "refused: it cannot"),
         ("stop", "", "STOP key"),
         ("stop answered", "", "left_hip: confirmed, left_knee: unconfirmed"),
+    ]
+
+
+def test_the_right_to_write_is_called_control_as_in_the_rest_of_the_window(journal: RobotsJournal) -> None:
+    audit = Audit()
+    journal.say("lease taken")
+    journal.say("lease taken over by somebody")
+    journal.say("write refused", after={STEP: 0.5}, result="somebody has the lease for up to 9.0 s more")
+    audit.take(journal.told().journal.entries)
+    assert done(audit) == [
+        ("control taken", "", ""),
+        ("control taken over by somebody", "", ""),
+        ("write", STEP, "refused: somebody has control for up to 9.0 s more"),
     ]
 
 

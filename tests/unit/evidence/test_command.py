@@ -54,7 +54,7 @@ def test_one_edit_is_shown_with_every_metric(config: str, capsys: pytest.Capture
     assert "worse: 49 gait cycles before, 48 after" in text
     row = next(line for line in text.splitlines() if "tracking error RMS" in line)
     assert row.split()[-1] == "rad"
-    assert "…" in row
+    assert "+19.2 %  +17.5 to +20.9 %" in row
     assert "no data: " in text
     assert "not enough cycles for" not in text
     assert main(["show", "bb", "--config", config, "--json"]) == 0

@@ -214,3 +214,14 @@ def test_a_lead_is_no_better_than_a_lag(before: float, after: float, word: Word)
         values["left_knee.lag"] = (after if at_s >= AT_S else before) + 1e-4 * (at_s % 1.0)
 
     assert metric(compare(cycles(change), spell(), JOINTS), "left_knee.lag").word is word
+
+
+def test_strides_since_it_was_taken_back_are_told_apart() -> None:
+    """They have the old values, and count with those before."""
+    back_ns = round((AT_S + 31.0) * SECOND)
+    reverted = Spell([(0, round(AT_S * SECOND)), (back_ns, 120 * SECOND)], spell(AT_S + 30.0).after)
+    found = compare(cycles(), reverted, JOINTS)
+    since_back = sum(cycle.began_ns >= back_ns and cycle.ended_ns <= 120 * SECOND for cycle in cycles())
+    assert found.cycles_back == since_back > 20
+    assert found.cycles_before - found.cycles_back == compare(cycles(), spell(), JOINTS).cycles_before
+    assert compare(cycles(), spell(), JOINTS).cycles_back == 0
