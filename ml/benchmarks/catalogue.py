@@ -40,6 +40,11 @@ class Benchmark:
     goals: Mapping[str, Goal]
 
 
+_DANGER_GOALS: Final[Mapping[str, Goal]] = {
+    "foreseen": Goal(0.95),
+    "advice_per_hour": Goal(1.0, at_most=True),
+    "stops_per_100_h_upper": Goal(1.0, at_most=True),
+}
 BENCHMARKS: Final = {
     one.name: one
     for one in (
@@ -130,11 +135,14 @@ BENCHMARKS: Final = {
             "synthetic: dangers foreseen 0.3 s before harm, and false alarms; folds of people",
             danger.DANGER,
             danger.evaluate,
-            {
-                "foreseen": Goal(0.95),
-                "advice_per_hour": Goal(1.0, at_most=True),
-                "stops_per_100_h_upper": Goal(1.0, at_most=True),
-            },
+            _DANGER_GOALS,
+        ),
+        Benchmark(
+            "sim-danger-shipped",
+            "the same by the calibration that ships, of wearers whom it has not learned from",
+            danger.DANGER,
+            danger.evaluate_shipped,
+            _DANGER_GOALS,
         ),
     )
 }

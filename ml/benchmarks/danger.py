@@ -11,7 +11,7 @@ import numpy.typing as npt
 from ml.benchmarks.danger_data import SUDDEN, WALKS, Seen, read
 from ml.benchmarks.outcome import Outcome
 from ml.danger.budget import BLOCK_S, BUDGETS, rate_interval, rule_of_three, share_interval, thresholds
-from ml.danger.combine import Calibration, calibrated, evidence, fit, tails
+from ml.danger.combine import Calibration, calibrated, evidence, fit, load, tails
 from ml.danger.detector import DETECTORS
 from ml.danger.levels import Level, Levels
 from ml.danger.now import CHANNELS
@@ -26,7 +26,8 @@ LEAD_S: Final = 0.3  # before harm: what is said later is not foreseen
 PERIOD_S: Final = 0.04
 BINS: Final = 10  # of the reliability diagram
 WHY: Final = (
-    "synthetic: wearers of gwrms sim-record --scenario dangers, judged by weights and thresholds of others."
+    "synthetic: wearers of gwrms sim-record --scenario dangers, judged by weights and thresholds of others"
+    " (sim-danger) or by those that ship (sim-danger-shipped, which learned from wearers 1 to 10 of seed 1)."
     " Foreseen: advice at least 0.3 s before harm in the simulator's truth. …_low and …_high: 95 % intervals;"
     " stops_per_100_h_upper is the one-sided 95 % bound (3 / hours where none was seen)."
 )
@@ -187,6 +188,12 @@ def evaluate(path: Path, search: bool) -> Outcome:  # noqa: ARG001 - there is no
     """Folds of wearers; weights, curve and thresholds by the others alone."""
     seen = read(path)
     return outcome(cross_judged(seen))
+
+
+def evaluate_shipped(path: Path, search: bool) -> Outcome:  # noqa: ARG001 - there is nothing to choose
+    """The calibration that ships, on wearers from whom it was not learned."""
+    calibration = load()
+    return outcome([judge(one, calibration) for one in read(path)])
 
 
 def cross_judged(seen: Sequence[Seen]) -> list[Judged]:

@@ -18,6 +18,7 @@ from ml.danger.now import JOINTS, SIDES, Now, spoken
 
 KEPT: Final = 1000  # moments
 FEWEST: Final = 150  # moments, before one is looked up
+LOOKS: Final = 1200  # a minute and a half of health, till anything is told: much is new before, not wrong
 ALIKE: Final = 5  # moments that are asked
 NEW: Final = 0.3  # squared: a moment that is so far from all others is remembered …
 WAITS_S: Final = 10.0  # … unless something was wrong by so much later
@@ -58,6 +59,7 @@ class Memory:
         self._states = np.zeros((12, KEPT))
         self._values = np.zeros((KEPT, 15))
         self._count = 0
+        self._looks = 0
         self._off = np.zeros(15)
         self._leg = np.zeros(2)  # squared
         self._waiting: collections.deque[tuple[float, Floats, Floats]] = collections.deque()
@@ -87,6 +89,9 @@ class Memory:
         state = np.where(there, state, 0.0)[:, None] / _SCALE
         if self._count >= FEWEST:
             found, nearest = self._compared(state, values)
+        if self._looks < LOOKS:
+            found[:] = np.nan
+        self._looks += learn
         if learn and nearest > NEW:
             self._waiting.append((at_s, state, values))
         while self._waiting and at_s - self._waiting[0][0] > WAITS_S:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
 
+from ml.benchmarks import danger
 from ml.benchmarks.danger import LEAD_S, PERIOD_S, Judged, cross_judged, events, false_alarms, outcome
 from ml.benchmarks.danger_data import HEALTHY, LEARNED_S, OVER, Seen, read
 from ml.benchmarks.reliability import drawn
@@ -133,3 +134,10 @@ def test_what_is_no_such_recording_is_refused_with_its_name(tmp_path: Path) -> N
         read(recording(file, 1))
     with pytest.raises(UnusableData, match="dangers writes"):
         read(recording(file, 1, 2, columns=CHANNELS[1:]))
+
+
+def test_the_calibration_that_ships_learns_nothing_of_whom_it_judges(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(danger, "read", lambda _path: [seen("1"), seen("2", is_seen=False)])
+    monkeypatch.setattr(danger, "learn", lambda *_: pytest.fail("it learned"))
+    found = danger.evaluate_shipped(Path("dangers.jsonl"), search=False)
+    assert (found.figures["events"], found.figures["foreseen"]) == (2.0, 0.5)

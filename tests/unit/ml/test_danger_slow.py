@@ -17,7 +17,7 @@ Change = Callable[[float, dict[str, float]], None]
 Kind = Callable[[], Memory | Creep]
 
 STEP_S = 0.08
-LEARNED_S = 40.0
+LEARNED_S = 110.0
 
 
 def walking(at_s: float) -> dict[str, float]:
@@ -98,6 +98,20 @@ def test_a_set_point_that_runs_away_is_told_of_its_joint_alone() -> None:
     _, own = seen(Memory, "left_knee.target", runs_away)
     _, other = seen(Memory, "right_hip.target", runs_away)
     assert np.nanmax(other) < 0.3 * np.nanmax(own)
+
+
+def test_in_the_first_minute_and_a_half_nothing_is_told() -> None:
+    memory, now = Memory(), Now()
+    found = [
+        memory.measure(moment(at_s, walking(at_s), now), learn=True)
+        for at_s in (0.08 * n for n in range(1199))
+    ]
+    assert np.isnan(found).all()
+    known = memory.measure(moment(LEARNED_S, walking(LEARNED_S), now), learn=True)
+    assert np.isnan(known).all(), "the last look of the time in which nothing is told"
+    assert np.isfinite(
+        memory.measure(moment(LEARNED_S + 1.0, walking(LEARNED_S + 1.0), now), learn=True)
+    ).any()
 
 
 def test_an_imu_that_slips_is_told() -> None:
