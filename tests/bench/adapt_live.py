@@ -1,6 +1,6 @@
-"""What a minute of a wearer's walk teaches the shipped gait phase, as the window learns it, and what that costs.
+"""What a minute of a wearer's walk teaches the shipped gait phase, as the window learns it, and its cost.
 
-    python -m tests.bench adapt_live            # six wearers: some four minutes of processor
+    python -m tests.bench adapt_live            # six wearers: a minute and a half of processor
     python -m tests.bench adapt_live --quick    # one
 
 Simulated wearers whom the shipped model has not met walk as a robot's feed tells it, faster than real time.
