@@ -110,7 +110,7 @@ class RobotEvidence:
 
     def end(self) -> list[Told]:
         """Return what is known of the edits that were still followed; nothing more will come."""
-        told = [self._told(edit, is_final=True) for edit in self._open()]
+        told = [self._told(_left(edit), is_final=True) for edit in self._open()]
         self._over |= {one.edit.id for one in told}
         return told
 
@@ -224,6 +224,11 @@ class RobotEvidence:
             self._over.add(edit.id)
             del self._seen[edit.id]
         return self._told(edit, is_final=is_final)
+
+
+def _left(edit: Edit) -> Edit:
+    """An edit that nobody follows any more: of a trial nobody here hears how it ends."""
+    return replace(edit, state=State.ASKED) if edit.state is State.ON_TRIAL else edit
 
 
 def _load(buses: tuple[BusInfo, ...] | None) -> float | None:

@@ -114,6 +114,21 @@ def test_a_robot_that_starts_again_ends_what_was_followed(events: list[Event]) -
     assert robot.end() == []
 
 
+def test_a_trial_that_nobody_follows_any_more_is_not_on_trial_for_ever(events: list[Event]) -> None:
+    """The robot starts anew, or the desk ends: how the trial ended is not known, and that is what is kept."""
+
+    def on_trial(event: Event) -> Event:
+        if not isinstance(event, Journalled):
+            return event
+        done = {"write done": "trial begun"}
+        made = [one | {"what": done.get(one["what"], one["what"])} for one in event.journal.entries]
+        return Journalled(JournalEntries(made))
+
+    told = followed(map(on_trial, events))[WORSE.write]
+    assert (told.edit.state, told.is_final) == (State.ASKED, True)
+    assert told.evidence.word is Word.WORSE
+
+
 def test_edits_of_before_it_was_followed_are_not_judged(events: list[Event]) -> None:
     first = next(event for event in events if isinstance(event, Telemetry)).batch.stamps_ns[0]
     early = Journalled(
