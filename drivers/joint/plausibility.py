@@ -115,8 +115,8 @@ class FrozenCheck(Noted):
 class JumpCheck(Noted):
     """The position changes from one sample to the next by more than the joint's speed explains.
 
-    Across a gap in sampling, ours or the drive's, nobody knows its speed: what it can have gone at its fastest
-    is no jump then.
+    Across a gap in sampling, ours or the drive's, nobody knows its speed: what it can have gone at its
+    fastest is no jump then.
     """
 
     def __init__(self) -> None:

@@ -110,6 +110,13 @@ class JournalEdits:
         """Forget edits that were over long ago, or of which nothing was heard since."""
         self.all = [edit for edit in self.all if _last_ns(edit, before_ns) >= before_ns]
 
+    def lose_sight(self, at_ns: int) -> None:
+        """Of trials that go on nobody hears from now on how they end."""
+        self.all = [
+            replace(edit, state=State.ASKED, ended_ns=at_ns) if edit.state is State.ON_TRIAL else edit
+            for edit in self.all
+        ]
+
     def _take(self, entry: Entry, what: str) -> None:
         if what == "write":
             begun = _begun(self._robot, entry)
@@ -207,8 +214,8 @@ def spell(edit: Edit, edits: Sequence[Edit]) -> tuple[Spell, tuple[str, ...]]:
     """Return when old and new values were in force undisturbed by the other `edits`; and what has disturbed.
 
     Once an edit was taken back, the walk goes on with the old values: that is another stretch of before,
-    which tells a drift from an effect better than anything. It does not where another value came back than was
-    there before: that of before a trial which this one has taken over, of a stop, or of somebody else.
+    which tells a drift from an effect better than anything. It does not where another value came back than
+    was there before: that of before a trial which this one has taken over, of a stop, or of somebody else.
     """
     took_over = {other.id for other in edits if _is_taken_over(other, edit)}
     others = [

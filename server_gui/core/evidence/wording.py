@@ -36,7 +36,7 @@ def share(one: Measured) -> str:
         return NONE
     if not _is_share(one):
         return f"{one.difference:+.3g}{POINTS if one.unit == PERCENT else ''}"
-    return f"{one.difference / abs(one.before):+.1%}".replace("%", " %")
+    return f"{one.difference / abs(one.before or 1.0):+.1%}".replace("%", " %")
 
 
 def _is_share(one: Measured) -> bool:

@@ -107,7 +107,7 @@ def test_two_edits_that_overlap_say_so_and_share_nothing() -> None:
 
 
 def test_a_trial_that_takes_over_another_is_judged_against_what_it_found() -> None:
-    """What comes back at its end is of before the first one: that is no stretch of what it is compared with."""
+    """What comes back at its end is of before the first one, and not what it is compared with."""
     edits = journal(
         (200, "write", 1),
         (201, "trial begun", 1),
