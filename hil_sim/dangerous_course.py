@@ -78,8 +78,9 @@ class Course:
         danger, clock = DANGERS[name], self._robot.clock
         warmth = {drive.name: drive.temperature_c for drive in self._robot.simulated_drives}
         on, params = danger.drawn(self._source)
+        seen = Seen(self._robot, on, weak=self._robot.controller.generator.impairment[0])
         self._faults.begin(danger.fault, on, None, params)
-        seen, self.now = Seen(self._robot, on), 1.0 + list(DANGERS).index(name)
+        self.now = 1.0 + list(DANGERS).index(name)
         end_s = clock.now_s + LONGEST_S
         while clock.now_s < end_s and not self.harmed:
             yield True

@@ -24,7 +24,7 @@ TOLD_WRONG_RAD: Final = math.radians(10.0)  # a tilt that is told so wrongly
 SHAKING_RAD_S: Final = 0.8  # RMS of a joint's trembling about its demand
 SHAKEN_S: Final = 0.1  # over which the trembling is averaged
 RESISTED_NM: Final = 50.0
-DROPPED: Final = 0.85  # of a leg's strength lost: its toes drag
+DROPPED: Final = 0.85  # of what strength this wearer's leg had: its toes drag
 BEARS_N: Final = 200.0  # a foot that bears less says little
 HOT_C: Final = 100.0  # the drive switches itself off, and the leg gives way
 
@@ -39,6 +39,7 @@ class Seen:
     robot: Exoskeleton
     on: str
     shaking: float = 0.0  # rad²/s², smoothed
+    weak: float = 0.0  # of the left leg's strength is what this wearer has always lacked
 
     @property
     def joint(self) -> int:
@@ -110,7 +111,8 @@ def _told_wrong(seen: Seen) -> bool:
 
 
 def _dropped(seen: Seen) -> bool:
-    return seen.robot.controller.generator.impairment[0] > DROPPED
+    has = 1.0 - seen.weak
+    return has - (1.0 - seen.robot.controller.generator.impairment[0]) > DROPPED * has
 
 
 KNEES: Final = ("left_knee", "right_knee")
@@ -150,7 +152,7 @@ DANGERS: Final[Mapping[str, Danger]] = {
     ),
     "fatigue": Danger(
         "fatigue", WEARER, {"percent_per_s": (7.0, 14.0), "asymmetry": (0.15, 0.5)}, _dropped,
-        "the left leg has lost 85 % of its swing's strength: its toes drag",
+        "the left leg has lost 85 % of the strength that its swing had: its toes drag",
     ),
     "trip": Danger("trip_and_fall", WEARER, {"after_s": (0.25, 0.6)}, _on_ground, _IMPACT),
     "slip": Danger("foot_slips", WEARER, {}, _on_ground, _IMPACT),

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from ml.benchmarks import folds, ipol, losses, metrics
+from ml.benchmarks import coverage, folds, ipol, losses, metrics
 from ml.benchmarks.models.gait_phase import PhaseModel, PhaseSettings
 from ml.benchmarks.outcome import Outcome
 from ml.benchmarks.phase import WHY, WITHIN, errors_of, fitted, percent
@@ -103,13 +103,20 @@ def _cut(others: Decisions, minute: dict[int, int], judge: Decisions, settings: 
 
 def _outcome(judged: list[Decisions], every: list[Pairs], settings: str) -> Outcome:
     pairs = [one[0.0] for one in every]
+    subject = np.concatenate([own.subject for own in judged])
+    intervals = [
+        coverage.of_intervals(np.concatenate(column), subject) for column in zip(*pairs, strict=True)
+    ]
     by_subject = {}
     for own, (before, after) in zip(judged, pairs, strict=True):
+        rows = subject == own.subject[0]
         by_subject[str(own.subject[0])] = {
             "rmse_percent": percent(before),
             "adapted_rmse_percent": percent(after),
             "in_step_rmse_percent": percent(before[own.in_step]),
             "in_step_adapted_rmse_percent": percent(after[own.in_step]),
+            **_intervals("", rows, *intervals[0]),
+            **_intervals("adapted_", rows, *intervals[1]),
         }
     first = next(iter(by_subject.values()))
     mean = {name: float(np.nanmean([one[name] for one in by_subject.values()])) for name in first}
@@ -119,6 +126,9 @@ def _outcome(judged: list[Decisions], every: list[Pairs], settings: str) -> Outc
         "in_step_adaptation_cut": 1.0 - mean["in_step_adapted_rmse_percent"] / mean["in_step_rmse_percent"],
         "accuracy": float((np.abs(adapted) <= WITHIN).mean()),
     }
+    for name in ("", "adapted_"):
+        alone = {one: {"covered": found[f"{name}covered"]} for one, found in by_subject.items()}
+        figures |= {f"{name}{figure}": value for figure, value in coverage.figures(alone).items()}
     for share in losses.SHARES:
         general, personal = (
             float(np.mean([percent(one[share][which]) for one in every])) for which in (0, 1)
@@ -126,3 +136,13 @@ def _outcome(judged: list[Decisions], every: list[Pairs], settings: str) -> Outc
         figures[losses.at("adapted_rmse_percent", share)] = personal
         figures[losses.at("adaptation_cut", share)] = 1.0 - personal / general
     return Outcome(figures, len(by_subject), by_subject, settings=settings, notes=(WHY,))
+
+
+def _intervals(
+    name: str, rows: npt.NDArray[np.bool_], covered: npt.NDArray[np.bool_], width: npt.NDArray[np.float64]
+) -> dict[str, float]:
+    """One subject's interval, which comes from all the others', and how much of his errors it holds."""
+    return {
+        f"{name}covered": float(covered[rows].mean()),
+        f"{name}interval_percent": 100.0 * float(width[rows].mean()),
+    }

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from ml.benchmarks import folds, ipol, losses, metrics
+from ml.benchmarks import coverage, folds, ipol, losses, metrics
 from ml.benchmarks.models.gait_phase import PhaseModel, PhaseSettings
 from ml.benchmarks.outcome import Outcome
 from ml.benchmarks.search import Search, chosen, told
@@ -73,6 +73,7 @@ def errors_of(model: PhaseModel, data: Decisions) -> npt.NDArray[np.float64]:
 def _outcome(data: Decisions, by_share: Errors, settings: str) -> Outcome:
     error = by_share[0.0]
     hindsight = metrics.circular_error(data.hindsight, data.phase)
+    covered, width = coverage.of_intervals(error, data.subject)
     by_subject = {}
     for subject in np.unique(data.subject):
         own = data.subject == subject
@@ -81,6 +82,8 @@ def _outcome(data: Decisions, by_share: Errors, settings: str) -> Outcome:
             "in_step_rmse_percent": percent(error[own & data.in_step]),
             "hindsight_rmse_percent": percent(hindsight[own & ~np.isnan(hindsight)]),
             "in_step_fraction": float(data.in_step[own].mean()),
+            "covered": float(covered[own].mean()),
+            "interval_percent": 100.0 * float(width[own].mean()),
         }
     figures = {
         "rmse_percent": _mean(by_subject, "rmse_percent"),
@@ -89,6 +92,8 @@ def _outcome(data: Decisions, by_share: Errors, settings: str) -> Outcome:
         "hindsight_rmse_percent": _mean(by_subject, "hindsight_rmse_percent"),
         "in_step_fraction": float(data.in_step.mean()),
         "accuracy": float((np.abs(error) <= WITHIN).mean()),
+        **coverage.figures(by_subject),
+        "interval_percent": _mean(by_subject, "interval_percent"),
     }
     for share in losses.SHARES:
         of_people = [percent(by_share[share][data.subject == one]) for one in np.unique(data.subject)]

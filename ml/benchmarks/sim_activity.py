@@ -7,7 +7,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from ml.benchmarks import metrics
+from ml.benchmarks import coverage, metrics
 from ml.benchmarks.folds import Split
 from ml.benchmarks.outcome import Outcome
 from ml.benchmarks.search import Search
@@ -47,6 +47,7 @@ class Judged:
     probabilities: npt.NDArray[np.float64]
     label: npt.NDArray[np.int_]
     novelty: npt.NDArray[np.float64]
+    covered: npt.NDArray[np.bool_]  # the truth is in the conformal set
 
     @property
     def known(self) -> npt.NDArray[np.bool_]:
@@ -61,6 +62,11 @@ class Judged:
     def macro_f1(self, rows: npt.NDArray[np.bool_]) -> float:
         rows = rows & self.known
         return metrics.macro_f1(self.truth[rows], self.likeliest[rows], len(self.classes))
+
+    def sets(self, rows: npt.NDArray[np.bool_]) -> dict[str, float]:
+        """What these rows show of conformal sets."""
+        right = self.likeliest == self.truth
+        return coverage.of_rows(self.covered, self.label != NONE, right, rows & self.known)
 
 
 def evaluate(path: Path, search: Search) -> Outcome:  # noqa: ARG001 - there is nothing to choose
@@ -78,18 +84,17 @@ def evaluate(path: Path, search: Search) -> Outcome:  # noqa: ARG001 - there is 
     figures = _figures(judged, whole)
     figures |= {f"{name}macro_f1": one.macro_f1(everything) for name, one in others.items()}
     by_subject = {
-        str(one): {"macro_f1": judged.macro_f1(whole.subject == one)} for one in np.unique(whole.subject)
+        str(one): {"macro_f1": judged.macro_f1(whole.subject == one)} | judged.sets(whole.subject == one)
+        for one in np.unique(whole.subject)
     }
     figures["worst_subject_macro_f1"] = min(one["macro_f1"] for one in by_subject.values())
+    figures |= coverage.figures(by_subject)
     counts = metrics.confusion(
         judged.truth[judged.known], judged.likeliest[judged.known], len(judged.classes)
     )
     walks = by_walks(
         whole,
-        lambda rows: {
-            "macro_f1": judged.macro_f1(rows),
-            "unknown_fraction": float((judged.label[rows & judged.known] == NONE).mean()),
-        },
+        lambda rows: {"macro_f1": judged.macro_f1(rows)} | judged.sets(rows),
     )
     if walks:
         figures["worst_walks_macro_f1"] = min(one["macro_f1"] for one in walks.values())
@@ -106,24 +111,26 @@ def _judged(variant: Variant, taught: Examples, seen: Examples) -> Judged:
         train, held_out = split
         learned = learn(ACTIVITY, recipe, taught.features[train], names[train], taught.subject[train])
         said = learned.judge(seen.features[held_out])
-        return learned.classes, said.probabilities, said.label, said.novelty
+        sets = learned.together(said.probabilities)
+        within = (sets & (names[held_out, None] == np.array(learned.classes))).any(axis=1)
+        return learned.classes, said.probabilities, said.label, said.novelty, within
 
     classes = ACTIVITY.classes(recipe)
     place = {name: number for number, name in enumerate(classes)}
     truth = np.array([place.get(name, OTHER) for name in names])
     probabilities = np.zeros((len(truth), len(classes)))
     label, novelty = np.full(len(truth), NONE), np.zeros(len(truth))
-    for (_, held_out), (told, likely, said, strange) in in_folds(taught.subject, fold):
+    covered = np.zeros(len(truth), dtype=bool)
+    for (_, held_out), (told, likely, said, strange, within) in in_folds(taught.subject, fold):
         columns = np.array([place[name] for name in told])
         probabilities[np.ix_(held_out, columns)] = likely
         label[held_out] = np.where(said == NONE, NONE, columns[said])
-        novelty[held_out] = strange
-    return Judged(classes, truth, probabilities, label, novelty)
+        novelty[held_out], covered[held_out] = strange, within
+    return Judged(classes, truth, probabilities, label, novelty, covered)
 
 
 def _figures(judged: Judged, seen: Examples) -> dict[str, float]:
-    known, said = judged.known, judged.label != NONE
-    right = judged.likeliest == judged.truth
+    known = judged.known
     strange = judged.novelty >= ABNORMAL_FROM
     lost = np.isin(seen.label, list(LOST))
     bins = calibrated(judged.probabilities[known], judged.truth[known])
@@ -131,9 +138,8 @@ def _figures(judged: Judged, seen: Examples) -> dict[str, float]:
         "macro_f1": judged.macro_f1(known),
         "worst_subject_macro_f1": float("nan"),
         "steady_macro_f1": judged.macro_f1(_steady(seen)),
-        "accuracy": float(right[known].mean()),
-        "said_accuracy": float(right[known & said].mean()) if (known & said).any() else float("nan"),
-        "unknown_fraction": float(1.0 - said[known].mean()),
+        "accuracy": metrics.accuracy(judged.truth[known], judged.likeliest[known]),
+        **judged.sets(known),
         "calibration_error": sum(abs(one.said - one.right) * one.count for one in bins) / int(known.sum()),
         "abnormal_false_fraction": float(strange[known].mean()),
         "abnormal_found_fraction": float(strange[lost].mean()) if lost.any() else float("nan"),

@@ -7,7 +7,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from ml.benchmarks import metrics
+from ml.benchmarks import coverage, metrics
 from ml.benchmarks.folds import Split
 from ml.benchmarks.outcome import Outcome
 from ml.benchmarks.phase import WITHIN, percent
@@ -56,18 +56,17 @@ def evaluate(path: Path, search: Search) -> Outcome:  # noqa: ARG001 - there is 
         figures[f"{variant.name}rmse_percent"] = percent(
             _judged(variant, seen, seen, truth, known)[0][steps].ravel()
         )
-    by_subject = {
-        str(one): {"rmse_percent": percent(error[steps & (whole.subject == one)].ravel())}
-        for one in np.unique(whole.subject)
-    }
+    right = steps & (np.abs(error) <= learn.WITHIN).all(axis=1)
+
+    def of_rows(rows: Flags) -> dict[str, float]:
+        sets = coverage.of_rows(right | ~said, said, right, rows & known)
+        unsaid = {"unknown_fraction": float(1.0 - said[steps & rows].mean())}
+        return {"rmse_percent": percent(error[steps & rows].ravel())} | sets | unsaid
+
+    by_subject = {str(one): of_rows(whole.subject == one) for one in np.unique(whole.subject)}
     figures["worst_subject_rmse_percent"] = max(one["rmse_percent"] for one in by_subject.values())
-    walks = by_walks(
-        whole,
-        lambda rows: {
-            "rmse_percent": percent(error[steps & rows].ravel()),
-            "unknown_fraction": float(1.0 - said[steps & rows].mean()),
-        },
-    )
+    figures |= coverage.figures(by_subject)
+    walks = by_walks(whole, of_rows)
     if walks:
         figures["worst_walks_rmse_percent"] = max(one["rmse_percent"] for one in walks.values())
     groups, by = (walks, "walks") if walks else (by_subject, "subject")

@@ -23,6 +23,7 @@ from ml.benchmarks.sim import WHOLE, recipe_of
 from ml.errors import UnusableData
 from ml.registry.card import Card
 from ml.registry.registry import SHIPPED, Registry
+from ml.robot.learn import WITHIN
 from ml.robot.learned import ABNORMAL_FROM, NONE, Learned
 from ml.robot.task import ACTIVITY, GAIT_PHASE, SIDES, Task
 from ml.training.adapting import taught
@@ -37,6 +38,7 @@ WHY: Final = (
 )
 
 Floats = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,6 +52,9 @@ class Found:
     error: Floats  # (m, 2) of the phases, of the cycle
     before: Floats  # (k, 2) the same after the first minute; none where too little comes then
     after: Floats  # (k, 2) of the adapted model
+    covered: Flags  # (n,) the truth of the activity is in the conformal set
+    missed_before: Flags  # (k,) a phase is said, and a leg is off by more than a tenth
+    missed_after: Flags
 
 
 def evaluate(path: Path, search: Search) -> Outcome:  # noqa: ARG001 - there is nothing to choose
@@ -113,27 +118,35 @@ def _found(session: Session, activity: Learned, phase: Learned) -> Found:
     steps = known & ~np.isnan(truth).any(axis=1)
     early = seen.time_ns - session.stamps_ns[0] < MINUTE_NS
     later = steps & ~early
-    error = _errors(phase, seen.features[steps], truth[steps])
-    before = after = np.zeros((0, 2))
-    if later.sum() >= LEAST_LATER:
+    error, missed = _errors(phase, seen.features[steps], truth[steps])
+    if later.sum() < LEAST_LATER:
+        later = np.zeros_like(later)
+    before, missed_before = error[later[steps]], missed[later[steps]]
+    after, missed_after = before, missed_before
+    if later.any():
         own = taught(phase, seen.features[known & early], truth[known & early])
-        before = error[later[steps]]
-        after = _errors(own, seen.features[later], truth[later])
+        after, missed_after = _errors(own, seen.features[later], truth[later])
+    doing_now = np.array([place[name] for name in names[rows]], dtype=np.int_)
     return Found(
         session.walks,
-        np.array([place[name] for name in names[rows]], dtype=np.int_),
+        doing_now,
         said.probabilities.argmax(axis=1),
         (said.label == NONE) | (said.novelty >= ABNORMAL_FROM),
         error,
         before,
         after,
+        activity.together(said.probabilities)[np.arange(len(doing_now)), doing_now],
+        missed_before,
+        missed_after,
     )
 
 
-def _errors(model: Learned, features: npt.NDArray[np.float32], truth: Floats) -> Floats:
+def _errors(model: Learned, features: npt.NDArray[np.float32], truth: Floats) -> tuple[Floats, Flags]:
+    """Both legs' errors (n, 2), and whether a phase is said that is off by more than a tenth (n,)."""
     verdicts = model.judge(features)
     phases = np.stack([verdicts.values[side] for side in SIDES], axis=1)
-    return metrics.circular_error(phases, truth)
+    error = metrics.circular_error(phases, truth)
+    return error, (verdicts.label != NONE) & (np.abs(error) > WITHIN).any(axis=1)
 
 
 def _figures(found: Sequence[Found], classes: int) -> dict[str, float]:
@@ -145,11 +158,19 @@ def _figures(found: Sequence[Found], classes: int) -> dict[str, float]:
         "macro_f1": metrics.macro_f1(truth, likeliest, classes),
         "said_accuracy": float(right[~unknown].mean()) if not unknown.all() else float("nan"),
         "unknown_fraction": float(unknown.mean()),
+        "covered": float(np.concatenate([one.covered for one in found]).mean()),
         "rmse_percent": percent(np.concatenate([one.error for one in found]).ravel()),
         "later_rmse_percent": percent(np.concatenate([one.before for one in found]).ravel()),
         "adapted_rmse_percent": percent(np.concatenate([one.after for one in found]).ravel()),
+        "later_covered": _covered([one.missed_before for one in found]),
+        "adapted_covered": _covered([one.missed_after for one in found]),
         "people": len(found),
     }
+
+
+def _covered(missed: Sequence[Flags]) -> float:
+    every = np.concatenate(missed)
+    return float(1.0 - every.mean()) if len(every) else float("nan")
 
 
 def _adaptation(found: Sequence[Found]) -> dict[str, float]:

@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from ml.benchmarks import folds, ipol, losses, metrics
+from ml.benchmarks import coverage, folds, ipol, losses, metrics
 from ml.benchmarks.models.gait_status import StatusSettings, status_model
 from ml.benchmarks.outcome import Outcome
 from ml.benchmarks.search import Search, chosen, told
@@ -69,18 +69,19 @@ def evaluate(path: Path, search: Search) -> Outcome:
     rows = {0.0: data.features}
     rows |= {share: decisions(ipol.lossy(trials, share)).features for share in losses.SHARES}
     work = folds.over(lambda split: _fold(data, rows, split, search), splits)
-    predicted = {share: np.empty_like(data.truth) for share in rows}
+    likely = {share: np.zeros((len(data.truth), len(ipol.STATUSES))) for share in rows}
     for (_, held_out), (found, _) in zip(splits, work, strict=True):
-        for share, labels in found.items():
-            predicted[share][held_out] = labels
-    return _outcome(data, predicted, told([settings for _, settings in work], search))
+        for share, probabilities in found.items():
+            likely[share][held_out] = probabilities
+    return _outcome(data, likely, told([settings for _, settings in work], search))
 
 
 Rows = Mapping[float, npt.NDArray[np.float32]]  # features by the share of packets that are lost
-Labels = dict[float, npt.NDArray[np.int_]]
+Floats = npt.NDArray[np.float64]
+Likely = dict[float, Floats]  # (n, statuses) probabilities
 
 
-def _fold(data: Decisions, every: Rows, split: folds.Split, search: Search) -> tuple[Labels, StatusSettings]:
+def _fold(data: Decisions, every: Rows, split: folds.Split, search: Search) -> tuple[Likely, StatusSettings]:
     train, held_out = split
     settings = chosen(
         SETTINGS,
@@ -90,22 +91,24 @@ def _fold(data: Decisions, every: Rows, split: folds.Split, search: Search) -> t
         lambda one, rows, judge: _score(data, one, train[rows], train[judge]),
     )
     model = _fitted(data, settings, train)
-    return {share: _predict(model, rows[held_out], settings) for share, rows in every.items()}, settings
+    return {share: _likely(model, rows[held_out], settings) for share, rows in every.items()}, settings
 
 
 def _fitted(data: Decisions, settings: StatusSettings, train: folds.Rows) -> Any:
     return status_model(settings).fit(data.features[train], data.truth[train])
 
 
-def _predict(model: Any, features: npt.NDArray[np.float32], settings: StatusSettings) -> npt.NDArray[np.int_]:
-    """The class that is likeliest, turns weighted."""
+def _likely(model: Any, features: npt.NDArray[np.float32], settings: StatusSettings) -> Floats:
+    """(n, statuses): the probability of each, turns weighted."""
     weights = np.where(model.classes_ == ipol.TURN, settings.turn_weight, 1.0)
-    return np.asarray(model.classes_[(model.predict_proba(features) * weights).argmax(axis=1)], dtype=np.int_)
+    likely = np.zeros((len(features), len(ipol.STATUSES)))
+    likely[:, model.classes_] = model.predict_proba(features) * weights
+    return np.asarray(likely / likely.sum(axis=1, keepdims=True))
 
 
 def _score(data: Decisions, settings: StatusSettings, train: folds.Rows, judge: folds.Rows) -> float:
-    predicted = _predict(_fitted(data, settings, train), data.features[judge], settings)
-    return _mean_f1(data.truth[judge], predicted, data.subject[judge])
+    likely = _likely(_fitted(data, settings, train), data.features[judge], settings)
+    return _mean_f1(data.truth[judge], likely.argmax(axis=1), data.subject[judge])
 
 
 def _mean_f1(
@@ -118,8 +121,10 @@ def _f1(truth: npt.NDArray[np.int_], predicted: npt.NDArray[np.int_], rows: npt.
     return metrics.macro_f1(truth[rows], predicted[rows], len(ipol.STATUSES))
 
 
-def _outcome(data: Decisions, by_share: Labels, settings: str) -> Outcome:
-    predicted = by_share[0.0]
+def _outcome(data: Decisions, by_share: Likely, settings: str) -> Outcome:
+    predicted = by_share[0.0].argmax(axis=1)
+    covered, said = coverage.of_sets(by_share[0.0], data.truth, data.subject)
+    right = predicted == data.truth
     by_subject = {}
     for subject in np.unique(data.subject):
         own = data.subject == subject
@@ -127,14 +132,19 @@ def _outcome(data: Decisions, by_share: Labels, settings: str) -> Outcome:
             "macro_f1": _f1(data.truth, predicted, own),
             "steady_macro_f1": _f1(data.truth, predicted, own & data.steady),
             "accuracy": metrics.accuracy(data.truth[own], predicted[own]),
+            **coverage.of_rows(covered, said, right, own),
         }
     figures = {
         "macro_f1": float(np.mean([one["macro_f1"] for one in by_subject.values()])),
         "worst_subject_macro_f1": min(one["macro_f1"] for one in by_subject.values()),
         "steady_macro_f1": float(np.mean([one["steady_macro_f1"] for one in by_subject.values()])),
         "accuracy": metrics.accuracy(data.truth, predicted),
+        **coverage.of_rows(covered, said, right, np.ones_like(said)),
+        **coverage.figures(by_subject),
     }
     for share in losses.SHARES:
-        figures[losses.at("macro_f1", share)] = _mean_f1(data.truth, by_share[share], data.subject)
+        figures[losses.at("macro_f1", share)] = _mean_f1(
+            data.truth, by_share[share].argmax(axis=1), data.subject
+        )
     counts = metrics.confusion(data.truth, predicted, len(ipol.STATUSES))
     return Outcome(figures, len(by_subject), by_subject, "subject", ipol.STATUSES, counts, settings)

@@ -16,15 +16,15 @@ Floats = npt.NDArray[np.float64]
 
 SHIPPED: Final = Path(__file__).with_name("calibration.json")
 RARE: Final = 0.1  # of the healthy blocks
-LEAST_SCALE: Final = 0.1
+LEAST_SCALE: Final = 0.5  # spreads
 BALANCED: Final = 0.1  # regularisation of the weights
 
 
 class Calibration(msgspec.Struct, frozen=True):
     """What was learned from simulated wearers.
 
-    `floor` and `scale` of each detector make evidence of its spreads, `weights` are of the evidence, `bias`
-    makes log odds of it; `odds` → `share` is what came true.
+    `floor` and `scale` of each detector make evidence of its spreads, `weights` are of the worst and of the
+    second of it, `bias` makes log odds of them; `odds` → `share` is what came true.
     `thresholds` are log odds by level's name, `budgets` the false alarms an hour that they are set for.
     """
 
@@ -56,22 +56,21 @@ class Calibration(msgspec.Struct, frozen=True):
 
 
 def evidence(above: Floats, floor: Sequence[float], scale: Sequence[float]) -> Floats:
-    """(…, n) → (…, n + 2): how rare each detector's spreads are, then the worst two; NaN says nothing.
+    """(…, n) → (…, 2): how rare the spreads of the two worst detectors are; NaN says nothing.
 
     Below `floor`, which a tenth of all healthy blocks exceeds, nothing is said; from there on it is counted
     in `scale`, the mean by which these blocks exceed it: one number means the same of each detector.
     """
-    logs = np.maximum((np.log1p(np.nan_to_num(above)) - np.array(floor)) / np.array(scale), 0.0)
-    worst = np.partition(logs, -2, axis=-1)[..., :-3:-1]
-    both: Floats = np.concatenate([logs, worst], axis=-1)
-    return both
+    beyond = np.maximum((np.nan_to_num(above) - np.array(floor)) / np.array(scale), 0.0)
+    worst: Floats = np.partition(beyond, -2, axis=-1)[..., :-3:-1]
+    return worst
 
 
 def tails(maxima: Floats) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Floor and scale of each detector from the maxima of healthy blocks, (blocks, detectors)."""
-    logs = np.log1p(np.nan_to_num(maxima))
-    floor = np.quantile(logs, 1.0 - RARE, axis=0)
-    beyond = [column[column >= low] - low for column, low in zip(logs.T, floor, strict=True)]
+    spreads = np.nan_to_num(maxima)
+    floor = np.quantile(spreads, 1.0 - RARE, axis=0)
+    beyond = [column[column >= low] - low for column, low in zip(spreads.T, floor, strict=True)]
     scale = [max(float(part.mean()), LEAST_SCALE) for part in beyond]
     return tuple(floor.tolist()), tuple(scale)
 
@@ -120,8 +119,8 @@ def _unfit(one: Calibration) -> Iterator[str]:
     """Why it would say what is not so."""
     if one.detectors != DETECTORS:
         yield f"it is of the detectors {', '.join(one.detectors)}, and these are {', '.join(DETECTORS)}"
-    if not len(one.floor) == len(one.scale) == len(DETECTORS) == len(one.weights) - 2:
-        yield "it does not have a floor, a scale and a weight of each detector, and two weights of the worst"
+    if not len(one.floor) == len(one.scale) == len(DETECTORS) or len(one.weights) != 2:
+        yield "it does not have a floor and a scale of each detector, and the two weights of the worst"
     if min((*one.weights, *one.scale), default=-1.0) < 0.0:
         yield "a weight or a scale is negative: evidence would speak against danger"
     if not one.odds or len(one.odds) != len(one.share):

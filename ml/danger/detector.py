@@ -10,7 +10,22 @@ from ml.danger.now import Now
 
 Floats = npt.NDArray[np.float64]
 
-DETECTORS: Final = ("tracking", "torque", "strides", "support", "balance", "rhythm", "agreement", "drift")
+DETECTORS: Final = (
+    "tracking",
+    "torque",
+    "strides",
+    "support",
+    "balance",
+    "rhythm",
+    "agreement",
+    "drift",
+    "creep",
+    "set-points",
+    "effort",
+    "loads",
+    "lean",
+    "legs",
+)
 
 
 class Detector(Protocol):

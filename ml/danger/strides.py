@@ -1,7 +1,7 @@
 """(c) Each stride against those most alike of this wearer's own: asymmetry, loads, lean and torque.
 
 Stairs, ramps and turns have strides of their own; so a part of a stride is compared with that part of those
-healthy strides whose other parts were alike.
+healthy strides whose other parts were alike. Where none was, as in a first stride on stairs, little is said.
 """
 
 import math
@@ -16,6 +16,7 @@ KEPT: Final = 160  # strides of each side; newer ones take the place of older on
 FEWEST: Final = 14  # strides, before there is anything to compare with
 NEIGHBOURS: Final = 4
 FARTHEST: Final = 9.0  # squared spreads: more apart in one number says no more
+DOUBTED: Final = 1.5  # squared spreads a number, from the strides most alike: half is believed
 STALE_S: Final = 3.0
 MEASURES: Final = 34
 KILO: Final = 1000.0  # loads in kilonewtons are of the size of angles
@@ -33,6 +34,7 @@ PARTS: Final = (
 _IN_PART: Final = np.array(
     [[at in numbers for at in range(MEASURES)] for _, numbers in PARTS], dtype=np.float64
 )
+_OTHERS: Final = MEASURES - _IN_PART.sum(axis=1)
 
 
 class _Side:
@@ -100,10 +102,12 @@ class _Side:
         of_part = square @ _IN_PART.T
         others = of_part.sum(axis=1, keepdims=True) - of_part
         near = np.argpartition(others, NEIGHBOURS, axis=0)[:NEIGHBOURS]
+        distance = np.take_along_axis(others, near, axis=0).mean(axis=0) / _OTHERS
         found = np.empty(len(PARTS))
         for at, (_, numbers) in enumerate(PARTS):
             found[at] = np.abs(off[near[:, at]][:, numbers].mean(axis=0)).max()
-        return found
+        believed: Floats = found / (1.0 + (distance / DOUBTED) ** 2)
+        return believed
 
     def learn(self, stride: Floats) -> None:
         """Keep it, and follow how much one differs from the next."""

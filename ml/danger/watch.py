@@ -12,9 +12,11 @@ import numpy.typing as npt
 from ml.danger.agreement import Agreement
 from ml.danger.balance import Balance
 from ml.danger.combine import Calibration
+from ml.danger.creep import Creep
 from ml.danger.detector import DETECTORS, Detector
 from ml.danger.drift import Drift
 from ml.danger.levels import Level, Levels
+from ml.danger.memory import Memory, kinds
 from ml.danger.now import CHANNELS, Now
 from ml.danger.rhythm import Rhythm
 from ml.danger.strides import Strides
@@ -29,6 +31,8 @@ PERIOD_S: Final = 0.035  # rows that come sooner after another are passed over: 
 HELD_S: Final = 0.1  # a value that is older is missing
 LEARNS_BELOW: Final = 15.0  # spreads above what is usual: models follow what is less
 TOLD: Final = 3  # reasons
+STRANGE_S: Final = 0.8  # after a moment that was like none before, some detectors cannot judge yet
+COMPARE: Final = ("tracking", "torque", "strides", "support", "rhythm", "agreement")  # these
 TELLING: Final = 2.0  # spreads from which on a detector is a reason
 
 
@@ -57,22 +61,26 @@ class Verdict:
         return "; ".join(self.why) or "several things together, none of which would tell it alone"
 
 
-def detectors() -> tuple[Detector, ...]:
+def detectors(memory: Memory) -> tuple[Detector, ...]:
     """New ones, for one robot, in the order of `DETECTORS`."""
-    return Tracking(), Torque(), Strides(), Support(), Balance(), Rhythm(), Agreement(), Drift()
+    first = (Tracking(), Torque(), Strides(), Support(), Balance(), Rhythm(), Agreement(), Drift(), Creep())
+    return *first, *kinds(memory)
 
 
 class Evidence:
     """How far each detector is above what is usual on this robot, moment by moment; bounded in memory."""
 
     def __init__(self) -> None:
-        self.detectors = detectors()
+        self._memory = Memory()
+        self.detectors = detectors(self._memory)
         bounds = accumulate((len(one.keys) for one in self.detectors), initial=0)
         self._parts = [slice(*pair) for pair in pairwise(bounds)]
         self._starts = np.array([part.start for part in self._parts])
         least = np.concatenate([one.least for one in self.detectors])
         self._usual = Usual(least), Usual(least)  # of somebody who stands, and who walks
         self._now = Now()
+        self._compare = [at for at, one in enumerate(self.detectors) if one.name in COMPARE]
+        self._strange_s = -math.inf
         self._worst = 0.0
         self.keys = np.full(self._parts[-1].stop, np.nan)
 
@@ -86,6 +94,10 @@ class Evidence:
         above = np.fmax.reduceat(self.keys, self._starts)
         worst = float(np.fmax.reduce(above))
         self._worst = 0.0 if math.isnan(worst) else worst
+        if not self._memory.alike:
+            self._strange_s = at_s
+        if at_s - self._strange_s <= STRANGE_S:
+            above[self._compare] = math.nan
         return above
 
     def why(self, above: Floats) -> tuple[str, ...]:

@@ -1,11 +1,11 @@
 """Learning: features and truth → a model that knows how far to trust itself.
 
-Probabilities, the threshold below which it abstains and the limit of what it knows come from people who were
-left out; then it learns from all.
+Probabilities, what it promises of its sets and the limit of what it knows come from people who were left out;
+then it learns from all.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -20,6 +20,7 @@ from ml.features.recipe import Features, Recipe
 from ml.neural import fixed_epochs
 from ml.progress import Tell, untold
 from ml.robot import novelty
+from ml.robot.conformal import passed_over, promised
 from ml.robot.learned import Floats, Learned, on_circle, scaled, scores, softmax
 from ml.robot.network import FAR, Rows, outputs
 from ml.robot.task import STRIDE, Task
@@ -33,9 +34,6 @@ EPOCHS: Final = 12
 ONLY_TO_LEARN: Final = ("_optimizer", "_random_state")  # of a network: no part of what it says
 TEMPERATURES: Final = np.geomspace(0.3, 6.0, 60)
 WITHIN: Final = 0.1  # of the cycle: what gait_phase's probability is about
-WANTED: Final = 0.97  # of what is said, that is right; the rest is why a model abstains
-MOST_ABSTAINED: Final = 0.1  # of what is decided
-LEAST_SURE: Final = 0.5  # what is as likely wrong as right is never said
 
 Groups = npt.NDArray[Any]
 Network = Callable[[Task, int], Any]  # for a task, from a seed
@@ -95,9 +93,9 @@ def _classes(lesson: _Lesson) -> Learned:
     model, unseen, limits = _taught(lesson, rows, targets, _classifier, len(classes))
     temperature = _temperature(unseen, targets)
     probabilities = softmax(unseen / temperature)
-    right = probabilities.argmax(axis=1) == targets
-    threshold = _threshold(probabilities.max(axis=1), right)
-    numbers = {"temperature": temperature, "threshold": threshold, **limits}
+    above = passed_over(probabilities, targets)
+    promise = promised(above, probabilities.max(axis=1), lesson.group[rows])
+    numbers = {"temperature": temperature, **asdict(promise), **limits}
     return Learned(lesson.task, recipe, classes, model, numbers)
 
 
@@ -114,7 +112,9 @@ def _phases(lesson: _Lesson) -> Learned:
     trust = IsotonicRegression(y_min=0.0, y_max=1.0, out_of_bounds="clip").fit(lengths.min(axis=1), right)
     model |= {"length": trust.X_thresholds_, "trust": trust.y_thresholds_}
     sure = np.interp(lengths.min(axis=1), model["length"], model["trust"])
-    numbers = {"threshold": _threshold(sure, right), **limits}
+    # What is said is that both phases are within a tenth; where nothing is said, anything may be true.
+    promise = promised(np.where(right, 0.0, sure), sure[steps], lesson.group[rows])
+    numbers = {**asdict(promise), **limits}
     return Learned(lesson.task, lesson.recipe, (STRIDE,), model, numbers)
 
 
@@ -195,16 +195,6 @@ def _temperature(unseen: Floats, targets: npt.NDArray[np.int_]) -> float:
         -np.log(np.maximum(softmax(unseen / one)[rows, targets], 1e-12)).mean() for one in TEMPERATURES
     ]
     return float(TEMPERATURES[int(np.argmin(surprise))])
-
-
-def _threshold(probability: Floats, right: npt.NDArray[np.bool_]) -> float:
-    """The lowest from which on enough of what is said is right, but at most so much is left unsaid."""
-    order = np.argsort(-probability)
-    share = np.cumsum(right[order]) / np.arange(1, len(order) + 1)
-    said = np.flatnonzero(share >= WANTED)
-    least = int(len(order) * (1.0 - MOST_ABSTAINED))
-    last = max(int(said[-1]) if len(said) else 0, least - 1)
-    return max(LEAST_SURE, float(probability[order[min(last, len(order) - 1)]]))
 
 
 def _enough(what: str, count: int) -> None:

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from ml.features.recipe import Features, Recipe
 from ml.robot import novelty
+from ml.robot.conformal import together
 from ml.robot.network import Rows, outputs
 from ml.robot.task import SIDES, TASKS, Task
 
@@ -45,7 +46,9 @@ class Learned:
     `parts`: `scale`, a StandardScaler; `network`, an MLPClassifier, or for gait_phase an MLPRegressor of both
     legs' cosine and sine, of length 0 where nobody steps; `length` and `trust` (k,), which make their shorter
     length a probability; `axes` and `prototypes` for the novelty. `numbers`: `temperature` of a classifier,
-    `threshold` of the probability below which it abstains, `near` and `out` for the novelty.
+    `threshold` of the probability below which it abstains, and what it promises: that of `covered` of his
+    decisions the truth is within what is said, for a share of new `wearers` (older models promise nothing);
+    `near` and `out` for the novelty.
     """
 
     task: Task
@@ -86,6 +89,10 @@ class Learned:
         probabilities = np.interp(lengths.min(axis=1), self.parts["length"], self.parts["trust"])[:, None]
         values = dict(zip(SIDES, phases.T, strict=True))
         return Verdicts(probabilities, self._labels(probabilities), unlike, values)
+
+    def together(self, probabilities: Floats) -> npt.NDArray[np.bool_]:
+        """The classes (n, classes) of which one is true, as far as the model's promise goes."""
+        return together(probabilities, self.numbers["threshold"])
 
     def _labels(self, probabilities: Floats) -> npt.NDArray[np.int_]:
         sure = probabilities.max(axis=1) >= self.numbers["threshold"]

@@ -26,7 +26,8 @@ class Prediction:
     `label` is a class of the task, UNKNOWN where the model abstains, ABNORMAL where it has learned from
     nothing like this. `probability` is the likeliest class's, also then. `novelty` is 0 for what is as in
     learning, 1 and more for what is abnormal. `values` are further numbers, such as the gait phases "left"
-    and "right".
+    and "right". `either` are the classes, the likeliest first, of which one is true as far as the model's
+    promise goes, where it abstains from saying which; empty elsewhere, and of a recorded prediction.
     """
 
     task: str
@@ -37,6 +38,7 @@ class Prediction:
     novelty: float
     probabilities: Mapping[str, float]
     values: Mapping[str, float] = field(default_factory=dict)
+    either: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -123,9 +125,19 @@ def _predictions(model: str, learned: Learned, stamps_ns: Sequence[int], rows: F
             novelty,
             dict(zip(learned.classes, probabilities, strict=True)),
             {name: column[at] for name, column in values.items()},
+            _either(learned, probabilities) if label == NONE and novelty < ABNORMAL_FROM else (),
         )
         for at, (stamp_ns, label, novelty, probabilities) in enumerate(columns)
     ]
+
+
+def _either(learned: Learned, probabilities: Sequence[float]) -> tuple[str, ...]:
+    """In the order of their probabilities; of a phase there is but one class to say."""
+    if not learned.task.fold:
+        return ()
+    there = learned.together(np.array([probabilities]))[0].tolist()
+    found = sorted(zip(probabilities, learned.classes, there, strict=True), key=lambda one: -one[0])
+    return tuple(name for _, name, is_there in found if is_there)
 
 
 def _label(classes: Sequence[str], label: int, novelty: float) -> str:

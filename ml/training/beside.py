@@ -7,6 +7,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ml.features.recipe import Features
+from ml.robot.conformal import Flags
+from ml.robot.learn import WITHIN
 from ml.robot.learned import NONE, Learned
 from ml.robot.task import SIDES
 
@@ -28,6 +30,8 @@ class Beside:
     strides: int
     left: float  # upper end of the one-sided interval of after / before
     more_unsaid: float  # of the decisions, more than before
+    missed_before: float  # of the decisions: something is said, and a leg is further off than a tenth
+    missed: float
 
     @property
     def is_better(self) -> bool:
@@ -44,8 +48,8 @@ def beside(
     seed: int = 0,
 ) -> Beside:
     """Judge both on n decisions in time's order: `truth` (n, 2) phases, `stride` (n,) that each is of."""
-    before, its_unsaid = _squares(general, features, truth)
-    after, unsaid = _squares(adapted, features, truth)
+    before, its_unsaid, missed_before = _squares(general, features, truth)
+    after, unsaid, missed = _squares(adapted, features, truth)
     starts = np.flatnonzero(np.diff(stride, prepend=stride[0] - 1))
     sums = np.stack([np.add.reduceat(each, starts) for each in (before, after)])
     blocks = _blocks(len(starts), seed)
@@ -55,16 +59,19 @@ def beside(
         100.0 * float(np.sqrt(after.mean())),
         len(starts),
         float(np.quantile(np.sqrt(drawn[1] / np.maximum(drawn[0], 1e-12)), SURE)),
-        unsaid - its_unsaid,
+        float(unsaid.mean() - its_unsaid.mean()),
+        float(missed_before.mean()),
+        float(missed.mean()),
     )
 
 
-def _squares(learned: Learned, features: Features, truth: Floats) -> tuple[Floats, float]:
-    """The squared error of each decision (n,), over both legs; the share of those that are not said."""
+def _squares(learned: Learned, features: Features, truth: Floats) -> tuple[Floats, Flags, Flags]:
+    """Of each decision (n,): the squared error over both legs; whether it is unsaid, or said and wrong."""
     found = learned.judge(features)
     phases = np.stack([found.values[side] for side in SIDES], axis=1)
     error = (phases - truth + 0.5) % 1.0 - 0.5
-    return (error * error).mean(axis=1), float((found.label == NONE).mean())
+    unsaid = found.label == NONE
+    return (error * error).mean(axis=1), unsaid, ~unsaid & (np.abs(error) > WITHIN).any(axis=1)
 
 
 def _blocks(strides: int, seed: int) -> npt.NDArray[np.intp]:

@@ -156,8 +156,32 @@ def _metrics(learned: Learned, parts: Sequence[Part], classes: Sequence[str]) ->
     verdicts = [learned.judge(each.features) for each in parts]
     people = np.concatenate([np.full(len(each.truth), each.group) for each in parts])
     if learned.task.fold:
-        return _of_classes(learned.classes, classes, truth, verdicts, people)
-    return _of_phases(truth, verdicts, people)
+        found = _of_classes(learned.classes, classes, truth, verdicts, people)
+        covered = _in_sets(learned, verdicts, truth)
+    else:
+        found, covered = _of_phases(truth, verdicts, people)
+    return replace(found, figures=found.figures | _coverage(learned, covered, people))
+
+
+def _in_sets(
+    learned: Learned, verdicts: Sequence[Verdicts], truth: npt.NDArray[Any]
+) -> npt.NDArray[np.bool_]:
+    """(n,) whether the set of each decision holds its truth: never that of a class that it does not know."""
+    sets = np.concatenate([learned.together(one.probabilities) for one in verdicts])
+    within: npt.NDArray[np.bool_] = (sets & (truth[:, None] == np.array(learned.classes))).any(axis=1)
+    return within
+
+
+def _coverage(learned: Learned, covered: npt.NDArray[np.bool_], people: npt.NDArray[Any]) -> dict[str, float]:
+    """The share of decisions, and of the worst person's, whose truth is within; beside what is promised."""
+    found = {
+        "covered": float(covered.mean()),
+        "worst_subject_covered": min(float(covered[people == one].mean()) for one in np.unique(people)),
+    }
+    promised = {"promised_covered": "covered", "promised_wearers": "wearers"}
+    return found | {
+        name: learned.numbers[number] for name, number in promised.items() if number in learned.numbers
+    }
 
 
 def _label(verdicts: Sequence[Verdicts]) -> npt.NDArray[np.int_]:
@@ -183,8 +207,10 @@ def _of_classes(
     return replace(found, figures=found.figures | {"idle": idle.figures["macro_f1"]})
 
 
-def _of_phases(truth: npt.NDArray[Any], verdicts: Sequence[Verdicts], people: npt.NDArray[Any]) -> Metrics:
-    """Errors over both legs where they step; whether it says so, where they do not."""
+def _of_phases(
+    truth: npt.NDArray[Any], verdicts: Sequence[Verdicts], people: npt.NDArray[Any]
+) -> tuple[Metrics, npt.NDArray[np.bool_]]:
+    """Errors over both legs where they step, and whether it says so where they do not; what is not wrong."""
     steps = ~np.isnan(truth).any(axis=1)
     said = _label(verdicts) != NONE
     phases = np.concatenate(
@@ -201,12 +227,13 @@ def _of_phases(truth: npt.NDArray[Any], verdicts: Sequence[Verdicts], people: np
         "idle": 100.0 / math.sqrt(12.0),  # of a phase that is anything
     }
     walkers = np.unique(people[steps])
-    return Metrics(
+    found = Metrics(
         figures=figures,
         per_subject={str(one): _rmse(error[steps & (people == one)]) for one in walkers},
         calibration=calibration,
         calibration_error=sum(abs(one.said - one.right) * one.count for one in calibration) / len(truth),
     )
+    return found, right | ~said
 
 
 def _rmse(error: npt.NDArray[np.float64]) -> float:

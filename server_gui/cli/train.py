@@ -23,7 +23,10 @@ from server_gui.core.settings.promoters import desk_signature
 if TYPE_CHECKING:
     from ml.training.training import Trained
 
-FIGURES: Final = ("macro_f1", "accuracy", "rmse_percent", "abstained", "stepping_where_none_steps")
+FIGURES: Final = (
+    "macro_f1", "accuracy", "rmse_percent", "abstained", "stepping_where_none_steps",
+    "covered", "worst_subject_covered", "promised_covered", "promised_wearers",
+)  # fmt: skip
 EPILOG: Final = """It learns from every session with labels (gwrms label). A quarter of the wearers, by a
 hash of their names, or those that --held-out names, are held out to be judged by. A wearer is known by gwrms
 label SESSION --wearer NAME, however that is spelled: P01, p01 and P-1 are one. Where nobody is named each

@@ -19,6 +19,7 @@ from server_gui.views.marks import Mark
 
 ACTIVITY, FALLING, GAIT_PHASE = "activity", "falling", "gait_phase"
 STEADY: Final = "steady"
+FEW: Final = 3  # classes of which one is true: more are no news
 LEAST: Final = 0.01  # what is less probable is not worth a word
 TITLES: Final = {FALLING: "Balance", GAIT_PHASE: "Stride"}
 LEARNED: Final = {state: ("ring", "dim", state.value) for state in State} | {
@@ -238,6 +239,8 @@ def _runner_up(shown: Told) -> str:
     """What it may be as well, where it may."""
     prediction = shown.prediction
     others = sorted(prediction.probabilities.items(), key=lambda item: -item[1])
+    if 1 < len(prediction.either) <= FEW:
+        return " or ".join(label_text(name).lower() for name in prediction.either)
     if prediction.label in (UNKNOWN, ABNORMAL):
         return f"likeliest {label_text(others[0][0]).lower()} {100 * others[0][1]:.0f} %" if others else ""
     others = [item for item in others if item[0] != prediction.label and item[1] >= LEAST]

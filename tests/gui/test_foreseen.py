@@ -120,6 +120,18 @@ def test_a_model_that_does_not_know_says_so(
     assert window.overview._ring._word == label.capitalize(), "the probability is another class's"
 
 
+def test_what_it_may_be_is_said_where_a_model_abstains(station: Station) -> None:
+    """Of so few classes that this says anything."""
+    unsure = predicted("unknown", {"walk": 0.5, "stairs_up": 0.4, "ramp": 0.1})
+    for either, detail in (
+        (("walk", "stairs_up"), "walk or stairs up"),
+        (("walk", "stairs_up", "ramp", "turn"), "likeliest walk 50 %"),
+    ):
+        prediction = dataclasses.replace(unsure.prediction, either=either)
+        station.take_prediction(dataclasses.replace(unsure, prediction=prediction))
+        assert activity(station).detail == f"{UNCHECKED} · {detail}"
+
+
 def test_a_fall_stands_before_all_else(station: Station) -> None:
     station.take_prediction(predicted("walk", WALKS))
     station.take_prediction(predicted("steady", {"steady": 0.99, "fall": 0.01}, "falling"))

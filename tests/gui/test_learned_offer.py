@@ -19,7 +19,7 @@ from tests.gui.foreseen import predicted
 from tests.support.desk import looked, walking
 
 HOUR_S = 3600.0
-OFFERED = Adapting("exo-01", 7, State.OFFERED, "P01", tried=Tried(3.4, 2.1, 34))
+OFFERED = Adapting("exo-01", 7, State.OFFERED, "P01", tried=Tried(3.4, 2.1, 34, (0.031, 0.002)))
 STRIDE = predicted("stride", {"stride": 0.97}, "gait_phase", values={"left": 0.2, "right": 0.7})
 
 
@@ -57,6 +57,13 @@ def test_an_offer_is_accepted_and_taken_back_with_a_click_each(
     assert show(window, station, dataclasses.replace(OFFERED, state=State.TAKEN_BACK)) == ["Learn again"]
     show(window, station, dataclasses.replace(OFFERED, state=State.COLLECTING))
     assert offer.isHidden(), "there is nothing to decide"
+
+
+def test_the_tip_says_how_often_each_was_wrong() -> None:
+    wrong = "off by more than a tenth of the stride: 3.1 → 0.2 % of the time"
+    assert OFFERED.tip == f"{OFFERED.text}\n{wrong}"
+    unknown = Adapting("exo-01", 7, State.OFFERED, "P01", tried=Tried(3.4, 2.1, 34))
+    assert unknown.tip == unknown.text
 
 
 def test_meanwhile_a_line_says_how_it_goes(station: Station) -> None:

@@ -22,7 +22,7 @@ from server_gui.core.evidence.metrics import OF_JOINTS, OF_ROBOTS, Better, Metri
 from server_gui.core.processing.gait_events import Leg
 from server_gui.core.processing.wiring import leg_of
 
-ALPHA: Final = 0.01  # evidence is looked at again and again while it grows
+ALPHA: Final = 0.03  # and not 0.05: evidence is looked at again and again while it grows
 FEWEST: Final = 8  # cycles on each side
 SAME_SPEED: Final = (2.5, 97.5)  # percentiles of the stride time that strides of the other side must lie in
 AROUND: Final = 0.01  # and so much around them

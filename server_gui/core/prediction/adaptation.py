@@ -127,11 +127,20 @@ class Tried:
     before: float
     after: float
     strides: int
+    missed: tuple[float, float] | None = None  # shares of the decisions: said, and off by over a tenth
 
     @property
     def text(self) -> str:
         """In few words."""
         return f"{self.before:.1f} → {self.after:.1f} %"
+
+    @property
+    def wrong(self) -> str:
+        """How often what was said was wrong; nothing where that is not known."""
+        if self.missed is None:
+            return ""
+        before, after = (100.0 * each for each in self.missed)
+        return f"off by more than a tenth of the stride: {before:.1f} → {after:.1f} % of the time"
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,6 +161,12 @@ class Adapting:
     def choices(self) -> tuple[Happening, ...]:
         """What a person may say now."""
         return tuple(one for one in BY_PERSON if one in NEXT[self.state])
+
+    @property
+    def tip(self) -> str:
+        """In words, and how often what was said was wrong."""
+        wrong = "" if self.tried is None else self.tried.wrong
+        return "\n".join(filter(None, (self.text, wrong)))
 
     @property
     def standing(self) -> str:

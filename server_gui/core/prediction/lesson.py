@@ -98,7 +98,8 @@ def tried(base: Model, adapted: Model, rows: Sequence[Row]) -> tuple[Tried, bool
 
     strides = np.array([row.instant.stride_ns for row in rows], np.int64)
     found = beside(base.learned, adapted.learned, _features(rows), _truth(rows), strides)
-    return Tried(found.before, found.after, found.strides), found.is_better
+    missed = (found.missed_before, found.missed)
+    return Tried(found.before, found.after, found.strides, missed), found.is_better
 
 
 def _features(rows: Sequence[Row]) -> Features:

@@ -63,7 +63,7 @@ class LearnedOffer(QWidget):
         self._icon.show_mark(Mark(*LEARNED[adapting.state]))
         self.words.say(*wordings(adapting))
         self.setAccessibleDescription(adapting.text)
-        set_tip(self, adapting.text)
+        set_tip(self, adapting.tip)
         for what, button in self.buttons.items():
             button.setVisible(what in adapting.choices)
         self.show()

@@ -68,7 +68,14 @@ def test_a_value_that_has_gone_stale_silences_its_detector() -> None:
     assert watch.verdict.number is None
 
 
-@given(st.lists(st.floats(0.0, 50.0), min_size=8, max_size=8), st.integers(0, 7), st.floats(0.0, 50.0))
+MOST = len(DETECTORS)
+
+
+@given(
+    st.lists(st.floats(0.0, 50.0), min_size=MOST, max_size=MOST),
+    st.integers(0, MOST - 1),
+    st.floats(0.0, 50.0),
+)
 def test_more_evidence_never_lowers_the_number(above: list[float], at: int, more: float) -> None:
     raised = list(above)
     raised[at] = min(raised[at] + more, 50.0)
@@ -78,7 +85,7 @@ def test_more_evidence_never_lowers_the_number(above: list[float], at: int, more
 
 
 def test_what_is_unknown_says_nothing() -> None:
-    silent, calm = np.full(8, np.nan), np.zeros(8)
+    silent, calm = np.full(MOST, np.nan), np.zeros(MOST)
     assert CALIBRATION.log_odds(silent) == CALIBRATION.log_odds(calm)
 
 

@@ -36,7 +36,9 @@ def judged(danger: list[float], level: list[Level]) -> Judged:
     """One wearer, a row a tenth of a second."""
     count = len(danger)
     at_s = LEARNED_S + 1.0 + 0.1 * np.arange(count, dtype=np.float64)
-    one = Seen("1", ("slip",), at_s, np.zeros((count, 8)), np.array(danger), np.full(count, "walk"))
+    one = Seen(
+        "1", ("slip",), at_s, np.zeros((count, len(DETECTORS))), np.array(danger), np.full(count, "walk")
+    )
     return Judged(one, np.zeros(count), np.array(level, dtype=np.int_))
 
 

@@ -3,6 +3,7 @@
 import functools
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -62,6 +63,26 @@ def test_a_model_that_is_unsure_abstains() -> None:
     assert (doubtful.judge(rows).label == NONE).mean() > (learned().judge(rows).label == NONE).mean()
     # Two thirds of what it heard was right: it says neither 0.95 nor 0.4.
     assert 0.5 < doubtful.judge(lessons(ACTIVITY, [20, 21]).features).probabilities.max(axis=1).mean() < 0.85
+
+
+@pytest.mark.parametrize("threshold", [0.5, 0.9, 0.999999])
+def test_a_set_is_of_one_class_exactly_where_that_is_said(threshold: float) -> None:
+    model = learned()
+    assert {"threshold", "covered", "wearers"} <= set(model.numbers)
+    model = replace(model, numbers=model.numbers | {"threshold": threshold})
+    verdicts = model.judge(lessons(ACTIVITY, [20, 21]).features)
+    sets = model.together(verdicts.probabilities)
+    assert np.array_equal(sets.sum(axis=1) == 1, verdicts.label != NONE)
+    assert sets[np.arange(len(sets)), verdicts.probabilities.argmax(axis=1)].all()
+
+
+@pytest.mark.parametrize("task", [ACTIVITY, PHASE], ids=lambda task: task.name)
+def test_a_model_that_promises_nothing_serves_on(task: Task) -> None:
+    """One that was stored before there were promises has a threshold alone."""
+    model, rows = learned(task.name), lessons(task, [41]).features
+    older = {name: value for name, value in model.numbers.items() if name not in ("covered", "wearers")}
+    restored = Learned.restored(model.state() | {"numbers": older})
+    assert same(restored.judge(rows), model.judge(rows), slice(None))
 
 
 @pytest.mark.parametrize("task", [ACTIVITY, PHASE], ids=lambda task: task.name)

@@ -50,7 +50,7 @@ def test_a_recording_of_several_walks_is_judged_by_each_and_by_the_worst(
     told, answer = printed(capsys, name, walks)
     assert answer["subjects"] == 3
     table = [line.split() for line in told.splitlines()]
-    assert ["WALKS", figure, "unknown_fraction"] in table
+    assert ["WALKS", figure, "covered", "unknown_fraction", "said_accuracy"] in table
     rows = {row[0]: float(row[1]) for row in table if row and row[0] in ("crouch", "ordinary")}
     assert len(rows) == 2
     worst = max(rows.values()) if name == "sim-phase" else min(rows.values())

@@ -84,7 +84,7 @@ def test_a_wearer_is_served_by_what_was_learned_until_anybody_else_is_named(fold
         serves = lab.told.predicted()[-1]
         assert serves.prediction.model == serves.card.id == lab.adapting().model
         assert serves.card.parent == name
-        assert any("serves: " in text for text in lab.service.state.adapting.values())
+        assert any(": serves" in text for text in lab.service.state.adapting.values())
         lab.wearing = Wearing("session-2", "P02")
         lab.until_served_by("")
         assert lab.told.predicted()[-1].card.id == name

@@ -49,7 +49,11 @@ def trained(url: str) -> Trained:
 def test_it_is_judged_by_people_that_it_has_not_learned_from(trained: Trained) -> None:
     assert trained.card.held_out == (HELD_OUT,)
     assert trained.card.learned == ("s0", "s1", "s2", "s4")
-    assert trained.held_out.new.figures["macro_f1"] > 0.85
+    figures = trained.held_out.new.figures
+    assert figures["macro_f1"] > 0.85
+    assert 0.8 < figures["worst_subject_covered"] <= figures["covered"] <= 1.0
+    assert figures["promised_covered"] > 0.5
+    assert figures["promised_wearers"] < 0.9, "there are too few to promise more"
     assert trained.decision.better
     assert trained.serving == ""
 

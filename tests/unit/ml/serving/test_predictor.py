@@ -1,10 +1,11 @@
 """Predictions: the same live, of many robots together and over a recording; the unknown is called so."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 
-from ml.robot.task import ABNORMAL
+from ml.robot.task import ABNORMAL, UNKNOWN
 from ml.serving.predictor import Prediction, Window, Windows, judged, replayed
 from tests.unit.ml.serving.small import MS, STEP_MS, Floats, hips, learned
 
@@ -71,6 +72,15 @@ def test_what_is_like_nothing_learned_from_is_abnormal() -> None:
     rows = np.random.default_rng(5).normal(0, 2.0, (600, 2))
     assert {one.label for one in live(rows)} == {ABNORMAL}
     assert all(one.novelty >= 1 for one in live(rows))
+
+
+def test_a_model_that_abstains_says_which_classes_it_may_be() -> None:
+    unsure = replace(learned(), numbers=learned().numbers | {"threshold": 1.5})
+    found = judged("m", unsure, windows(hips(9, walks=True)))
+    assert {one.label for one in found} == {UNKNOWN}
+    for one in found:
+        assert one.either == tuple(sorted(one.probabilities, key=lambda name: -one.probabilities[name]))
+    assert not any(one.either for one in live(hips(9, walks=True)) if one.label != UNKNOWN)
 
 
 def test_of_nothing_nothing_is_said() -> None:

@@ -1,0 +1,168 @@
+"""(i) One thing that leaves what all others say: the robot's own moments, remembered, as its healthy model.
+
+A moment's joints are looked up among those of before; what a joint's set-point, torque, a foot's load and the
+trunk's lean were then, they should be now. A joint is looked up by the other joints alone, and a leg by the
+other leg, so that one which goes its own way finds the moments in which it should be elsewhere. Where no
+moment was alike, as in the first steps of stairs, nothing is said: a new activity changes all joints at once.
+"""
+
+import collections
+import math
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from ml.danger.detector import Floats
+from ml.danger.now import JOINTS, SIDES, Now, spoken
+
+KEPT: Final = 1000  # moments
+FEWEST: Final = 150  # moments, before one is looked up
+ALIKE: Final = 5  # moments that are asked
+NEW: Final = 0.3  # squared: a moment that is so far from all others is remembered …
+WAITS_S: Final = 10.0  # … unless something was wrong by so much later
+FARTHEST: Final = 4.0  # from moments alike: beyond that nobody can say
+DOUBTED: Final = 3.0  # at such a distance half is believed
+EVERY_S: Final = 0.07  # between two moments
+SMOOTH: Final = 0.15  # of the newest moment: over half a second
+# What makes a joint's angle (rad) and velocity (rad/s) another one.
+_SCALE: Final = np.array([0.08] * 6 + [0.6, 0.8, 0.6] * 2)[:, None]
+_OWN: Final = np.array([*range(6), *[8] * 9, *[6] * 3, *[7] * 3])  # which search answers for which value
+_VALUE: Final = np.array([*range(15), *range(6)])  # and which value that is
+LEG_SMOOTH: Final = 0.06  # of the newest moment: over a stride
+
+Bools = npt.NDArray[np.bool_]
+
+
+class Memory:
+    """How far each thing is from what it was in the moments alike, over half a second."""
+
+    keys = (
+        *(f"{joint}.target" for joint in JOINTS),
+        *(f"{joint}.torque" for joint in JOINTS),
+        *(f"{side} load" for side in SIDES),
+        "lean",
+        *(f"{side} leg" for side in SIDES),
+    )
+    least = np.array([0.01] * 6 + [0.5] * 6 + [5.0] * 2 + [0.004] + [0.1] * 2)  # rad, N·m, N, rad, shares
+    needs = "positions and velocities of the joints"
+
+    def __init__(self) -> None:
+        self._there: Bools = np.zeros(12, dtype=np.bool_)
+        self.said = np.full(17, np.nan)
+        self.alike = True  # whether there were moments like this one, as far as anybody can say
+        self._due_s = -math.inf
+        self._forget()
+
+    def _forget(self) -> None:
+        self._states = np.zeros((12, KEPT))
+        self._values = np.zeros((KEPT, 15))
+        self._count = 0
+        self._off = np.zeros(15)
+        self._leg = np.zeros(2)  # squared
+        self._waiting: collections.deque[tuple[float, Floats, Floats]] = collections.deque()
+        self._source = np.random.default_rng(0)
+
+    def measure(self, now: Now, *, learn: bool) -> Floats:
+        if not learn:
+            self._waiting.clear()
+        if now.at_s < self._due_s:
+            return self.said
+        self._due_s = now.at_s + EVERY_S
+        position, velocity, torque, error = now.joint[:4]
+        target = position + np.nan_to_num(error)
+        values = np.concatenate([target, torque, now.foot[0], now.trunk[6:7]])
+        self.alike = True
+        self.said = self._asked(now.at_s, np.concatenate([target, velocity]), values, learn=learn)
+        return self.said
+
+    def _asked(self, at_s: float, state: Floats, values: Floats, *, learn: bool) -> Floats:
+        there = np.isfinite(state)
+        if (there & ~self._there).any():  # another robot than before: nothing can be compared
+            self._there = there
+            self._forget()
+        if not there.any() or not (there == self._there).all():
+            return np.full(17, np.nan)
+        found, nearest = np.full(17, np.nan), math.inf
+        state = np.where(there, state, 0.0)[:, None] / _SCALE
+        if self._count >= FEWEST:
+            found, nearest = self._compared(state, values)
+        if learn and nearest > NEW:
+            self._waiting.append((at_s, state, values))
+        while self._waiting and at_s - self._waiting[0][0] > WAITS_S:
+            self._keep(*self._waiting.popleft()[1:])
+        return found
+
+    def _compared(self, state: Floats, values: Floats) -> tuple[Floats, float]:
+        apart = self._states[:, : self._count] - state
+        apart *= apart
+        whole = apart.sum(axis=0)
+        joint = apart[:6] + apart[6:]
+        leg = joint.reshape(2, 3, -1).sum(axis=1)
+        search = whole - np.concatenate([joint, leg, np.zeros((1, self._count))])
+        near = np.argpartition(search, ALIKE, axis=1)[:, :ALIKE]
+        distance = np.sqrt(np.maximum(np.take_along_axis(search, near, axis=1).mean(axis=1), 0.0))[_OWN]
+        was = self._values[near[_OWN], _VALUE[:, None]].mean(axis=1)
+        off = (values[_VALUE] - was) / (1.0 + (distance / DOUBTED) ** 2)
+        known = np.isfinite(off) & (distance < FARTHEST)
+        self._off += SMOOTH * np.where(known[:15], off[:15] - self._off, 0.0)
+        legs = ((off[15:] / _SCALE[:6, 0]) ** 2).reshape(2, 3).mean(axis=1)
+        whole_legs = known[15:].reshape(2, 3).all(axis=1)
+        self._leg += LEG_SMOOTH * np.where(whole_legs, legs - self._leg, 0.0)
+        found = np.concatenate([np.abs(self._off), np.sqrt(self._leg)])
+        # What one foot bears less and the other more is a weight that was shifted.
+        found[12:14] = np.minimum(found[12:14], abs(self._off[12:14].sum()))
+        told = np.concatenate([known[:15], whole_legs])
+        self.alike = bool(distance[6] < FARTHEST)
+        return np.where(told, found, np.nan), float(search[8, near[8]].min())
+
+    def _keep(self, state: Floats, values: Floats) -> None:
+        at = self._count if self._count < KEPT else int(self._source.integers(KEPT))
+        self._states[:, at], self._values[at] = state[:, 0], values
+        self._count = min(self._count + 1, KEPT)
+
+
+class Kind:
+    """A detector: what the memory says of things of one kind, whose first asks it."""
+
+    needs = Memory.needs
+
+    def __init__(self, name: str, memory: Memory, keys: slice) -> None:
+        self.name = name
+        self.keys = Memory.keys[keys]
+        self.least = Memory.least[keys]
+        self._memory = memory
+        self._own = keys
+
+    def measure(self, now: Now, *, learn: bool) -> Floats:
+        """Take the next sample; the memory takes it from the first of all kinds."""
+        if self._own.start == 0:
+            self._memory.measure(now, learn=learn)
+        return self._memory.said[self._own]
+
+    def words(self, key: str) -> str:
+        """Say what is wrong where this key is the worst."""
+        joint, _, what = key.partition(".")
+        if key.endswith(" leg"):
+            return f"the {key} moves as it never did beside the other one"
+        if what == "target":
+            return f"{spoken(joint)}: is led where it never is while the other joints are as they are"
+        if what:
+            return f"{spoken(joint)}: takes another torque than it did for the same motion"
+        if key == "lean":
+            return "the trunk is told to lean otherwise than it did in the same motion"
+        return f"the {key.replace(' load', ' foot')} bears another load than it did in the same motion"
+
+
+def kinds(memory: Memory) -> tuple[Kind, ...]:
+    """All that a memory says, each kind as a detector."""
+    return tuple(Kind(name, memory, keys) for name, keys in _KINDS.items())
+
+
+_KINDS: Final = {
+    "set-points": slice(0, 6),
+    "effort": slice(6, 12),
+    "loads": slice(12, 14),
+    "lean": slice(14, 15),
+    "legs": slice(15, 17),
+}

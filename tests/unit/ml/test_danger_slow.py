@@ -1,0 +1,149 @@
+"""Dangers that come slowly: each detector sees its own, and a new activity is not taken for one."""
+
+import copy
+import math
+from collections.abc import Callable
+from functools import cache
+
+import numpy as np
+import numpy.typing as npt
+
+from ml.danger.creep import Creep
+from ml.danger.memory import Memory
+from ml.danger.now import CHANNELS, Now
+
+Floats = npt.NDArray[np.float64]
+Change = Callable[[float, dict[str, float]], None]
+Kind = Callable[[], Memory | Creep]
+
+STEP_S = 0.08
+LEARNED_S = 40.0
+
+
+def walking(at_s: float) -> dict[str, float]:
+    """Somebody who walks, a stride in 1.2 s, by channels; no two strides are alike."""
+    angle, row = math.tau * at_s / 1.2, {}
+    size = 1.0 + 0.05 * math.sin(0.7 * at_s)
+    for side, phase in (("left", angle), ("right", angle + math.pi)):
+        for joint, reach in (("hip", 0.35), ("knee", 0.45), ("ankle", 0.15)):
+            name = f"{side}_{joint}"
+            row[f"{name}.position"] = size * reach * math.sin(phase)
+            row[f"{name}.velocity"] = size * reach * math.tau / 1.2 * math.cos(phase)
+            row[f"{name}.torque"] = 20.0 * math.cos(phase)
+            row[f"{name}.following_error"] = 0.0
+        row[f"{side}_insole.force"] = 400.0 * (1.0 + math.sin(phase))
+    row["trunk.tilt_forward"] = 0.05 + 0.02 * math.sin(2.0 * angle)
+    return row
+
+
+def moment(at_s: float, row: dict[str, float], now: Now) -> Now:
+    now.take(at_s, np.array([row.get(name, math.nan) for name in CHANNELS]))
+    return now
+
+
+@cache
+def learned(kind: Kind) -> tuple[Memory | Creep, Now, Floats]:
+    """A detector that knows somebody who walks, and its numbers of the last seconds (n, keys)."""
+    detector, now = kind(), Now()
+    times = np.arange(0.0, LEARNED_S, STEP_S).tolist()
+    found = [detector.measure(moment(at_s, walking(at_s), now), learn=True) for at_s in times]
+    return detector, now, np.array(found[-100:])
+
+
+def seen(kind: Kind, key: str, change: Change, seconds: float = 4.0) -> tuple[float, Floats]:
+    """The largest number of a key before a change, and its numbers after it began, NaN where unknown."""
+    detector, now, before = copy.deepcopy(learned(kind))
+    at, after = list(detector.keys).index(key), []
+    for since_s in np.arange(0.0, seconds, STEP_S).tolist():
+        row = walking(LEARNED_S + since_s)
+        change(since_s, row)
+        after.append(detector.measure(moment(LEARNED_S + since_s, row, now), learn=False)[at])
+    return float(before[:, at].max()), np.array(after)
+
+
+def runs_away(since_s: float, row: dict[str, float]) -> None:
+    row["left_knee.position"] += 0.15 * since_s
+
+
+def new_activity(since_s: float, row: dict[str, float]) -> None:
+    for name in row:
+        if name.endswith(".position"):
+            row[name] += 0.5
+
+
+def slips(since_s: float, row: dict[str, float]) -> None:
+    row["trunk.tilt_forward"] += 0.03 * since_s
+
+
+def dies(since_s: float, row: dict[str, float]) -> None:
+    row["right_insole.force"] *= max(1.0 - 0.15 * since_s, 0.0)
+
+
+def fades(since_s: float, row: dict[str, float]) -> None:
+    row["left_hip.torque"] /= max(1.0 - 0.12 * since_s, 0.1)
+
+
+def tires(since_s: float, row: dict[str, float]) -> None:
+    for joint in ("hip", "knee", "ankle"):
+        row[f"left_{joint}.position"] *= 1.0 - 0.1 * since_s
+
+
+def told(change: Change, key: str, least: float = 2.0) -> None:
+    usual, after = seen(Memory, key, change)
+    assert np.nanmax(after) > least * usual
+
+
+def test_a_set_point_that_runs_away_is_told_of_its_joint_alone() -> None:
+    told(runs_away, "left_knee.target", 5.0)
+    _, own = seen(Memory, "left_knee.target", runs_away)
+    _, other = seen(Memory, "right_hip.target", runs_away)
+    assert np.nanmax(other) < 0.3 * np.nanmax(own)
+
+
+def test_an_imu_that_slips_is_told() -> None:
+    told(slips, "lean", 5.0)
+
+
+def test_an_insole_whose_cells_die_is_told() -> None:
+    told(dies, "right load")
+
+
+def test_torque_that_fades_is_told() -> None:
+    told(fades, "left_hip.torque")
+
+
+def test_a_leg_that_tires_is_told() -> None:
+    told(tires, "left leg")
+
+
+def test_of_a_new_activity_nobody_can_say() -> None:
+    for key in ("left_knee.target", "lean", "right load", "left leg"):
+        usual, after = seen(Memory, key, new_activity, 2.0)
+        assert math.isfinite(usual)
+        assert np.isnan(after).all()
+
+
+def test_a_robot_that_loses_a_joint_is_compared_with_nothing() -> None:
+    def lost(since_s: float, row: dict[str, float]) -> None:
+        del row["left_hip.velocity"]
+
+    _, after = seen(Memory, "lean", lost, 1.0)
+    assert np.isnan(after).all()
+
+
+def test_what_is_wrong_is_not_remembered() -> None:
+    memory, now = Memory(), Now()
+    for count in range(300):
+        at_s = count * STEP_S
+        assert np.isnan(memory.measure(moment(at_s, walking(at_s), now), learn=False)).all()
+
+
+def test_an_encoder_that_slips_again_and_again_creeps() -> None:
+    def encoder(since_s: float, row: dict[str, float]) -> None:
+        row["left_knee.position"] += 0.012 * int(since_s / 0.5)
+
+    usual, after = seen(Creep, "left_knee", encoder)
+    assert np.nanmax(after) > 0.05
+    assert usual < 0.02
+    usual, after = seen(Creep, "right_knee", encoder)
+    assert np.nanmax(after) < 0.02
