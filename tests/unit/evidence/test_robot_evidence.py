@@ -131,7 +131,8 @@ def test_a_trial_that_nobody_follows_any_more_is_not_on_trial_for_ever(events: l
 
 def test_what_a_missed_part_of_the_journal_told_is_compared_with_nothing(events: list[Event]) -> None:
     """The trial was taken back, or another edit was made, in entries that nobody here has seen."""
-    robot, seen = RobotEvidence("exo-01"), []
+    robot = RobotEvidence("exo-01")
+    seen: list[Told] = []
     for event in events:
         if isinstance(event, Journalled):
             made = [one | {"what": "trial begun"} for one in event.journal.entries if one["n"] == 2]
