@@ -44,7 +44,7 @@ class Standstill(Noted):
             self.gap = passed_ns, now_ns
             if now_ns - passed_ns > STOOD_NS:
                 self._stood(passed_ns, now_ns)
-        elif self.finding is not None and now_ns - self._before_ns > SHOWN_S * 1e9:
+        if self.finding is not None and now_ns - self._before_ns > SHOWN_S * 1e9:
             self.clear()
         self._passed_ns = now_ns  # last: who reads meanwhile takes it for standing still, not for a silence
 

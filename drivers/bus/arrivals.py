@@ -34,7 +34,10 @@ class Arrivals(Noted):
         self.stamps.clear()
 
     def excuse(self, began_ns: int, ended_ns: int) -> None:
-        """Nobody read meanwhile: frames that have no stamp then are not missing; all others are."""
+        """Nobody read meanwhile, so frames that have no stamp then are not missing; all others are.
+
+        Where stamps lie in between they are the frames' own, as a socket's: then nothing is to be excused.
+        """
         known = list(self.stamps)
         around = [
             place
@@ -45,6 +48,8 @@ class Arrivals(Noted):
             return
         place = max(around, key=lambda one: known[one + 1] - known[one])
         usual = sorted(later - earlier for earlier, later in pairwise(known))[(len(known) - 1) // 2]
+        if any(began_ns + usual / 2 < stamp < ended_ns - usual / 2 for stamp in known):
+            return
         excess = min(known[place + 1] - known[place] - usual, ended_ns - began_ns)
         if excess > usual / 2:
             self.stamps.clear()

@@ -22,7 +22,7 @@ FASTEST = 10.0  # rad/s where the drive does not tell its velocity, or nobody ha
 JERK = 15.0  # rad/s² by which a joint may have started and stopped in between
 MARGIN = 1.5  # of a speed in between over those before and after
 LATE_S = 0.05  # by which a sample's stamp may be wrong
-LONGEST_STEP_S = 0.1  # between two samples that are compared
+LONGEST_STEP_S = 0.1  # between two samples, over which their speeds say how far it went
 JUMP_SHOWN_S = 30.0
 
 LOADED_S = 5.0
@@ -115,7 +115,8 @@ class FrozenCheck(Noted):
 class JumpCheck(Noted):
     """The position changes from one sample to the next by more than the joint's speed explains.
 
-    Across a gap in sampling nobody knows its speed: what it can have gone at its fastest is no jump then.
+    Across a gap in sampling, ours or the drive's, nobody knows its speed: what it can have gone at its
+    fastest is no jump then.
     """
 
     def __init__(self) -> None:
@@ -141,13 +142,14 @@ class JumpCheck(Noted):
         if before is None or HOMING in (before.mode, now.mode):
             return
         step_s = (now.stamp_ns - before.stamp_ns) / 1e9
-        if not 0.0 < step_s <= (UNSEEN_S if across else LONGEST_STEP_S):
+        if not 0.0 < step_s <= UNSEEN_S:
             return
         step = now.position - before.position
         way = math.copysign(1.0, step)
         usual = JUMP + JERK * step_s**2 / 4 + _explained(before, now, way, step_s)
-        most = max(usual, JUMP + FASTEST * step_s) if across else usual
-        self.was_gap = usual < abs(step) <= most
+        is_unseen = across or step_s > LONGEST_STEP_S
+        most = max(usual, JUMP + FASTEST * step_s) if is_unseen else usual
+        self.was_gap = across and usual < abs(step) <= most
         if abs(step) > most:
             self._jumped_ns = now.stamp_ns
             jump = f"{abs(math.degrees(step)):.1f}° within {step_s * 1e3:.0f} ms"

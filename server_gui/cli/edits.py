@@ -115,7 +115,7 @@ def _row(told: Told) -> tuple[str, ...]:
         edit.robot,
         edit.who,
         what(told),
-        str(edit.state),
+        edit.became,
         str(evidence.word),
         NONE if strongest is None else f"{strongest.title} {share(strongest)}",
     )
@@ -127,7 +127,8 @@ def shown(told: Told) -> Iterator[str]:
     yield f"{tried.kind if tried else 'edit'} {edit.id} of {edit.robot}, {edit.utc}, by {edit.who or NONE}"
     yield f"  {what(told)}"
     if tried is None:
-        yield f"  {edit.state}; entry {edit.n} of the robot's journal; recording {told.session or NONE}"
+        yield f"  {edit.became}; entry {edit.n} of the robot's journal; recording {told.session or NONE}"
+        yield from (f"  not as before: {line}" for line in edit.not_back)
     else:
         yield f"  recording {told.session or NONE}"
         yield from (f"  {line}" for line in record(tried))

@@ -186,6 +186,14 @@ def test_a_trial_that_begins_is_looked_at_until_somebody_chooses_another(bench: 
     assert chosen.currentRow() == 2, "who chose it after the trial had begun keeps looking at it"
 
 
+def test_a_trial_of_another_day_that_nobody_saw_end_is_not_looked_at(bench: Bench, parts: Parts) -> None:
+    old = replace(running(1), is_final=True)
+    bench.station.take_evidence(old)
+    bench.station.take_evidence(worse(2))
+    parts.edits.refresh()
+    assert parts.edits.list.currentRow() == 0, "the newest one"
+
+
 def test_what_has_ended_is_told_as_over_and_its_later_strides_as_such(bench: Bench, parts: Parts) -> None:
     known = running(1, State.REVERTED)
     counts = replace(known.evidence, cycles_before=49, cycles_after=41, cycles_back=9)

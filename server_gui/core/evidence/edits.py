@@ -64,6 +64,12 @@ class Edit(Struct, frozen=True):
     state: State = State.ASKED
     in_force_ns: int | None = None
     ended_ns: int | None = None
+    not_back: tuple[str, ...] = ()  # parameters that its end has left with another value, and why
+
+    @property
+    def became(self) -> str:
+        """What became of it, in words."""
+        return f"{self.state}, NOT all of it" if self.not_back else str(self.state)
 
     @property
     def utc(self) -> str:
@@ -104,6 +110,13 @@ class JournalEdits:
         """Forget edits that were over long ago, or of which nothing was heard since."""
         self.all = [edit for edit in self.all if _last_ns(edit, before_ns) >= before_ns]
 
+    def lose_sight(self, at_ns: int) -> None:
+        """Of trials that go on nobody hears from now on how they end."""
+        self.all = [
+            replace(edit, state=State.ASKED, ended_ns=at_ns) if edit.state is State.ON_TRIAL else edit
+            for edit in self.all
+        ]
+
     def _take(self, entry: Entry, what: str) -> None:
         if what == "write":
             begun = _begun(self._robot, entry)
@@ -118,10 +131,15 @@ class JournalEdits:
         in_force_ns = edit.in_force_ns
         if outcome in (State.ON_TRIAL, State.KEPT) and in_force_ns is None:
             in_force_ns = stamp_ns
-        ended_ns = stamp_ns if outcome in (State.REVERTED, State.FAILED) else edit.ended_ns
+        ended_ns = edit.ended_ns  # the first end, where a stop has claimed a part
+        if ended_ns is None and outcome in (State.REVERTED, State.FAILED):
+            ended_ns = stamp_ns
         if outcome is State.ON_TRIAL:
             self._take_over(edit, stamp_ns)
-        self.all[places[-1]] = replace(edit, state=outcome, in_force_ns=in_force_ns, ended_ns=ended_ns)
+        not_back = tuple(dict.fromkeys([*edit.not_back, *_not_back(entry)]))
+        self.all[places[-1]] = replace(
+            edit, state=outcome, in_force_ns=in_force_ns, ended_ns=ended_ns, not_back=not_back
+        )
 
     def _take_over(self, by: Edit, stamp_ns: int) -> None:
         """Another trial of the same parameter is over with this one, of which no entry is written."""
@@ -141,6 +159,16 @@ _OUTCOMES: Final[Mapping[str, State]] = {
     "write taken back": State.FAILED,
     "ROLL-BACK FAILED": State.FAILED,
 }
+
+
+OLD_VALUE: Final = frozenset({"taken back", "unchanged"})  # what a robot says of a parameter that has it
+
+
+def _not_back(entry: Entry) -> Iterator[str]:
+    """What a stop has set, somebody else has changed, or was given up."""
+    outcome = entry.get("outcome")
+    if _OUTCOMES.get(str(entry.get("what"))) is State.REVERTED and isinstance(outcome, Mapping):
+        yield from (f"{name}: {said}" for name, said in outcome.items() if said not in OLD_VALUE)
 
 
 def _begun(robot: str, entry: Entry) -> Edit:
@@ -186,9 +214,17 @@ def spell(edit: Edit, edits: Sequence[Edit]) -> tuple[Spell, tuple[str, ...]]:
     """Return when old and new values were in force undisturbed by the other `edits`; and what has disturbed.
 
     Once an edit was taken back, the walk goes on with the old values: that is another stretch of before,
-    which tells a drift from an effect better than anything.
+    which tells a drift from an effect better than anything. It does not where another value came back than
+    was there before: that of before a trial which this one has taken over, of a stop, or of somebody else.
     """
-    others = [(at_ns, other) for other in edits if other.id != edit.id for at_ns in _instants(other)]
+    took_over = {other.id for other in edits if _is_taken_over(other, edit)}
+    others = [
+        (at_ns, other)
+        for other in edits
+        if other.id != edit.id
+        for at_ns in _instants(other)
+        if other.id not in took_over or at_ns != edit.in_force_ns
+    ]
     began_ns, in_force_ns = edit.began_ns, edit.in_force_ns
     earlier = [at_ns for at_ns, _ in others if at_ns <= began_ns]
     since_ns = max([began_ns - BEFORE_NS, *(at_ns + SETTLE_NS for at_ns in earlier)])
@@ -198,7 +234,8 @@ def spell(edit: Edit, edits: Sequence[Edit]) -> tuple[Spell, tuple[str, ...]]:
     later = [at_ns for at_ns, _ in others if at_ns > began_ns]
     ends = [in_force_ns + AFTER_NS, *later, *([edit.ended_ns] if edit.ended_ns is not None else [])]
     after = [(in_force_ns + SETTLE_NS, min(ends))]
-    if edit.ended_ns is not None and not any(at_ns <= edit.ended_ns for at_ns in later):
+    is_as_before = not took_over and not edit.not_back
+    if edit.ended_ns is not None and is_as_before and not any(at_ns <= edit.ended_ns for at_ns in later):
         before.append((edit.ended_ns + SETTLE_NS, min([edit.ended_ns + BACK_NS, *later])))
     return Spell(before, after), tuple(_disturbances(edit, others, since_ns, after[0][1]))
 
@@ -210,6 +247,13 @@ def within(found: Spell, since_ns: int, until_ns: int) -> Spell:
         for spans in (found.before, found.after)
     )
     return Spell(*sides)
+
+
+def _is_taken_over(edit: Edit, by: Edit) -> bool:
+    """Whether a trial's end is the other one's beginning: the same entry of the journal."""
+    names = {change.name for change in by.changes}
+    shares = any(change.name in names for change in edit.changes)
+    return edit.state is State.TAKEN_OVER and edit.ended_ns == by.in_force_ns and edit.id != by.id and shares
 
 
 def _instants(edit: Edit) -> Iterator[int]:

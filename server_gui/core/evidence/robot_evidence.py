@@ -42,6 +42,9 @@ LONGEST_NS: Final = max(AFTER_NS, TRIAL_NS + BACK_NS)  # from an edit until noth
 NEVER_NS: Final = 2**63
 OUTSIDE: Final = "a recording began or ended within its time: what is outside, of anybody, does not count"
 KEPT_NS: Final = BEFORE_NS + LONGEST_NS + 2 * LATE_NS  # of cycles
+MISSED: Final = (
+    "entries of the robot's journal were missed: what is of that time, of whatever edit, does not count"
+)
 JOINT: Final = "joint"  # the kind of component
 
 
@@ -69,7 +72,8 @@ class RobotEvidence:
         self._head: JournalHead | None = None
         self._recordings: list[tuple[int, str]] = [
             (-NEVER_NS, "")
-        ]  # since when (robot's clock), and their names
+        ]  # since when (robot's clock), and their names; one has pieces where the journal was missed
+        self._told_ns = 0  # until when the journal has told everything
         self._first_ns: int | None = None  # the first row of this boot
         self.newest_ns = 0  # the newest row, on the robot's clock
         self._seen: dict[str, tuple[Edit, Spell, int | None]] = {}  # how, and at how many cycles at most
@@ -110,7 +114,7 @@ class RobotEvidence:
 
     def end(self) -> list[Told]:
         """Return what is known of the edits that were still followed; nothing more will come."""
-        told = [self._told(edit, is_final=True) for edit in self._open()]
+        told = [self._told(_left(edit), is_final=True) for edit in self._open()]
         self._over |= {one.edit.id for one in told}
         return told
 
@@ -139,7 +143,11 @@ class RobotEvidence:
         if self._first_ns is None:  # nothing was seen before it
             self._recordings = [(-NEVER_NS, session)]
             return
-        self._recordings.append((self.newest_ns, session))
+        self._divide(self.newest_ns, session)
+
+    def _divide(self, at_ns: int, session: str) -> None:
+        """What is later than this is compared with nothing of before."""
+        self._recordings.append((at_ns, session))
         while len(self._recordings) > 1 and self._recordings[1][0] < self.newest_ns - KEPT_NS:
             del self._recordings[0]
 
@@ -155,7 +163,11 @@ class RobotEvidence:
         since_ns = self._recordings[place][0]
         until_ns = self._recordings[place + 1][0] if place + 1 < len(self._recordings) else NEVER_NS
         inside = within(windows, since_ns, until_ns)
-        return inside, notes if inside == windows else (*notes, OUTSIDE)
+        if inside == windows:
+            return inside, notes
+        around = self._recordings[max(place - 1, 0) : place] + self._recordings[place + 1 : place + 2]
+        missed = any(session == self._recordings[place][1] for _, session in around)
+        return inside, (*notes, MISSED if missed else OUTSIDE)
 
     def _rows(self, stamps_ns: list[int], columns: Mapping[str, Any]) -> None:
         if not stamps_ns:
@@ -171,11 +183,24 @@ class RobotEvidence:
 
     def _journal(self, entries: list[dict[str, Any]]) -> None:
         found = news(entries, self._head)
+        if found.missing:
+            self._missed(found.entries[0])
+        self._told_ns = self.newest_ns
         if found.entries:
             newest = found.entries[-1]
             self._head = JournalHead(newest["n"], newest["hash"])
             self._edits.take(entry for entry in found.entries if entry.get("boot_id") == self._boot_id)
             self._edits.forget(self.newest_ns - KEPT_NS)
+
+    def _missed(self, first: Mapping[str, Any]) -> None:
+        """Whatever was written before this entry, and how trials have ended, nobody here will ever know."""
+        if first.get("boot_id") != self._boot_id:
+            return  # it was in a boot that nothing is of
+        stamp_ns, session = first.get("monotonic_ns"), self._recordings[-1][1]
+        until_ns = stamp_ns if isinstance(stamp_ns, int) else self.newest_ns
+        self._edits.lose_sight(self._told_ns)
+        self._divide(self._told_ns, session)
+        self._divide(max(until_ns, self._told_ns), session)
 
     def _described(self, description: Description) -> list[Told]:
         ended: list[Told] = []
@@ -185,7 +210,7 @@ class RobotEvidence:
             self.cycles.clear()
             self._cutter.restart()
             self._edits = JournalEdits(self.robot)
-            self._first_ns, self.newest_ns = None, 0
+            self._first_ns, self.newest_ns, self._told_ns = None, 0, 0
             self._recordings = [(-NEVER_NS, self._recordings[-1][1])]
         if self._boot_id != description.boot_id:
             self._head = None
@@ -224,6 +249,11 @@ class RobotEvidence:
             self._over.add(edit.id)
             del self._seen[edit.id]
         return self._told(edit, is_final=is_final)
+
+
+def _left(edit: Edit) -> Edit:
+    """An edit that nobody follows any more: of a trial nobody here hears how it ends."""
+    return replace(edit, state=State.ASKED) if edit.state is State.ON_TRIAL else edit
 
 
 def _load(buses: tuple[BusInfo, ...] | None) -> float | None:

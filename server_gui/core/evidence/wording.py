@@ -9,6 +9,9 @@ from server_gui.core.evidence.comparison import Evidence, Measured, Word
 from server_gui.core.evidence.edits import Edit, State
 from server_gui.core.evidence.file import Told
 
+PERCENT: Final = "%"
+POINTS: Final = " points"  # of a percentage: from 10 to 15 % it is 5 more, and not 50 %
+MOST_SHARE: Final = 10.0  # times what was before, which else was next to nothing
 NO_UNITS: Final[Mapping[str, str]] = MappingProxyType({})
 
 
@@ -31,14 +34,15 @@ def share(one: Measured) -> str:
     """The difference, in percent of what was before where that says something."""
     if one.difference is None:
         return NONE
-    if not one.before or not _is_share(one):
-        return f"{one.difference:+.3g}"
-    return f"{one.difference / abs(one.before):+.1%}".replace("%", " %")
+    if not _is_share(one):
+        return f"{one.difference:+.3g}{POINTS if one.unit == PERCENT else ''}"
+    return f"{one.difference / abs(one.before or 1.0):+.1%}".replace("%", " %")
 
 
 def _is_share(one: Measured) -> bool:
-    """Whether a percentage of what was before says something."""
-    return bool(one.before) and abs((one.difference or 0.0) / (one.before or 1.0)) <= 10.0
+    """Whether a percentage of what was before says something: not of next to nothing, nor of percents."""
+    ends = (abs(end or 0.0) for end in (one.difference, one.low, one.high))
+    return bool(one.before) and one.unit != PERCENT and max(ends) <= MOST_SHARE * abs(one.before or 0.0)
 
 
 def interval(one: Measured) -> str:
@@ -46,7 +50,8 @@ def interval(one: Measured) -> str:
     if one.low is None or one.high is None:
         return NONE
     if not _is_share(one):
-        return f"{one.low:+.3g} to {one.high:+.3g} {one.unit}".rstrip()
+        unit = POINTS if one.unit == PERCENT else f" {one.unit}"
+        return f"{one.low:+.3g} to {one.high:+.3g}{unit}".rstrip()
     low, high = (100.0 * end / abs(one.before or 1.0) for end in (one.low, one.high))
     return f"{low:+.1f} to {high:+.1f} %"
 

@@ -1,7 +1,7 @@
 """The stop rules: what ends an experiment, each in words. Nothing here asks the robot anything."""
 
 import math
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -141,7 +141,10 @@ class Watch:
             f" (twice what was usual); if that much is harmless allow it: {ASKED[quantity]}, or nearer values"
         )
 
-    def _told(self, entries: Iterable[Mapping[str, Any]]) -> Iterator[str]:
+    def _told(self, entries: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+        numbers = [number for entry in entries if isinstance(number := entry.get("n"), int)]
+        if numbers and max(numbers) < self._entry:
+            self._entry = 0  # it was begun anew: nothing of it is known
         for entry in entries:
             number = entry.get("n")
             if not isinstance(number, int) or number <= self._entry:

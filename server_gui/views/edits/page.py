@@ -117,7 +117,11 @@ class Edits(QWidget):
 
     def _follow(self) -> None:
         """A trial that has begun is looked at, until somebody chooses another edit."""
-        running = (place for place, one in enumerate(self._shown) if one.edit.state is State.ON_TRIAL)
+        running = (
+            place
+            for place, one in enumerate(self._shown)
+            if one.edit.state is State.ON_TRIAL and not one.is_final
+        )
         place = next(running, None)
         if place is not None and self._shown[place].edit.id != self._followed:
             self._followed = self._shown[place].edit.id
@@ -248,7 +252,7 @@ class Edits(QWidget):
         return f"{what(told)} {told.experiment.unit}".rstrip()
 
     def _line(self, told: Told) -> str:
-        ended = told.edit.state if told.experiment is None else told.experiment.kind
+        ended = told.edit.became if told.experiment is None else told.experiment.kind
         values = self._what(told).replace(" → ", ARROW)  # no line ends within them
         return f"{_when(told.edit)}  {values}\n{ended} · {word(told)}"
 
@@ -287,7 +291,8 @@ def _said(told: Told) -> list[str]:
     evidence, tried = told.evidence, told.experiment
     done = [] if tried is None else list(record(tried))
     strong = _strong(told)
-    lines = [*done, *(_metric(one) for one in strong[:MOST])]
+    lines = [*done, *(f"Not as before: {line}." for line in told.edit.not_back)]
+    lines += map(_metric, strong[:MOST])
     if len(strong) > MOST:
         lines.append(f"and {len(strong) - MOST} more: gwrms edits show {told.edit.id}")
     same = sum(one.word is Word.SAME for one in evidence.metrics)

@@ -60,6 +60,17 @@ def test_what_waited_while_we_stood_still_was_not_missing() -> None:
     assert "its heartbeat is missing for 2.2 s" in (life.problem(reader.now_ns) or "")
 
 
+def test_a_standstill_is_not_told_for_ever_where_every_look_is_a_little_late() -> None:
+    reader = Reader()
+    reader.runs(500)
+    reader.stands(700)
+    reader.runs()
+    for _ in range(round(SHOWN_S * 1000 / 65) + 2):
+        reader.stands(65)
+        reader.standstill.passed(reader.now_ns)
+    assert reader.said is None
+
+
 def test_who_is_gone_is_missed_though_we_stand_still_again_and_again() -> None:
     reader = Reader()
     life = NodeLife(0.25, reader.standstill)
@@ -213,6 +224,20 @@ def test_a_jump_before_or_after_a_short_gap_is_found_as_ever() -> None:
         joint.watch.restart()
 
 
+@pytest.mark.parametrize("silent_ms", [100, 300, 900])
+def test_who_comes_back_elsewhere_after_a_silence_of_its_own_has_jumped(silent_ms: int) -> None:
+    """PDOs that were missing for a moment hide no encoder that lost its turns."""
+    for turns, said in ((3, True), (0.1, False)):
+        reader = Reader()
+        joint = Joint(reader, speed=0.0)
+        reader.runs(500, joint.late(0))
+        reader.runs(silent_ms)
+        joint.offset = 6.2832 * turns
+        reader.runs(1000, joint.late(0))
+        assert ("its position jumped by" in joint.said) is said
+        assert reader.said is None
+
+
 def test_a_jump_while_it_stood_still_is_no_secret() -> None:
     reader = Reader()
     joint = Joint(reader, speed=0.0)
@@ -240,6 +265,23 @@ def test_pdos_that_did_not_come_while_nobody_read_are_not_missing(every: int, to
             arrivals.look(reader.now_ns)
             reader.now_ns += 10 * MS
             reader.standstill.passed(reader.now_ns)
+    assert (arrivals.finding is not None) is told
+
+
+@pytest.mark.parametrize(("every", "told"), [(10, True), (1000, False)])
+def test_pdos_with_stamps_of_their_own_are_missed_though_every_look_is_late(every: int, told: bool) -> None:
+    """Each look takes 65 ms, for good; of PDOs each 10 ms, which the kernel stamps, every tenth is lost."""
+    reader, arrivals, sent_ns = Reader(), Arrivals(), 0
+    for _ in range(100):
+        reader.stands(65)
+        while sent_ns + 1_000 * MS <= reader.now_ns:
+            if sent_ns // (10 * MS) % every:
+                arrivals.stamps.append(sent_ns + 1_000 * MS)
+            sent_ns += 10 * MS
+        reader.standstill.passed(reader.now_ns)
+        assert reader.standstill.gap is not None
+        arrivals.excuse(*reader.standstill.gap)
+        arrivals.look(reader.now_ns)
     assert (arrivals.finding is not None) is told
 
 

@@ -106,6 +106,44 @@ def test_two_edits_that_overlap_say_so_and_share_nothing() -> None:
     assert "of before" in notes[0]
 
 
+def test_a_trial_that_takes_over_another_is_judged_against_what_it_found() -> None:
+    """What comes back at its end is of before the first one, and not what it is compared with."""
+    edits = journal(
+        (200, "write", 1),
+        (201, "trial begun", 1),
+        (220, "write", 2),
+        (221, "trial begun", 2),
+        (250, "taken back", 2),
+    ).all
+    first, _ = spell(edits[0], edits)
+    second, _ = spell(edits[1], edits)
+    assert (edits[0].state, edits[1].state) == (State.TAKEN_OVER, State.REVERTED)
+    assert first.after == [(202 * SECOND, 221 * SECOND)]
+    assert second.before == [(202 * SECOND, 220 * SECOND)]
+    assert second.after == [(222 * SECOND, 250 * SECOND)]
+
+
+def test_what_did_not_come_back_is_said_and_no_stretch_of_before() -> None:
+    """Somebody else has changed it meanwhile, or a stop has set it: the robot left it alone."""
+    for what, said in (
+        ("taken back", "left alone: it holds 01, neither of both"),
+        ("claimed by the stop", "left as the stop set it"),
+    ):
+        edits = JournalEdits("exo-01")
+        told = _entries((200, "write", 1), (201, "trial begun", 1), (231, what, 1), (240, "taken back", 1))
+        told[2]["outcome"], told[3]["outcome"] = {NAME: said}, {"left_hip.max_torque": "taken back"}
+        edits.take(told)
+        (edit,) = edits.all
+        assert (edit.ended_ns, edit.became) == (231 * SECOND, "reverted, NOT all of it")
+        assert edit.not_back == (f"{NAME}: {said}",)
+        assert len(spell(edit, edits.all)[0].before) == 1
+    edits = JournalEdits("exo-01")
+    told = _entries((200, "write", 1), (201, "trial begun", 1), (231, "taken back", 1))
+    told[2]["outcome"] = {NAME: "unchanged"}
+    edits.take(told)
+    assert (edits.all[0].became, len(spell(edits.all[0], edits.all)[0].before)) == ("reverted", 2)
+
+
 def test_a_replayed_tail_changes_nothing() -> None:
     """The same write number of another journal's entry is another edit."""
     told = ((200, "write", 1), (201, "write done", 1), (300, "write", 1), (301, "write done", 1))

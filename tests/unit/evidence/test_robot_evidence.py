@@ -10,7 +10,7 @@ from gateway.wire.control import JournalEntries
 from server_gui.core.evidence.comparison import Word
 from server_gui.core.evidence.edits import State
 from server_gui.core.evidence.file import Told
-from server_gui.core.evidence.robot_evidence import OUTSIDE, Recorded, RobotEvidence
+from server_gui.core.evidence.robot_evidence import MISSED, OUTSIDE, Recorded, RobotEvidence
 from server_gui.core.follow.events import Described, Event, Journalled, Telemetry, replaced
 from tests.support.desk import described
 from tests.unit.evidence.synthetic import cycles
@@ -112,6 +112,42 @@ def test_a_robot_that_starts_again_ends_what_was_followed(events: list[Event]) -
     assert all(told.is_final for told in ended)
     assert robot.take(described()) == []
     assert robot.end() == []
+
+
+def test_a_trial_that_nobody_follows_any_more_is_not_on_trial_for_ever(events: list[Event]) -> None:
+    """The robot starts anew, or the desk ends: how the trial ended is not known, and that is what is kept."""
+
+    def on_trial(event: Event) -> Event:
+        if not isinstance(event, Journalled):
+            return event
+        done = {"write done": "trial begun"}
+        made = [one | {"what": done.get(one["what"], one["what"])} for one in event.journal.entries]
+        return Journalled(JournalEntries(made))
+
+    told = followed(map(on_trial, events))[WORSE.write]
+    assert (told.edit.state, told.is_final) == (State.ASKED, True)
+    assert told.evidence.word is Word.WORSE
+
+
+def test_what_a_missed_part_of_the_journal_told_is_compared_with_nothing(events: list[Event]) -> None:
+    """The trial was taken back, or another edit was made, in entries that nobody here has seen."""
+    robot = RobotEvidence("exo-01")
+    seen: list[Told] = []
+    for event in events:
+        if isinstance(event, Journalled):
+            made = [one | {"what": "trial begun"} for one in event.journal.entries if one["n"] == 2]
+            robot.take(Journalled(JournalEntries([*event.journal.entries[:1], *made])))
+            continue
+        robot.take(event)
+        if robot.newest_ns > 32 * SECOND and not seen:
+            late = entry(900, robot.newest_ns, "stop", 0)
+            robot.take(Journalled(JournalEntries([late])))
+            seen = robot.look()
+    (told,) = robot.end()
+    assert told.edit.state is State.ASKED, "no trial is on for ever"
+    assert MISSED in told.evidence.notes
+    assert told.evidence.cycles_after <= 4, "from the last look at the journal on nobody knows what was held"
+    assert [one.edit.state for one in seen] == [State.ASKED]
 
 
 def test_edits_of_before_it_was_followed_are_not_judged(events: list[Event]) -> None:

@@ -213,6 +213,14 @@ def test_the_journal_ends_it_by_what_others_do_now(entry: dict[str, Any], why: s
     assert bool(world.run.watch.why) is bool(why)
 
 
+def test_a_journal_that_was_begun_anew_tells_of_a_stop_all_the_same() -> None:
+    watch = Watch(NAME, ("left_knee",), Bounds())
+    watch.take(Journalled(JournalEntries([{"n": 500, "who": "anna", "what": "note", "monotonic_ns": 1}])))
+    watch.begin((), 2)
+    watch.take(Journalled(JournalEntries([{"n": 1, "who": "anna", "what": "stop", "monotonic_ns": 3}])))
+    assert watch.why == "somebody has sent a STOP (anna)"
+
+
 @pytest.mark.parametrize(("bounds", "is_usual"), [(Bounds(), True), (Bounds(error=0.015), False)])
 def test_a_bound_that_nobody_chose_says_what_to_do(bounds: Bounds, is_usual: bool) -> None:
     """The larger the effect of a value, the sooner twice the usual ends its trial."""

@@ -1,0 +1,25 @@
+"""Differences in words: in percent only where a percentage says something."""
+
+import pytest
+
+from server_gui.core.evidence.comparison import Measured, Word
+from server_gui.core.evidence.wording import interval, share
+
+
+@pytest.mark.parametrize(
+    ("before", "difference", "half", "unit", "said"),
+    [
+        (0.01, 0.002, 0.001, "rad", ("+20.0 %", "+10.0 to +30.0 %")),
+        (-0.01, 0.002, 0.001, "s", ("+20.0 %", "+10.0 to +30.0 %")),
+        (1e-6, 5e-6, 1e-3, "s", ("+5e-06", "-0.000995 to +0.00101 s")),  # not -99500 to +100500 %
+        (1e-300, 0.0, 1e-3, "s", ("+0", "-0.001 to +0.001 s")),
+        (0.0, 0.1, 0.05, "", ("+0.1", "+0.05 to +0.15")),
+        (10.0, 5.0, 2.0, "%", ("+5 points", "+3 to +7 points")),  # not +50 %
+    ],
+)
+def test_percent_is_of_what_was_before(
+    before: float, difference: float, half: float, unit: str, said: tuple[str, str]
+) -> None:
+    low, high = difference - half, difference + half
+    one = Measured("a.b", "b", unit, Word.SAME, 9, 9, before, before + difference, difference, low, high)
+    assert (share(one), interval(one)) == said
