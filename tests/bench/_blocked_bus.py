@@ -36,7 +36,7 @@ def _serve(master: int, slave: int, ending: threading.Event) -> None:
         if ending.wait(0.001):
             return
         try:
-            heard = (heard + os.read(master, 100))[-100:]
+            heard = heard[-len(_OPENED) :] + os.read(master, 100)  # it may come in two pieces
         except BlockingIOError:
             continue
     try:

@@ -151,8 +151,9 @@ def test_no_rule_begins_to_hold_by_what_is_unknown() -> None:
     ("changes", "why"),
     [
         ({"detectors": ("drift",) * 8}, "it is of the detectors drift"),
-        ({"weights": (1.0,) * 8}, "a weight of each detector"),
-        ({"weights": (-1.0,) * 10}, "negative"),
+        ({"floor": (1.0,) * 8}, "a floor and a scale of each detector"),
+        ({"weights": (1.0,) * 8}, "the two weights of the worst"),
+        ({"weights": (-1.0,) * 2}, "negative"),
         ({"odds": ()}, "how often"),
         ({"thresholds": {"alarm": 1.0}}, "no threshold of early warning, advice, stop"),
     ],
