@@ -131,6 +131,11 @@ def choose(argv: list[str], commands: Mapping[str, Callable[[list[str]], int]], 
     if command is None:
         asked = argv[:1] in (["-h"], ["--help"])
         (sys.stdout if asked else sys.stderr).write(usage)
+        if argv and not asked:
+            missing = f"there is no command {argv[0]!r}{did_you_mean(argv[0], commands)}"
+            sys.stderr.write(
+                f"\n{'options come behind the COMMAND' if argv[0].startswith('-') else missing}\n"
+            )
         return 0 if asked else 2
     return command(argv[1:])
 

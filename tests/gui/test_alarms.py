@@ -292,6 +292,24 @@ def test_events_are_chosen_by_kind_and_word(around: Around, bench: Bench) -> Non
     assert [line.text for line in around.events.lines[len(around.events.pinned) :]] == ["right_insole stale"]
 
 
+def test_events_of_the_only_robot_do_not_spend_their_room_on_its_name(around: Around, bench: Bench) -> None:
+    def said(row: int = 0) -> object:
+        return around.events.table.model().index(row, 3).data()
+
+    while len(bench.desk.stations) > 1:
+        bench.desk.remove(bench.desk.stations[-1])
+    bench.desk.news.add(NewsKind.WARNING, "recording", "the disk is full")
+    bench.desk.news.add(NewsKind.STOP, bench.desk.stations[0].title, "STOP confirmed")
+    bench.draw(around)
+    first = len(around.events.pinned)
+    assert around.events.table.isColumnHidden(2)
+    assert (said(first), said(first + 1)) == ("STOP confirmed", "recording: the disk is full")
+    bench.add("exo-02")
+    bench.draw(around)
+    assert not around.events.table.isColumnHidden(2)
+    assert said(len(around.events.pinned) + 1) != "recording: the disk is full"
+
+
 def test_a_fault_is_cleared_after_a_question_and_enables_nothing(window: MainWindow, bench: Bench) -> None:
     fault(bench)
     bench.draw(window)

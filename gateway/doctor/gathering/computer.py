@@ -26,7 +26,7 @@ def computer(config: RobotConfig, root: Path = ROOT) -> Computer:
         clock_synchronised=_synchronised(root),
         queue_lengths=dict(_numbers(root / "sys/class/net", names, "tx_queue_len")),
         latency_ms=dict(_numbers(root / "sys/bus/usb-serial/devices", ports, "latency_timer")),
-        why_none=f"{root} does not tell",
+        why_none="its /sys and /proc do not tell" if root == Path("/") else f"{root} does not tell",
     )
 
 

@@ -297,6 +297,8 @@ def _off(seen: Observations, kind: str, means: dict[str, float]) -> Finding:
 def insole_scale(seen: Observations) -> Iterator[Verdict]:
     """A foot that carries what no foot does, or many times what the other one carries."""
     most: dict[str, float] = {}
+    if not seen.config.insole:
+        yield Unknown("insole_scale", "insoles", "the robot has none")
     for side in SIDES:
         insole, values = insole_of(seen, side), force(seen, side)
         if insole is not None and values is None:

@@ -64,7 +64,7 @@ TEXTS: Final = dict(
             Kind.NEVER_REACHED,
             "cross",
             "bad",
-            "is the robot switched on, its gateway running (gwrms serve), and the address right?",
+            "is the robot switched on, its gateway running (gwrms gateway), and the address right?",
         ),
         _text(
             Kind.NO_LINK,
@@ -126,7 +126,12 @@ TEXTS: Final = dict(
         _text(
             Kind.BUS_FAILS, "square", "bad", "check termination, wiring, bitrate and load (gwrms describe)"
         ),
-        _text(Kind.NOT_RECORDED, "square", "bad", "see to it: what comes until then may be lost"),
+        _text(
+            Kind.NOT_RECORDED,
+            "square",
+            "bad",
+            "see to this computer's disk and load; what comes until then may be lost",
+        ),
         _text(Kind.RECORDING, "triangle", "warn", "see to the disk of the spool (gwrms collect --status)"),
         _text(Kind.UPLOAD, "triangle", "warn", "nothing is lost: it waits in the spool; check the store"),
         _text(

@@ -182,7 +182,8 @@ class Run:
 
     def _late(self) -> str:
         unread = f"{self.plan.name} could not be read"
-        unseen = f"{self._least()} of {LOOKS_AT} gait cycles were seen: nobody walks, or rows are missing"
+        seen = f"{self._least()} of {LOOKS_AT} gait cycles were seen"
+        unseen = f"{seen}: nobody walks, or rows are missing, as where this computer is too busy"
         return {
             State.LOOKING: unread if self._held is None else unseen,
             State.WRITING: "the robot has not answered a write in time",

@@ -29,6 +29,7 @@ from server_gui.views.widgets.plain import tip
 
 Index = QModelIndex | QPersistentModelIndex
 COLUMNS: Final = 4
+ROBOT: Final = 2  # its column
 # What of them is shown; active alarms are whatever is chosen.
 CHOICES: Final[dict[str, frozenset[NewsKind]]] = {
     "Everything": frozenset(NewsKind),
@@ -83,6 +84,17 @@ class NewsModel(QAbstractTableModel):
         self.lines = [*active, *(line for line in news if self._has_words(line))]
         self.endResetModel()
 
+    @property
+    def only(self) -> Station | None:
+        """The robot, where there is one alone: its name on each line would take the room of what is said."""
+        stations = self._desk.stations
+        return stations[0] if len(stations) == 1 else None
+
+    def _said(self, line: Line) -> str:
+        """What is said, and of whom where that is neither in the column beside it nor the only robot."""
+        only = self.only
+        return line.text if only is None or line.robot == only.title else f"{line.robot}: {line.text}"
+
     def _has_words(self, line: Line) -> bool:
         said = f"{line.mark.word} {line.robot} {line.text}".lower()
         return all(word in said for word in self._words)
@@ -99,7 +111,7 @@ class NewsModel(QAbstractTableModel):
         match role:
             case Qt.ItemDataRole.DisplayRole:
                 kind = f"{GLYPHS.get(line.mark.shape, '◆')} {line.mark.word}"
-                return (line.when, kind, plain(line.robot), plain(line.text))[column]
+                return (line.when, kind, plain(line.robot), plain(self._said(line)))[column]
             case Qt.ItemDataRole.ForegroundRole if column < 2:
                 return self._theme.colour(line.mark.colour if column else "dim")
             case Qt.ItemDataRole.FontRole if is_pinned:
@@ -169,6 +181,7 @@ class EventsPanel(QWidget):
     def refresh(self) -> None:
         """Take what is new."""
         self._news.refresh()
+        self.table.setColumnHidden(ROBOT, self._news.only is not None)
 
     def minimumSizeHint(self) -> QSize:
         return QSize(self._theme.px(120), self._theme.px(60))

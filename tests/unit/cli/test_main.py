@@ -7,6 +7,7 @@ import sys
 
 import pytest
 
+from gateway.main import main as run
 from tests.fake_robot import FakeRobot
 
 GWRMS = (sys.executable, "-m", "gateway.main")
@@ -51,3 +52,24 @@ sys.exit(main())
         [sys.executable, "-c", pressed], capture_output=True, text=True, timeout=300, check=False
     )
     assert (ended.returncode, ended.stderr) == (130, "")
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["params", "--robot", "127.0.0.1:1", "save"], "options come behind the COMMAND"),
+        (["journal", "tial"], "there is no command 'tial'; did you mean tail?"),
+    ],
+)
+def test_one_of_several_commands_that_is_not_there_is_named(
+    words: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(words) == 2
+    assert capsys.readouterr().err.splitlines()[-1] == said
+
+
+def test_one_of_several_commands_that_is_not_given_only_shows_which_there_are(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert run(["journal"]) == 2
+    assert "there is no command" not in capsys.readouterr().err

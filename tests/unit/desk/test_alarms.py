@@ -1,5 +1,6 @@
 """What is wrong with a robot: its cause, since when, what to check; the unknown is never good."""
 
+import re
 import time
 from collections.abc import Callable
 
@@ -8,6 +9,7 @@ from msgspec.structs import replace
 
 from drivers.error_codes import error_check
 from gateway.client import ConnectionState, NotConnected
+from gateway.main import COMMANDS
 from gateway.wire.bus import BusInfo
 from gateway.wire.component import QualityInfo, Snapshot
 from gateway.wire.control import JournalEntries
@@ -152,6 +154,12 @@ def test_each_way_not_to_know_has_its_own_word_and_none_is_good(
 def test_no_kind_of_alarm_is_green_and_each_says_what_to_check() -> None:
     assert set(TEXTS) == set(Kind)
     assert all(text.mark.colour != "good" and text.check for text in TEXTS.values())
+
+
+def test_a_command_that_an_alarm_names_is_there() -> None:
+    named = {name for text in TEXTS.values() for name in re.findall(r"gwrms ([a-z-]+)", text.check)}
+    assert "gateway" in named
+    assert named <= set(COMMANDS)
 
 
 def test_a_state_that_this_program_does_not_know_is_not_taken_for_well(bench: Bench) -> None:

@@ -4,6 +4,7 @@ import random
 from collections.abc import Iterator
 from dataclasses import replace
 
+import msgspec
 import pytest
 
 from gateway.doctor.observations import Observations, Samples
@@ -81,3 +82,9 @@ def test_two_minutes_of_standing_raise_no_alarm_and_are_not_called_well(standing
 def test_a_wearer_with_one_weak_leg_who_turns_is_not_called_a_wrong_gear(standing: Observations) -> None:
     for one in windows(standing, walked(6, Activity.TURN_LEFT)):
         assert not any(isinstance(verdict, Finding) for verdict in motion.gear(one))
+
+
+def test_a_robot_without_insoles_is_told_that_none_was_judged(standing: Observations) -> None:
+    bare = replace(standing, config=msgspec.structs.replace(standing.config, insole={}))
+    verdicts = list(motion.insole_scale(bare))
+    assert verdicts == [Unknown("insole_scale", "insoles", "the robot has none")]
