@@ -18,14 +18,14 @@ from ml.danger.now import JOINTS, SIDES, Now, spoken
 
 KEPT: Final = 1000  # moments
 FEWEST: Final = 150  # moments, before one is looked up
-LOOKS: Final = 1200  # a minute and a half of health, till anything is told: much is new before, not wrong
+LOOKS: Final = 600  # 42 s of health, till anything is told: much is new before, not wrong
 ALIKE: Final = 5  # moments that are asked
 NEW: Final = 0.3  # squared: a moment that is so far from all others is remembered …
 WAITS_S: Final = 10.0  # … unless something was wrong by so much later
 FARTHEST: Final = 4.0  # from moments alike: beyond that nobody can say
-DOUBTED: Final = 3.0  # at such a distance half is believed
+DOUBTED: Final = 2.0  # at such a distance half is believed
 EVERY_S: Final = 0.07  # between two moments
-SMOOTH: Final = 0.15  # of the newest moment: over half a second
+SMOOTH: Final = np.array([0.3] * 12 + [0.15] * 3)  # of the newest moment: over a quarter, and half a second
 # What makes a joint's angle (rad) and velocity (rad/s) another one.
 _SCALE: Final = np.array([0.08] * 6 + [0.6, 0.8, 0.6] * 2)[:, None]
 _OWN: Final = np.array([*range(6), *[8] * 9, *[6] * 3, *[7] * 3])  # which search answers for which value
@@ -109,6 +109,7 @@ class Memory:
         distance = np.sqrt(np.maximum(np.take_along_axis(search, near, axis=1).mean(axis=1), 0.0))[_OWN]
         was = self._values[near[_OWN], _VALUE[:, None]].mean(axis=1)
         off = (values[_VALUE] - was) / (1.0 + (distance / DOUBTED) ** 2)
+        off[:6] *= _alone(distance[:6])
         known = np.isfinite(off) & (distance < FARTHEST)
         self._off += SMOOTH * np.where(known[:15], off[:15] - self._off, 0.0)
         legs = ((off[15:] / _SCALE[:6, 0]) ** 2).reshape(2, 3).mean(axis=1)
@@ -125,6 +126,16 @@ class Memory:
         at = self._count if self._count < KEPT else int(self._source.integers(KEPT))
         self._states[:, at], self._values[at] = state[:, 0], values
         self._count = min(self._count + 1, KEPT)
+
+
+def _alone(distance: Floats) -> Floats:
+    """How far each of six searches found moments more alike than the others, 0 to 1: its joint spoils theirs.
+
+    In a new activity all joints are new; one that is led astray is what the other five cannot find.
+    """
+    ranked = np.sort(distance)
+    others = np.where(distance <= ranked[2], ranked[3], ranked[2])  # the median of the other five
+    return np.maximum(1.0 - distance / np.maximum(others, 1e-9), 0.0)
 
 
 class Kind:

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ml.danger.creep import Creep
-from ml.danger.memory import Memory
+from ml.danger.memory import LOOKS, Memory
 from ml.danger.now import CHANNELS, Now
 
 Floats = npt.NDArray[np.float64]
@@ -100,18 +100,13 @@ def test_a_set_point_that_runs_away_is_told_of_its_joint_alone() -> None:
     assert np.nanmax(other) < 0.3 * np.nanmax(own)
 
 
-def test_in_the_first_minute_and_a_half_nothing_is_told() -> None:
+def test_till_it_has_looked_for_long_enough_nothing_is_told() -> None:
     memory, now = Memory(), Now()
-    found = [
-        memory.measure(moment(at_s, walking(at_s), now), learn=True)
-        for at_s in (0.08 * n for n in range(1199))
-    ]
-    assert np.isnan(found).all()
-    known = memory.measure(moment(LEARNED_S, walking(LEARNED_S), now), learn=True)
-    assert np.isnan(known).all(), "the last look of the time in which nothing is told"
-    assert np.isfinite(
-        memory.measure(moment(LEARNED_S + 1.0, walking(LEARNED_S + 1.0), now), learn=True)
-    ).any()
+    found = np.array(
+        [memory.measure(moment(at_s, walking(at_s), now), learn=True) for at_s in 0.08 * np.arange(LOOKS + 1)]
+    )
+    assert np.isnan(found[:-1]).all()
+    assert np.isfinite(found[-1]).any()
 
 
 def test_an_imu_that_slips_is_told() -> None:
