@@ -64,7 +64,7 @@ class Course:
                 return
 
     def _wait(self, seconds: float, doing: Activity, *, steady: bool = False) -> Iterator[bool]:
-        pace = self._source.uniform(0.30, 0.55), self._source.uniform(1.1, 2.0)
+        pace = self._source.uniform(0.30, 0.55), self._source.uniform(1.4, 2.4)
         self._robot.controller.go(Activity.WALK if steady else doing, pace)
         until_s = self._robot.clock.now_s + seconds + self._source.uniform(0.0, 2.0)
         while self._robot.clock.now_s < until_s or self._robot.controller.generator.in_transition:

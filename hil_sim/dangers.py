@@ -171,7 +171,7 @@ def healthy(source: random.Random) -> Iterator[Entry]:
         visits = [*_VISITS]
         source.shuffle(visits)
         for activity in visits:
-            pace = source.uniform(0.30, 0.55), source.uniform(1.1, 2.0)
+            pace = source.uniform(0.30, 0.55), source.uniform(1.4, 2.4)
             yield Entry(activity, source.uniform(5.0, 11.0), pace)
 
 
