@@ -24,8 +24,8 @@ from tests.attack.table import ATTACKS, MODULES
 from tests.support.waiting import until
 from tests.unit.gateway.harness import Client
 
-RATE = 400.0  # TPDOs a second, for slow machines
-SECONDS = 0.5
+RATE = 200.0  # TPDOs a second, for slow machines
+SECONDS = 0.25
 NODES = tuple(range(1, 9))
 LONGEST_NAME = 1000  # characters, of whatever a client calls itself; no limit need be so wide
 

@@ -165,7 +165,7 @@ def test_the_joint_table_is_whole_beside_an_alarm(window: MainWindow, bench: Ben
     for size in ((1024, 700), (1366, 768), (1920, 1080)):
         window.resize(*size)
         settle(window, bench)
-        table = window.overview.findChild(JointTable)
+        table = window.tabs.overview.findChild(JointTable)
         assert isinstance(table, JointTable)
         assert table.visibleRegion().boundingRect().height() == table.height(), size
 
@@ -336,9 +336,9 @@ def test_the_signal_of_a_fault_is_shown_around_its_instant(window: MainWindow, b
     bench.draw(window)
     window.alarms.buttons.show_signal.click()
     assert window.tabs.currentIndex() == 1
-    assert window.signals.chosen == ["left_knee.current"]
-    assert window.signals.pause.isChecked()
-    left, right = window.signals.plots[0].plot.window_s
+    assert window.tabs.signals.chosen == ["left_knee.current"]
+    assert window.tabs.signals.pause.isChecked()
+    left, right = window.tabs.signals.plots[0].plot.window_s
     assert -8.0 < left <= -5.0
     assert right <= 0.0
 

@@ -84,10 +84,10 @@ def test_a_trial_is_in_sight_whatever_panel_is_hidden(window: MainWindow, bench:
     bench.draw(window)
     assert window.parameters.trial.isVisible()
     assert not window.trial.isVisible(), "it is told twice"
-    assert not window.overview.now.keep.isVisible(), "it is asked twice"
+    assert not window.tabs.overview.now.keep.isVisible(), "it is asked twice"
     window._panels.put_away()
     bench.draw(window)
-    assert window.overview.now.keep.isVisible()
+    assert window.tabs.overview.now.keep.isVisible()
     assert not window.trial.isVisible()
     window.tabs.setCurrentIndex(1)  # the overview shows it itself
     bench.draw(window)

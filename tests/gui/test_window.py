@@ -174,12 +174,12 @@ def test_a_window_without_room_has_its_panels_behind_each_other_and_gives_them_b
     assert set(window.tabifiedDockWidgets(robots)) == {parameters, events}
     parameters.raise_()
     bench.draw(window)
-    assert window.overview.width() > 600
+    assert window.tabs.overview.width() > 600
     assert not window.parameters.visibleRegion().isEmpty()
     assert stop_is_whole(window)
     QTest.mouseClick(window.panels_button, Qt.MouseButton.LeftButton)
     bench.draw(window)
-    assert window.overview.width() > 1300
+    assert window.tabs.overview.width() > 1300
     assert stop_is_whole(window)
     QTest.mouseClick(window.panels_button, Qt.MouseButton.LeftButton)
     theme.set(scale=1.0)
@@ -196,8 +196,8 @@ def test_a_tight_window_begins_with_the_robot_and_has_its_panels_a_click_away(
     window.resize(1024, 700)
     theme.set(scale=1.5)
     bench.draw(window)
-    assert window.overview.width() > 1000
-    assert window.overview._columns == 3
+    assert window.tabs.overview.width() > 1000
+    assert window.tabs.overview._columns == 3
     assert not any(dock.isVisible() for dock in window.docks)
     QTest.mouseClick(window.panels_button, Qt.MouseButton.LeftButton)
     bench.draw(window)
