@@ -229,7 +229,7 @@ def test_the_controls_of_the_player_stay_in_sight_at_every_size(
     record(settings)
     play(whole, archive)
     player = full_window.tabs.recordings.player
-    for width, height, scale in ((1366, 768, 1.0), (1024, 700, 1.5), (1920, 1080, 2.0)):
+    for width, height, scale in ((1366, 768, 1.0), (1024, 700, 1.5)):
         if scale != theme.scale:
             theme.set(Look.LIGHT, scale)
         full_window.resize(width, height)
