@@ -260,7 +260,7 @@ def test_both_tabs_are_drawn_dark_and_light(
             shown.open(tab)
             shown.draw()
             image = shown.window.grab().toImage()
-            places = ((x, y) for x in range(0, image.width(), 5) for y in range(0, image.height(), 5))
+            places = ((x, y) for x in range(0, image.width(), 9) for y in range(0, image.height(), 9))
             seen = {image.pixel(x, y) for x, y in places}
             assert len(seen) > 40
             assert theme.colour("card").rgb() in seen

@@ -27,6 +27,8 @@ NOT_THE_WINDOWS = {"F12", "Ctrl+Space", "Alt+O", "F2"}  # of STOP, and Qt's own
 
 def test_the_sheet_tells_every_key_of_the_window_and_no_other(window: MainWindow) -> None:
     text = QKeySequence.SequenceFormat.PortableText
+    for place in range(window.tabs.count()):
+        window.tabs.setCurrentIndex(place)  # which makes the page
     held = {shortcut.key().toString(text) for shortcut in window.findChildren(QShortcut)}
     held |= {button.shortcut().toString(text) for button in window.findChildren(QAbstractButton)}
     held |= {action.shortcut().toString(text) for action in window.parameters.tree.actions()}
