@@ -211,6 +211,7 @@ def test_everything_that_can_be_reached_has_a_name(
 ) -> None:
     record(settings)
     play(shown, archive)
+    assert shown.window.tabs.recordings.changed is not None  # made now
     nameless = [
         f"{type(widget).__name__} {widget.objectName()}"
         for tab in (shown.window.tabs.recordings, shown.window.tabs.cloud)

@@ -18,7 +18,7 @@ from server_gui.views.resources.processes import COMMAND, CPU, NAME, ProcessTabl
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.sort_header import SortHeader
 from server_gui.views.widgets.stop_button import StopButton
-from tests.gui.fakes import Bench, destroy, stop_is_whole
+from tests.gui.fakes import Bench, destroy, make_every_page, stop_is_whole
 from tests.support.desk import HELD, described, looked, walking
 
 TOLD_AS_ONE = {f"Ctrl+{place}" for place in range(2, 10)}  # with Ctrl+1
@@ -27,8 +27,7 @@ NOT_THE_WINDOWS = {"F12", "Ctrl+Space", "Alt+O", "F2"}  # of STOP, and Qt's own
 
 def test_the_sheet_tells_every_key_of_the_window_and_no_other(window: MainWindow) -> None:
     text = QKeySequence.SequenceFormat.PortableText
-    for place in range(window.tabs.count()):
-        window.tabs.setCurrentIndex(place)  # which makes the page
+    make_every_page(window)
     held = {shortcut.key().toString(text) for shortcut in window.findChildren(QShortcut)}
     held |= {button.shortcut().toString(text) for button in window.findChildren(QAbstractButton)}
     held |= {action.shortcut().toString(text) for action in window.parameters.tree.actions()}

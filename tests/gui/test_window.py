@@ -15,7 +15,7 @@ from server_gui.views.frame.main_window import USUAL, MainWindow, opening_size
 from server_gui.views.parameters.tree import DEFAULT, RANGE
 from server_gui.views.robots.panel import RobotsPanel
 from server_gui.views.theme import PALETTES, Look, Theme
-from tests.gui.fakes import Bench, destroy, stop_is_whole
+from tests.gui.fakes import Bench, destroy, make_every_page, stop_is_whole
 from tests.support.desk import described, looked, walking
 
 TEXT = ("text", "dim", "accent", "left", "right", "good", "warn", "bad")
@@ -137,6 +137,7 @@ def test_left_and_right_are_told_apart_by_those_who_see_no_red_or_green() -> Non
 
 
 def test_everything_that_can_be_reached_has_a_name(window: MainWindow) -> None:
+    make_every_page(window)
     nameless = [
         f"{type(widget).__name__} {widget.objectName()}"
         for widget in window.findChildren(QWidget)

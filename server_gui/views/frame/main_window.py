@@ -125,14 +125,11 @@ class MainWindow(QMainWindow):
         self.experiment = ExperimentBar(desk)
         self.events = EventsPanel(desk, theme)
         self.events.shown.connect(self.show_around)
-        for bar in (self.trial, self.parameters.trial):
-            bar.compare.connect(lambda station: self.tabs.edits.compare(station))
         self.help, self.help_button = Help(theme), QPushButton("?")
         self.empty = EmptyView(theme)
         self.empty.added.connect(self.added)
         self.empty.pairing.connect(self.robots.begin_pairing)
         self.empty.simulator.connect(self.simulator)
-        self.empty.recordings.connect(lambda: self.tabs.look_at_recordings())
         self._pages = QStackedWidget()
         column = _column(self._middle)
         column.addWidget(self._pages, 1)
@@ -141,6 +138,9 @@ class MainWindow(QMainWindow):
         nobody.setWidget(self.empty)
         self.tabs = Pages(desk, theme, archive, commissioning)
         self.tabs.edited.connect(self._edit_parameter)
+        self.empty.recordings.connect(self.tabs.look_at_recordings)
+        for bar in (self.trial, self.parameters.trial):
+            bar.compare.connect(lambda station: self.tabs.edits.compare(station))
         self._pages.addWidget(self.tabs)
         self._commissioning = commissioning
         self._is_closing = self._is_ending = False
