@@ -42,12 +42,12 @@ within_s = [1, 2]
 [[expect]]
 component = "left_elbow"
 state = "ok"
-within_s = [0, 3]
+within_s = [0, 2]
 
 [[expect]]
 channel = "left_knee.position"
 min = 10
-between_s = [0, 4]
+between_s = [0, 2]
 """
 
 
@@ -82,9 +82,9 @@ def test_what_is_not_as_expected_is_told_and_the_exit_status_is_1(tmp_path: Path
     assert [line.split()[0] for line in told] == ["ok", "FAILED", "FAILED", "FAILED"]
     held = told["  FAILED  true gait.state is 'held' once between 1 and 2 s"]
     assert re.fullmatch(r"gait.state was 'running' from 1.\d\d to 2.00 s", held)
-    elbow = told["  FAILED  left_elbow is 'ok' once between 0 and 3 s"]
+    elbow = told["  FAILED  left_elbow is 'ok' once between 0 and 2 s"]
     assert elbow == "there is no component left_elbow"
-    position = told["  FAILED  left_knee.position at least 10 always between 0 and 4 s"]
+    position = told["  FAILED  left_knee.position at least 10 always between 0 and 2 s"]
     assert position.startswith("left_knee.position was ")
     if not slow:
         assert "of 4 expectations 3 failed" in lines
