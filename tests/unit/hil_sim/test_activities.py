@@ -68,7 +68,7 @@ WAYS = [
 @pytest.mark.parametrize(("ways", "seen"), WAYS)
 def test_what_is_done_between_two_activities(ways: tuple[Activity, Activity], seen: list[str]) -> None:
     moving = Moving()
-    moving.do(ways[0], 10.0)
+    moving.do(ways[0], 5.0)
     assert labels([*moving.do(ways[0], 0.1), *moving.do(ways[1], 10.0)]) == seen
 
 
