@@ -45,7 +45,7 @@ def one_robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SimulatedRob
 
 @pytest.fixture(scope="module")
 def one_gateway(one_robot: SimulatedRobot) -> Iterator[tuple[str, int]]:
-    """Of that robot, in this process too: its address. One client stays, so that its threads are no test's."""
+    """The address of that robot's, here too. One client stays, so that its threads are no test's."""
     with serving(load(one_robot.config)) as address, Client(address) as stays:
         until(lambda: None not in stays.call("component.snapshot")["values"].values(), "all is there")
         stays.call("stream.start", modules=["component"], rate_hz=1, channels=["left_hip.position"])
