@@ -50,6 +50,7 @@ class Outside:
         for name, line in self.robot.sensors.lines.items():
             line.port = self.ports[name]
         self.messages: list[can.Message] = []
+        self._came: list[can.Message] = []
         self.robot.bus.attach(self, self._hear, self._hear_error)
         self.robot.power_on()
         self.run(_UP_S)
@@ -69,15 +70,16 @@ class Outside:
 
     def run(self, seconds: float) -> list[can.Message]:
         """Let the robot live on; what came on the bus meanwhile."""
-        before = len(self.messages)
         self.robot.clock.run_until(self.robot.clock.now_ns + round(seconds * SECOND_NS))
-        return self.messages[before:]
+        came, self._came = self._came, []
+        self.messages += came
+        return came
 
     def send(self, cob_id: int, data: bytes) -> None:
         self.robot.bus.send(Frame(cob_id, data), self)
 
     def _hear(self, frame: Frame, _sender: object) -> None:
-        self.messages.append(
+        self._came.append(
             can.Message(
                 arbitration_id=frame.cob_id,
                 data=frame.data,
@@ -88,9 +90,7 @@ class Outside:
         )
 
     def _hear_error(self, error_class: int) -> None:
-        self.messages.append(
-            can.Message(arbitration_id=error_class, is_error_frame=True, timestamp=self.now_s)
-        )
+        self._came.append(can.Message(arbitration_id=error_class, is_error_frame=True, timestamp=self.now_s))
 
     def ask(self, node: int, request: bytes, seconds: float = _ANSWER_S) -> list[bytes]:
         """An SDO request; the answers that come in time."""

@@ -9,7 +9,6 @@ from typing import Any
 
 import pytest
 
-from hil_sim.bare import BareExoskeleton
 from hil_sim.errors import SimulatorError
 from hil_sim.exoskeleton import Exoskeleton, Scenario
 from hil_sim.gait.activity import Activity
@@ -56,7 +55,7 @@ def test_times_are_of_both_clocks(tmp_path: Path) -> None:
 
 
 def test_who_walks_has_phases_and_alternating_events(tmp_path: Path) -> None:
-    _, rows = recorded(tmp_path / "truth", BareExoskeleton(Scenario.WALK, seed=1), 6.0)
+    _, rows = recorded(tmp_path / "truth", Exoskeleton(Scenario.WALK, seed=1), 5.5)
     assert rows[10]["label"] == "stand"
     assert rows[10]["left_phase"] is None
     even = rows[250:]
