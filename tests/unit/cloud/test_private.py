@@ -137,11 +137,14 @@ def test_the_folder_of_a_store_is_for_its_owner_alone(tmp_path: Path) -> None:
     assert mode(tmp_path / "data") == mode(tmp_path / "data" / "store") == 0o700
 
 
-@pytest.mark.usefixtures("usual_umask")
-@pytest.mark.parametrize(
-    "name",
-    ["cloud", "collect", "evaluate", "gui", "label", "models", "predict", "query", "sessions", "train"],
+COMMANDS = (
+    *("cloud", "collect", "evaluate", "gui", "label"),
+    *("models", "predict", "query", "sessions", "train"),
 )
+
+
+@pytest.mark.usefixtures("usual_umask")
+@pytest.mark.parametrize("name", COMMANDS)
 def test_a_command_that_writes_makes_private_files(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     """Also what libraries make, such as a table's log: by the process's own mask."""
     with contextlib.suppress(SystemExit):
