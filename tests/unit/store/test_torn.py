@@ -74,7 +74,7 @@ def test_an_append_that_is_cut_at_any_length_is_made_once(url: str) -> None:
 def _lengths(data: bytes) -> list[int]:
     """Every end of a line, with and without it, and what lies between at intervals."""
     ends = [at for at in range(len(data)) if data[at : at + 1] == b"\n"]
-    return sorted({*ends, *(end + 1 for end in ends), *range(0, len(data), 101)} - {len(data)})
+    return sorted({*ends, *(end + 1 for end in ends), *range(0, len(data), 307)} - {len(data)})
 
 
 def test_a_table_whose_making_is_cut_at_any_length_is_made_anew(url: str) -> None:
