@@ -2,7 +2,6 @@
 
 import atexit
 import gc
-import importlib
 import os
 import re
 import signal
@@ -78,8 +77,6 @@ def _marks_of(item: pytest.Item, marks: list[tuple[str, str]]) -> Iterator[str]:
 def pytest_collection() -> Generator[None, object, object]:
     """All that is collected stays: to look for garbage in it, now or later, takes each worker seconds."""
     gc.disable()
-    if "PYTEST_XDIST_WORKER" in os.environ:
-        importlib.import_module("skops.io")  # it looks at every module that there is: now there are few
     try:
         return (yield)
     finally:

@@ -2,7 +2,8 @@
 
 A moment's joints are looked up among those of before; what a joint's set-point, torque, a foot's load and the
 trunk's lean were then, they should be now. A joint is looked up by the other joints alone, so that one which
-goes its own way finds the moments in which it should be elsewhere. Where no moment was alike, as in the first steps of stairs, nothing is said: a new activity changes all joints at once.
+goes its own way finds the moments in which it should be elsewhere. Where no
+moment was alike, as in the first steps of stairs, nothing is said: a new activity changes all joints at once.
 """
 
 import collections
