@@ -16,7 +16,7 @@ _LOOKS_LIKE = "Silent drives (SDO time-outs) and missing samples may be only thi
 
 
 class Pace:
-    """Looks each turn of `loop`, in its thread; `now_ns` and `cpu_ns` are real time and what it has computed."""
+    """Looks each turn of `loop`, in its thread; `now_ns` and `cpu_ns` are real time and what was computed."""
 
     def __init__(
         self,
@@ -72,6 +72,6 @@ def _words(speed: float, lost: float, busy: float, real_ns: int) -> str:
             "a higher priority (nice -n -5)"
         )
     return (
-        f"it cannot keep {pace}: it went at {went:.2f} times real time in the last {real_ns / SECOND_NS:.0f} s; "
-        f"{why}. {_LOOKS_LIKE}"
+        f"it cannot keep {pace}: it went at {went:.2f} times real time in the last "
+        f"{real_ns / SECOND_NS:.0f} s; {why}. {_LOOKS_LIKE}"
     )

@@ -74,7 +74,7 @@ class CanSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
 
     @property
     def is_program(self) -> bool:
-        """Whether a program on this computer carries the frames: a simulator, or a daemon before an adapter."""
+        """Whether a program of this computer carries the frames: a simulator, or an adapter's daemon."""
         return self.interface == "socketcand" and self.network is None
 
     @classmethod

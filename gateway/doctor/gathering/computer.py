@@ -26,7 +26,7 @@ def computer(config: RobotConfig, root: Path = ROOT) -> Computer:
         clock_synchronised=_synchronised(root),
         queue_lengths=dict(_numbers(root / "sys/class/net", names, "tx_queue_len")),
         latency_ms=dict(_numbers(root / "sys/bus/usb-serial/devices", map(usb_name, paths), "latency_timer")),
-        missing_ports=frozenset(path for path in paths if root == ROOT and not os.path.exists(path)),
+        missing_ports=frozenset(path for path in paths if root == ROOT and not Path(path).exists()),
         why_none="its /sys and /proc do not tell" if root == Path("/") else f"{root} does not tell",
     )
 
