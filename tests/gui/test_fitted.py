@@ -27,6 +27,19 @@ def test_the_fullest_wording_that_has_room_is_shown_and_the_last_is_whole(theme:
     assert label.accessibleName() == WORDINGS[0]
 
 
+def test_labels_beside_each_other_are_of_one_form(theme: Theme) -> None:
+    left, right = FittedLabel(), FittedLabel()
+    left.speak_alike(right)
+    left.say("LEFT  933 N", "L  933 N")
+    right.say("RIGHT  0 N", "R  0 N")
+    room = left.fontMetrics().horizontalAdvance("LEFT  933 N")
+    left.resize(room + 1, 20)
+    right.resize(room + 1, 20)
+    assert (left.shown, right.shown) == ("LEFT  933 N", "RIGHT  0 N")
+    left.resize(room - 1, 20)
+    assert (left.shown, right.shown) == ("L  933 N", "R  0 N")
+
+
 def test_in_a_narrow_card_the_name_gives_way_to_the_number(theme: Theme) -> None:
     card = Card("Posture of whoever stands in it")
     card.set_note("STALE, 12.3 s old", "12.3 s old")
