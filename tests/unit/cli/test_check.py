@@ -320,3 +320,19 @@ def test_severities_are_told_in_their_order(tmp_path: Path, capsys: pytest.Captu
     assert main(["--no-machine", str(file)]) == 1
     said = [line.split(": ")[1] for line in capsys.readouterr().out.splitlines()[:-1]]
     assert said == [Severity.MISTAKE, Severity.WARNING]
+
+
+def test_what_files_and_computer_lack_is_told_beside_mistakes_in_one_run(tmp_path: Path) -> None:
+    text = BARE + KNEE.replace("node_id = 2", "node_id = 200").replace("gait_controller.eds", "gone.eds")
+    text += f'[insole.left]\nport = "{tmp_path}/gone"\nlayout = "sole"\n'
+    text += '[joint.hip]\nbus = "mian"\nnode_id = 3\neds = "gone.eds"\n'
+    text += "counts_per_revolution = 4096\ngear_ratio = 100\n"
+    found = told(written(tmp_path, text), machine=True)
+    for words in (
+        "mistake: [joint.knee] node_id: must be",
+        "mistake: [joint.hip] bus: there is no bus 'mian'",
+        "mistake: [insole.left] layout: 'sole' is not known",
+        "mistake: [device.gait]: there is no EDS file 'gone.eds'",
+        f"warning: [insole.left] port: {tmp_path}/gone does not exist",
+    ):
+        assert words in found, found
