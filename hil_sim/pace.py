@@ -29,7 +29,7 @@ class Pace:
         self._say = say
         self._now_ns, self._cpu_ns = now_ns, cpu_ns
         self._since_ns, self._cpu_since_ns = now_ns(), cpu_ns()
-        self._skipped_ns = loop.skipped_ns
+        self._skipped_ns, self._simulated_ns = loop.skipped_ns, loop.clock.now_ns
         self._slow = self._even = 0  # windows in a row
         self._said_ns: int | None = None
         self._is_said = False  # that it is behind, and not yet that it is no more
@@ -42,12 +42,13 @@ class Pace:
         real_ns = now_ns - self._since_ns
         if real_ns < _WINDOW_NS:
             return
-        cpu_ns, skipped_ns = self._cpu_ns(), self._loop.skipped_ns
+        cpu_ns, skipped_ns, simulated_ns = self._cpu_ns(), self._loop.skipped_ns, self._loop.clock.now_ns
         speed = self._loop.speed or 1.0
         lost = (skipped_ns - self._skipped_ns) / (real_ns * speed)
-        busy = (cpu_ns - self._cpu_since_ns) / real_ns
-        self._since_ns, self._cpu_since_ns, self._skipped_ns = now_ns, cpu_ns, skipped_ns
-        self._judge(now_ns, lost, _words(speed, lost, busy, real_ns))
+        went, busy = (simulated_ns - self._simulated_ns) / real_ns, (cpu_ns - self._cpu_since_ns) / real_ns
+        self._since_ns, self._cpu_since_ns = now_ns, cpu_ns
+        self._skipped_ns, self._simulated_ns = skipped_ns, simulated_ns
+        self._judge(now_ns, lost, _words(speed, went, busy, real_ns))
 
     def _judge(self, now_ns: int, lost: float, words: str) -> None:
         is_slow = lost >= _WORTH
@@ -60,15 +61,14 @@ class Pace:
             self._say("it keeps its pace again")
 
 
-def _words(speed: float, lost: float, busy: float, real_ns: int) -> str:
+def _words(speed: float, went: float, busy: float, real_ns: int) -> str:
     """What is slow, by how much, and what to do."""
     pace = "real time" if speed == 1.0 else f"{speed:g} times real time"
-    went = max(0.0, speed * (1.0 - lost))
     if busy >= _BUSY:
         why = f"it takes {100 * busy:.0f} % of a core itself: take a lower --speed, or a faster computer"
     else:
         why = (
-            f"it got {100 * busy:.0f} % of a core, the rest other programs took: end them, or start it with "
+            f"it got only {100 * busy:.0f} % of a core: end other programs (top shows them), or start it with "
             "a higher priority (nice -n -5)"
         )
     return (

@@ -24,6 +24,8 @@ class Slow:
             self.now_ns += SECOND_NS
             self.cpu_ns += round(busy * SECOND_NS)
             self.loop.skipped_ns += round(lost * SECOND_NS)
+            went_ns = round(max(0.0, (self.loop.speed or 1.0) - lost) * SECOND_NS)
+            self.loop.clock.run_until(self.loop.clock.now_ns + went_ns)
             for look in self.loop._each_turn:
                 look()
 
@@ -39,7 +41,7 @@ def test_what_is_slow_by_how_much_and_what_to_do_is_said_once(slow: Slow) -> Non
     slow.runs(30, lost=0.4)
     (words,) = slow.said
     assert "cannot keep real time: it went at 0.60 times real time in the last 3 s" in words
-    assert "it got 50 % of a core, the rest other programs took: end them" in words
+    assert "it got only 50 % of a core: end other programs" in words
     assert "SDO time-outs" in words
 
 
