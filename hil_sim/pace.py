@@ -68,7 +68,7 @@ def _words(speed: float, went: float, busy: float, real_ns: int) -> str:
         why = f"it takes {100 * busy:.0f} % of a core itself: take a lower --speed, or a faster computer"
     else:
         why = (
-            f"it got only {100 * busy:.0f} % of a core: end other programs (top shows them), or start it with "
+            f"it got only {100 * busy:.0f} % of a core: end other programs (see top), or start it with "
             "a higher priority (nice -n -5)"
         )
     return (

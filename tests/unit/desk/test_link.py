@@ -87,7 +87,7 @@ def test_a_write_that_comes_while_it_resets_keeps_control(link: Link, client: Fa
 
 @pytest.mark.parametrize("how", ["released", "refused"])
 def test_what_is_no_longer_ours_is_given_back_again(link: Link, client: FakeClient, how: str) -> None:
-    async def refused(ttl_s: float) -> Lease:  # noqa: ARG001 - the name is part of it
+    async def refused(ttl_s: float) -> Lease:
         raise NotConnected("gone")
 
     async def before() -> None:
