@@ -25,8 +25,8 @@ class Loop:
 
     def __init__(self, clock: Clock, speed: float | None = 1.0) -> None:
         self.clock = clock
-        self.skipped_ns = 0
-        self._speed = speed
+        self.speed = speed
+        self.skipped_ns = 0  # simulated, left out because it came too late
         self._step_ns = round(_STEP_NS * (speed or 1.0))
         self._selector = (
             selectors.SelectSelector()
@@ -84,11 +84,11 @@ class Loop:
     def _target_ns(self) -> int:
         """The simulated time that should be reached now."""
         now_ns = self.clock.now_ns
-        if self._speed is None:
+        if self.speed is None:
             return now_ns + _FAST_SLICE_NS
         elapsed_ns = time.monotonic_ns() - self._real_start_ns
-        target = self._simulated_start_ns + round(elapsed_ns * self._speed)
-        if target - now_ns > _CATCH_UP_NS * max(self._speed, 1.0):
+        target = self._simulated_start_ns + round(elapsed_ns * self.speed)
+        if target - now_ns > _CATCH_UP_NS * max(self.speed, 1.0):
             self.skipped_ns += target - now_ns
             self._late_ns += target - now_ns
             self._anchor(now_ns)
@@ -97,15 +97,15 @@ class Loop:
 
     def _note_late(self, target_ns: int) -> None:
         due_ns = self.clock.next_due_ns()
-        if due_ns is not None and self._speed is not None:
+        if due_ns is not None and self.speed is not None:
             self._late_ns = max(self._late_ns, target_ns - due_ns)
 
     def _wait_s(self) -> float | None:
-        if self._speed is None:
+        if self.speed is None:
             return 0.0
         due_ns = self.clock.next_due_ns()
         if due_ns is None:
             return None
         steps = -((self._simulated_start_ns - due_ns) // self._step_ns)
-        wake_ns = self._real_start_ns + round(steps * self._step_ns / self._speed)
+        wake_ns = self._real_start_ns + round(steps * self._step_ns / self.speed)
         return min(max(wake_ns - time.monotonic_ns(), 0), _LONGEST_WAIT_NS) / SECOND_NS

@@ -32,6 +32,7 @@ from eds import Description
 T = TypeVar("T")
 
 _REMAPPED = "its PDOs are being mapped otherwise: nothing is made of them until that has rested"
+_PLAYED = "; where its bus is simulated: does the simulator keep real time? It says where not"
 _NOT_ASKED = "it has not come up, so nobody knows what it is: nothing is written to it"
 EMCY = 0x080
 PDO_PARAMETERS = range(0x1400, 0x1C00)  # communication and mapping, of both directions (CiA 301 §7.5.2)
@@ -69,6 +70,7 @@ class Node(BusUser):
             times.sdo_timeout_s,
             lambda: self.distrust,
         )
+        self.channel.also_silent = _PLAYED if bus.settings.is_program else ""
         self.worker = SdoWorker(self.channel)
         self._booting = Booting(self.worker, self._lock, self._come_up, self._explain)
         guard_s = times.guard_time_s if bus.role is Role.MASTER else None

@@ -72,6 +72,11 @@ class CanSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
             return f"the multicast group {self.channel}"
         return None
 
+    @property
+    def is_program(self) -> bool:
+        """Whether a program of this computer carries the frames: a simulator, or an adapter's daemon."""
+        return self.interface == "socketcand" and self.network is None
+
     @classmethod
     def parted(cls, table: Mapping[str, Any]) -> dict[str, Any]:
         """The table with python-can's keys in `more`."""

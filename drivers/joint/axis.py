@@ -5,6 +5,7 @@ from drivers.bus.values import unsigned
 from drivers.joint.cia402 import DriveState, drive_state
 from drivers.joint.commands import CONTROLWORD, STATUSWORD, Controlword
 
+ERROR_CODE = 0x603F
 POSITION_ACTUAL = 0x6064
 
 
@@ -22,6 +23,10 @@ class Axis:
     def state(self, timeout_s: float | None = None) -> DriveState | None:
         """What its statusword says now; `None` for a pattern that the standard does not know."""
         return drive_state(unsigned(self.read(STATUSWORD, 2, timeout_s=timeout_s)))
+
+    def error_code(self) -> int:
+        """Of the latest error (603Fh); 0: it tells none."""
+        return unsigned(self.read(ERROR_CODE, 2))
 
     def position(self) -> int:
         """Counts of 6064h."""

@@ -9,6 +9,7 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass, field, replace
 
 from drivers.bus.sdo.channel import Interrupted
+from drivers.error_codes import error_check, error_text
 from drivers.errors import DeviceTimeout, DriverError, Unavailable
 from drivers.joint.axis import Axis
 from drivers.joint.cia402 import DriveState
@@ -56,7 +57,19 @@ def look(axis: Axis) -> Led:
 
 def lead_down(axis: Axis, errand: Errand) -> Led:
     """To SWITCH ON DISABLED from any state; an axis that drives or brakes comes to rest before."""
-    return _unless_overtaken(errand, _Descent(axis, errand).run())
+    led = _Descent(axis, errand).run()
+    if led.state is DriveState.FAULT and led.problem is not None and errand.wanted():
+        led = replace(led, problem=f"{led.problem}: {_why_in_fault(axis)}, then reset it again")
+    return _unless_overtaken(errand, led)
+
+
+def _why_in_fault(axis: Axis) -> str:
+    """Its error code in words, and what to do."""
+    try:
+        code = axis.error_code()
+    except DriverError:
+        code = 0
+    return f"{error_text(code)}; {error_check(code)}" if code else "it tells no code; remove what causes it"
 
 
 def step_up(axis: Axis, errand: Errand, origin: DriveState) -> Led:

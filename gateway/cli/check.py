@@ -4,19 +4,20 @@ import argparse
 import importlib
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
 from gateway.amounts import counted
 from gateway.cli.text import say, say_json
 from gateway.tables.finding import Finding, Severity
-from gateway.tables.reading import Unreadable, read
+from gateway.tables.places import Places
+from gateway.tables.reading import Unreadable, as_far_as_readable, parse, read
 
 _DESCRIPTION = """\
 Checks a robot's file, a server's file or a scenario as a gateway, a collector or `gwrms sim run` would read
-it, and tells everything that is wrong at once: table, key, what is allowed and what was likely meant. Which
-of them a file is shows in its tables. Nothing is started, and nothing is written.
+it, and tells everything that is wrong at once: line, table, key, what is allowed and what was likely meant.
+Which of them a file is shows in its tables. Nothing is started, and nothing is written.
 
 Of a robot's file also what it needs is looked at: whether its EDS files, layouts and calibrations can be used
 and allow what its parameters say, whether the ports exist and this user may open them, whether the CAN links
@@ -26,7 +27,8 @@ _EPILOG = """\
 A mistake is what a file is refused for, or, in a file that it names, the component that needs that one: the
 gateway starts without it. A warning is what can work and is likely not what was meant, or what this computer
 lacks: it may come yet. A gateway says the same of its file and of devices' files when it starts, and of ports
-and buses in gwrms describe. Of what is no TOML only the first mistake is told.
+and buses in gwrms describe. Lines that are no TOML are told, and the rest is checked without them; behind
+a header that cannot be read, or a value that does not end, nobody knows what is meant.
 
 exit status: 0 no mistakes; 1 mistakes, with --strict also warnings; 2 usage
 
@@ -35,6 +37,8 @@ examples
   gwrms check --no-machine --json *.toml
   gwrms check --schema robot > robot.schema.json
 """
+
+_MISSING: Final = "is missing"  # which is not known where a line could not be read
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,11 +122,21 @@ def check(file: Path, kind: str | None = None, *, machine: bool = True) -> Check
     """Everything that is wrong with a file, or likely is; its kind is what its tables show, unless given."""
     try:
         tables = read(file)
+        text = file.read_text(encoding="utf-8")
     except Unreadable as error:
-        return Checked(file, kind, [error.finding])
-    found = kind or recognised(file, tables)
-    told = _find(KINDS[found].check)(file, tables, machine=machine)
-    return Checked(file, found, [Finding(where, key, text, Severity(how)) for how, where, key, text in told])
+        found, rest = as_far_as_readable(file, error.finding)
+        more = (
+            [] if rest is None else _check(file, kind, rest, parse(rest.encode()), machine=machine).findings
+        )
+        return Checked(file, kind, [*found, *(one for one in more if not one.text.startswith(_MISSING))])
+    return _check(file, kind, text, tables, machine=machine)
+
+
+def _check(file: Path, kind: str | None, text: str, tables: Mapping[str, Any], *, machine: bool) -> Checked:
+    what, places = kind or recognised(file, tables), Places(text)
+    told = _find(KINDS[what].check)(file, tables, machine=machine)
+    findings = [Finding(where, key, said, Severity(how)) for how, where, key, said in told]
+    return Checked(file, what, [replace(one, line=places.line(one)) for one in findings])
 
 
 def recognised(file: Path, tables: Mapping[str, Any]) -> str:
@@ -148,15 +162,27 @@ def _as_json(one: Checked) -> dict[str, object]:
         "kind": one.kind,
         "ok": not one.count(Severity.MISTAKE),
         "findings": [
-            {"severity": found.severity.value, "where": found.where, "key": found.key, "text": found.text}
+            {
+                "severity": found.severity.value,
+                "where": found.where,
+                "key": found.key,
+                "text": found.text,
+                "line": found.line,
+            }
             for found in one.findings
         ],
     }
 
 
 def _as_text(one: Checked) -> str:
-    lines = [f"{one.file}: {found.severity}: {found.words}" for found in _worst_first(one.findings)]
+    lines = [
+        f"{_place(one.file, found)}: {found.severity}: {found.words}" for found in _worst_first(one.findings)
+    ]
     return "\n".join([*lines, f"{one.file}: {_summary(one)}\n"])
+
+
+def _place(file: Path, found: Finding) -> str:
+    return str(file) if found.line is None else f"{file}:{found.line}"
 
 
 def _summary(one: Checked) -> str:

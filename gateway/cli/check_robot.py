@@ -5,17 +5,21 @@ from pathlib import Path
 from typing import Any
 
 from gateway.config.reading import examined
-from gateway.tables.finding import Told, told
+from gateway.config.remains import remains
+from gateway.tables.finding import Told, mistakes, told
 
 
 def findings(file: Path, tables: Mapping[str, Any], *, machine: bool) -> Iterator[Told]:
-    """All of that; files and computer are looked at where the tables can be used."""
+    """All of that; where tables have mistakes, as far as what is right can be looked at."""
     found = examined(file, tables)
     yield from told(found.findings)
-    if found.config is None:
+    config = found.config or found.rest
+    if config is None:
         return
     from gateway.surroundings import beside, here  # needs what drives and EDS files need
 
-    yield from told(beside(found.config))
+    wrong = mistakes(found.findings)
+    yield from told(beside(remains(config, wrong) if wrong else config))
     if machine:
-        yield from told(here(found.config))
+        known = {(one.where, one.key) for one in wrong}
+        yield from told(one for one in here(config) if (one.where, one.key) not in known)

@@ -35,7 +35,7 @@ def _which(draft: Draft, others: Mapping[int, Told]) -> Talk[int | None]:
     names = ", ".join(f"{node} ({one.name or 'without a name'})" for node, one in sorted(others.items()))
     choice = yield from choose(
         "Which node commands the drives, so that a STOP can tell it too? "
-        f"Beside the drives here are: {names or 'no others'}.  {NONE}: it is no node, or not here now",
+        f"Beside the drives here are: {names or 'no others'}. {NONE}: it is no node, or not here now",
         (*map(str, sorted(others)), NONE),
         NONE,
     )

@@ -66,10 +66,10 @@ def _description(draft: Draft, axis: Axis) -> Description:
 
 
 def _chosen(joint: str, methods: tuple[int, ...]) -> Talk[int | None]:
-    listed = ";  ".join(f"{one}: {METHODS[one].words}" for one in methods)
+    listed = "; ".join(f"{one}: {METHODS[one].words}" for one in methods)
     choice = yield from choose(
         f"Should the drive of the {words(joint)} find its own zero (homing)? It gets power for that, and is "
-        f"disabled again.  {NO}: nothing gets power;  {listed}",
+        f"disabled again. {NO}: nothing gets power; {listed}",
         (NO, *map(str, methods)),
         NO,
     )
@@ -150,7 +150,7 @@ def _followed(run: HomingRun, known: Known) -> Talk[Outcome]:
         while not run.done:
             moved = math.degrees(run.moved * known.scale.direction * math.tau / known.counts_per_turn)
             why = yield Moving(
-                f"The {words(known.joint)} is under power. STOP: Enter.  {run.said} ({moved:+.1f}°)"
+                f"The {words(known.joint)} is under power. STOP: Enter. {run.said} ({moved:+.1f}°)"
             )
             if why:
                 run.stop(why)

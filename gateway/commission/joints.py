@@ -202,7 +202,7 @@ def _settled(first: Held, second: Held, nominal: Nominal) -> Talk[Scale | None]:
             f"two angles say {off:.2f} times as many counts a turn."
         )
         choice = yield from choose(
-            "Which is right?  again: measure again;  angles: what was measured;  drive: what it says",
+            "Which is right? again: measure again; angles: what was measured; drive: what it says",
             ("again", "angles", "drive"),
             "again",
         )

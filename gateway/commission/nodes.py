@@ -70,7 +70,7 @@ def role(draft: Draft, found: Found) -> Talk[None]:
     if draft.has("gateway", "role"):
         return
     choice = yield from choose(
-        "Nobody leads this bus now.  observer: a controller will;  master: this is a bench, where GWRMS "
+        "Nobody leads this bus now. observer: a controller will; master: this is a bench, where GWRMS "
         "starts the nodes. Neither enables a drive.",
         (OBSERVER, MASTER),
         OBSERVER,

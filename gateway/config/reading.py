@@ -61,6 +61,7 @@ class Examined:
 
     config: RobotConfig | None
     findings: list[Finding] = field(default_factory=list)
+    rest: RobotConfig | None = None  # of one that cannot be served: what can be read of it, mistakes and all
 
 
 def load(path: Path) -> RobotConfig:
@@ -97,7 +98,8 @@ def examined(path: Path, document: Table) -> Examined:
     findings = decoding.findings
     if config is not None:
         findings.extend(complaints(config))
-    return Examined(None if mistakes(findings) else config, in_order(findings, document))
+    is_wrong = bool(mistakes(findings))
+    return Examined(None if is_wrong else config, in_order(findings, document), config if is_wrong else None)
 
 
 class _Reading:

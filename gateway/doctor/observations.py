@@ -68,6 +68,7 @@ class Computer:
     clock_synchronised: bool | None = None
     queue_lengths: Mapping[str, int] = field(default_factory=dict)  # CAN interface → frames
     latency_ms: Mapping[str, int] | None = None  # USB serial port's device → its timer
+    missing_ports: frozenset[str] = frozenset()  # of the file, that are not there
     why_none: str = "this is not the robot's computer"
 
 

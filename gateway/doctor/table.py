@@ -72,7 +72,10 @@ RULES: tuple[Rule, ...] = (
     Rule("insole_scale", "an insole's scale is off", "walking: force under each foot", motion.insole_scale),
     Rule("imu", "the IMU's axes are wrong, or it is frozen", "standing: gravity; walking: sway", trunk.imu),
     Rule(
-        "component", "a driver says that something else is wrong", "channels: quality", components.component
+        "component",
+        "a driver says that something else is wrong, or a bus has no interface",
+        "channels: quality; computer: CAN interfaces",
+        components.component,
     ),
     Rule("latency_timer", "a USB serial adapter gathers bytes", "computer: /sys", computer.latency_timer),
     Rule("clock", "the clock is not synchronised", "computer: adjtimex", computer.clock),

@@ -22,6 +22,7 @@ class Finding:
     key: str  # empty where it is the table itself, as both are for the whole file
     text: str
     severity: Severity = Severity.MISTAKE
+    line: int | None = None  # in the file, where that was looked for
 
     @property
     def words(self) -> str:

@@ -26,6 +26,7 @@ _HINTS: Final = (
     (r"[^=]*=\s*\"[^\"]*$", "the quotes do not end in this line"),
     (r"[^=]*=\s*\S+\s+[^#\s]", "something follows the value: a new key begins a new line"),
 )
+_MOST: Final = 50  # mistakes that are told of what is no TOML
 
 
 class Unreadable(Exception):
@@ -65,6 +66,45 @@ def parse(data: bytes) -> dict[str, Any]:
         return tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         raise Unreadable(_explained(str(error), text.splitlines())) from error
+
+
+def as_far_as_readable(file: Path, first: Finding) -> tuple[list[Finding], str | None]:
+    """What keeps a file from being TOML, each line that is none by itself; and the text without them.
+
+    `first` is what reading it has found. Behind a header that cannot be read, or a value that does not end,
+    nobody knows what is meant: no text then.
+    """
+    found = [first]
+    try:
+        lines = file.read_bytes().decode("utf-8").split("\n")
+    except (OSError, UnicodeDecodeError):
+        return found, None
+    while len(found) < _MOST and (number := _line_of(found[-1])) is not None and _is_wrong(lines, number):
+        lines[number - 1] = ""
+        try:
+            parse("\n".join(lines).encode())
+        except Unreadable as error:
+            found.append(error.finding)
+        else:
+            return found, "\n".join(lines)
+    return found, None
+
+
+def _line_of(finding: Finding) -> int | None:
+    word, _, number = finding.where.partition(" ")
+    return int(number) if word == "line" and number.isdecimal() else None
+
+
+def _is_wrong(lines: list[str], number: int) -> bool:
+    """Whether it is this line alone that is wrong, and no header."""
+    line = lines[number - 1] if number <= len(lines) else ""
+    if not line.strip() or line.lstrip().startswith("["):
+        return False
+    try:
+        tomllib.loads(line)
+    except tomllib.TOMLDecodeError:
+        return True
+    return False
 
 
 def _explained(said: str, text: list[str]) -> Finding:

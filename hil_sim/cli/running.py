@@ -7,6 +7,7 @@ from collections.abc import Callable
 from types import FrameType
 
 from hil_sim.housing import Housing
+from hil_sim.pace import Pace
 
 
 def say(sentence: str) -> None:
@@ -27,6 +28,7 @@ def run(robot: Housing, seconds: float | None, prepare: Callable[[], None]) -> i
     try:
         robot.open()
         prepare()
+        Pace(robot.loop, say)
         if not robot.config_is_ours:
             say(f"kept {robot.config} as it is; delete it to have it written anew")
         sys.stdout.write(json.dumps({"ready": True, "config": str(robot.config)}) + "\n")

@@ -30,8 +30,9 @@ exit status
 HEADER: Final = ("ID", "WHEN (UTC)", "ROBOT", "WHO", "WHAT", "STATE", "VERDICT", "STRONGEST")
 COLUMNS: Final = ("METRIC", "WORD", "BEFORE", "AFTER", "DIFFERENCE", "95 % INTERVAL", "SIZE", "UNIT")
 NOTHING: Final = (
-    "no edit is known here: one is kept that was made while this computer recorded the robot, a minute "
-    "after it was taken back, or two after it was kept; until then the window has it"
+    "no edit is known here: gwrms collect or the window records them, while it follows the robot on this "
+    "computer and somebody walks; one is here a minute after it was taken back, or two after it was kept "
+    "(until then the window shows it)"
 )
 EXPLAINED: Final = """
 The difference is the edit's: without a slow drift, and at equal speed; its interval holds in 95 of 100 edits.

@@ -31,6 +31,7 @@ from server_gui.cli.sessions_changed import changed
 from server_gui.cli.sessions_gait import gait
 from server_gui.cli.sessions_resources import compare, resources
 from server_gui.core.cloud import exports
+from server_gui.core.cloud.changed import DIGITS
 from server_gui.core.cloud.mcap import write_mcap
 from server_gui.core.cloud.recordings import Recorded, Recordings
 from server_gui.core.cloud.selection import Choice, choose
@@ -171,7 +172,7 @@ def _told(
         "configuration": session.configuration_hash,
         "software": ", ".join(f"{name} {version}" for name, version in session.versions.items()),
         "parameters": ", ".join(
-            f"{name}={value}" for name, value in session.parameters.items() if value is not None
+            f"{name}={_value(value)}" for name, value in session.parameters.items() if value is not None
         ),
     }
     yield f"session {session.session}"
@@ -184,6 +185,12 @@ def _told(
         )
     if labels:
         yield table(("LABEL", "FROM (UTC)", "TO", "BY"), map(_label, labels))
+
+
+def _value(value: object) -> str:
+    """A parameter's, as what changed between sessions is told; whole numbers keep all their digits."""
+    rounds = isinstance(value, float) and not value.is_integer()
+    return f"{value:.{DIGITS}g}" if rounds else str(value)
 
 
 def _stored(session: Session) -> str:

@@ -11,9 +11,11 @@ from PySide6.QtWidgets import QApplication, QPushButton
 from gateway.client import LinkLost, NotConnected
 from gateway.wire.stop import Reset, Stopped
 from server_gui.core.tuning.stop import StopProgress, StopState
+from server_gui.views.ask import Question
 from server_gui.views.frame.header import Header
 from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.frame.stop_keys import StopKeys
+from server_gui.views.robots.reset import ask_clear
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.stop_button import StopButton
 from tests.gui.fakes import Bench, destroy, stop_is_whole
@@ -158,6 +160,20 @@ def test_a_reset_that_leaves_the_stop_held_says_why(bench: Bench) -> None:
     bench.first.answer(Reset({}, {"left_knee": "does not answer"}, held=True))
     assert "left_knee: does not answer" in bench.desk.news.items[0].text
     assert bench.station.stopping.held
+
+
+def test_a_fault_that_stays_after_it_was_cleared_is_shown_and_can_be_cleared_again(
+    window: MainWindow, bench: Bench
+) -> None:
+    asked = ask_clear(window, bench.station)
+    asked.act.click()
+    stays = "it stays in fault: 0x4310 drive temperature too high; let it cool, then reset it again"
+    drives = {**dict.fromkeys(JOINTS, "switch on disabled"), "left_knee": "fault"}
+    bench.first.answer(Reset(drives, {"left_knee": stays}, held=False))
+    shown = [one for one in window.findChildren(Question) if one.windowTitle().startswith("NOT cleared")]
+    assert [one.words.text() for one in shown] == [f"left_knee DID NOT LEAVE FAULT: {stays}."]
+    shown[0].act.click()
+    assert any(one.windowTitle().startswith("Clear the fault") for one in window.findChildren(Question))
 
 
 def test_the_robot_is_named_on_the_button_and_so_is_another(header: Header, bench: Bench) -> None:

@@ -68,6 +68,7 @@ class SdoChannel:
         self.label = label
         self.timeout_s = timeout_s
         self.counters = SdoCounters()
+        self.also_silent = ""  # what else than the device may be the cause of its silence, in words
         self.answered_ns = 0  # when the device last did, or refused, what it was asked
         self._outlet = outlet
         self._distrust = distrust
@@ -246,7 +247,8 @@ class SdoChannel:
         except queue.Empty as error:
             self._count_timeout()
             self._abort(transfer, protocol.TIMED_OUT)
-            raise DeviceTimeout(f"{transfer.what}: no answer within {transfer.timeout_s:g} s") from error
+            text = f"{transfer.what}: no answer within {transfer.timeout_s:g} s{self.also_silent}"
+            raise DeviceTimeout(text) from error
         else:
             self.answered_ns = time.monotonic_ns()
             return result

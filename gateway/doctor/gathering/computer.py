@@ -19,13 +19,14 @@ _UNLIMITED = "unlimited"
 def computer(config: RobotConfig, root: Path = ROOT) -> Computer:
     """What it tells; what it does not is `None` or not there."""
     names = {link for settings in config.can.values() if (link := links(settings)) is not None}
-    ports = {usb_name(sensor.port) for _, sensor in config.on_ports()}
+    paths = {sensor.port for _, sensor in config.on_ports()}
     return Computer(
         governors=_governors(root),
         realtime_allowed=_realtime(root),
         clock_synchronised=_synchronised(root),
         queue_lengths=dict(_numbers(root / "sys/class/net", names, "tx_queue_len")),
-        latency_ms=dict(_numbers(root / "sys/bus/usb-serial/devices", ports, "latency_timer")),
+        latency_ms=dict(_numbers(root / "sys/bus/usb-serial/devices", map(usb_name, paths), "latency_timer")),
+        missing_ports=frozenset(path for path in paths if root == ROOT and not Path(path).exists()),
         why_none="its /sys and /proc do not tell" if root == Path("/") else f"{root} does not tell",
     )
 

@@ -5,10 +5,11 @@ from collections.abc import Iterable, Iterator
 from drivers.bus.nmt import HEARTBEAT
 from gateway.config.robot import COMPONENT_TABLES, header
 from gateway.doctor.observations import Observations
-from gateway.doctor.verdicts import Advice, Finding, Unknown, Verdict
+from gateway.doctor.verdicts import Advice, Finding, Run, Unknown, Verdict
 
 _RESTART = Advice("start the gateway again while nobody is in the robot, so that it takes the file")
 _COPY = Advice("where this is a copy of the robot's file, or an old one: take that which the gateway serves")
+_CHANNEL = Advice("where it is another one: correct interface and channel in the robot's file")
 _DESCRIBE = Advice("gwrms describe says since when, and what to check")
 
 
@@ -17,6 +18,7 @@ def component(seen: Observations) -> Iterator[Verdict]:
     if seen.other_file is not None:
         words = "the gateway goes by another file than this one: joints and sensors are not judged"
         yield Finding("component", str(seen.config.path), words, (seen.other_file,), (_RESTART, _COPY))
+    yield from _buses(seen)
     yield from _strangers(seen)
     sampled = {name.partition(".")[0] for name in seen.samples.columns}
     for kind in COMPONENT_TABLES:
@@ -27,6 +29,18 @@ def component(seen: Observations) -> Iterator[Verdict]:
                 yield Finding("component", header(kind, name), words, (problem,), (_DESCRIBE,))
             elif name not in sampled and kind != "device":  # a device has no channels
                 yield Unknown("component", header(kind, name), seen.samples.why_none)
+
+
+def _buses(seen: Observations) -> Iterator[Verdict]:
+    """Buses on which nothing is heard, where their interface says why: it is not there, or down."""
+    for name in seen.config.can:
+        why, facts = seen.bus_obstacles.get(name), seen.buses.get(name)
+        if why is None or "bit/s" in why or (facts is not None and not facts.is_silent):
+            continue  # another bit rate is a finding of its own
+        problem, _, command = why.partition("; run: ")
+        fix = Run(command) if command else _CHANNEL
+        words = "nothing can be heard on it: its interface is not there, or not as it must be"
+        yield Finding("component", header("can", name), words, (problem,), (fix,))
 
 
 def _strangers(seen: Observations) -> Iterator[Verdict]:

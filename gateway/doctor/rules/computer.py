@@ -18,9 +18,13 @@ _ABOUT = "the robot's computer"
 def latency_timer(seen: Observations) -> Iterator[Verdict]:
     """A USB serial adapter that gathers bytes for so long that frames come in bursts."""
     timers = seen.computer.latency_ms
-    for where, sensor in seen.config.on_ports():
-        if timers is None:
-            yield Unknown("latency_timer", where, seen.computer.why_none)
+    ports = list(seen.config.on_ports())
+    if not ports:
+        yield Unknown("latency_timer", "sensors", "the robot has none on a serial port")
+    for where, sensor in ports:
+        if timers is None or sensor.port in seen.computer.missing_ports:
+            why = seen.computer.why_none if timers is None else f"{sensor.port} does not exist"
+            yield Unknown("latency_timer", where, why)
             continue
         device = usb_name(sensor.port)
         latency = timers.get(device)

@@ -17,6 +17,8 @@ Signed = tuple[int, int]  # which axis, and its sign
 
 def imu(seen: Observations) -> Iterator[Verdict]:
     """Frozen, or mounted otherwise than the file says."""
+    if not seen.config.imu:
+        yield Unknown("imu", "IMUs", "the robot has none")
     for name in seen.config.imu:
         about = f"[imu.{name}]"
         columns = [seen.column(f"{name}.acceleration_{axis}") for axis in _AXES]

@@ -38,7 +38,7 @@ def bit_rate(seen: Observations) -> Iterator[Verdict]:
             )
             yield _wrong_rate(seen, name, evidence, tuple(_other_rates(seen, name, settings)))
         else:
-            yield Unknown("bit_rate", header("can", name), _SILENT)
+            yield Unknown("bit_rate", header("can", name), seen.bus_obstacles.get(name, _SILENT))
 
 
 def _wrong_rate(seen: Observations, name: str, evidence: tuple[str, ...], fixes: tuple[Fix, ...]) -> Finding:
@@ -73,7 +73,7 @@ def terminator(seen: Observations) -> Iterator[Verdict]:
         if facts.error_frames_per_s is None:
             yield Unknown("terminator", about, "its interface tells no error frames")
         elif facts.is_silent:
-            yield Unknown("terminator", about, _SILENT)
+            yield Unknown("terminator", about, seen.bus_obstacles.get(name, _SILENT))
         elif facts.error_frames_per_s >= ERRORS_PER_S:
             share = 100 * facts.error_frames_per_s / ((facts.frames_per_s or 0) + facts.error_frames_per_s)
             errors = f"{facts.error_frames_per_s:.0f} error frames/s ({share:.0f} %)"

@@ -48,7 +48,7 @@ class Leases:
             raise refuse(
                 Kind.LEASE_HELD,
                 f"{held.session.who} has the lease for up to {left_s:.1f} s more; ask again then, "
-                "or have it released there",
+                "or have it released there (in a window: Release, on its page Parameters)",
             )
         if session.closed:
             raise refuse(Kind.NO_LEASE, "the connection has ended")

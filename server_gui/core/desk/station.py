@@ -16,17 +16,17 @@ from gateway.wire.method import AnyMethod
 from gateway.wire.parameter import ParameterInfo, Written
 from gateway.wire.resource import ProcessUse, ResourceSnapshot
 from gateway.wire.robot import Description
-from gateway.wire.stop import Stopped
+from gateway.wire.stop import Reset, Stopped
 from ml.danger.levels import Level
 from server_gui.core.alarms.alarm import Alarms
 from server_gui.core.alarms.causes import STOOD_S, Stalls, gathered
 from server_gui.core.alarms.found import Facts, any_enabled
 from server_gui.core.alarms.found import alarms as found
 from server_gui.core.alarms.marks import Mark
-from server_gui.core.alarms.texts import Kind, check_of
 from server_gui.core.alarms.worst import worst
 from server_gui.core.audit.journal import Audit
 from server_gui.core.desk.flags import Flag, FlagKind, Flags, StateWatch, of_journal
+from server_gui.core.desk.resetting import after_reset
 from server_gui.core.desk.rings import Rings
 from server_gui.core.evidence.file import Told
 from server_gui.core.experiments.plan import Plan
@@ -354,25 +354,22 @@ class Station:
         if event.clock is not None:
             self.stopping.show(stamps_ns, words, event.clock.offset_ns)
 
-    def reset(self) -> None:
-        """End a held stop; enables nothing."""
+    def reset(self, failed: Callable[[str], None] = lambda _: None) -> None:
+        """End a held stop, clear faults; enables nothing. `failed` is told what is still in fault."""
 
-        def done(held: bool, problems: dict[str, str]) -> None:
-            self.stopping.was_reset(held)
-            said = "; ".join(f"{name}: {why}" for name, why in problems.items())
-            after = f"; {said}" if said else ""
-            self.tell(
-                NewsKind.STOP,
-                f"stop still held: {said}"
-                if held
-                else f"stop reset, every drive is off{after}; {check_of(Kind.RESET)}",
-            )
+        def done(reset: Reset) -> None:
+            self.stopping.was_reset(reset.held)
+            said, stays = after_reset(reset)
+            self.tell(NewsKind.STOP, said)
+            if stays:
+                self.tell(NewsKind.FAULT, stays)
+                failed(stays)
 
-        self._ask(
-            self._commands.reset(),
-            lambda reset: done(reset.held, reset.problems),
-            "reset",
-        )
+        def refused(error: Exception) -> None:
+            self.tell(NewsKind.WARNING, f"reset: {error}")
+            failed(f"Nothing was cleared: {error}")
+
+        when_done(self._commands.reset(), self._deliver, done, refused)
 
     # --- the lease
 

@@ -20,6 +20,7 @@ from server_gui.core.follow.validation import Validator
 from server_gui.core.tuning.commands import ReadBack
 
 LEASE_S: Final = 300.0  # the longest that a robot gives; every write begins it anew
+RESET_LEASE_S: Final = 60.0  # for a reset alone
 PROCESSES_S: Final = 1.0  # between looks at the process table, while it is shown
 PROCESSES: Final = ResourceSnapshotParams(include=["disk", "network", "thermal", "cmdline"])
 
@@ -47,6 +48,7 @@ class Link:
         self._client = Client(address, LinkSettings(client=client), self._state_changed)
         self._arriving = Validator()
         self._processes_wanted = asyncio.Event()
+        self._ours_until_ns = 0  # how long control was taken for more than a command (monotonic)
 
     async def run(self) -> None:
         """Hold the link, and ask for processes while they are wanted."""
@@ -65,10 +67,10 @@ class Link:
         return self._network.run(self._client.stop(reason))
 
     def take_control(self) -> "Future[Lease]":
-        return self._network.run(self._client.acquire(LEASE_S))
+        return self._network.run(self._take())
 
     def release_control(self) -> "Future[None]":
-        return self._network.run(self._client.release())
+        return self._network.run(self._release())
 
     def write(self, changes: Mapping[str, float], trial_s: float | None) -> "Future[Written]":
         return self._network.run(self._write(changes, trial_s))
@@ -99,8 +101,20 @@ class Link:
 
     # --- in the network's thread
 
+    async def _take(self) -> Lease:
+        before, self._ours_until_ns = self._ours_until_ns, time.monotonic_ns() + round(LEASE_S * 1e9)
+        try:
+            return await self._client.acquire(LEASE_S)
+        except BaseException:
+            self._ours_until_ns = before
+            raise
+
+    async def _release(self) -> None:
+        self._ours_until_ns = 0
+        await self._client.release()
+
     async def _write(self, changes: Mapping[str, float], trial_s: float | None) -> Written:
-        await self._client.acquire(LEASE_S)
+        await self._take()
         return await self._client.write(changes, trial_s)
 
     async def _read_back(self, name: str) -> ReadBack:
@@ -110,12 +124,19 @@ class Link:
         return ReadBack(value, held.problem, any(name in trial.before for trial in trials))
 
     async def _store(self, component: str) -> Stored:
-        await self._client.acquire(LEASE_S)
+        await self._take()
         return await self._client.store(component)
 
     async def _reset(self) -> Reset:
-        await self._client.acquire(LEASE_S)
-        return await self._client.reset()
+        """Control that was taken for it alone is given back, so that nobody else waits for a window."""
+        left_s = (self._ours_until_ns - time.monotonic_ns()) / 1e9
+        await self._client.acquire(max(RESET_LEASE_S, left_s))
+        try:
+            return await self._client.reset()
+        finally:
+            if self._ours_until_ns <= time.monotonic_ns():
+                with contextlib.suppress(ClientError):  # it has gone with its time, or the link
+                    await self._client.release()
 
     async def _show_processes(self, wanted: bool) -> None:
         if wanted:
@@ -138,4 +159,5 @@ class Link:
 
     def _state_changed(self, state: ConnectionState) -> None:
         if state in (ConnectionState.WAITING, ConnectionState.CLOSED):
+            self._ours_until_ns = 0
             self._dropped()

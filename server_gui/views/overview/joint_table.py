@@ -48,12 +48,16 @@ SI: Final = {
 }
 SIGNED: Final = frozenset({"position", "velocity", "torque", "current"})
 SPARE: Final = (CURRENT, VELOCITY, TEMPERATURE, STOP)  # left out in this order where there is less room
+# How error codes of CiA 402 begin (IEC 61800-7-201) → the column that holds what they are about.
+ABOUT: Final = {0x2000: CURRENT, 0x4000: TEMPERATURE, 0x8400: VELOCITY}
+FAMILIES: Final = (0xF000, 0xFF00)  # of a code: how much of it says what it is about
 FAR_RAD: Final = 0.175  # 10°: the end of the bar of how far a joint is from its target
 NEAR_LIMIT: Final = 0.8  # of a limit
 CODE: Final = re.compile(r"0x[0-9A-Fa-f]{4}(?P<words> [^(;:]+)?")
 ENABLED: Final = "operation enabled"  # only then it is to be where its target is
 NONE: Final = "–"
 MOST_ERROR: Final = 280  # wide, in words
+LEAST_ERROR: Final = "0x0000 …"
 BAR = Qt.ItemDataRole.UserRole + 1
 
 
@@ -84,12 +88,14 @@ class JointModel(QAbstractTableModel):
         self._theme = theme
         self._joints: list[str] = []
         self._cells: list[list[Cell]] = []
+        self.at_fault: frozenset[int] = frozenset()  # columns that an active fault is about
 
     def refresh(self) -> None:
         """Show how it is now."""
         station = self._desk.selected
         joints = [] if station is None else station.robot.names("joint")
         rows = [] if station is None else [_row(station, joint, self._desk) for joint in joints]
+        self.at_fault = frozenset() if station is None else _at_fault(station, joints)
         if joints != self._joints or not self._cells:
             self.beginResetModel()
             self._joints, self._cells = joints, rows
@@ -211,15 +217,24 @@ class JointTable(QTableView):
         """Every column as wide as what is in it; what has no room is left out whole."""
         widths = [self._width(column) for column in range(len(COLUMNS))]
         shown = set(range(len(COLUMNS))) - self._model.empty()
-        for column in SPARE:
+        for column in (column for column in SPARE if column not in self._model.at_fault):
             if sum(widths[known] for known in shown) > self.viewport().width():
                 shown.discard(column)
+        if self._model.at_fault:
+            code = self._text_width(LEAST_ERROR)
+            for column in (TORQUE, ANGLE):  # the last to go, for what is wrong alone
+                least = sum(min(widths[known], code) if known == ERROR else widths[known] for known in shown)
+                if least > self.viewport().width():
+                    shown.discard(column)
         spare = max(self.viewport().width() - sum(widths[known] for known in shown), 0) // max(len(shown), 1)
         for column, width in enumerate(widths):
             self.setColumnHidden(column, column not in shown)
             wanted = width + (spare if column != ERROR else 0)
             if column in shown and column != ERROR and abs(self.columnWidth(column) - wanted) > 1:
                 self.setColumnWidth(column, wanted)
+
+    def _text_width(self, text: str) -> int:
+        return QFontMetrics(self._theme.text_font()).horizontalAdvance(text) + self._theme.px(16)
 
     def _width(self, column: int) -> int:
         numbers = ANGLE <= column <= TEMPERATURE
@@ -323,6 +338,12 @@ def _error(station: Station, part: Part, *, stale: bool) -> Cell:
     if stale:
         return Cell("not known", "old")
     return Cell("–", "dim")
+
+
+def _at_fault(station: Station, joints: list[str]) -> frozenset[int]:
+    """Columns of the values that the drives' errors are about."""
+    codes = [int(station.robot.values.get(f"{joint}.error_code") or 0) for joint in joints]
+    return frozenset(ABOUT[code & part] for code in codes for part in FAMILIES if code & part in ABOUT)
 
 
 def _stop(station: Station, joint: str) -> Cell:

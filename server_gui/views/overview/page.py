@@ -196,6 +196,8 @@ class Overview(QWidget):
                 label.setAlignment(Qt.AlignmentFlag.AlignCenter)
                 column.addWidget(label)
             row.addLayout(column, 1)
+        for labels in (self._loads, self._shares):
+            labels[SIDES[0]].speak_alike(*(labels[side] for side in SIDES[1:]))
         row.addWidget(ColourBar(self._desk, self._theme))
         card.body.addLayout(row)
         return card

@@ -1,5 +1,7 @@
 """Asks before a stop is ended or a fault cleared, and says what that does and how to go on."""
 
+from collections.abc import Callable
+
 from PySide6.QtWidgets import QWidget
 
 from gateway.wire.stop import ROBOT_RESET
@@ -32,12 +34,32 @@ def ask_clear(parent: QWidget, station: Station) -> Question:
         more = ""
     held = "\n\nThe STOP that is held ends with it." if station.stopping.held else ""
     text = f"Clear the fault of {station.title}?\n\n{DOES}{more}{held}\n\nAfterwards, {check_of(Kind.RESET)}"
-    return _asked(parent, f"Clear the fault of {station.title}", text, "Clear fault", station)
+    title = f"Clear the fault of {station.title}"
+    return _asked(parent, title, text, "Clear fault", station, lambda why: _ask_again(parent, station, why))
 
 
-def _asked(parent: QWidget, title: str, text: str, action: str, station: Station) -> Question:
+def _ask_again(parent: QWidget, station: Station, why: str) -> None:
+    """Say that it has not helped, which is no success though no stop is held."""
+
+    def again() -> None:
+        ask_clear(parent, station)
+
+    title = f"NOT cleared: the fault of {station.title}"
+    ask(parent, title, f"{why}.", "Clear fault again …", again)
+
+
+def _asked(
+    parent: QWidget,
+    title: str,
+    text: str,
+    action: str,
+    station: Station,
+    failed: Callable[[str], None] = lambda _: None,
+) -> Question:
     """With no way to do what this desk may not."""
     why_not = station.refused(ROBOT_RESET)
-    question = ask(parent, title, f"{why_not}.\n\n{text}" if why_not else text, action, station.reset)
+    question = ask(
+        parent, title, f"{why_not}.\n\n{text}" if why_not else text, action, lambda: station.reset(failed)
+    )
     question.act.setEnabled(not why_not)
     return question

@@ -19,6 +19,7 @@ class FittedLabel(PlainLabel):
         self.setObjectName(name)
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Preferred)
         self._wordings: tuple[str, ...] = ("",)
+        self.alike: tuple[FittedLabel, ...] = (self,)
         self.say(text)
 
     def say(self, *wordings: str) -> None:
@@ -28,13 +29,26 @@ class FittedLabel(PlainLabel):
             self.setText(wordings[0])
             self.setAccessibleName(wordings[0])
             self.updateGeometry()
-            self.update()
+            for one in self.alike:
+                one.update()
+
+    def speak_alike(self, *others: "FittedLabel") -> None:
+        """Of all of them none is fuller than another: beside each other they are read as one."""
+        for one in (self, *others):
+            one.alike = (self, *others)
 
     @property
     def shown(self) -> str:
         """The wording that is drawn."""
-        room = self.contentsRect().width()
-        return next((text for text in self._wordings if self._width(text) <= room), self._wordings[-1])
+        wanted = max(one.fullest for one in self.alike)
+        return self._wordings[min(wanted, len(self._wordings) - 1)]
+
+    @property
+    def fullest(self) -> int:
+        """Which of its wordings has room, the last where none has."""
+        room, last = self.contentsRect().width(), len(self._wordings) - 1
+        fits = (number for number, text in enumerate(self._wordings) if self._width(text) <= room)
+        return next(fits, last)
 
     @property
     def is_whole(self) -> bool:

@@ -11,7 +11,7 @@ from drivers.bus.device import CanDevice
 from drivers.bus.life import EMCY_HISTORY
 from drivers.bus.node import shared_node
 from drivers.bus.sdo.channel import SdoChannel
-from drivers.bus.settings import DeviceSettings
+from drivers.bus.settings import CanSettings, DeviceSettings
 from drivers.errors import DeviceAbort, DeviceTimeout, DriverError, SettingsError, Unavailable
 from drivers.samples import State
 from eds import Description
@@ -331,3 +331,12 @@ def test_a_node_described_by_two_files_is_refused(bus: CanBus, describe: Describ
         SettingsError, match=r"node 5 on bus main is described by small\.eds and by other\.eds"
     ):
         shared_node(bus, 5, other, first.settings)
+
+
+@pytest.mark.parametrize(("interface", "asks"), [("socketcand", True), ("virtual", False)])
+def test_a_time_out_on_a_simulated_bus_is_not_blamed_on_the_device_alone(
+    interface: str, asks: bool, describe: Describe
+) -> None:
+    table = {"interface": interface, "channel": "sim", "host": "127.0.0.1", "port": 1}
+    node = device(CanBus("main", CanSettings.from_table(table)), describe).node
+    assert ("does the simulator keep real time" in node.channel.also_silent) is asks

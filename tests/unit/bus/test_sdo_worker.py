@@ -36,6 +36,13 @@ def test_a_write_that_stays_unanswered_is_never_repeated(worker: SdoWorker, devi
     assert device.commands() == ["23 6065", "80 6065"]
 
 
+def test_what_else_may_be_silent_stands_in_the_words_of_a_time_out(worker: SdoWorker, device: Device) -> None:
+    device.channel.also_silent = "; is it the simulator?"
+    device.deaf_to[0x1000] = 9
+    with pytest.raises(DeviceTimeout, match=r"no answer within 0.2 s; is it the simulator\?"):
+        upload(worker, 0x1000).result(WAIT_S)
+
+
 def test_an_abort_is_told_in_words_with_object_and_value(worker: SdoWorker, device: Device) -> None:
     def refuse(request: bytes) -> None:
         device.channel.on_response(0, b"\x80" + request[1:4] + (0x06090031).to_bytes(4, "little"))

@@ -94,7 +94,7 @@ def test_mistakes_end_with_1_and_warnings_only_where_it_is_strict(
     wrong = written(tmp_path, '[robot]\nnmae = "x"\n', "wrong.toml")
     assert main(["--no-machine", str(well), str(wrong)]) == 1
     lines = capsys.readouterr().out.splitlines()
-    assert lines[1].startswith(f"{wrong}: mistake: [robot] nmae: is not known: did you mean 'name'?")
+    assert lines[1].startswith(f"{wrong}:2: mistake: [robot] nmae: is not known: did you mean 'name'?")
     assert lines[-1] == f"{wrong}: a robot's file, 2 mistakes"
 
 
@@ -113,7 +113,9 @@ def test_a_program_reads_the_same_as_json(tmp_path: Path, capsys: pytest.Capture
         "file": str(files[0]),
         "kind": "robot",
         "ok": False,
-        "findings": [{"severity": "mistake", "where": "[robot]", "key": "name", "text": "is missing"}],
+        "findings": [
+            {"severity": "mistake", "where": "[robot]", "key": "name", "text": "is missing", "line": 1}
+        ],
     }
     assert (no_toml["kind"], no_toml["findings"][0]["where"]) == (None, "line 1")
     assert away["findings"][0]["text"] == "cannot be read: No such file or directory"
@@ -320,3 +322,36 @@ def test_severities_are_told_in_their_order(tmp_path: Path, capsys: pytest.Captu
     assert main(["--no-machine", str(file)]) == 1
     said = [line.split(": ")[1] for line in capsys.readouterr().out.splitlines()[:-1]]
     assert said == [Severity.MISTAKE, Severity.WARNING]
+
+
+def test_what_files_and_computer_lack_is_told_beside_mistakes_in_one_run(tmp_path: Path) -> None:
+    text = BARE + KNEE.replace("node_id = 2", "node_id = 200").replace("gait_controller.eds", "gone.eds")
+    text += f'[insole.left]\nport = "{tmp_path}/gone"\nlayout = "sole"\n'
+    text += '[joint.hip]\nbus = "mian"\nnode_id = 3\neds = "gone.eds"\n'
+    text += "counts_per_revolution = 4096\ngear_ratio = 100\n"
+    found = told(written(tmp_path, text), machine=True)
+    for words in (
+        "mistake: [joint.knee] node_id: must be",
+        "mistake: [joint.hip] bus: there is no bus 'mian'",
+        "mistake: [insole.left] layout: 'sole' is not known",
+        "mistake: [device.gait]: there is no EDS file 'gone.eds'",
+        f"warning: [insole.left] port: {tmp_path}/gone does not exist",
+    ):
+        assert words in found, found
+
+
+def test_every_line_that_is_no_toml_is_told_and_the_rest_is_checked_without_them(tmp_path: Path) -> None:
+    text = BARE + KNEE.replace("node_id = 2", "node_id 2").replace('"joint_drive.eds"', "joint_drive.eds")
+    found = told(written(tmp_path, text.replace("gear_ratio", "gear_ration"))).splitlines()
+    assert [line.partition(" is no TOML")[0] for line in found[:2]] == [
+        "mistake: line 8:",
+        "mistake: line 9:",
+    ]
+    assert found[2].startswith("mistake: [joint.knee] gear_ration: is not known")
+    assert len(found) == 3, "what is missing is not known where lines could not be read"
+
+
+@pytest.mark.parametrize("cut", ["[can.main", 'name = """x', "x = [\n1,"])
+def test_behind_what_does_not_end_nothing_is_guessed(cut: str, tmp_path: Path) -> None:
+    found = told(written(tmp_path, f'{cut}\nbus = "main"\n[joint.x]\nnode_id = "y"\n'))
+    assert found.count("is no TOML") == len(found.splitlines()) == 1

@@ -33,7 +33,10 @@ def record(
     with Spool(spool, reserve_bytes=0) as opened:
         with Recorder(opened) as recorder:
             recorder.describe(robot, description(robot))
-            session = recorder.begin(robot, Facts(operator="anna", notes="first", parameters={"gain": 2.0}))
+            session = recorder.begin(
+                robot,
+                Facts(operator="anna", notes="first", parameters={"gain": 2.0, "step": 1.0000020756226495}),
+            )
             for seq in range(BATCHES):
                 recorder.record(robot, 1, batch(seq + (seq >= 10), ROWS, channels=channels))
             recorder.mark(robot, "here")

@@ -148,7 +148,7 @@ def test_a_store_by_its_url_is_looked_into_without_this_computers_spool(
 def test_a_session_is_shown(desk: Desk) -> None:
     recorded = desk.record()
     text = desk.run("sessions", "show", recorded.session)
-    for word in ("anna", "gain=2.0", "left_knee.velocity  rad/s", "marker", "here", "walk"):
+    for word in ("anna", "gain=2.0, step=1\n", "left_knee.velocity  rad/s", "marker", "here", "walk"):
         assert word in text
     shown = desk.ask("sessions", "show", recorded.session[:-1])
     assert {each["name"]: each["unit"] for each in shown["channels"]}["left_knee.velocity"] == "rad/s"

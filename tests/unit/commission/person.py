@@ -1,5 +1,6 @@
 """A robot of unknown drives, and somebody who reads what is asked, moves its joints by hand and types."""
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -36,13 +37,14 @@ class Person:
         self._folder = folder
 
     def say(self, text: str) -> None:
+        assert not re.search(r"\S  +\S", text), text
         self.read.append(text)
 
     def moving(self, text: str) -> str:
         raise AssertionError(f"nobody agreed to a motion: {text}")
 
     def ask(self, question: Ask) -> str:
-        self.read.append(question.text)
+        self.say(question.text)
         assert len(self.read) < 150, self.read[:12]
         return self._answer(question)
 

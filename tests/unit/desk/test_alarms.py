@@ -258,6 +258,26 @@ def test_after_a_reset_it_says_how_to_go_on_until_a_drive_is_enabled(bench: Benc
     assert kinds(bench.station) == []
 
 
+def test_a_drive_that_does_not_leave_fault_is_told_and_no_success(bench: Bench) -> None:
+    fault(bench.station)
+    told: list[str] = []
+    bench.station.reset(told.append)
+    stays = "it stays in fault: 0x4310 drive temperature too high; let it cool, then reset it again"
+    drives = {**dict.fromkeys(JOINTS, "switch on disabled"), "left_knee": "fault"}
+    bench.first.answer(Reset(drives, {"left_knee": stays}, held=False))
+    assert told == [f"left_knee DID NOT LEAVE FAULT: {stays}"]
+    grave = bench.desk.news.items[0]
+    assert (grave.kind, grave.text) == (NewsKind.FAULT, told[0])
+    assert not any("every drive is off" in item.text for item in bench.desk.news.items)
+
+
+def test_a_clearing_that_was_refused_is_told_too(bench: Bench) -> None:
+    told: list[str] = []
+    bench.station.reset(told.append)
+    bench.first.fail(NotConnected("bob has the lease"))
+    assert told == ["Nothing was cleared: bob has the lease"]
+
+
 def test_a_stop_of_somebody_else_is_read_in_the_journal_and_so_is_its_end(bench: Bench) -> None:
     stop = {"n": 7, "hash": "a", "who": "gwrms stop", "what": "stop", "reason": "door", "utc_ns": 5}
     bench.station.take([Journalled(JournalEntries([stop], None))])

@@ -9,10 +9,11 @@ import pytest
 from gateway.config.reading import load
 from gateway.config.robot import RobotConfig
 from gateway.doctor.gathering import silent
+from gateway.doctor.gathering.computer import computer
 from gateway.doctor.gathering.gather import How, gather
-from gateway.doctor.observations import Observations
+from gateway.doctor.observations import Observations, Samples
 from gateway.doctor.table import judged
-from gateway.doctor.verdicts import Finding
+from gateway.doctor.verdicts import Finding, Unknown
 from tests.unit.bus.fake_node import FakeNode
 
 ROBOT = """\
@@ -102,4 +103,24 @@ def test_a_bus_that_cannot_be_opened_is_not_called_well(tmp_path: Path) -> None:
     seen = gather(load(file), How(seconds=0.1))
     verdicts = [one for one in judged(seen) if one.about == "[can.main]"]
     assert {one.rule for one in verdicts} >= {"bit_rate", "terminator", "bus_load", "sync"}
-    assert not any(isinstance(one, Finding) for one in verdicts)
+    (missing,) = [one for one in verdicts if isinstance(one, Finding)]
+    assert missing.evidence[0].startswith("there is no interface nocan0; ")
+    silent_ones = [
+        one for one in verdicts if isinstance(one, Unknown) and one.rule in ("bit_rate", "terminator")
+    ]
+    assert not any("power" in one.why for one in silent_ones)
+
+
+def test_a_port_that_is_not_there_is_not_called_well(config: RobotConfig, tmp_path: Path) -> None:
+    text = config.path.read_text(encoding="utf-8")
+    config.path.write_text(f'{text}[insole.left]\nport = "{tmp_path}/gone"\n', encoding="utf-8")
+    here = computer(load(config.path))
+    assert here.missing_ports == {f"{tmp_path}/gone"}
+    seen = Observations(load(config.path), {}, {}, {}, Samples(), here)
+    (unknown,) = [one for one in judged(seen) if one.rule == "latency_timer"]
+    assert unknown == Unknown("latency_timer", "[insole.left]", f"{tmp_path}/gone does not exist")
+
+
+def test_what_a_robot_has_not_is_not_called_well(config: RobotConfig) -> None:
+    judged_of = judged(Observations(config, {}, {}, {}, Samples(), computer(config)))
+    assert {one.rule for one in judged_of} >= {"latency_timer", "imu", "insole_scale"}

@@ -70,7 +70,7 @@ def test_a_desk_without_edits_says_how_they_come(tmp_path: Path, capsys: pytest.
     file = tmp_path / "server.toml"
     file.write_text(f"[recorder]\nspool = {json.dumps(str(tmp_path / 'spool'))}\n", encoding="utf-8")
     assert main(["--config", str(file)]) == 0
-    assert "recorded the robot" in capsys.readouterr().err
+    assert "gwrms collect or the window records them" in capsys.readouterr().err
 
 
 def test_what_could_not_be_compared_is_counted_with_its_reason(

@@ -7,8 +7,11 @@ from typing import Any, Final, NamedTuple
 
 import pytest
 
+from gateway.config.checks import complaints
 from gateway.config.reading import examine as examine_robot
+from gateway.config.remains import remains
 from gateway.tables.finding import Finding, Severity
+from gateway.tables.finding import mistakes as only_mistakes
 from gateway.tables.reading import Unreadable, read
 from hil_sim.scenario.script import examined
 from server_gui.core.settings.server_file import examine as examine_server
@@ -95,3 +98,19 @@ def test_all_mistakes_of_a_file_are_told_at_once(kind: str, tmp_path: Path) -> N
     told = "\n".join(finding.words for finding in EXAMINE[kind](file))
     assert len(wanted) >= 10
     assert [words for words in wanted if words not in told] == [], told
+
+
+KINDS: Final = ("can", "joint", "device", "insole", "imu", "parameter", "channel")
+
+
+@pytest.mark.parametrize("mistake", [one for one in ALL if "robot: " in str(one.id)])
+def test_what_remains_of_a_robot_without_its_mistakes_has_none(mistake: Mistake, tmp_path: Path) -> None:
+    found = examine_robot(mistake.write(tmp_path))
+    if found.rest is None:
+        return  # no robot at all, or no mistake
+    rest = remains(found.rest, only_mistakes(found.findings))
+    wrong = [one for one in only_mistakes(complaints(rest)) if one.where.lstrip("[").startswith(KINDS)]
+    assert wrong == []
+    assert all(
+        getattr(one, "bus", None) in {None, *rest.can} for one in (*rest.joint.values(), *rest.imu.values())
+    )

@@ -5,6 +5,7 @@ import time
 import pytest
 
 from drivers.bus.sdo.channel import Interrupted
+from drivers.error_codes import error_check, error_text
 from drivers.joint.cia402 import DriveState
 from drivers.joint.commands import WAY_UP
 from drivers.joint.transitions import OVERTAKEN, Errand, Led, lead_down, look, step_up
@@ -13,6 +14,7 @@ from tests.unit.joint.standard import LEAVES_BY_ITSELF, S
 
 ERRAND = Errand(lambda: True, timeout_s=0.3, counts_per_turn=409_600)
 PATIENT = Errand(lambda: True, timeout_s=20.0, counts_per_turn=409_600)
+NO_CODE = "it tells no code; remove what causes it, then reset it again"
 SENT_DOWN = {0x0000, 0x0002, 0x0080}
 
 
@@ -55,8 +57,18 @@ class TestDown:
     def test_a_fault_that_stays_is_told_and_not_reset_again_and_again(self) -> None:
         drive = SdoDrive(S.FAULT)
         drive.deaf_to = {0x0080}
-        assert lead_down(drive.axis, ERRAND) == Led(S.FAULT, "it stays in fault")
+        led = lead_down(drive.axis, ERRAND)
+        assert led == Led(S.FAULT, f"it stays in fault: {NO_CODE}")
         assert drive.controlwords.count(0x0080) == 1
+
+    def test_a_fault_that_stays_is_told_with_its_code_and_what_to_do(self) -> None:
+        drive = SdoDrive(S.FAULT)
+        drive.deaf_to = {0x0080}
+        drive.values[0x603F, 0] = (0x4310).to_bytes(2, "little")
+        told = lead_down(drive.axis, ERRAND).problem or ""
+        assert told.startswith(f"it stays in fault: {error_text(0x4310)}; ")
+        assert error_check(0x4310) in told
+        assert told.endswith(", then reset it again")
 
     @pytest.mark.parametrize("state", LEAVES_BY_ITSELF)
     def test_what_a_drive_leaves_by_itself_is_waited_for(self, state: DriveState) -> None:

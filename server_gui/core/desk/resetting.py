@@ -1,0 +1,25 @@
+"""What a reset, or a clearing of faults, came to, in words: what is still in fault is no success."""
+
+from collections.abc import Mapping
+
+from gateway.wire.stop import Reset
+from server_gui.core.alarms.texts import Kind, check_of
+
+
+def after_reset(reset: Reset) -> tuple[str, str]:
+    """What became of the stop; and of drives that have not left fault, with why and what to do, else ""."""
+    stays = {name: why for name, why in reset.problems.items() if "fault" in reset.drives.get(name, "")}
+    others = {name: why for name, why in reset.problems.items() if name not in stays}
+    in_fault = "; ".join(f"{name} DID NOT LEAVE FAULT: {why}" for name, why in stays.items())
+    if reset.held:
+        return f"stop still held: {_told(reset.problems)}", in_fault
+    if in_fault:
+        return "; ".join(
+            filter(None, ["no stop is held, but not every fault is cleared", _told(others)])
+        ), in_fault
+    done = "; ".join(filter(None, ["stop reset, every drive is off", _told(others)]))
+    return f"{done}; {check_of(Kind.RESET)}", ""
+
+
+def _told(problems: Mapping[str, str]) -> str:
+    return "; ".join(f"{name}: {why}" for name, why in problems.items())

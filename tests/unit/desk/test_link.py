@@ -1,0 +1,105 @@
+"""Control over the link of a window: what took it for one command alone gives it back."""
+
+import asyncio
+from typing import Any, cast
+
+import pytest
+
+from gateway.client import Address, ClientError, NotConnected
+from gateway.wire.control import Lease
+from gateway.wire.stop import Reset
+from server_gui.core.follow.network import Network
+from server_gui.core.tuning.link import LEASE_S, Link
+
+
+class FakeClient:
+    """Answers everything, and notes it."""
+
+    def __init__(self) -> None:
+        self.asked: list[str] = []
+        self.fails: ClientError | None = None
+
+    async def acquire(self, ttl_s: float) -> Lease:
+        self.asked.append("acquire")
+        return Lease("x", ttl_s)
+
+    async def release(self) -> None:
+        self.asked.append("release")
+
+    async def write(self, _changes: object, _trial_s: object) -> None:
+        self.asked.append("write")
+
+    async def reset(self) -> Reset:
+        self.asked.append("reset")
+        if self.fails is not None:
+            raise self.fails
+        return Reset({}, {}, held=False)
+
+
+@pytest.fixture
+def client() -> FakeClient:
+    return FakeClient()
+
+
+@pytest.fixture
+def link(client: FakeClient) -> Link:
+    made = Link(cast("Network", None), Address.parse("127.0.0.1:1"), lambda _event: None, lambda: None)
+    made._client = cast("Any", client)
+    return made
+
+
+def test_a_reset_gives_control_back_at_once(link: Link, client: FakeClient) -> None:
+    asyncio.run(link._reset())
+    assert client.asked == ["acquire", "reset", "release"]
+
+
+def test_a_reset_that_fails_gives_it_back_too(link: Link, client: FakeClient) -> None:
+    client.fails = NotConnected("gone")
+    with pytest.raises(NotConnected):
+        asyncio.run(link._reset())
+    assert client.asked[-1] == "release"
+
+
+@pytest.mark.parametrize("first", ["take", "write"])
+def test_control_that_was_ours_before_stays_ours_and_with_it_what_is_on_trial(
+    link: Link, client: FakeClient, first: str
+) -> None:
+    asyncio.run(link._take() if first == "take" else link._write({"gait.step_length": 0.4}, 30.0))
+    asyncio.run(link._reset())
+    assert "release" not in client.asked
+
+
+def test_a_write_that_comes_while_it_resets_keeps_control(link: Link, client: FakeClient) -> None:
+    async def both() -> None:
+        reset = client.reset
+
+        async def meanwhile() -> Reset:
+            await link._write({"gait.step_length": 0.4}, 30.0)
+            return await reset()
+
+        client.reset = meanwhile  # type: ignore[method-assign]
+        await link._reset()
+
+    asyncio.run(both())
+    assert client.asked == ["acquire", "acquire", "write", "reset"]
+    assert LEASE_S > 60
+
+
+@pytest.mark.parametrize("how", ["released", "refused"])
+def test_what_is_no_longer_ours_is_given_back_again(link: Link, client: FakeClient, how: str) -> None:
+    async def refused(ttl_s: float) -> Lease:
+        raise NotConnected("gone")
+
+    async def before() -> None:
+        if how == "released":
+            await link._take()
+            await link._release()
+            return
+        taken, client.acquire = client.acquire, refused  # type: ignore[method-assign]
+        with pytest.raises(NotConnected):
+            await link._take()
+        client.acquire = taken  # type: ignore[method-assign]
+
+    asyncio.run(before())
+    asyncio.run(link._reset())
+    assert client.asked[-3:] == ["acquire", "reset", "release"]
