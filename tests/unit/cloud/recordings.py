@@ -12,6 +12,7 @@ from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.upload import send
 from tests.unit.recording.robots import CHANNELS, batch, description
 
+PARAMETERS = {"gain": 2.0, "step": 1.0000020756226495}
 BATCHES, ROWS = 20, 5
 UNITS = {"left_knee.position": "rad", "left_knee.velocity": "rad/s", "trunk.tilt_forward": "rad"}
 
@@ -35,7 +36,7 @@ def record(
             recorder.describe(robot, description(robot))
             session = recorder.begin(
                 robot,
-                Facts(operator="anna", notes="first", parameters={"gain": 2.0, "step": 1.0000020756226495}),
+                Facts(operator="anna", notes="first", parameters=PARAMETERS),
             )
             for seq in range(BATCHES):
                 recorder.record(robot, 1, batch(seq + (seq >= 10), ROWS, channels=channels))
