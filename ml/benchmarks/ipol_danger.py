@@ -36,9 +36,7 @@ def evaluate(path: Path, search: bool) -> Outcome:  # noqa: ARG001 - there is no
     groups = {}
     for name, judged in (("", trunk), (", with feet", feet)):
         groups |= {f"{state}{name}": _figures(judged, state) for state in ipol.STATUSES}
-    advised = {
-        one.seen.subject for one in trunk if (one.level[one.seen.healthy] >= Level.ADVICE).any()
-    }
+    advised = {one.seen.subject for one in trunk if (one.level[one.seen.healthy] >= Level.ADVICE).any()}
     figures = _figures(trunk) | {"people_with_advice": float(len(advised))}
     figures |= {f"with_feet_{name}": value for name, value in _figures(feet).items()}
     people = len({one.subject for one in trials})
@@ -62,9 +60,7 @@ def _judged(trials: Sequence[ipol.Trial], *, feet: bool) -> Iterator[Judged]:
 def rows(trial: ipol.Trial, *, feet: bool) -> Floats:
     """The trial as rows of `CHANNELS`; with `feet`, as insoles would tell of it."""
     back = trial.samples[:, :6]
-    found = danger_trunk.channels(
-        danger_trunk.upright(back, back[: int(UPRIGHT_S * RATE_HZ)], AXES), RATE_HZ
-    )
+    found = danger_trunk.channels(danger_trunk.upright(back, back[: int(UPRIGHT_S * RATE_HZ)], AXES), RATE_HZ)
     if feet:
         down = ~np.stack(trial.in_air, axis=1)
         found[:, FORCES] = BODY_N * down / np.maximum(down.sum(axis=1, keepdims=True), 1)

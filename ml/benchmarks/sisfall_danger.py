@@ -1,4 +1,4 @@
-"""`sisfall-danger`: falls of real people foreseen by the danger number, and advice in what they do each day."""
+"""`sisfall-danger`: falls of real people foreseen by the danger number, and advice in their daily life."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from ml.benchmarks import danger_trunk, sisfall
-from ml.benchmarks.danger import PERIOD_S, Event, Judged, events, of_danger, shares
+from ml.benchmarks.danger import Event, Judged, events, false_alarms, of_danger, shares
 from ml.benchmarks.danger_data import HEALTHY
 from ml.benchmarks.danger_trunk import Person
 from ml.benchmarks.outcome import Outcome
@@ -19,13 +19,16 @@ from ml.features.falling import RATE_HZ
 
 AXES: Final = ((0, 0, 1), (-1, 0, 0), (0, -1, 0))  # forward, left, up: its x points right, its y down
 KNOWN: Final = ("D01", "D02")  # walking slowly and quickly: what each person is known by
-SETTLES_S: Final = 3.0  # of each recording: it begins elsewhere than the one before has ended
+LEAD_IN_S: Final = 3.0  # of each recording's beginning, but for a fall, are played backwards before it
+LEAD_IN: Final = ""  # the label of these
+BACKWARDS: Final = np.array([1.0, 1.0, 1.0, -1.0, -1.0, -1.0])  # accelerations stay, rates turn round
 FALL_S: Final = 1.5  # before the impact: what is said sooner is of something else
 WHY: Final = (
-    "Each person walks slowly (D01) and quickly (D02); all other recordings begin anew from there, as nobody's"
-    " next fall is learned from the last one. Their first 3 s are not judged. Foreseen: advice begins between"
-    " 1.5 and 0.3 s before the impact, the largest acceleration; already_said: it stood before that. Stumbles"
-    " (D18) and jumps (D19) are counted among daily activities."
+    "Each person walks slowly (D01) and quickly (D02); all other recordings begin anew from there, as nobody"
+    " learns from the fall before; the first 3 s are played backwards before, so that no posture"
+    " jumps, and are not judged then. Foreseen: advice begins between 1.5 and 0.3 s before the impact, the"
+    " largest acceleration; already_said: it stood before that. Stumbles (D18) and jumps (D19) are counted"
+    " among daily activities."
 )
 
 
@@ -39,13 +42,12 @@ class Watched:
     @property
     def rows(self) -> danger_trunk.Flags:
         """The moments of daily life that count."""
-        at_s = self.judged.seen.at_s
-        return self.judged.seen.healthy & ((at_s - at_s[0] >= SETTLES_S) | (self.activity in KNOWN))
+        return self.judged.seen.healthy & (self.judged.seen.label != LEAD_IN)
 
     @property
     def advised(self) -> bool:
         """Whether advice was given in moments that count."""
-        return bool((self.judged.level[self.rows] >= Level.ADVICE).any())
+        return false_alarms(self.judged, Level.ADVICE, self.rows) > 0
 
 
 def evaluate(path: Path, search: bool) -> Outcome:  # noqa: ARG001 - there is nothing to choose
@@ -70,33 +72,33 @@ def watched(own: Sequence[sisfall.Recording], calibration: Calibration) -> Itera
 
 def _taken(person: Person, one: sisfall.Recording, walking: sisfall.Recording) -> Judged:
     # What is said after the impact changes no figure.
-    samples = one.samples if one.impact is None else one.samples[: one.impact + int(PERIOD_S * RATE_HZ) + 1]
+    samples = one.samples if one.impact is None else one.samples[: one.impact + 1]
     trunk = danger_trunk.upright(samples, walking.samples, AXES)
-    begin_s = person.at_s + danger_trunk.PAUSE_S
-    judged = person.take(
-        danger_trunk.channels(trunk, RATE_HZ), RATE_HZ, np.full(len(samples), one.activity)
-    )
-    return judged if one.impact is None else fallen(judged, begin_s + one.impact / RATE_HZ)
+    calm = len(trunk) - 1 if one.impact is None else one.impact - int(FALL_S * RATE_HZ)
+    before = max(min(int(LEAD_IN_S * RATE_HZ), calm), 0)
+    trunk = np.concatenate([trunk[before:0:-1] * BACKWARDS, trunk])
+    label = np.repeat([LEAD_IN, one.activity], [before, len(samples)])
+    impact_s = person.at_s + danger_trunk.PAUSE_S + (len(trunk) - 1) / RATE_HZ
+    judged = person.take(danger_trunk.channels(trunk, RATE_HZ), RATE_HZ, label)
+    return judged if one.impact is None else fallen(judged, impact_s)
 
 
 def fallen(judged: Judged, impact_s: float) -> Judged:
     """The same with a fall as a danger that does harm at its impact; advice that stood before it is none."""
-    at_s = judged.seen.at_s
-    comes = (at_s > impact_s - FALL_S) & (at_s <= impact_s)
-    danger = np.where(comes, 1.0, HEALTHY)
-    danger[np.flatnonzero(comes)[-1] + 1 :] = 1.5
+    comes = judged.seen.at_s > impact_s - FALL_S
+    danger, first = np.where(comes, 1.0, HEALTHY), int(np.argmax(comes))
+    danger[-1] = 1.5
     level = judged.level.copy()
-    calm = np.flatnonzero(level < Level.ADVICE)
-    first = int(np.argmax(comes))
     if level[max(first - 1, 0)] >= Level.ADVICE:
-        level[first : calm[calm >= first].min(initial=len(level))] = Level.UNKNOWN
-    seen = replace(judged.seen, names=(str(judged.seen.label[0]),), danger=danger)
+        calm = np.flatnonzero(level[first:] < Level.ADVICE)
+        level[first : first + calm[0] if len(calm) else None] = Level.UNKNOWN
+    seen = replace(judged.seen, names=(str(judged.seen.label[-1]),), danger=danger)
     return replace(judged, seen=seen, level=level)
 
 
 def _stood(one: Watched) -> bool:
     """Whether advice stood when the fall began."""
-    first = int(np.argmax(one.judged.seen.danger == 1.0))
+    first = int(np.argmax(one.judged.seen.danger > HEALTHY))
     return bool(one.judged.level[max(first - 1, 0)] >= Level.ADVICE)
 
 
@@ -126,10 +128,20 @@ def _daily(own: Sequence[Watched]) -> dict[str, float]:
 
 
 def _fall(own: Sequence[Watched]) -> dict[str, float]:
-    """A kind of fall: `told` is the share that advice was given of."""
+    """Of a kind of fall; `told` is the share that was foreseen."""
     said: list[Event] = [event for one in own for event in events(one.judged, Level.ADVICE)]
-    return {"told": float(np.mean([event.foreseen for event in said]))} | of_danger(said)
+    found = of_danger(said)
+    return {"told": found.pop("foreseen"), "advice_per_hour": np.nan} | found
 
 
 def _activity(own: Sequence[Watched]) -> dict[str, float]:
-    return shares("told", [one.advised for one in own]) | _daily(own)
+    """Of a kind of daily activity; `told` is the share of recordings with advice."""
+    found = shares("told", [one.advised for one in own])
+    return {
+        "told": found["told"],
+        "advice_per_hour": _daily(own)["advice_per_hour"],
+        "low": found["told_low"],
+        "high": found["told_high"],
+        "median_lead_s": np.nan,
+        "events": float(len(own)),
+    }
