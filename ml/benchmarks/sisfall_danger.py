@@ -87,7 +87,7 @@ def fallen(judged: Judged, impact_s: float) -> Judged:
     """The same with a fall as a danger that does harm at its impact; advice that stood before it is none."""
     comes = judged.seen.at_s > impact_s - FALL_S
     danger, first = np.where(comes, 1.0, HEALTHY), int(np.argmax(comes))
-    danger[-1] = 1.5
+    danger[[0, -1]] = HEALTHY, 1.5  # however short it is, it begins and ends
     level = judged.level.copy()
     if level[max(first - 1, 0)] >= Level.ADVICE:
         calm = np.flatnonzero(level[first:] < Level.ADVICE)
