@@ -24,7 +24,7 @@ FOLLOWS_S: Final = 2.0  # of the tilt by gravity, as the drivers' complementary 
 TRUSTED: Final = 0.15  # acceleration further from gravity than this share says nothing about up
 LONGEST_S: Final = 0.2  # without a sample: the tilt begins anew
 PAUSE_S: Final = 1.0  # of the watch's clock between two recordings: what is compared over time begins anew
-OWN: Final = tuple(CHANNELS.index(name) for name in TRUNK)
+OWN: Final = [CHANNELS.index(name) for name in TRUNK]
 NOTE: Final = (
     "recorded people, judged by the calibration that ships, which has learned from simulated wearers alone;"
     " nothing was tuned on these. Of fourteen detectors two can speak, those that need only the trunk's IMU:"
@@ -71,7 +71,7 @@ def channels(trunk: Floats, rate_hz: float) -> Floats:
     ups = np.array(tilts).reshape(-1, 3)
     forward = np.arctan2(-ups[:, 0], np.hypot(ups[:, 1], ups[:, 2]))
     side = np.arctan2(-ups[:, 1], np.hypot(ups[:, 0], ups[:, 2]))
-    rows[np.ix_(there, OWN)] = np.column_stack([trunk[there], forward, side])
+    rows[there[:, None], OWN] = np.column_stack([trunk[there], forward, side])
     return rows
 
 

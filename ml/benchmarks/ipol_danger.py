@@ -33,7 +33,7 @@ def evaluate(path: Path, search: bool) -> Outcome:  # noqa: ARG001 - there is no
     """Everybody's trials one after the other, by the trunk alone and with made-up insoles."""
     trials = ipol.read(path)
     trunk, feet = (list(_judged(trials, feet=feet)) for feet in (False, True))
-    groups = {}
+    groups: dict[str, dict[str, float]] = {}
     for name, judged in (("", trunk), (", with feet", feet)):
         groups |= {f"{state}{name}": _figures(judged, state) for state in ipol.STATUSES}
     advised = {one.seen.subject for one in trunk if (one.level[one.seen.healthy] >= Level.ADVICE).any()}

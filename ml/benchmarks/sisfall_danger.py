@@ -42,7 +42,8 @@ class Watched:
     @property
     def rows(self) -> danger_trunk.Flags:
         """The moments of daily life that count."""
-        return self.judged.seen.healthy & (self.judged.seen.label != LEAD_IN)
+        counts: danger_trunk.Flags = self.judged.seen.healthy & (self.judged.seen.label != LEAD_IN)
+        return counts
 
     @property
     def advised(self) -> bool:
