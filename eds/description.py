@@ -50,6 +50,8 @@ class Description:
 
     def variable(self, index: int, subindex: int = 0) -> ODVariable | None:
         """The description of one object, `None` where the file has none."""
+        if index not in self.object_dictionary.indices:
+            return None  # without an error that canopen makes and takes
         found = self.object_dictionary.get_variable(index, subindex)
         if found is None or found.subindex != subindex:
             return None

@@ -23,7 +23,7 @@ from eds.repair import repair
 MAX_BYTES = 8 * 1024 * 1024
 # Files of a robot whose objects are kept: as bytes of this process, because whoever gets a dictionary may
 # change it. No file is ever unpickled.
-KEPT = 4
+KEPT = 8
 
 _UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 NODE_ID = "$NODEID"  # what a repaired value is relative to

@@ -66,9 +66,9 @@ def pdo_rows(description: Description) -> Iterator[PdoRow]:
     """Every PDO that the file describes."""
     for kind, communication, mapping in _PDOS:
         for number in range(512):
-            cob_id = file_value(description, communication + number, 1)
             if not description.has(communication + number, 1):
                 continue
+            cob_id = file_value(description, communication + number, 1)
             count = file_value(description, mapping + number, 0)
             last = MAX_MAPPED if count is None else min(count, MAX_MAPPED)  # a file may give entries alone
             entries = (file_value(description, mapping + number, sub) for sub in range(1, last + 1))

@@ -10,7 +10,6 @@ from typing import Self
 from hil_sim import robot_file
 from hil_sim.bus.can_bus import CanBus
 from hil_sim.bus.hub import Hub
-from hil_sim.bus.virtual import VirtualBridge
 from hil_sim.folder import Folder
 from hil_sim.loop import Loop
 
@@ -83,6 +82,8 @@ class Housing:
     def _open_bus(self, loop: Loop, closing: ExitStack) -> str:
         """Returns the bus's table in robot.toml."""
         if self._virtual_channel is not None:
+            from hil_sim.bus.virtual import VirtualBridge  # python-can is heavy, and the hub does without
+
             closing.callback(VirtualBridge(self._bus, self._virtual_channel).close)
             return robot_file.virtual_bus(self._virtual_channel)
         hub = Hub(loop, self._bus, self.folder.hub_port(), self._epoch_s)

@@ -147,7 +147,7 @@ class App:
         self._gateway: FileGateway | None = None  # of a robot that was commissioned here
         self.ending = Ending(self.feeds, self._close_others, self._close_own)
         self.window = MainWindow(self.desk, self.theme, kept, self._archive, self.commissioning)
-        self.window.commission.connect_to.connect(self._start_gateway)
+        self.window.tabs.connect_to.connect(self._start_gateway)
         self.window.stopped.connect(lambda: self.stop("STOP button of the window"))
         self.window.stop_all.connect(lambda: self.desk.stop_all("STOP ALL of the window"))
         self.window.added.connect(self._add)
@@ -300,10 +300,10 @@ class App:
             self._gateway.close()
         self._gateway = FileGateway(Path(file))
         self._gateway.start()
-        self.window.commission.result.say("The gateway is starting …", again=False)
+        self.window.tabs.commission.result.say("The gateway is starting …", again=False)
 
     def _look_at_gateway(self) -> None:
-        gateway, result = self._gateway, self.window.commission.result
+        gateway, result = self._gateway, self.window.tabs.commission.result
         if gateway is None:
             return
         if gateway.problem:

@@ -5,8 +5,9 @@ import fnmatch
 import time
 from pathlib import Path
 
+from eds.light_imports import import_canopen
 from hil_sim import mounting, personality
-from hil_sim.cli import replay, run, running
+from hil_sim.cli import running
 from hil_sim.cli.arguments import add_wearer, seconds, speed
 from hil_sim.exoskeleton import CONTROLLER, CONTROLLER_NODE, JOINTS, Scenario
 from hil_sim.gait.walks import NAMES
@@ -252,13 +253,18 @@ def _drives(words: list[str]) -> dict[str, Path]:
 def main(argv: list[str]) -> int:
     """Run the simulator; returns the exit status."""
     if argv[:1] == ["run"]:
+        from hil_sim.cli import run
+
         return run.main(argv[1:])
     if any(word.startswith("--replay") for word in argv):
+        from hil_sim.cli import replay  # with python-can
+
         return replay.main(argv)
     try:
         arguments, script = _parse(argv)
     except SystemExit as leave:
         return 2 if leave.code else 0
+    import_canopen()
     robot = SimulatedRobot(
         arguments.dir,
         Scenario(arguments.scenario),

@@ -131,7 +131,7 @@ class TrackPosition(_Track):
     """Cyclic synchronous position."""
 
     def step(self, reference: Reference, dt: float) -> None:
-        way = 0.0 if self.done else (self._target - reference.position) * self._share(dt)
+        way = 0.0 if self._left_s <= 0.0 else (self._target - reference.position) * self._share(dt)
         reference.position += way
         reference.velocity = way / dt
 

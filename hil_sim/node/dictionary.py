@@ -1,14 +1,16 @@
 """The living object dictionary of a device: values with their type, access and limits (CiA 301 §7.4)."""
 
 from collections.abc import Callable, Iterator
-
-from canopen.objectdictionary import ODVariable
+from typing import TYPE_CHECKING
 
 from eds.datatypes import DATA_TYPES
 from eds.description import Description
 from hil_sim.node import coding
 from hil_sim.node.abort import AbortCode, SdoAbort
 from hil_sim.node.coding import Value as Value
+
+if TYPE_CHECKING:
+    from canopen.objectdictionary import ODVariable
 
 Key = tuple[int, int]
 
@@ -41,7 +43,7 @@ class Entry:
         "value",
     )
 
-    def __init__(self, variable: ODVariable) -> None:
+    def __init__(self, variable: "ODVariable") -> None:
         self.key: Key = (variable.index, variable.subindex)
         self.data_type = DATA_TYPES[variable.data_type or 0x07]
         self.access = variable.access_type.lower()
@@ -105,8 +107,8 @@ class Dictionary:
     def __init__(self, description: Description) -> None:
         self._entries: dict[Key, Entry] = {}
         for item in description.object_dictionary.values():
-            members = [item] if isinstance(item, ODVariable) else item.subindices.values()
-            for variable in members:
+            members = getattr(item, "subindices", None)
+            for variable in (item,) if members is None else members.values():
                 self._entries[variable.index, variable.subindex] = Entry(variable)
         dummies = [key for key in self._entries if key[0] < _FIRST_OBJECT]
         self.dummies = {key: self._entries.pop(key).data_type.bits for key in dummies}

@@ -24,7 +24,6 @@ DETECTORS: Final = (
     "effort",
     "loads",
     "lean",
-    "legs",
 )
 
 

@@ -1,9 +1,8 @@
 """(i) One thing that leaves what all others say: the robot's own moments, remembered, as its healthy model.
 
 A moment's joints are looked up among those of before; what a joint's set-point, torque, a foot's load and the
-trunk's lean were then, they should be now. A joint is looked up by the other joints alone, and a leg by the
-other leg, so that one which goes its own way finds the moments in which it should be elsewhere. Where no
-moment was alike, as in the first steps of stairs, nothing is said: a new activity changes all joints at once.
+trunk's lean were then, they should be now. A joint is looked up by the other joints alone, so that one which
+goes its own way finds the moments in which it should be elsewhere. Where no moment was alike, as in the first steps of stairs, nothing is said: a new activity changes all joints at once.
 """
 
 import collections
@@ -28,9 +27,7 @@ EVERY_S: Final = 0.07  # between two moments
 SMOOTH: Final = np.array([0.3] * 12 + [0.15] * 3)  # of the newest moment: over a quarter, and half a second
 # What makes a joint's angle (rad) and velocity (rad/s) another one.
 _SCALE: Final = np.array([0.08] * 6 + [0.6, 0.8, 0.6] * 2)[:, None]
-_OWN: Final = np.array([*range(6), *[8] * 9, *[6] * 3, *[7] * 3])  # which search answers for which value
-_VALUE: Final = np.array([*range(15), *range(6)])  # and which value that is
-LEG_SMOOTH: Final = 0.06  # of the newest moment: over a stride
+_OWN: Final = np.array([*range(6), *[6] * 9])  # which search answers for which value
 
 Bools = npt.NDArray[np.bool_]
 
@@ -43,14 +40,13 @@ class Memory:
         *(f"{joint}.torque" for joint in JOINTS),
         *(f"{side} load" for side in SIDES),
         "lean",
-        *(f"{side} leg" for side in SIDES),
     )
-    least = np.array([0.01] * 6 + [0.5] * 6 + [5.0] * 2 + [0.004] + [0.1] * 2)  # rad, N·m, N, rad, shares
+    least = np.array([0.01] * 6 + [0.5] * 6 + [5.0] * 2 + [0.004])  # rad, N·m, N, rad
     needs = "positions and velocities of the joints"
 
     def __init__(self) -> None:
         self._there: Bools = np.zeros(12, dtype=np.bool_)
-        self.said = np.full(17, np.nan)
+        self.said = np.full(15, np.nan)
         self.alike = True  # whether there were moments like this one, as far as anybody can say
         self._due_s = -math.inf
         self._forget()
@@ -61,7 +57,6 @@ class Memory:
         self._count = 0
         self._looks = 0
         self._off = np.zeros(15)
-        self._leg = np.zeros(2)  # squared
         self._waiting: collections.deque[tuple[float, Floats, Floats]] = collections.deque()
         self._source = np.random.default_rng(0)
 
@@ -84,8 +79,8 @@ class Memory:
             self._there = there
             self._forget()
         if not there.any() or not (there == self._there).all():
-            return np.full(17, np.nan)
-        found, nearest = np.full(17, np.nan), math.inf
+            return np.full(15, np.nan)
+        found, nearest = np.full(15, np.nan), math.inf
         state = np.where(there, state, 0.0)[:, None] / _SCALE
         if self._count >= FEWEST:
             found, nearest = self._compared(state, values)
@@ -103,24 +98,19 @@ class Memory:
         apart *= apart
         whole = apart.sum(axis=0)
         joint = apart[:6] + apart[6:]
-        leg = joint.reshape(2, 3, -1).sum(axis=1)
-        search = whole - np.concatenate([joint, leg, np.zeros((1, self._count))])
+        search = whole - np.concatenate([joint, np.zeros((1, self._count))])
         near = np.argpartition(search, ALIKE, axis=1)[:, :ALIKE]
         distance = np.sqrt(np.maximum(np.take_along_axis(search, near, axis=1).mean(axis=1), 0.0))[_OWN]
-        was = self._values[near[_OWN], _VALUE[:, None]].mean(axis=1)
-        off = (values[_VALUE] - was) / (1.0 + (distance / DOUBTED) ** 2)
+        was = self._values[near[_OWN], np.arange(15)[:, None]].mean(axis=1)
+        off = (values - was) / (1.0 + (distance / DOUBTED) ** 2)
         off[:6] *= _alone(distance[:6])
         known = np.isfinite(off) & (distance < FARTHEST)
-        self._off += SMOOTH * np.where(known[:15], off[:15] - self._off, 0.0)
-        legs = ((off[15:] / _SCALE[:6, 0]) ** 2).reshape(2, 3).mean(axis=1)
-        whole_legs = known[15:].reshape(2, 3).all(axis=1)
-        self._leg += LEG_SMOOTH * np.where(whole_legs, legs - self._leg, 0.0)
-        found = np.concatenate([np.abs(self._off), np.sqrt(self._leg)])
+        self._off += SMOOTH * np.where(known, off - self._off, 0.0)
+        found = np.abs(self._off)
         # What one foot bears less and the other more is a weight that was shifted.
         found[12:14] = np.minimum(found[12:14], abs(self._off[12:14].sum()))
-        told = np.concatenate([known[:15], whole_legs])
         self.alike = bool(distance[6] < FARTHEST)
-        return np.where(told, found, np.nan), float(search[8, near[8]].min())
+        return np.where(known, found, np.nan), float(search[6, near[6]].min())
 
     def _keep(self, state: Floats, values: Floats) -> None:
         at = self._count if self._count < KEPT else int(self._source.integers(KEPT))
@@ -159,8 +149,6 @@ class Kind:
     def words(self, key: str) -> str:
         """Say what is wrong where this key is the worst."""
         joint, _, what = key.partition(".")
-        if key.endswith(" leg"):
-            return f"the {key} moves as it never did beside the other one"
         if what == "target":
             return f"{spoken(joint)}: is led where it never is while the other joints are as they are"
         if what:
@@ -180,5 +168,4 @@ _KINDS: Final = {
     "effort": slice(6, 12),
     "loads": slice(12, 14),
     "lean": slice(14, 15),
-    "legs": slice(15, 17),
 }

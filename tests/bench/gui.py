@@ -218,7 +218,7 @@ def whole_window(theme: Theme, tab: int) -> float:
         window.tabs.setCurrentIndex(tab)
         window.show()
         bench.draw(window)
-        window.signals.choose([info.name for info in described().description.channels][:24])
+        window.tabs.signals.choose([info.name for info in described().description.channels][:24])
         took = [_frame_ms(window, station, frame) for frame in range(WARM_UP + FRAMES)]
         window.close()
         window.deleteLater()

@@ -1,5 +1,6 @@
 """Links of Markdown files lead somewhere, also those that the site leaves to the repository."""
 
+import functools
 import re
 from pathlib import Path
 
@@ -32,6 +33,16 @@ def anchors(page: Path) -> set[str]:
     return {re.sub(r"[^\w\- ]", "", head.lower()).replace(" ", "-") for head in heads}
 
 
+@functools.cache
+def known_files() -> frozenset[str]:
+    """Every file of ours that may be named by the end of its path."""
+    return frozenset(
+        file.relative_to(ROOT).as_posix()
+        for part in (*_PARTS, "tools")
+        for file in (ROOT / part).rglob("*.py")
+    )
+
+
 def named_files(text: str) -> list[str]:
     """Paths of this repository in code spans, whole or from within a house; not those of the reader's own."""
     houses = "|".join([*_PARTS, "tools", "scenarios"])
@@ -51,11 +62,6 @@ def test_every_link_leads_somewhere(page: Path) -> None:
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
 def test_every_file_that_is_named_is_there(page: Path) -> None:
-    known = {
-        file.relative_to(ROOT).as_posix()
-        for part in (*_PARTS, "tools")
-        for file in (ROOT / part).rglob("*.py")
-    }
     named = named_files(page.read_text(encoding="utf-8")) if page.name != "CHANGELOG.md" else []
     wrong = [path for path in named if not (ROOT / path).exists()]
-    assert [path for path in wrong if not any(f"/{one}".endswith(f"/{path}") for one in known)] == []
+    assert [path for path in wrong if not any(f"/{one}".endswith(f"/{path}") for one in known_files())] == []

@@ -18,12 +18,12 @@ class Mistake(Protocol):
     def parts(self) -> tuple[Part, ...]: ...
 
 
-def parser(name: str, what: str | None) -> argparse.ArgumentParser:
-    """With the options that both have."""
+def parser(name: str, what: str | None, replay: str = "store") -> argparse.ArgumentParser:
+    """With the options that both have; several can be played again where `replay` appends."""
     made = argparse.ArgumentParser(prog=name, description=what)
     add = made.add_argument
     add("--saying", default="", metavar="PATTERN", help="only violations that say this count")
-    add("--replay", metavar="STEPS", help="play these again, as a violation printed them")
+    add("--replay", metavar="STEPS", action=replay, help="play these again, as a violation printed them")
     add("--with-defect", metavar="DEFECT", help="put this defect back before")
     add("--defects", nargs="*", metavar="DEFECT", help="look for each of these, or of all, put back")
     return made

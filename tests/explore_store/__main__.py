@@ -22,8 +22,8 @@ def main() -> int:
         import pytest
 
         return int(pytest.main([f"tests/unit/{options.test}", "-q", "-x", "-p", "no:cacheprovider"]))
-    if options.replay is not None:
-        return _replay(options.replay)
+    if options.replay:
+        return max(_replay(play) for play in options.replay)
     if options.workers > 1:
         return _side_by_side(options)
     return _search(options.seconds, options.seed, options.words, options.saying)
@@ -36,7 +36,7 @@ def _defects() -> Mapping[str, Mistake]:
 
 
 def _options() -> argparse.Namespace:
-    made = parser("./dev explore store", __doc__)
+    made = parser("./dev explore store", __doc__, replay="append")
     add = made.add_argument
     add("--seconds", type=float, default=DEFAULT_S, help="how long")
     add("--seed", type=int, default=1, help="another one plays something else")

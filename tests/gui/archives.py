@@ -168,14 +168,14 @@ def shown(
 
 def cell(shown: Shown, column: int) -> str:
     """What stands in the row of the newest job."""
-    item = shown.window.cloud.jobs.item(0, column)
+    item = shown.window.tabs.cloud.jobs.item(0, column)
     return "" if item is None else item.text()
 
 
 def play(shown: Shown, archive: Archive) -> None:
     """Open the newest recording and play it."""
     shown.open("Recordings")
-    page = shown.window.recordings.list
+    page = shown.window.tabs.recordings.list
     shown.until(lambda: page.sessions.rowCount(), "listed it")
     page.table.selectRow(0)
     shown.until(lambda: archive.tape, "looked into it")

@@ -86,7 +86,7 @@ def test_processes_are_asked_for_only_while_they_are_looked_at(app: App, robot: 
     asked = [params for params in robot.called("resource.snapshot") if params.get("processes", True)]
     assert [params for params in asked if params.get("limit") != 1 or params["include"]] == []
     app.window.tabs.setCurrentIndex(2)
-    wait(lambda: app.window.resources.table.processes.rowCount() == 12, "showed the processes")
+    wait(lambda: app.window.tabs.resources.table.processes.rowCount() == 12, "showed the processes")
 
 
 def test_objects_are_asked_for_only_while_they_are_looked_at(app: App, robot: FakeRobot) -> None:
@@ -98,8 +98,8 @@ def test_objects_are_asked_for_only_while_they_are_looked_at(app: App, robot: Fa
     }
     wait(lambda: not app.desk.stations[0].robot.is_stale(), "saw live data")
     assert not robot.called("object.list")
-    page = app.window.objects
-    app.window.tabs.setCurrentIndex(app.window._views.index(page))
+    page = app.window.tabs.objects
+    app.window.tabs.look_at(page)
     reading = app.desk.stations[0].objects.reading
     wait(lambda: len(reading.held) == len(OBJECTS), "read what is in sight")
     wait(lambda: page.count.text() == f"{len(OBJECTS)} objects, {len(OBJECTS)} read", "said so")

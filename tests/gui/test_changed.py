@@ -16,7 +16,7 @@ def compared(shown: Shown, settings: ServerSettings) -> ChangedPage:
     record(settings, facts=msgspec.structs.replace(ADA, parameters={"left_knee.gain": 2.0}, setup=setup))
     record(settings, facts=msgspec.structs.replace(ADA, parameters={"left_knee.gain": 3.0}, operator="Bert"))
     shown.open("Recordings")
-    page = shown.window.recordings.list
+    page = shown.window.tabs.recordings.list
     shown.until(lambda: page.sessions.rowCount() == 2, "listed both")
     page.table.selectRow(0)
     shown.draw()
@@ -25,8 +25,8 @@ def compared(shown: Shown, settings: ServerSettings) -> ChangedPage:
     shown.draw()
     assert len(page.marked) == 2
     page.compare.click()
-    assert shown.window.recordings.currentIndex() == CHANGED
-    return shown.window.recordings.changed
+    assert shown.window.tabs.recordings.currentIndex() == CHANGED
+    return shown.window.tabs.recordings.changed
 
 
 def cells(page: ChangedPage) -> list[list[str]]:
@@ -51,7 +51,7 @@ def test_what_changed_is_listed_and_what_is_not_recorded_is_said(
     assert NOT_THE_CAUSE in page.verdict.text()
     assert "gait cycle" in page.verdict.text()
     page.left.emit()
-    assert shown.window.recordings.currentIndex() == LIST
+    assert shown.window.tabs.recordings.currentIndex() == LIST
 
 
 def test_a_store_that_cannot_be_read_is_said_and_nothing_is_shown_as_unchanged(

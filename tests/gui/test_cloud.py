@@ -26,7 +26,7 @@ def test_the_store_is_shown_with_where_its_keys_come_from_and_never_the_keys(
 ) -> None:
     record(settings)
     shown.open("Cloud")
-    cloud = shown.window.cloud
+    cloud = shown.window.tabs.cloud
     shown.until(lambda: "Reached" in cloud.state.text(), "reached it")
     assert cloud._facts["URL"].text() == settings.store.url
     assert cloud._facts["Keys"].text() == "none needed: it is a folder"
@@ -59,14 +59,14 @@ def test_a_store_that_is_away_says_so_and_is_tried_again(
     monkeypatch.setattr(Store, "existing", reach)
     record(settings)
     shown.open("Cloud")
-    shown.until(lambda: "Connection refused" in shown.window.cloud.state.text(), "said so")
-    assert shown.window.cloud._facts["Holds"].text() == "not known"
+    shown.until(lambda: "Connection refused" in shown.window.tabs.cloud.state.text(), "said so")
+    assert shown.window.tabs.cloud._facts["Holds"].text() == "not known"
     shown.open("Recordings")
-    assert "it is tried again" in shown.window.recordings.list.said.text()
+    assert "it is tried again" in shown.window.tabs.recordings.list.said.text()
     away[0] = False
-    shown.until(lambda: shown.window.recordings.list.sessions.rowCount(), "came back")
+    shown.until(lambda: shown.window.tabs.recordings.list.sessions.rowCount(), "came back")
     shown.open("Cloud")
-    assert "Reached" in shown.window.cloud.state.text()
+    assert "Reached" in shown.window.tabs.cloud.state.text()
 
 
 def test_upload_now_asks_who_records_and_does_it_itself_where_nobody_does(
@@ -74,7 +74,7 @@ def test_upload_now_asks_who_records_and_does_it_itself_where_nobody_does(
 ) -> None:
     record(settings, sent=False)
     shown.open("Cloud")
-    cloud = shown.window.cloud
+    cloud = shown.window.tabs.cloud
     cloud.upload.click()
     job = archive.jobs.jobs[0]
     shown.until(lambda: job.is_over, "uploaded it")
@@ -100,7 +100,7 @@ def test_a_job_shows_how_far_it_is_and_can_be_cancelled(shown: Shown, archive: A
 
     job = archive.jobs.add("Verify", long)
     shown.open("Cloud")
-    table = shown.window.cloud.jobs
+    table = shown.window.tabs.cloud.jobs
     shown.until(lambda: cell(shown, 2) == "4 of 10 files", "showed how far it is")
     cancel = table.cellWidget(0, 3)
     assert isinstance(cancel, QPushButton)
@@ -114,8 +114,8 @@ def test_a_store_is_downloaded_and_verified(
 ) -> None:
     record(settings)
     shown.open("Cloud")
-    shown.window.cloud.download_to(tmp_path / "copy", ())
-    shown.window.cloud._verify(deep=True)
+    shown.window.tabs.cloud.download_to(tmp_path / "copy", ())
+    shown.window.tabs.cloud._verify(deep=True)
     shown.until(lambda: all(job.is_over for job in archive.jobs.jobs), "did both")
     assert [job.state for job in archive.jobs.jobs] == [JobState.DONE, JobState.DONE]
     assert Store((tmp_path / "copy").as_uri()).dataset("sessions").count_rows() > 0

@@ -41,12 +41,12 @@ def app(qt: QApplication, tmp_path: Path) -> Iterator[App]:
     kept = QSettings(str(tmp_path / "kept.ini"), QSettings.Format.IniFormat)
     settings = ServerSettings(prediction=PredictionSettings(enabled=False))
     with running(qt, settings, kept) as made:
-        made.window.tabs.setCurrentWidget(made.window.commission)
+        made.window.tabs.setCurrentWidget(made.window.tabs.commission)
         yield made
 
 
 def test_six_drives_are_commissioned_by_the_page_and_walk(app: App, folder: Path, tmp_path: Path) -> None:
-    page, file = app.window.commission, tmp_path / "exo-01.toml"
+    page, file = app.window.tabs.commission, tmp_path / "exo-01.toml"
     page.form.file.setText(str(file))
     page.form.bus.setEditText(str(folder / "robot.toml"))
     page.form.serial.setText(" ".join(str(folder / port) for port in PORTS))

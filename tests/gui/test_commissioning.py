@@ -267,4 +267,4 @@ def test_a_window_without_a_robot_leads_to_it(full_window: MainWindow) -> None:
     button = full_window.empty.findChild(QPushButton, "commission")
     assert button is not None
     button.click()
-    assert full_window.tabs.currentWidget() is full_window.commission
+    assert full_window.tabs.view is full_window.tabs.commission

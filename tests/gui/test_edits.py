@@ -34,17 +34,17 @@ def worse(write: int = 1, *, is_final: bool = True) -> Told:
 
 
 def test_the_newest_edit_is_shown_with_its_word_and_its_strides(bench: Bench, window: MainWindow) -> None:
-    window.tabs.setCurrentIndex(window._views.index(window.edits))
+    window.tabs.look_at(window.tabs.edits)
     window.refresh()
-    assert "No edit is known yet" in window.edits.words.text()
+    assert "No edit is known yet" in window.tabs.edits.words.text()
     bench.station.take_evidence(worse())
-    window.edits.refresh()
-    assert window.edits.list.count() == 1
-    assert "worse (" in window.edits.verdict.text()
-    assert "left knee tracking error RMS worse: +19.2 %" in window.edits.words.text()
-    assert "No data for " in window.edits.words.text()
-    assert set(window.edits.curves) == {"left_knee.position", "left_knee.following_error"}
-    described = window.edits.curves["left_knee.position"].accessibleDescription()
+    window.tabs.edits.refresh()
+    assert window.tabs.edits.list.count() == 1
+    assert "worse (" in window.tabs.edits.verdict.text()
+    assert "left knee tracking error RMS worse: +19.2 %" in window.tabs.edits.words.text()
+    assert "No data for " in window.tabs.edits.words.text()
+    assert set(window.tabs.edits.curves) == {"left_knee.position", "left_knee.following_error"}
+    described = window.tabs.edits.curves["left_knee.position"].accessibleDescription()
     assert described.startswith("40 strides before and 41 after, from ")
 
 

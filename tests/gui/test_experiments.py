@@ -56,9 +56,10 @@ def swept() -> Told:
 def begun(bench: Bench, window: MainWindow | Parts) -> None:
     """An A/B trial of two step lengths."""
     bench.station.take([looked()])
-    window.edits.refresh()
-    window.edits.ab.click()
-    form = window.edits.form
+    edits = window.edits if isinstance(window, Parts) else window.tabs.edits
+    edits.refresh()
+    edits.ab.click()
+    form = edits.form
     form.parameter.setCurrentText(NAME)
     form.fields["B"].setText("420")
     assert form.begin.isEnabled(), form.words.text()
@@ -92,8 +93,8 @@ def test_stop_and_take_back_is_in_sight_until_it_was_read_back(bench: Bench, win
     assert "a write of yours ends it" in window.parameters.banner.text()
     part = told(5)
     bench.station.take_evidence(replace(part, edit=replace(part.edit, boot_id=run.boot_id)))
-    window.edits.refresh()
-    assert window.edits.list.count() == 0
+    window.tabs.edits.refresh()
+    assert window.tabs.edits.list.count() == 0
     window.experiment.end.click()
     assert bench.first.named("revert") == [(5,)]
     assert run.state is State.TAKING_BACK
@@ -104,9 +105,9 @@ def test_stop_and_take_back_is_in_sight_until_it_was_read_back(bench: Bench, win
     window.experiment.refresh()
     assert "the original value is back" in window.experiment.words.text()
     assert "ended early: asked for" in window.experiment.words.text()
-    window.edits.refresh()
-    assert window.edits.list.count() == 1
-    assert "A/B" in window.edits.list.item(0).text()
+    window.tabs.edits.refresh()
+    assert window.tabs.edits.list.count() == 1
+    assert "A/B" in window.tabs.edits.list.item(0).text()
     window.experiment.end.click()
     assert not window.experiment.isVisible()
 
@@ -116,7 +117,7 @@ def test_from_a_trials_bar_both_of_its_values_are_asked_about(bench: Bench, wind
     bench.station.writing.done(Written(7, {NAME: 0.4}, {NAME: 0.42}, 40.0))
     window.trial.refresh()
     window.trial.ab.click()
-    form = window.edits.form
+    form = window.tabs.edits.form
     assert bench.first.named("revert") == [(7,)]
     assert [field.text() for field in form.fields.values()] == ["400", "420"]
     assert "on trial" in form.words.text()

@@ -101,13 +101,13 @@ def test_a_double_click_shows_all_of_the_time_again_as_does_another_robot(
 def test_a_click_opens_the_channels_in_signals(window: MainWindow, bench: Bench) -> None:
     bench.station.take([walking(300, -HOUR_S)])
     bench.draw(window)
-    plot = window.overview._plots[0]
+    plot = window.tabs.overview._plots[0]
     QTest.mouseClick(
         plot.plot.viewport(), Qt.MouseButton.LeftButton, pos=plot.plot._lines.geometry().center()
     )
     assert window.tabs.currentIndex() == 0, "it may become a double click"
     wait(lambda: window.tabs.currentIndex() == 1, "opened")
-    assert window.signals.chosen == ["left_knee.position", "right_knee.position"]
+    assert window.tabs.signals.chosen == ["left_knee.position", "right_knee.position"]
 
 
 def test_each_curve_is_named_with_its_value_in_the_legend(overview: Overview) -> None:

@@ -18,7 +18,7 @@ from server_gui.views.resources.processes import COMMAND, CPU, NAME, ProcessTabl
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.sort_header import SortHeader
 from server_gui.views.widgets.stop_button import StopButton
-from tests.gui.fakes import Bench, destroy, stop_is_whole
+from tests.gui.fakes import Bench, destroy, make_every_page, stop_is_whole
 from tests.support.desk import HELD, described, looked, walking
 
 TOLD_AS_ONE = {f"Ctrl+{place}" for place in range(2, 10)}  # with Ctrl+1
@@ -27,6 +27,7 @@ NOT_THE_WINDOWS = {"F12", "Ctrl+Space", "Alt+O", "F2"}  # of STOP, and Qt's own
 
 def test_the_sheet_tells_every_key_of_the_window_and_no_other(window: MainWindow) -> None:
     text = QKeySequence.SequenceFormat.PortableText
+    make_every_page(window)
     held = {shortcut.key().toString(text) for shortcut in window.findChildren(QShortcut)}
     held |= {button.shortcut().toString(text) for button in window.findChildren(QAbstractButton)}
     held |= {action.shortcut().toString(text) for action in window.parameters.tree.actions()}
@@ -84,10 +85,10 @@ def test_a_trial_is_in_sight_whatever_panel_is_hidden(window: MainWindow, bench:
     bench.draw(window)
     assert window.parameters.trial.isVisible()
     assert not window.trial.isVisible(), "it is told twice"
-    assert not window.overview.now.keep.isVisible(), "it is asked twice"
+    assert not window.tabs.overview.now.keep.isVisible(), "it is asked twice"
     window._panels.put_away()
     bench.draw(window)
-    assert window.overview.now.keep.isVisible()
+    assert window.tabs.overview.now.keep.isVisible()
     assert not window.trial.isVisible()
     window.tabs.setCurrentIndex(1)  # the overview shows it itself
     bench.draw(window)

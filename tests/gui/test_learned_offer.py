@@ -33,9 +33,11 @@ def station(bench: Bench) -> Station:
 def show(window: MainWindow, station: Station, adapting: Adapting) -> list[str]:
     """Which buttons there are."""
     station.take_prediction(adapting)
-    window.overview.read_now()
+    window.tabs.overview.read_now()
     window.refresh()
-    return [button.text() for button in window.overview.learned.buttons.values() if not button.isHidden()]
+    return [
+        button.text() for button in window.tabs.overview.learned.buttons.values() if not button.isHidden()
+    ]
 
 
 def test_an_offer_is_accepted_and_taken_back_with_a_click_each(
@@ -43,7 +45,7 @@ def test_an_offer_is_accepted_and_taken_back_with_a_click_each(
 ) -> None:
     said: list[tuple[str, int, Happening]] = []
     bench.desk.adapt = lambda *what: said.append(what)
-    offer = window.overview.learned
+    offer = window.tabs.overview.learned
     assert offer.isHidden()
     assert show(window, station, OFFERED) == ["Use it", "No"]
     assert not offer.isHidden()

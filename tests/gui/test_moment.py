@@ -24,7 +24,7 @@ def test_all_of_a_frame_is_judged_by_one_moment(
     said = list[str]()
     for _ in range(40):
         window.refresh()
-        chip, fact = window.header._chips["drives"], window.overview.now.drives
+        chip, fact = window.header._chips["drives"], window.tabs.overview.now.drives
         colours = {icon._mark.colour for one in (chip, fact) for icon in one.findChildren(MarkIcon)}
         assert len(colours) == 1, said
         said.append(colours.pop())
@@ -41,7 +41,7 @@ def test_what_is_read_is_shown_anew_in_the_same_frames(bench: Bench, window: Mai
         window.refresh()
         header = window.header._chips["drives"].main_text
         shown.add(header)
-        assert window.overview.now.drives.main.text() == header
+        assert window.tabs.overview.now.drives.main.text() == header
 
 
 def test_within_one_moment_the_clock_stands(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -29,7 +29,7 @@ from tests.gui.fakes import Bench
 from tests.gui.monkey import Monkey
 from tests.support.desk import HELD, JOINTS, FakeCommands, described, looked, resources, walking
 
-SECONDS = [float(os.environ["GWRMS_MONKEY_S"])] if "GWRMS_MONKEY_S" in os.environ else [2.0, 60.0]
+SECONDS = [float(os.environ["GWRMS_MONKEY_S"])] if "GWRMS_MONKEY_S" in os.environ else [1.0, 60.0]
 SEED = int(os.environ.get("GWRMS_MONKEY_SEED", "7"))
 FRAMES_PER_S = 30
 ROWS = 4  # a frame, at about 100 Hz

@@ -57,7 +57,7 @@ def test_no_angle_beside_the_figure_is_cut(theme: Theme, width: int) -> None:
 
 
 def test_what_is_old_looks_old_and_is_not_called_now(window: MainWindow, bench: Bench) -> None:
-    overview = window.overview
+    overview = window.tabs.overview
 
     def is_live() -> bool:
         bench.look_again([walking(200), looked()])

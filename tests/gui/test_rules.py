@@ -133,7 +133,7 @@ def test_a_recording_in_its_views(
     record(request.getfixturevalue("settings"))
     full.resize(width, height)
     play(page, request.getfixturevalue("archive"))
-    player = full.recordings.player
+    player = full.tabs.recordings.player
     for place in range(2):
         player._stack.setCurrentIndex(place)
         page.draw()

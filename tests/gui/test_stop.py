@@ -212,10 +212,10 @@ def test_two_robots_of_one_name_are_told_apart_on_their_stops(
 def test_header_and_overview_say_the_same_of_a_stop_at_once(window: MainWindow, bench: Bench) -> None:
     bench.look_again([walking(10), looked()])
     bench.draw(window)
-    said = [window.header._chips["status"].main_text, window.overview.now.activity.main.text()]
+    said = [window.header._chips["status"].main_text, window.tabs.overview.now.activity.main.text()]
     bench.station.stopping.held = True
     window.refresh()
-    after = [window.header._chips["status"].main_text, window.overview.now.activity.main.text()]
+    after = [window.header._chips["status"].main_text, window.tabs.overview.now.activity.main.text()]
     assert all(one != other for one, other in zip(said, after, strict=True))
     assert len(set(after)) == 1
 

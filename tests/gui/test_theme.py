@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QApplication, QHBoxLayout, QLabel, QWidget
 from server_gui.views.frame.application import kept_theme
 from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.theme import PALETTES, Look, Theme
-from tests.gui.fakes import Bench, destroy
+from tests.gui.fakes import Bench, destroy, make_every_page
 
 CHOSEN = ((Look.DARK, 1.5), (Look.LIGHT, 1.5), (Look.DARK, 1.0))
 
@@ -28,6 +28,7 @@ def hidden(qt: QApplication, theme: Theme, bench: Bench, kept: QSettings) -> Ite
 
 
 def test_a_window_takes_what_is_chosen_before_it_is_shown(hidden: MainWindow, theme: Theme) -> None:
+    make_every_page(hidden)
     before = _points(hidden)
     theme.set(Look.LIGHT, 1.5)
     hidden.show()
@@ -35,6 +36,7 @@ def test_a_window_takes_what_is_chosen_before_it_is_shown(hidden: MainWindow, th
 
 
 def test_a_window_takes_what_is_chosen_while_it_is_shown(window: MainWindow, theme: Theme) -> None:
+    make_every_page(window)
     before = _points(window)
     for look, scale in CHOSEN:
         theme.set(look, scale)

@@ -420,7 +420,7 @@ class ControlMachine(RuleBasedStateMachine):
 
 
 ControlMachine.TestCase.settings = settings(
-    max_examples=40 if examples(40) == 40 else 10,
+    max_examples=40 if examples(40) == 40 else 6,
     stateful_step_count=50,
     suppress_health_check=list(HealthCheck),
     phases=(Phase.explicit, Phase.reuse, Phase.generate),  # making a failure smaller takes minutes here

@@ -18,7 +18,7 @@ from tests.scenario.collecting import Collecting, Kept
 from tests.scenario.processes import Bench, gwrms
 from tests.support.waiting import WAIT_S, until
 
-FAST_S = (20, int(os.environ.get("GWRMS_SIMULATED_S", "60")))
+FAST_S = (8, int(os.environ.get("GWRMS_SIMULATED_S", "60")))
 SIMULATED_S = int(os.environ.get("GWRMS_SIMULATED_S", "10"))
 SIMULATOR = tuple(os.environ.get("GWRMS_SIMULATOR", "").split())
 ROBOTS = ("exo-a", "exo-b", "exo-c")

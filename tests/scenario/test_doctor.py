@@ -50,7 +50,7 @@ def doctor(bench: Bench, *more: str) -> tuple[str, ...]:
         "--computer",
         computer,
         "--seconds",
-        "3",
+        "2",
         *more,
     )
 

@@ -156,14 +156,6 @@ def test_a_step_is_recorded_shown_and_everything_is_as_before(robot: SimulatedRo
     assert shown.test.head.parameters["0x2030:1"] == 3000
 
 
-def test_without_its_phrase_nothing_gets_power(robot: SimulatedRobot) -> None:
-    with begun(robot, "step") as process:
-        said = list(heard(process, phrase="yes"))
-        assert process.wait() == 1
-    assert {"say": "Nothing gets power."} in said
-    assert not any("moving" in one for one in said)
-
-
 def moved_by_hand(robot: SimulatedRobot) -> str:
     """Why a test ended whose joint was moved before the phrase was typed; it never had power."""
     angle = robot.exoskeleton.drives[KNEE].joint.position * robot.exoskeleton.mountings[KNEE].direction
@@ -299,14 +291,18 @@ def stop_says(robot: SimulatedRobot) -> str:
         return process.communicate(timeout=WAIT_S)[1]
 
 
-def test_two_at_once_are_one(robot: SimulatedRobot) -> None:
+def test_two_at_once_are_one_and_without_its_phrase_nothing_gets_power(robot: SimulatedRobot) -> None:
     with begun(robot, "step") as process:
         next(one for one in heard(process) if "ask" in one)
         with begun(robot, "step") as other:
             _, errors = other.communicate(timeout=WAIT_S)
         assert (other.returncode, "is at it" in errors) == (1, True)
         typed(process, "")
-        assert any("ask" in one for one in heard(process, phrase="no")), "the first one goes on"
+        said = list(heard(process, phrase="yes"))
+        assert process.wait() == 1
+    assert any("ask" in one for one in said), "the first one goes on"
+    assert {"say": "Nothing gets power."} in said
+    assert not any("moving" in one for one in said)
 
 
 def test_a_rule_of_the_guard_ends_it(robot: SimulatedRobot) -> None:

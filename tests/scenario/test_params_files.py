@@ -71,16 +71,13 @@ def test_save_same_change_different_apply_same(served: Served, file: str) -> Non
     assert (served.value(GAIN), served.value(TORQUE)) == (3000, 80)
 
 
-def test_a_dcf_holds_all_that_can_be_configured_in_a_drive(served: Served) -> None:
+def test_a_dcf_holds_all_of_a_drive_and_a_walking_robot_takes_what_is_live_alone(served: Served) -> None:
     assert served.run("params", "save", "knee.dcf", "--component", "left_knee") == 0
     values = dcf.read(Path("knee.dcf"), 2).values
     assert len(values) > 80
     assert (values[0x6072, 0], values[0x1017, 0], values[0x2030, 1]) == (2000, 100, 3000)
     assert values[0x1400, 1] == 0x202  # as the drive has it, not as the EDS has it for any node
     assert not {(0x6040, 0), (0x607A, 0), (0x6060, 0), (0x1010, 1)} & values.keys()
-
-
-def test_a_running_robot_takes_what_is_live_and_nothing_of_a_file_that_is_not(served: Served) -> None:
     assert served.run("params", "save", "a.toml", "gait.*", "left_knee.*") == 0
     text = Path("a.toml").read_text()
     Path("a.toml").write_text(text.replace('gait.step_length" = 0.4', 'gait.step_length" = 0.45'))

@@ -1,6 +1,6 @@
 """A server that is killed at any moment loses nothing that was acknowledged, and stores nothing twice.
 
-10 kills a backend, and 25 by night; GWRMS_KILLS=100 for more.
+5 kills a backend, and 25 by night; GWRMS_KILLS=100 for more.
 """
 
 import os
@@ -17,7 +17,7 @@ from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.upload import upload
 from tests.scenario.recording_lives import PER_LIFE, ROBOT
 
-KILLS = (10, int(os.environ.get("GWRMS_KILLS", "25")))
+KILLS = (5, int(os.environ.get("GWRMS_KILLS", "25")))
 
 
 def lives(spool: Path, url: str, count: int) -> set[int]:

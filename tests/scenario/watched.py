@@ -197,12 +197,12 @@ class Watched:
         config = self._config(folder, rules)
         self.robot = self._assemble(config)
         self.simulated.power_on()
-        self.run(1.0)
+        self.run(0.7)
         prepare(self.simulated)
         for component in self.robot.components.values():
             component.start()
         self._watch({} if config.guard is None else config.guard.rule)
-        self.run(1.0)
+        self.run(0.6)
 
     def _watch(self, rules: Mapping[str, Rule]) -> None:
         for name, rule in rules.items():

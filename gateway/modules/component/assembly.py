@@ -20,9 +20,9 @@ from drivers.joint.drive import JointDrive
 from drivers.joint.pairs import join_joints
 from drivers.joint.settings import JointSettings
 from drivers.site import Site
+from eds.light_imports import import_canopen, without
 from eds.profile import profile_of
 from gateway.config.robot import RobotConfig
-from gateway.process.light_imports import standing_in, without
 
 T = TypeVar("T")
 
@@ -73,12 +73,11 @@ def _format_of(data: bytes) -> str | None:
 
 
 def _import_canopen(*, with_can: bool) -> None:
-    """It reads EDS files. Without python-can, where no bus is opened by that: 10 MB, and 40 ms of a stop."""
+    """Without python-can, where no bus is opened by that: 40 ms of a stop."""
     with without("ssl", "_hashlib"):  # OpenSSL: 5 MB
         if with_can:
             importlib.import_module("can")
-        with standing_in("can"):
-            importlib.import_module("canopen")
+        import_canopen()
 
 
 def _add(robot: Robot, kind: Kind, name: str, build: Callable[[], Component]) -> None:

@@ -1,6 +1,7 @@
 """Rows of one store against those of another: which of them are new there, and which contradict."""
 
 import contextlib
+import functools
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
@@ -73,12 +74,10 @@ class Merge:
     @contextlib.contextmanager
     def _opened(self) -> Iterator[tuple["duckdb.DuckDBPyConnection", list[str]]]:
         """Both sides' rows as the views `ours` and `theirs`, with the same columns."""
-        import duckdb  # of an extra that a collector does not need
-
         sides = {"ours": self._source, "theirs": self._target}
         with (
             translated(f"{self._source.url}/{self._table.name} cannot be compared with {self._target.url}"),
-            contextlib.closing(duckdb.connect(config=_CONFIG)) as connection,
+            contextlib.closing(_database().cursor()) as connection,
             _said(),
         ):
             for setting in _SETTINGS:
@@ -107,6 +106,14 @@ class Merge:
             f"{self._target.url}/{self._table.name} has other contents than {self._source.url} by the same "
             f"name: {told}. Nothing was copied; copy to a folder of its own"
         )
+
+
+@functools.cache
+def _database() -> "duckdb.DuckDBPyConnection":
+    """Empty for ever: each comparison has a cursor of its own, which costs a fortieth of a new database."""
+    import duckdb  # of an extra that a collector does not need
+
+    return duckdb.connect(config=_CONFIG)
 
 
 @contextlib.contextmanager

@@ -41,6 +41,7 @@ from server_gui.core.follow.events import (
     Resources,
     Telemetry,
 )
+from server_gui.core.follow.moment import Moment, this_moment
 from server_gui.core.follow.news import News, NewsKind
 from server_gui.core.follow.robot import Robot
 from server_gui.core.follow.robot_news import RobotNews
@@ -104,6 +105,7 @@ class Station:
         self._deliver = deliver
         self.news = news
         self._alarms = Alarms()
+        self._judged: Moment | None = None  # by which the alarms were looked for, since anything has come
         self._watch = RobotNews(self.tell)
         self._watched_ns = 0
         self._states = StateWatch()
@@ -157,10 +159,12 @@ class Station:
 
     @property
     def alarms(self) -> Alarms:
-        """What is wrong with it, as of now."""
-        stalls, now_s = self._stalls.latest, self.robot.now_s()
-        told, danger = self.audit.entries, self.predictions.danger
-        facts = Facts(self.robot, self.stopping, self.address, told, stalls, danger)
+        """What is wrong with it, as of now: a dozen views ask in each frame."""
+        if (moment := this_moment()) is not None and moment is self._judged:
+            return self._alarms
+        self._judged = moment
+        stalls, now_s, danger = self._stalls.latest, self.robot.now_s(), self.predictions.danger
+        facts = Facts(self.robot, self.stopping, self.address, self.audit.entries, stalls, danger)
         if self.stopping.was_ended and any_enabled(self.robot) and self.is_live:
             self.stopping.was_ended = False
         self._alarms.look(
@@ -187,6 +191,7 @@ class Station:
 
     def take(self, events: Iterable[Event]) -> None:
         """Apply what has come, and look for what is new."""
+        self._judged = None
         for event in events:
             if self.experiment is not None:
                 self.experiment.take(event)
@@ -271,6 +276,7 @@ class Station:
 
     def take_prediction(self, news: PredictionNews) -> None:
         """Apply what models say of this robot."""
+        self._judged = None
         before = self.predictions.danger
         self.predictions.take(news)
         if isinstance(news, Ruled):

@@ -1,7 +1,7 @@
 """The main window: header with STOP, robots left, tabs in the middle, parameters right, events below."""
 
 from collections.abc import Callable, Sequence
-from typing import Final, Protocol
+from typing import Final
 
 from PySide6.QtCore import QPoint, QSettings, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import (
@@ -21,7 +21,6 @@ from PySide6.QtWidgets import (
     QMenu,
     QPushButton,
     QStackedWidget,
-    QTabWidget,
     QVBoxLayout,
     QWidget,
 )
@@ -36,10 +35,6 @@ from server_gui.core.follow.moment import one_moment
 from server_gui.views.alarms.events_panel import EventsPanel
 from server_gui.views.alarms.strip import AlarmStrip
 from server_gui.views.ask import ask
-from server_gui.views.audit.page import Audit
-from server_gui.views.cloud.panel import Cloud
-from server_gui.views.commissioning.page import CommissionPage
-from server_gui.views.edits.page import Edits
 from server_gui.views.experiments.bar import ExperimentBar
 from server_gui.views.frame.closing import COMMISSIONING
 from server_gui.views.frame.docks import Area, Docks
@@ -49,40 +44,24 @@ from server_gui.views.frame.help import Help
 from server_gui.views.frame.kept import keep_bytes, kept_bytes
 from server_gui.views.frame.keys_sheet import KeysSheet
 from server_gui.views.frame.page_bar import PageBar
+from server_gui.views.frame.pages import Pages
 from server_gui.views.frame.recording_chip import ask_recording
 from server_gui.views.frame.status_bar import StatusBar
-from server_gui.views.models.panel import ModelsPage
-from server_gui.views.objects.panel import ObjectsPage
-from server_gui.views.overview.page import Overview
 from server_gui.views.pace import Pace
 from server_gui.views.parameters.panel import ParametersPanel
 from server_gui.views.parameters.trial_bar import TrialBar
-from server_gui.views.recordings.panel import Recordings
-from server_gui.views.resources.bus_health import BusHealthView
-from server_gui.views.resources.page import Resources
 from server_gui.views.robots.panel import RobotsPanel
 from server_gui.views.robots.reset import ask_clear, ask_reset
 from server_gui.views.theme import Look, Theme
 from server_gui.views.widgets.scrolled import Scrolled
 from server_gui.views.widgets.seen import has_focus_in, is_seen
-from server_gui.views.workspace.beside_menu import others_of
-from server_gui.views.workspace.page import Signals
 
-OF_A_ROBOT: Final = ("&Overview", "&Signals", "&Resources", "&Bus", "Ob&jects", "&Audit", "&Edits")
 SCALES: Final = (80, 90, 100, 125, 150, 175, 200)
 # Quantities with more than one unit worth choosing.
 CHOICES: Final = ("rad", "rad/s", "m", "Pa", "m/s²", "s", "A")
 ROBOTS: Final = 9  # that have a key
 LEAST: Final = 240  # high, at text of 100 %
 USUAL: Final = QSize(1680, 1000)  # where the screen has room for that
-
-
-class View(Protocol):
-    """What a tab holds."""
-
-    def refresh(self) -> None:
-        """Show how it is now; called each frame while the tab is visible."""
-        ...
 
 
 def opening_size(room: QSize, scale: float) -> QSize:
@@ -146,53 +125,27 @@ class MainWindow(QMainWindow):
         self.experiment = ExperimentBar(desk)
         self.events = EventsPanel(desk, theme)
         self.events.shown.connect(self.show_around)
-        step = None if archive is None else archive.playback.step
-        self.overview = Overview(desk, theme)
-        self.overview.is_paced = False
-        self.signals = Signals(desk, theme, others=lambda: others_of(desk, archive), step=step)
-        self.overview.opened.connect(self._open_in_signals)
-        self.resources = Resources(desk, theme)
-        self.buses = BusHealthView(desk, theme)
-        self.objects = ObjectsPage(desk, theme)
-        self.objects.edited.connect(self._edit_parameter)
-        self.audit = Audit(desk, theme, None if archive is None else archive.journals)
-        self.edits = Edits(desk, theme)
-        for bar in (self.trial, self.parameters.trial, self.overview.now):
-            bar.compare.connect(self.edits.compare)
         self.help, self.help_button = Help(theme), QPushButton("?")
         self.empty = EmptyView(theme)
         self.empty.added.connect(self.added)
         self.empty.pairing.connect(self.robots.begin_pairing)
         self.empty.simulator.connect(self.simulator)
-        self.empty.recordings.connect(self._look_at_recordings)
-        self.tabs, self._pages = QTabWidget(), QStackedWidget()
-        self.tabs.setAccessibleName("Views")
+        self._pages = QStackedWidget()
         column = _column(self._middle)
         column.addWidget(self._pages, 1)
         nobody = Scrolled()
         self._pages.addWidget(nobody)
         nobody.setWidget(self.empty)
+        self.tabs = Pages(desk, theme, archive, commissioning)
+        self.tabs.edited.connect(self._edit_parameter)
+        self.empty.recordings.connect(self.tabs.look_at_recordings)
+        for bar in (self.trial, self.parameters.trial):
+            bar.compare.connect(lambda station: self.tabs.edits.compare(station))
         self._pages.addWidget(self.tabs)
-        live = (self.overview, self.signals, self.resources, self.buses, self.objects, self.audit, self.edits)
-        for title, view in zip(OF_A_ROBOT, live, strict=True):
-            self._add_tab(view, title)
-        self._views: tuple[View, ...] = live
-        self._live = len(self._views)  # tabs that show the robot that is looked at
-        if archive is not None:
-            self.recordings = Recordings(archive, desk.recording, theme)
-            self.cloud = Cloud(archive, desk.recording, theme)
-            self.models = ModelsPage(archive.models, theme, desk)
-            self._views += (self.recordings, self.cloud, self.models)
-            self.tabs.addTab(self.recordings, "Re&cordings")
-            self._add_tab(self.cloud, "C&loud")
-            self._add_tab(self.models, "&Models")
         self._commissioning = commissioning
         self._is_closing = self._is_ending = False
         if commissioning is not None:
-            self.commission = CommissionPage(commissioning, theme)
-            self._views += (self.commission,)
-            self.tabs.addTab(self.commission, "Commissio&n")
-            self.empty.offer_commissioning(lambda: self.tabs.setCurrentWidget(self.commission))
+            self.empty.offer_commissioning(self.tabs.look_at_commissioning)
         self._bar = StatusBar(desk, theme)
         self.setStatusBar(self._bar)
         self.page_bar = PageBar(self.tabs, self._help_corner())
@@ -216,11 +169,10 @@ class MainWindow(QMainWindow):
         self._bar.frame()
         due = self._is_due()
         if due:
-            for page in (self.overview, self.signals, self.resources, self.buses):
-                page.read_now()  # what header, alarms and page say is of the same moment
-        shown = self._desk.selected is not None or self.tabs.currentIndex() >= self._live
+            self.tabs.read_now()  # what header, alarms and page say is of the same moment
+        shown = self._desk.selected is not None or not self.tabs.is_of_a_robot
         if shown:
-            self._views[self.tabs.currentIndex()].refresh()
+            self.tabs.view.refresh()
         if not due:
             return
         self._pages.setCurrentIndex(1 if shown else 0)
@@ -230,8 +182,9 @@ class MainWindow(QMainWindow):
         self._hold_header()
         self.robots.refresh()
         self.parameters.refresh()
-        elsewhere = (self.parameters.trial, self.overview.now.trial)
-        self.overview.now.offer(not is_seen(self.parameters.trial))
+        now = self.tabs.overview.now
+        elsewhere = (self.parameters.trial, now.trial)
+        now.offer(not is_seen(self.parameters.trial))
         self.experiment.refresh()
         self.trial.refresh(shown=not any(is_seen(one) for one in elsewhere))
         self.events.refresh()
@@ -245,15 +198,16 @@ class MainWindow(QMainWindow):
 
     def show_signals(self, globs: Sequence[str]) -> None:
         """Begin with these channels in sight."""
-        self.signals.channels.usual = globs
-        self.tabs.setCurrentIndex(self._views.index(self.signals))
+        self.tabs.signals.channels.usual = globs
+        self.tabs.look_at(self.tabs.signals)
 
     def show_around(self, station: Station, channel: str, at_ns: int) -> None:
         """Show a channel some seconds before and after an instant of a robot's signals."""
         self._desk.select(station)
-        self.tabs.setCurrentIndex(self._views.index(self.signals))
-        self.signals.refresh()
-        self.signals.show_around((channel,), at_ns)
+        signals = self.tabs.signals
+        self.tabs.look_at(signals)
+        signals.refresh()
+        signals.show_around((channel,), at_ns)
 
     def closeEvent(self, event: QCloseEvent) -> None:
         if self._commissioning is not None and self._commissioning.runs and not self._is_ending:
@@ -316,14 +270,6 @@ class MainWindow(QMainWindow):
         """Show a panel, in front of those that are at its place."""
         self._panels.bring(dock)
 
-    def _open_in_signals(self, channels: Sequence[str]) -> None:
-        self.tabs.setCurrentIndex(self._views.index(self.signals))
-        self.signals.refresh()
-        self.signals.choose(channels)
-
-    def _look_at_recordings(self) -> None:
-        self.tabs.setCurrentIndex(self._live)
-
     def _find(self) -> None:
         """Words that are typed are seen, also where the panel was hidden."""
         self.bring(self.docks[1])
@@ -343,11 +289,6 @@ class MainWindow(QMainWindow):
             self._desk.select(self._desk.stations[place])
 
     # --- how it is put together
-
-    def _add_tab(self, view: QWidget, title: str) -> None:
-        room = Scrolled()
-        self.tabs.addTab(room, title)
-        room.setWidget(view)
 
     def _build(self) -> None:
         self.keys = KeysSheet(self._theme, self._middle)

@@ -8,6 +8,7 @@ from server_gui.views.recordings.changed import ChangedPage
 from server_gui.views.recordings.player import Player
 from server_gui.views.recordings.sessions import SessionsPage
 from server_gui.views.theme import Theme
+from server_gui.views.widgets.later import Later
 from server_gui.views.widgets.scrolled import Scrolled
 
 LIST, PLAYER, CHANGED = range(3)
@@ -19,24 +20,41 @@ class Recordings(QStackedWidget):
     def __init__(self, archive: Archive, recording: Recording, theme: Theme) -> None:
         super().__init__()
         self._archive = archive
+        self._theme = theme
         self.setObjectName("page")
         self.list = SessionsPage(archive, recording, theme)
         self.list.played.connect(self._play)
-        self.player = Player(archive, theme)
-        self.player.left.connect(lambda: self.setCurrentIndex(LIST))
-        self.changed = ChangedPage(archive, theme)
-        self.changed.left.connect(lambda: self.setCurrentIndex(LIST))
         self.list.compared.connect(lambda: self.setCurrentIndex(CHANGED))
-        for page in (
-            self.list,
-            self.player,
-            self.changed,
-        ):  # each by itself, else a low one is as high as the other likes
-            self.addWidget(Scrolled(page))
+        self._player = Later(self._make_player)
+        self._changed = Later(self._make_changed)
+        # Each is scrolled by itself, else a low one is as high as the other likes.
+        for page in (Scrolled(self.list), self._player, self._changed):
+            self.addWidget(page)
+
+    @property
+    def player(self) -> Player:
+        return self._player.view
+
+    @property
+    def changed(self) -> ChangedPage:
+        return self._changed.view
 
     def refresh(self) -> None:
         """Show how it is now."""
-        (self.list, self.player, self.changed)[self.currentIndex()].refresh()
+        if self.currentIndex() == LIST:
+            self.list.refresh()
+        else:
+            (self.player if self.currentIndex() == PLAYER else self.changed).refresh()
+
+    def _make_player(self) -> Player:
+        made = Player(self._archive, self._theme)
+        made.left.connect(lambda: self.setCurrentIndex(LIST))
+        return made
+
+    def _make_changed(self) -> ChangedPage:
+        made = ChangedPage(self._archive, self._theme)
+        made.left.connect(lambda: self.setCurrentIndex(LIST))
+        return made
 
     def _play(self) -> None:
         if self._archive.play():

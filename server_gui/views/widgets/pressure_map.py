@@ -1,6 +1,7 @@
 """A foot's pressure from above: cells smoothed by precomputed weights, the centre of pressure, its trail."""
 
 import collections
+import functools
 from collections.abc import Sequence
 from typing import Final
 
@@ -227,10 +228,11 @@ def weights(cells: Sequence[Cell]) -> Weights:
     return found
 
 
-def colour_table() -> list[int]:
+@functools.cache
+def colour_table() -> tuple[int, ...]:
     """Viridis as Qt's 32-bit colours: even in print, and for those who do not tell red from green."""
     colours = VIRIDIS.getLookupTable(nPts=STEPS)
-    return [*(QColor(*(int(part) for part in colour[:3])).rgb() for colour in colours), 0]
+    return (*(QColor(*(int(part) for part in colour[:3])).rgb() for colour in colours), 0)
 
 
 def outline(sign: float) -> QPainterPath:

@@ -2,6 +2,7 @@
 
 import errno
 import json
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -42,16 +43,6 @@ def test_files_as_they_were_made_are_removed_and_those_of_others_stay(server: Se
     assert exports_folder().stat().st_mode & 0o077 == 0
 
 
-def test_the_window_s_exports_are_known_too(server: Server, tmp_path: Path) -> None:
-    settings, file, copied = load(server.config), tmp_path / "hers.csv", tmp_path / "copied"
-    (session,) = [each for each in Recordings(server.url, server.spool).sessions() if each.session == HERS]
-    actions.export(settings, session, Choice(), "csv", file)(Job("export"))
-    actions.download(server.url, copied, [session])(Job("download"))
-    said = server.run(*FORGET, status=1)
-    assert not file.exists()
-    assert f"{copied.as_uri()} is a copy that has rows of theirs" in said
-
-
 def _edited(file: Path) -> None:
     file.write_bytes(file.read_bytes() + b"more")
 
@@ -70,24 +61,12 @@ def _a_folder(file: Path) -> None:
     file.mkdir()
 
 
-def test_files_that_are_others_now_are_named_and_stay(server: Server, tmp_path: Path) -> None:
-    """Also in a folder whose name a shell would take for a pattern."""
-    folder = tmp_path / "wal[k] *?"
-    folder.mkdir()
-    changes: dict[Callable[[Path], None], str] = {
-        _edited: "has changed since",
-        _linked: "has changed since",
-        _a_folder: "has changed since",
-        _named_twice: "has another name too",
-    }
-    files = {change: export(server, HERS, folder / f"[{change.__name__}]*.csv") for change in changes}
-    for change, file in files.items():
-        change(file)
-    said = server.run(*FORGET, status=1)
-    for change, file in files.items():
-        assert f"{file} was exported with rows of theirs, and {changes[change]}" in said
-        assert file.exists()
-    assert "gone:" not in said
+CHANGES: dict[Callable[[Path], None], str] = {
+    _edited: "has changed since",
+    _linked: "has changed since",
+    _a_folder: "has changed since",
+    _named_twice: "has another name too",
+}
 
 
 def test_what_came_to_its_place_since_it_was_found_is_not_removed(
@@ -109,19 +88,34 @@ def test_what_came_to_its_place_since_it_was_found_is_not_removed(
     assert not late.exists()
 
 
-def test_what_cannot_be_looked_at_or_removed_is_named(
+def test_what_stays_is_named_with_why_and_all_else_is_removed(
     server: Server, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Then the rest is done, and the same command goes on when it can be."""
-    stays, unseen = (export(server, HERS, tmp_path / f"{name}.csv") for name in ("stays", "unseen"))
-    goes = export(server, HERS, tmp_path / "goes.csv")
+    """Also in a folder whose name a shell would take for a pattern, and what the window has exported."""
+    folder, copied, windows = tmp_path / "wal[k] *?", tmp_path / "copied", tmp_path / "window's.csv"
+    folder.mkdir()
+    said = {
+        export(server, HERS, folder / f"[{change.__name__}]*.csv"): why for change, why in CHANGES.items()
+    }
+    for file, change in zip(said, CHANGES, strict=True):
+        change(file)
+    for name, method in (("stays", "unlink"), ("unseen", "lstat")):
+        file = export(server, HERS, tmp_path / f"{name}.csv")
+        monkeypatch.setattr(Path, method, _refusing(getattr(Path, method), file))
+        said[file] = "cannot be looked at or removed (Permission denied)"
+    (session,) = [each for each in Recordings(server.url, server.spool).sessions() if each.session == HERS]
+    actions.export(load(server.config), session, Choice(), "csv", windows)(Job("export"))
+    actions.download(server.url, copied, [session])(Job("download"))
     (exports_folder() / "0.json").mkdir()
-    for refused, name in ((stays, "unlink"), (unseen, "lstat")):
-        monkeypatch.setattr(Path, name, _refusing(getattr(Path, name), refused))
-    said = server.run(*FORGET, status=1)
-    assert said.count("and cannot be looked at or removed (Permission denied)") == 2
-    assert f"{exports_folder() / '0.json'} is an entry of the list of exports that cannot be read" in said
-    assert not goes.exists()
+
+    told = server.run(*FORGET, status=1)
+    for file, why in said.items():
+        assert f"{file} was exported with rows of theirs, and {why}" in told
+        assert os.path.lexists(file)
+    assert f"{copied.as_uri()} is a copy that has rows of theirs" in told
+    assert f"{exports_folder() / '0.json'} is an entry of the list of exports that cannot be read" in told
+    assert "gone:" not in told
+    assert not windows.exists()
     assert server.rows() == {HIS}
 
 

@@ -110,7 +110,7 @@ def test_what_was_damaged_is_whole_again(place: Place, damage: Callable[[Place],
 
 def test_the_same_loss_twice_is_mended_twice(place: Place) -> None:
     before = rows(place.url)
-    for _ in range(3):
+    for _ in range(2):
         for file in place.files():
             file.unlink()
         assert "would be brought again" in place.told("mend", "--dry-run")

@@ -31,10 +31,9 @@ STRAIGHT, BENT = 2.0, 47.0
 class Person:
     """Does what is asked with the hands, and types."""
 
-    def __init__(self, folder: Path, until: str | None = None) -> None:
+    def __init__(self, folder: Path) -> None:
         self.read: list[str] = []
         self._folder = folder
-        self._until = until
 
     def say(self, text: str) -> None:
         self.read.append(text)
@@ -45,8 +44,6 @@ class Person:
     def ask(self, question: Ask) -> str:
         self.read.append(question.text)
         assert len(self.read) < 150, self.read[:12]
-        if self._until is not None and self._until in question.text:
-            raise EOFError
         return self._answer(question)
 
     def _answer(self, question: Ask) -> str:

@@ -317,7 +317,7 @@ def test_what_a_resource_only_gateway_imports() -> None:
 
 def test_what_is_kept_out_while_a_library_is_imported_can_be_imported_afterwards() -> None:
     code = (
-        "import sys; from gateway.process.light_imports import without\n"
+        "import sys; from eds.light_imports import without\n"
         "with without('ssl', 'json'): import asyncio\n"
         "print('ssl' in sys.modules); import ssl; print(ssl.OPENSSL_VERSION_INFO[0] > 0)"
     )

@@ -2,6 +2,7 @@
 
 import random
 from dataclasses import dataclass
+from functools import cache
 
 from hil_sim.gait.activity import Activity, Label
 from hil_sim.gait.curves import Leg
@@ -61,6 +62,7 @@ class Moving:
         )
 
 
+@cache
 def stride_of(activity: Activity, shape: Shape = USUAL, who: WearerSettings = NOMINAL) -> list[Moment]:
     """Three even strides, after the start is over."""
     moving = Moving(shape, who)

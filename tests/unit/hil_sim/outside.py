@@ -1,4 +1,4 @@
-"""A whole robot in simulated time, seen from outside: by python-can on its bus, by readers of its ports.
+"""A whole robot in simulated time, seen from outside: by one more node on its bus, by readers of its ports.
 
 Nothing here asks the simulator what it did. Identifiers and commands are those of CiA 301 and CiA 402.
 """
@@ -7,7 +7,7 @@ from pathlib import Path
 
 import can
 
-from hil_sim.bus.virtual import VirtualBridge
+from hil_sim.bus.can_bus import Frame
 from hil_sim.clock import SECOND_NS
 from hil_sim.exoskeleton import JOINTS, Exoskeleton, Scenario
 from hil_sim.faults.injector import Faults
@@ -16,7 +16,7 @@ KNEE = JOINTS["left_knee"]
 GAIT = 16
 STATE_MASK, ENABLED, IN_FAULT = 0x6F, 0x27, 0x08
 _UP_S = 0.6  # the drives are enabled, the motion begins
-_SLICE_S = 0.05
+_A_MOMENT_S = 0.05
 _ANSWER_S = 0.05
 
 
@@ -41,31 +41,28 @@ class Listener:
 
 
 class Outside:
-    """The robot, its faults, a python-can reader of its bus and a listener on each port."""
+    """The robot, its faults, a node that hears its bus and a listener on each port."""
 
     def __init__(self, folder: Path, scenario: Scenario = Scenario.WALK, seed: int = 0) -> None:
-        channel = f"outside {folder}"
         self.robot = Exoskeleton(scenario, seed)
         self.faults = Faults(self.robot, folder, seed)
         self.ports = {name: Listener(line.baudrate) for name, line in self.robot.sensors.lines.items()}
         for name, line in self.robot.sensors.lines.items():
             line.port = self.ports[name]
         self.messages: list[can.Message] = []
-        self._bridge = VirtualBridge(self.robot.bus, channel)
-        self._bus = can.Bus(interface="virtual", channel=channel)
+        self._came: list[can.Message] = []
+        self.robot.bus.attach(self, self._hear, self._hear_error)
         self.robot.power_on()
         self.run(_UP_S)
 
     def mend(self) -> None:
         """End every fault, and let nobody wait for what came before."""
         self.faults.clear()
-        self.run(_SLICE_S)
+        self.run(_A_MOMENT_S)
         self.messages.clear()
 
     def close(self) -> None:
         self.faults.clear()
-        self._bus.shutdown()
-        self._bridge.close()
 
     @property
     def now_s(self) -> float:
@@ -73,16 +70,27 @@ class Outside:
 
     def run(self, seconds: float) -> list[can.Message]:
         """Let the robot live on; what came on the bus meanwhile."""
-        before = len(self.messages)
-        end_ns = self.robot.clock.now_ns + round(seconds * SECOND_NS)
-        while (now_ns := self.robot.clock.now_ns) < end_ns:
-            self.robot.clock.run_until(min(now_ns + round(_SLICE_S * SECOND_NS), end_ns))
-            while (message := self._bus.recv(timeout=0)) is not None:
-                self.messages.append(message)
-        return self.messages[before:]
+        self.robot.clock.run_until(self.robot.clock.now_ns + round(seconds * SECOND_NS))
+        came, self._came = self._came, []
+        self.messages += came
+        return came
 
     def send(self, cob_id: int, data: bytes) -> None:
-        self._bus.send(can.Message(arbitration_id=cob_id, data=data, is_extended_id=False))
+        self.robot.bus.send(Frame(cob_id, data), self)
+
+    def _hear(self, frame: Frame, _sender: object) -> None:
+        self._came.append(
+            can.Message(
+                arbitration_id=frame.cob_id,
+                data=frame.data,
+                is_extended_id=frame.extended,
+                is_remote_frame=frame.remote,
+                timestamp=self.now_s,
+            )
+        )
+
+    def _hear_error(self, error_class: int) -> None:
+        self._came.append(can.Message(arbitration_id=error_class, is_error_frame=True, timestamp=self.now_s))
 
     def ask(self, node: int, request: bytes, seconds: float = _ANSWER_S) -> list[bytes]:
         """An SDO request; the answers that come in time."""

@@ -31,13 +31,13 @@ def through_all_pairs() -> list[Activity]:
 
 def test_no_angle_and_no_velocity_jumps_between_any_two_activities() -> None:
     """Commands come at odd times, also in the middle of a transition; the most are a fall's."""
-    dt, pause = 0.008, random.Random(4)
+    dt, pause = 0.01, random.Random(4)
     moving = Moving(replace(USUAL, step_length=0.5, cycle_time=1.4), seed=1)
     generator = moving.generator
     before: tuple[float, ...] = (*generator.legs()[0], *generator.legs()[1], generator.trunk)
     speeds: tuple[float, ...] = (0.0,) * len(before)
     for activity in through_all_pairs():
-        for _ in range(round(pause.uniform(0.1, 2.0) / dt)):
+        for _ in range(round(pause.uniform(0.1, 1.3) / dt)):
             generator.step(dt, activity, moving.shape)
             now = (*generator.legs()[0], *generator.legs()[1], generator.trunk)
             after = tuple((b - a) / dt for a, b in zip(before, now, strict=True))
@@ -68,7 +68,7 @@ WAYS = [
 @pytest.mark.parametrize(("ways", "seen"), WAYS)
 def test_what_is_done_between_two_activities(ways: tuple[Activity, Activity], seen: list[str]) -> None:
     moving = Moving()
-    moving.do(ways[0], 10.0)
+    moving.do(ways[0], 5.0)
     assert labels([*moving.do(ways[0], 0.1), *moving.do(ways[1], 10.0)]) == seen
 
 
@@ -245,12 +245,13 @@ def strides(moments: list[Moment]) -> list[float]:
 
 
 def test_strides_differ_as_in_people_and_repeat_with_the_seed() -> None:
-    first, again, other = (Moving(seed=seed).do(Activity.WALK, 24.0) for seed in (1, 1, 2))
-    assert first == again
+    first = Moving(seed=1).do(Activity.WALK, 18.0)
+    again, other = (Moving(seed=seed).do(Activity.WALK, 9.0) for seed in (1, 2))
+    assert first[: len(again)] == again
     times = strides(first)[2:]
     assert 0.005 < statistics.stdev(times) / statistics.fmean(times) < 0.04
-    assert strides(other)[2:] != times
-    even = strides(Moving().do(Activity.WALK, 12.0))[2:]
+    assert strides(other)[2:] != strides(again)[2:]
+    even = strides(Moving().do(Activity.WALK, 10.0))[2:]
     assert max(even) - min(even) < 0.011  # a step of the clock
 
 

@@ -119,13 +119,13 @@ def test_it_walks_within_three_seconds() -> None:
 
 
 def test_a_drive_stopped_by_another_hand_stops_them_all_until_start_is_written(robot: Robot) -> None:
-    robot.run(2.0)
+    robot.run(0.5)
     assert robot.download(2, 0x6040, 0x02, 2) == "ok"
     robot.run(0.5)
     assert robot.exo.controller.controller_state is ControllerState.HELD
     assert robot.states() == {PowerState.SWITCH_ON_DISABLED}
     assert struct.unpack("<BHB", robot.heard_last(0x190))[0::2] == (4, 2)
-    robot.run(2.0)
+    robot.run(1.0)
     assert robot.states() == {PowerState.SWITCH_ON_DISABLED}
     assert robot.download(16, 0x2000, 1, 1) == "ok"
     robot.run(1.0)
@@ -162,7 +162,7 @@ def test_a_missing_heartbeat_stops_all_and_is_told(robot: Robot) -> None:
     assert robot.exo.controller.dictionary.read(0x2012, 0) == bytes([5])
     assert robot.states() == {PowerState.SWITCH_ON_DISABLED}
     assert struct.unpack_from("<H", robot.heard_last(0x90))[0] == 0x8130
-    robot.run(3.0)
+    robot.run(1.0)
     assert robot.states() == {PowerState.SWITCH_ON_DISABLED}
     assert robot.download(5, 0x1017, 100, 2) == "ok"
     assert robot.download(16, 0x2000, 1, 1) == "ok"
@@ -203,9 +203,9 @@ def test_every_activity_is_one_that_the_drives_can_follow(robot: Robot) -> None:
 
 def test_who_is_stopped_on_the_ground_stays_there(robot: Robot) -> None:
     robot.exo.controller.go(Activity.FALL)
-    robot.run(4.0)
+    robot.run(3.0)
     assert robot.download(16, 0x2000, 0, 1) == "ok"
-    robot.run(4.0)
+    robot.run(2.0)
     assert robot.exo.controller.generator.label is Label.LYING
 
 
@@ -249,7 +249,7 @@ def test_the_hip_swings_further_with_longer_steps(robot: Robot) -> None:
 
 
 def test_setpoints_never_jump_when_parameters_do(robot: Robot) -> None:
-    robot.run(2.0)
+    robot.run(1.0)
     robot.heard.clear()
     for index, value in ((0x2001, 600), (0x2002, 1000), (0x2003, 120), (0x2004, 300), (0x2001, 200)):
         robot.download(16, index, value, 2)

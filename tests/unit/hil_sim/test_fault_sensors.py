@@ -239,10 +239,10 @@ def test_imu_saturated_never_says_more_than_its_limit(shared: Outside) -> None:
 def test_swapped_feet_load_each_insole_in_the_other_ones_turn(tmp_path: Path) -> None:
     def loads(swapped: bool) -> dict[str, list[int]]:
         with closing(Outside(tmp_path)) as outside:
-            outside.run(1.5)
+            outside.run(1.0)
             if swapped:
                 outside.faults.begin("swapped_feet")
-            outside.run(1.5)
+            outside.run(1.1)
             return {
                 name: [sum(frame.cells) for frame in insole_frames(outside.ports[name].take())[-100:]]
                 for name in ("left_insole", "right_insole")

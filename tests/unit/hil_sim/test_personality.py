@@ -154,17 +154,17 @@ def test_the_controller_sets_foreign_drives_up_and_the_robot_walks(file: Path) -
     heard = list[int]()
     robot.bus.attach("listener", lambda frame, _: heard.append(frame.cob_id))
     robot.power_on()
-    robot.clock.run_until(3_000_000_000)
+    robot.clock.run_until(2_000_000_000)
     angles = list[float]()
     for step in range(30):
-        robot.clock.run_until(3_000_000_000 + step * 50_000_000)
+        robot.clock.run_until(2_000_000_000 + step * 50_000_000)
         angles.append(robot.drives["left_knee"].joint.position)
     assert max(angles) - min(angles) > 0.5
     assert not [cob_id for cob_id in heard if 0x080 < cob_id < 0x100]  # no EMCY
     robot.drives["left_knee"].power_off()
-    robot.clock.run_until(5_000_000_000)
+    robot.clock.run_until(3_800_000_000)
     robot.drives["left_knee"].power_on()
-    robot.clock.run_until(6_000_000_000)
+    robot.clock.run_until(4_800_000_000)
     objects = robot.drives["left_knee"].dictionary
     assert objects.number((0x1A00, 0)) == 2  # set up once more
     assert objects.number((0x608F, 1)) == 4096

@@ -55,7 +55,7 @@ def test_times_are_of_both_clocks(tmp_path: Path) -> None:
 
 
 def test_who_walks_has_phases_and_alternating_events(tmp_path: Path) -> None:
-    _, rows = recorded(tmp_path / "truth", Exoskeleton(Scenario.WALK, seed=1), 6.5)
+    _, rows = recorded(tmp_path / "truth", Exoskeleton(Scenario.WALK, seed=1), 5.5)
     assert rows[10]["label"] == "stand"
     assert rows[10]["left_phase"] is None
     even = rows[250:]
@@ -98,10 +98,10 @@ def lived(truth: Path | None) -> list[float]:
     """Where the first seconds of a day have brought the joints."""
     robot = Exoskeleton(Scenario.DAY, seed=7, person=2)
     if truth is not None:
-        recorded(truth, robot, 2.0)
+        recorded(truth, robot, 1.2)
     else:
         robot.power_on()
-        robot.clock.run_until(2_000_000_000)
+        robot.clock.run_until(1_200_000_000)
     return [drive.joint.position for drive in robot.drives.values()]
 
 

@@ -83,9 +83,10 @@ def fades(since_s: float, row: dict[str, float]) -> None:
     row["left_hip.torque"] /= max(1.0 - 0.12 * since_s, 0.1)
 
 
-def tires(since_s: float, row: dict[str, float]) -> None:
-    for joint in ("hip", "knee", "ankle"):
-        row[f"left_{joint}.position"] *= 1.0 - 0.1 * since_s
+def all_go_elsewhere(since_s: float, row: dict[str, float]) -> None:
+    for name in row:
+        if name.endswith(".position"):
+            row[name] += 0.05 * since_s
 
 
 def told(change: Change, key: str, least: float = 2.0) -> None:
@@ -121,12 +122,14 @@ def test_torque_that_fades_is_told() -> None:
     told(fades, "left_hip.torque")
 
 
-def test_a_leg_that_tires_is_told() -> None:
-    told(tires, "left leg")
+def test_a_set_point_is_told_where_it_goes_its_own_way_and_not_where_all_do() -> None:
+    _, alone = seen(Memory, "left_knee.target", runs_away, 1.0)
+    _, together = seen(Memory, "left_knee.target", all_go_elsewhere, 3.0)
+    assert np.nanmax(together, initial=0.0) < 0.2 * np.nanmax(alone)
 
 
 def test_of_a_new_activity_nobody_can_say() -> None:
-    for key in ("left_knee.target", "lean", "right load", "left leg"):
+    for key in ("left_knee.target", "lean", "right load"):
         usual, after = seen(Memory, key, new_activity, 2.0)
         assert math.isfinite(usual)
         assert np.isnan(after).all()

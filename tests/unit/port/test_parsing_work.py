@@ -19,7 +19,7 @@ from drivers.insole.formats.insole_frame import InsoleFrameParser
 from drivers.parsing import GRANT, SAVED, Counters, FrameScanner
 from tests.unit.port.streams import Make
 
-SHORT, FACTOR = 4096, 8
+SHORT, FACTOR = 2048, 8
 CALLS_A_BYTE = 64  # of functions, each of which is short
 COUNTED_CELLS = {
     "header": "A5",

@@ -7,6 +7,8 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
+from ml.benchmarks import fall
+from ml.benchmarks.models.falling import FallSettings
 from ml.serving.predictor import Prediction
 from server_gui.cli import predict
 from server_gui.core.prediction.rehearsal import HOUR_NS, LEAD_NS, Stretch, rehearse
@@ -73,8 +75,9 @@ def told(argv: list[str], capsys: pytest.CaptureFixture[str]) -> list[dict[str, 
 
 
 def test_rules_are_tried_on_falls_of_people_whom_no_model_has_seen(
-    config: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    config: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(fall, "SETTINGS", FallSettings(rounds=8, still_share=0.5, moving_share=0.5))
     file = recordings.saved(tmp_path / "falls.npz", recordings.falls(each=2))
     argv = ["--benchmark", "sisfall-prefall", "--data", str(file), "--config", str(config)]
     (found,) = told(argv, capsys)

@@ -9,10 +9,11 @@ import pytest
 
 from ml.store import NoSuchTable, Store, StoreError, StoreUnreachable
 from ml.store.objects import Objects
-from ml.store.store import CHECKPOINT_EVERY, Batches
+from ml.store.store import Batches
 from ml.store.tables import EVENTS, TELEMETRY, field
 
 HERE = TELEMETRY.location("exo-01", 1)
+EVERY = 5  # commits, of which a checkpoint is made here
 
 
 def telemetry(rows: int, begin: int = 0, **channels: str | None) -> tuple[pa.Schema, Batches]:
@@ -148,14 +149,17 @@ def test_a_table_that_nobody_wrote_is_named(store_url: str) -> None:
         store.table(HERE, version=99)
 
 
-def test_after_many_commits_there_is_a_checkpoint_and_every_row(store_url: str) -> None:
+def test_after_many_commits_there_is_a_checkpoint_and_every_row(
+    store_url: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("ml.store.store.CHECKPOINT_EVERY", EVERY)
     store = Store(store_url)
     data = EVENTS.rows([{"robot": "exo-01", "utc": 1_000_000, "kind": "marker", "number": 0}])
-    for sequence in range(1, CHECKPOINT_EVERY + 3):
+    for sequence in range(1, EVERY + 3):
         store.append(EVENTS, "events", data.schema, data.to_reader, "spool-a", sequence)
     assert any(name.endswith(".checkpoint.parquet") for name in store.objects.names("events/_delta_log"))
-    assert Store(store_url).dataset("events").count_rows() == CHECKPOINT_EVERY + 2
-    assert Store(store_url).table("events").transaction_version("spool-a") == CHECKPOINT_EVERY + 2
+    assert Store(store_url).dataset("events").count_rows() == EVERY + 2
+    assert Store(store_url).table("events").transaction_version("spool-a") == EVERY + 2
 
 
 def test_what_a_store_was_made_with_stays(new_store_url: str) -> None:

@@ -14,6 +14,8 @@ from ml.training.material import Wish
 from ml.training.training import Trained
 from tests.unit.training.walkers import day, put
 
+pytestmark = pytest.mark.usefixtures("small_models")
+
 
 @pytest.fixture
 def config(folder_url: str, tmp_path: Path) -> str:

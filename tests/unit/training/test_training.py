@@ -15,6 +15,7 @@ from ml.training.material import Wish
 from ml.training.training import Trained, train
 from tests.unit.training.walkers import CHANNELS, MOTIONS, Made, day, late_walk, put
 
+pytestmark = pytest.mark.usefixtures("small_models")
 ACTIVITY = Wish("activity")
 HELD_OUT = "s3"  # by the hash of its name
 

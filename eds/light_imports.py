@@ -1,6 +1,7 @@
 """Keeps out of memory what libraries import by the way and a robot has no use for."""
 
 import contextlib
+import importlib
 import sys
 from collections.abc import Iterator
 from types import ModuleType
@@ -37,6 +38,12 @@ def standing_in(name: str) -> Iterator[None]:
         yield
     finally:
         del sys.modules[name]
+
+
+def import_canopen() -> None:
+    """It reads EDS files. Without python-can, for a process that opens no bus by that: 10 MB, and 0.2 s."""
+    with standing_in("can"):
+        importlib.import_module("canopen")
 
 
 class _StandIn(ModuleType):
