@@ -27,7 +27,7 @@ PAUSE_S: Final = 1.0  # of the watch's clock between two recordings: what is com
 OWN: Final = [CHANNELS.index(name) for name in TRUNK]
 NOTE: Final = (
     "recorded people, judged by the calibration that ships, which has learned from simulated wearers alone;"
-    " nothing was tuned on these. Of fourteen detectors two can speak, those that need only the trunk's IMU:"
+    " nothing was tuned on these. Of thirteen detectors two can speak, those that need only the trunk's IMU:"
     " balance and agreement. Spreads are each person's own, learned in the first minute, which is not judged."
     " …_low and …_high: 95 % intervals."
 )
