@@ -27,7 +27,8 @@ PERIOD_S: Final = 0.04
 BINS: Final = 10  # of the reliability diagram
 WHY: Final = (
     "synthetic: wearers of gwrms sim-record --scenario dangers, judged by weights and thresholds of others"
-    " (sim-danger) or by those that ship (sim-danger-shipped, learned from wearers 301 to 318 of seed 23)."
+    " (sim-danger) or by those that ship (sim-danger-shipped,"
+    " learned from 301-318 of seed 23 and 401-410 of 24)."
     " Foreseen: advice at least 0.3 s before harm in the simulator's truth. …_low and …_high: 95 % intervals;"
     " stops_per_100_h_upper is the one-sided 95 % bound (3 / hours where none was seen)."
 )
