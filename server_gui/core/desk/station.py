@@ -8,7 +8,7 @@ from typing import Final
 
 from msgspec.structs import replace
 
-from gateway.client import ConnectionState
+from gateway.client import CallTimeout, ConnectionState, LinkLost
 from gateway.units import Units
 from gateway.wire.control import Lease
 from gateway.wire.cost import GatewayCost
@@ -162,7 +162,6 @@ class Station:
         """What is wrong with it, as of now: a dozen views ask in each frame."""
         if (moment := this_moment()) is not None and moment is self._judged:
             return self._alarms
-        self._judged = moment
         stalls, now_s, danger = self._stalls.latest, self.robot.now_s(), self.predictions.danger
         facts = Facts(self.robot, self.stopping, self.address, self.audit.entries, stalls, danger)
         if self.stopping.was_ended and any_enabled(self.robot) and self.is_live:
@@ -170,6 +169,7 @@ class Station:
         self._alarms.look(
             found(facts), now_s, self.rings.newest_ns, lambda active: gathered(active, stalls, now_s)
         )
+        self._judged = moment  # by all of it: what raises half-way is looked for again
         return self._alarms
 
     @property
@@ -367,7 +367,9 @@ class Station:
 
         def refused(error: Exception) -> None:
             self.tell(NewsKind.WARNING, f"reset: {error}")
-            failed(f"Nothing was cleared: {error}")
+            unknown = isinstance(error, LinkLost | CallTimeout)
+            what = "Nobody knows whether anything was cleared" if unknown else "Nothing was cleared"
+            failed(f"{what}: {error}")
 
         when_done(self._commands.reset(), self._deliver, done, refused)
 
