@@ -17,8 +17,8 @@ from gateway.wire.robot import GuardInfo, GuardRuleInfo
 from gateway.wire.stop import Reset, Stopped
 from server_gui.core.alarms.marks import STATES
 from server_gui.core.alarms.texts import TEXTS, Kind
-from server_gui.core.desk.desk import Desk
 from server_gui.core.desk import station as station_module
+from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.events import BusesSeen, Described, Event, Journalled, LinkChanged, Looked
 from server_gui.core.follow.moment import one_moment
@@ -285,6 +285,16 @@ def test_of_a_clearing_whose_answer_was_lost_nobody_knows(bench: Bench) -> None:
     bench.station.reset(told.append)
     bench.first.fail(LinkLost("the link broke"))
     assert told == ["Nobody knows whether anything was cleared: the link broke"]
+
+
+def test_an_answer_to_a_reset_takes_no_stop_away_that_was_sent_meanwhile(bench: Bench) -> None:
+    bench.station.reset()
+    reset = bench.first.futures[-1]
+    bench.station.stop("test")
+    bench.first.answer(ALL)
+    reset.set_result(Reset(dict.fromkeys(JOINTS, "switch on disabled"), {}, held=False))
+    assert bench.station.stopping.held
+    assert kinds(bench.station) == [Kind.STOPPED]
 
 
 def test_a_look_for_alarms_that_ends_half_way_is_no_look(

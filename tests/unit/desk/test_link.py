@@ -105,8 +105,10 @@ def test_what_is_no_longer_ours_is_given_back_again(link: Link, client: FakeClie
     assert client.asked[-3:] == ["acquire", "reset", "release"]
 
 
-def test_control_that_went_with_the_link_in_mid_write_is_no_longer_ours(link: Link, client: FakeClient) -> None:
-    async def lost(_ttl_s: float) -> Lease:
+def test_control_that_went_with_the_link_in_mid_write_is_no_longer_ours(
+    link: Link, client: FakeClient
+) -> None:
+    async def lost(ttl_s: float) -> Lease:
         link._state_changed(ConnectionState.WAITING)
         raise NotConnected("gone")
 
