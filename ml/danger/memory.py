@@ -102,16 +102,18 @@ class Memory:
         search = whole - np.concatenate([joint, np.zeros((1, self._count))])
         near = np.argpartition(search, ALIKE, axis=1)[:, :ALIKE]
         distance = np.sqrt(np.maximum(np.take_along_axis(search, near, axis=1).mean(axis=1), 0.0))[_OWN]
-        was = self._values[near[_OWN], np.arange(15)[:, None]].mean(axis=1)
+        was = _mean(self._values[near[_OWN], np.arange(15)[:, None]])
         off = (values - was) / (1.0 + (distance / DOUBTED) ** 2)
-        off[:6] *= _alone(distance[:6])
+        off[:6] *= _alone(distance[:6], self._there[:6] | self._there[6:])
         known = np.isfinite(off) & (distance < FARTHEST)
         self._off += SMOOTH * np.where(known, off - self._off, 0.0)
         found = np.abs(self._off)
         # What one foot bears less and the other more is a weight that was shifted.
         found[12:14] = np.minimum(found[12:14], abs(self._off[12:14].sum()))
         self.alike = bool(distance[6] < FARTHEST)
-        return np.where(known, found, np.nan), float(search[6, near[6]].min())
+        # One that lacks what is known now does not stand for it: else what was missing once stays unknown.
+        lacks = (np.isnan(self._values[near[6]]) & np.isfinite(values)).any(axis=1)
+        return np.where(known, found, np.nan), float(np.where(lacks, np.inf, search[6, near[6]]).min())
 
     def _keep(self, state: Floats, values: Floats) -> None:
         at = self._count if self._count < KEPT else int(self._source.integers(KEPT))
@@ -119,13 +121,25 @@ class Memory:
         self._count = min(self._count + 1, KEPT)
 
 
-def _alone(distance: Floats) -> Floats:
+def _mean(values: Floats) -> Floats:
+    """Of each row, of what is known there; NaN where nothing is."""
+    known = np.isfinite(values)
+    count = known.sum(axis=1)
+    total: Floats = np.where(known, values, 0.0).sum(axis=1)
+    return np.where(count, total / np.maximum(count, 1), np.nan)
+
+
+def _alone(distance: Floats, there: Bools) -> Floats:
     """How far each of six searches found moments more alike than the others, 0 to 1: its joint spoils theirs.
 
-    In a new activity all joints are new; one that is led astray is what the other five cannot find.
+    In a new activity all joints are new; one that is led astray is what the others cannot find. Only joints
+    that are there are asked; a single one has no others, and nobody can say: NaN.
     """
-    ranked = np.sort(distance)
-    others = np.where(distance <= ranked[2], ranked[3], ranked[2])  # the median of the other five
+    ranked = np.sort(distance[there])
+    if len(ranked) < 2:
+        return np.full(6, np.nan)
+    middle = (len(ranked) - 2) // 2
+    others = np.where(distance <= ranked[middle], ranked[middle + 1], ranked[middle])  # their median
     share: Floats = np.maximum(1.0 - distance / np.maximum(others, 1e-9), 0.0)
     return share
 

@@ -28,6 +28,7 @@ from ml.danger.usual import Usual
 Floats = npt.NDArray[np.float64]
 
 PERIOD_S: Final = 0.035  # rows that come sooner after another are passed over: 25 a second are enough
+JUMP_S: Final = 1.0  # back: from there on the clock is another one, and what was learned is of the old
 HELD_S: Final = 0.1  # a value that is older is missing
 LEARNS_BELOW: Final = 15.0  # spreads above what is usual: models follow what is less
 TOLD: Final = 3  # reasons
@@ -116,14 +117,22 @@ class Watch:
     def __init__(self, calibration: Calibration) -> None:
         self.verdict: Verdict | None = None
         self._calibration = calibration
+        self._begin()
+
+    def _begin(self) -> None:
         self._evidence = Evidence()
-        self._levels = Levels(calibration.by_level)
+        self._levels = Levels(self._calibration.by_level)
         self._held = np.full(len(CHANNELS), np.nan)
         self._held_ns = np.zeros(len(CHANNELS), dtype=np.int64)
         self._taken_ns = -(2**62)
 
     def take(self, stamp_ns: int, values: Sequence[float | None]) -> Verdict | None:
-        """Take a row in the order of `CHANNELS`; the verdict, where one was due."""
+        """Take a row in the order of `CHANNELS`; the verdict, where one was due.
+
+        Where the clock has jumped back, all begins anew: else nothing was said until it is as late again.
+        """
+        if self._taken_ns - stamp_ns > JUMP_S * 1e9:
+            self._begin()
         row = np.array(values, dtype=np.float64)  # None becomes NaN
         there = np.isfinite(row)
         row[~there] = np.nan

@@ -5,12 +5,17 @@ import time
 from types import SimpleNamespace
 
 import pytest
+from PySide6.QtWidgets import QWidget
 
+from gateway.client import ConnectionState
 from server_gui.core.follow import moment, robot
+from server_gui.core.follow.events import LinkChanged
 from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.widgets.mark import MarkIcon
 from tests.gui.fakes import Bench
 from tests.support.desk import described, looked, walking
+
+BUS = 3
 
 
 def test_all_of_a_frame_is_judged_by_one_moment(
@@ -42,6 +47,25 @@ def test_what_is_read_is_shown_anew_in_the_same_frames(bench: Bench, window: Mai
         header = window.header._chips["drives"].main_text
         shown.add(header)
         assert window.tabs.overview.now.drives.main.text() == header
+
+
+def test_header_and_alarms_go_on_where_a_page_cannot_be_made(
+    bench: Bench, window: MainWindow, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fails() -> QWidget:
+        raise ValueError("a mistake of ours")
+
+    bench.station.take([described(), walking(600), looked()])
+    bench.draw(window)
+    monkeypatch.setattr(window.tabs._buses, "_make", fails)
+    monkeypatch.setattr(window.tabs._buses, "setVisible", lambda _visible: None)  # which Qt only prints
+    monkeypatch.setattr(window.tabs._buses, "showEvent", lambda _event: None)
+    window.tabs.setCurrentIndex(BUS)
+    bench.station.take([LinkChanged(ConnectionState.WAITING, "no answer", time.monotonic_ns())])
+    with pytest.raises(ValueError, match="a mistake of ours"):
+        window.refresh()
+    assert any("no answer" in text for text in window.alarms.texts)
+    assert "no link" in window.robots.cards[0].texts[1]
 
 
 def test_within_one_moment_the_clock_stands(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 
+from gateway.client import CallTimeout, LinkLost
 from gateway.wire.stop import Reset
 from server_gui.core.alarms.texts import Kind, check_of
 
@@ -19,6 +20,12 @@ def after_reset(reset: Reset) -> tuple[str, str]:
         ), in_fault
     done = "; ".join(filter(None, ["stop reset, every drive is off", _told(others)]))
     return f"{done}; {check_of(Kind.RESET)}", ""
+
+
+def without_answer(error: Exception) -> str:
+    """What is known of a clearing of faults that the robot has not answered, or has refused."""
+    is_unknown = isinstance(error, LinkLost | CallTimeout)
+    return f"{'Nobody knows whether anything' if is_unknown else 'Nothing'} was cleared: {error}"
 
 
 def _told(problems: Mapping[str, str]) -> str:

@@ -26,7 +26,7 @@ from server_gui.core.alarms.marks import Mark
 from server_gui.core.alarms.worst import worst
 from server_gui.core.audit.journal import Audit
 from server_gui.core.desk.flags import Flag, FlagKind, Flags, StateWatch, of_journal
-from server_gui.core.desk.resetting import after_reset
+from server_gui.core.desk.resetting import after_reset, without_answer
 from server_gui.core.desk.rings import Rings
 from server_gui.core.evidence.file import Told
 from server_gui.core.experiments.plan import Plan
@@ -162,7 +162,6 @@ class Station:
         """What is wrong with it, as of now: a dozen views ask in each frame."""
         if (moment := this_moment()) is not None and moment is self._judged:
             return self._alarms
-        self._judged = moment
         stalls, now_s, danger = self._stalls.latest, self.robot.now_s(), self.predictions.danger
         facts = Facts(self.robot, self.stopping, self.address, self.audit.entries, stalls, danger)
         if self.stopping.was_ended and any_enabled(self.robot) and self.is_live:
@@ -170,6 +169,7 @@ class Station:
         self._alarms.look(
             found(facts), now_s, self.rings.newest_ns, lambda active: gathered(active, stalls, now_s)
         )
+        self._judged = moment  # by all of it: what raises half-way is looked for again
         return self._alarms
 
     @property
@@ -240,9 +240,8 @@ class Station:
         batch = event.batch
         if self.robot.is_recording:
             return
-        ago_s = (time.monotonic_ns() - batch.received_ns) / 1e9
-        stamps_ns, received_s = batch.stamps_ns, self.robot.now_s() - ago_s
-        stall = self._stalls.take(event.stream, stamps_ns, batch.received_ns, received_s)
+        received_s = self.robot.now_s() - (time.monotonic_ns() - batch.received_ns) / 1e9
+        stall = self._stalls.take(event.stream, batch.stamps_ns, batch.received_ns, received_s)
         if stall is not None and stall.lasted_s >= STOOD_S:
             self.tell(NewsKind.WARNING, f"the robot's computer stood still for {stall.lasted_s:.1f} s")
 
@@ -356,8 +355,12 @@ class Station:
 
     def reset(self, failed: Callable[[str], None] = lambda _: None) -> None:
         """End a held stop, clear faults; enables nothing. `failed` is told what is still in fault."""
+        number = self.stopping.number
 
         def done(reset: Reset) -> None:
+            if number != self.stopping.number:  # the journal tells which of them was last
+                self.tell(NewsKind.STOP, "reset: a STOP was sent meanwhile, which counts")
+                return
             self.stopping.was_reset(reset.held)
             said, stays = after_reset(reset)
             self.tell(NewsKind.STOP, said)
@@ -367,7 +370,7 @@ class Station:
 
         def refused(error: Exception) -> None:
             self.tell(NewsKind.WARNING, f"reset: {error}")
-            failed(f"Nothing was cleared: {error}")
+            failed(without_answer(error))
 
         when_done(self._commands.reset(), self._deliver, done, refused)
 

@@ -49,6 +49,7 @@ class Link:
         self._arriving = Validator()
         self._processes_wanted = asyncio.Event()
         self._ours_until_ns = 0  # how long control was taken for more than a command (monotonic)
+        self._resets = 0  # that go on: the last gives control back
 
     async def run(self) -> None:
         """Hold the link, and ask for processes while they are wanted."""
@@ -102,11 +103,13 @@ class Link:
     # --- in the network's thread
 
     async def _take(self) -> Lease:
-        before, self._ours_until_ns = self._ours_until_ns, time.monotonic_ns() + round(LEASE_S * 1e9)
+        asked_ns = time.monotonic_ns() + round(LEASE_S * 1e9)
+        before, self._ours_until_ns = self._ours_until_ns, asked_ns
         try:
             return await self._client.acquire(LEASE_S)
         except BaseException:
-            self._ours_until_ns = before
+            if self._ours_until_ns == asked_ns:  # else it has gone with the link, or was asked for again
+                self._ours_until_ns = before
             raise
 
     async def _release(self) -> None:
@@ -130,11 +133,13 @@ class Link:
     async def _reset(self) -> Reset:
         """Control that was taken for it alone is given back, so that nobody else waits for a window."""
         left_s = (self._ours_until_ns - time.monotonic_ns()) / 1e9
-        await self._client.acquire(max(RESET_LEASE_S, left_s))
+        self._resets += 1
         try:
+            await self._client.acquire(max(RESET_LEASE_S, left_s))
             return await self._client.reset()
         finally:
-            if self._ours_until_ns <= time.monotonic_ns():
+            self._resets -= 1
+            if not self._resets and self._ours_until_ns <= time.monotonic_ns():
                 with contextlib.suppress(ClientError):  # it has gone with its time, or the link
                     await self._client.release()
 

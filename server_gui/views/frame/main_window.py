@@ -171,10 +171,15 @@ class MainWindow(QMainWindow):
         if due:
             self.tabs.read_now()  # what header, alarms and page say is of the same moment
         shown = self._desk.selected is not None or not self.tabs.is_of_a_robot
-        if shown:
-            self.tabs.view.refresh()
-        if not due:
-            return
+        try:
+            if shown:
+                self.tabs.view.refresh()
+        finally:  # whatever becomes of a page: STOP, alarms and what is known of the robot go on
+            if due:
+                self._draw_around(shown=shown)
+
+    def _draw_around(self, *, shown: bool) -> None:
+        """All but the page."""
         self._pages.setCurrentIndex(1 if shown else 0)
         self.page_bar.setVisible(shown)
         self.header.refresh()
@@ -182,13 +187,13 @@ class MainWindow(QMainWindow):
         self._hold_header()
         self.robots.refresh()
         self.parameters.refresh()
+        self.events.refresh()
+        self._bar.refresh()
         now = self.tabs.overview.now
         elsewhere = (self.parameters.trial, now.trial)
         now.offer(not is_seen(self.parameters.trial))
         self.experiment.refresh()
         self.trial.refresh(shown=not any(is_seen(one) for one in elsewhere))
-        self.events.refresh()
-        self._bar.refresh()
 
     def _is_due(self) -> bool:
         """Whether what is read now and then is: at once where another robot is named, or a STOP goes on."""

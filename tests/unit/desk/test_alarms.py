@@ -8,7 +8,7 @@ import pytest
 from msgspec.structs import replace
 
 from drivers.error_codes import error_check
-from gateway.client import ConnectionState, NotConnected
+from gateway.client import ConnectionState, LinkLost, NotConnected
 from gateway.main import COMMANDS
 from gateway.wire.bus import BusInfo
 from gateway.wire.component import QualityInfo, Snapshot
@@ -17,9 +17,11 @@ from gateway.wire.robot import GuardInfo, GuardRuleInfo
 from gateway.wire.stop import Reset, Stopped
 from server_gui.core.alarms.marks import STATES
 from server_gui.core.alarms.texts import TEXTS, Kind
+from server_gui.core.desk import station as station_module
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.events import BusesSeen, Described, Event, Journalled, LinkChanged, Looked
+from server_gui.core.follow.moment import one_moment
 from server_gui.core.follow.news import News, NewsKind
 from tests.support.desk import JOINTS, Bench, described, looked, telemetry, walking
 
@@ -276,6 +278,40 @@ def test_a_clearing_that_was_refused_is_told_too(bench: Bench) -> None:
     bench.station.reset(told.append)
     bench.first.fail(NotConnected("bob has the lease"))
     assert told == ["Nothing was cleared: bob has the lease"]
+
+
+def test_of_a_clearing_whose_answer_was_lost_nobody_knows(bench: Bench) -> None:
+    told: list[str] = []
+    bench.station.reset(told.append)
+    bench.first.fail(LinkLost("the link broke"))
+    assert told == ["Nobody knows whether anything was cleared: the link broke"]
+
+
+def test_an_answer_to_a_reset_takes_no_stop_away_that_was_sent_meanwhile(bench: Bench) -> None:
+    bench.station.reset()
+    reset = bench.first.futures[-1]
+    bench.station.stop("test")
+    bench.first.answer(ALL)
+    reset.set_result(Reset(dict.fromkeys(JOINTS, "switch on disabled"), {}, held=False))
+    assert bench.station.stopping.held
+    assert kinds(bench.station) == [Kind.STOPPED]
+
+
+def test_a_look_for_alarms_that_ends_half_way_is_no_look(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fails(*_: object) -> None:
+        raise ValueError("a mistake of ours")
+
+    fault(bench.station)
+    with one_moment():
+        bench.station.take([])
+        with monkeypatch.context() as patched:
+            patched.setattr(station_module, "found", fails)
+            for _ in range(2):  # the second place that asks gets no old ones either
+                with pytest.raises(ValueError, match="a mistake"):
+                    _ = bench.station.alarms
+        assert kinds(bench.station) == [Kind.FAULT]
 
 
 def test_a_stop_of_somebody_else_is_read_in_the_journal_and_so_is_its_end(bench: Bench) -> None:

@@ -5,7 +5,7 @@ from typing import Any, cast
 
 import pytest
 
-from gateway.client import Address, ClientError, NotConnected
+from gateway.client import Address, ClientError, ConnectionState, NotConnected
 from gateway.wire.control import Lease
 from gateway.wire.stop import Reset
 from server_gui.core.follow.network import Network
@@ -103,3 +103,43 @@ def test_what_is_no_longer_ours_is_given_back_again(link: Link, client: FakeClie
     asyncio.run(before())
     asyncio.run(link._reset())
     assert client.asked[-3:] == ["acquire", "reset", "release"]
+
+
+def test_control_that_went_with_the_link_in_mid_write_is_no_longer_ours(
+    link: Link, client: FakeClient
+) -> None:
+    async def lost(ttl_s: float) -> Lease:
+        link._state_changed(ConnectionState.WAITING)
+        raise NotConnected("gone")
+
+    async def before() -> None:
+        await link._take()
+        taken, client.acquire = client.acquire, lost  # type: ignore[method-assign]
+        with pytest.raises(NotConnected):
+            await link._write({"gait.step_length": 0.4}, 30.0)
+        client.acquire = taken  # type: ignore[method-assign]
+
+    asyncio.run(before())
+    asyncio.run(link._reset())
+    assert client.asked[-3:] == ["acquire", "reset", "release"]
+
+
+def test_of_two_resets_the_last_gives_control_back(link: Link, client: FakeClient) -> None:
+    async def both() -> None:
+        reset, first = client.reset, asyncio.Event()
+
+        async def one_after_the_other() -> Reset:
+            if "reset" not in client.asked:
+                answer = await reset()
+                await first.wait()
+                return answer
+            first.set()
+            for _ in range(5):
+                await asyncio.sleep(0)
+            return await reset()
+
+        client.reset = one_after_the_other  # type: ignore[method-assign]
+        await asyncio.gather(link._reset(), link._reset())
+
+    asyncio.run(both())
+    assert client.asked == ["acquire", "reset", "acquire", "reset", "release"]

@@ -140,3 +140,13 @@ def test_the_shipped_calibration_names_its_detectors_levels_and_source() -> None
     assert set(CALIBRATION.thresholds) == {level.word for level in URGENT}
     assert all(math.isfinite(one) for one in CALIBRATION.thresholds.values())
     assert "simulated" in CALIBRATION.learned_from
+
+
+def test_a_clock_that_jumps_back_silences_nobody_for_long() -> None:
+    watch = Watch(CALIBRATION)
+    rows(watch, 50, start=100_000, left_knee_temperature=30.0)
+    rows(watch, 50, left_knee_temperature=30.0)
+    assert watch.verdict is not None
+    assert watch.verdict.stamp_ns == 49 * PERIOD_NS
+    rows(watch, 50, start=48, left_knee_temperature=30.0)  # a row that comes late is none
+    assert watch.verdict.stamp_ns >= 49 * PERIOD_NS

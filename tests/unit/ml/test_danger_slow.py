@@ -7,9 +7,10 @@ from functools import cache
 
 import numpy as np
 import numpy.typing as npt
+import pytest
 
 from ml.danger.creep import Creep
-from ml.danger.memory import LOOKS, Memory
+from ml.danger.memory import LOOKS, Memory, _alone
 from ml.danger.now import CHANNELS, Now
 
 Floats = npt.NDArray[np.float64]
@@ -141,6 +142,40 @@ def test_a_robot_that_loses_a_joint_is_compared_with_nothing() -> None:
 
     _, after = seen(Memory, "lean", lost, 1.0)
     assert np.isnan(after).all()
+
+
+def walked(change: Change, seconds: float) -> Floats:
+    """All numbers of a walk in which a row may lack something, from the first moment on (n, keys)."""
+    memory, now, found = Memory(), Now(), []
+    for at_s in np.arange(0.0, seconds, STEP_S).tolist():
+        row = walking(at_s)
+        change(at_s, row)
+        found.append(memory.measure(moment(at_s, row, now), learn=True))
+    return np.array(found)
+
+
+def test_of_a_single_joint_nobody_can_say_where_it_should_be_led() -> None:
+    def alone(_at_s: float, row: dict[str, float]) -> None:
+        for name in [name for name in row if "insole" not in name and not name.startswith("left_hip")]:
+            del row[name]
+
+    found = walked(alone, LEARNED_S)[-100:]
+    assert np.isnan(found[:, 0]).all()
+    assert np.isfinite(found[:, Memory.keys.index("left_hip.torque")]).any()
+
+
+def test_what_a_joint_is_looked_up_by_is_there() -> None:
+    distance, there = np.array([1.0, 2.0, 9.0, 3.0, 4.0, 9.0]), np.array([1, 1, 0, 1, 1, 0], dtype=bool)
+    assert _alone(distance, there)[[0, 1, 3, 4]] == pytest.approx([1 - 1 / 3, 1 - 2 / 3, 0.0, 0.0])
+
+
+def test_what_was_missing_at_first_is_compared_once_it_is_there() -> None:
+    def late(at_s: float, row: dict[str, float]) -> None:
+        if at_s < 40.0:
+            row["left_hip.torque"] = row["left_insole.force"] = math.nan
+
+    found = walked(late, 90.0)[-100:]
+    assert np.isfinite(found[:, [Memory.keys.index("left_hip.torque"), Memory.keys.index("left load")]]).all()
 
 
 def test_what_is_wrong_is_not_remembered() -> None:
