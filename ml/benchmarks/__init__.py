@@ -3,6 +3,7 @@
 catalogue.py                their names, questions and goals
 status.py, phase.py, adapt.py, fall.py, terrain.py    one each
 ipol.py, sisfall.py, arrays.py    how recordings are read and checked
+ipol_danger.py, sisfall_danger.py    the danger number on recorded people; danger_trunk.py: how it sees them
 sim_activity.py, sim_phase.py, sim_falling.py    those on simulated people, one each
 sim_walks.py                the shipped models on simulated people who walk differently
 sim.py                      what these share: folds, missing sensors, noise

@@ -27,7 +27,8 @@ PERIOD_S: Final = 0.04
 BINS: Final = 10  # of the reliability diagram
 WHY: Final = (
     "synthetic: wearers of gwrms sim-record --scenario dangers, judged by weights and thresholds of others"
-    " (sim-danger) or by those that ship (sim-danger-shipped, learned from wearers 301 to 318 of seed 23)."
+    " (sim-danger) or by those that ship (sim-danger-shipped,"
+    " learned from 301-318 of seed 23 and 401-410 of 24)."
     " Foreseen: advice at least 0.3 s before harm in the simulator's truth. …_low and …_high: 95 % intervals;"
     " stops_per_100_h_upper is the one-sided 95 % bound (3 / hours where none was seen)."
 )
@@ -212,7 +213,7 @@ def outcome(judged: Sequence[Judged]) -> Outcome:
     """Every figure."""
     found = [event for one in judged for event in events(one, Level.ADVICE)]
     seen = [event for event in found if event.name not in SUDDEN]
-    figures = _shares("foreseen", [event.foreseen for event in seen])
+    figures = shares("foreseen", [event.foreseen for event in seen])
     leads = [event.lead_s for event in seen if event.lead_s is not None]
     figures |= {
         "events": float(len(seen)),
@@ -222,7 +223,7 @@ def outcome(judged: Sequence[Judged]) -> Outcome:
     }
     figures |= _rates(judged) | _reliability(judged)
     names = sorted({event.name for event in found})
-    groups = {name: _of_danger([event for event in found if event.name == name]) for name in names}
+    groups = {name: of_danger([event for event in found if event.name == name]) for name in names}
     people = len({one.seen.subject for one in judged})
     return Outcome(
         figures,
@@ -234,7 +235,8 @@ def outcome(judged: Sequence[Judged]) -> Outcome:
     )
 
 
-def _of_danger(found: Sequence[Event]) -> dict[str, float]:
+def of_danger(found: Sequence[Event]) -> dict[str, float]:
+    """The share of these events that was foreseen, with its interval."""
     leads = [event.lead_s for event in found if event.lead_s is not None]
     low, high = share_interval(sum(event.foreseen for event in found), len(found))
     return {
@@ -250,9 +252,7 @@ def _rates(judged: Sequence[Judged]) -> dict[str, float]:
     hours = _hours([one.seen for one in judged])
     found = {"healthy_hours": hours}
     for level, name in ((Level.EARLY, "early"), (Level.ADVICE, "advice"), (Level.ALARM, "alarm")):
-        count = sum(false_alarms(one, level, walking(one.seen)) for one in judged)
-        low, high = rate_interval(count, hours)
-        found |= {f"{name}_per_hour": count / hours, f"{name}_low": low, f"{name}_high": high}
+        found |= per_hour(judged, level, name, [walking(one.seen) for one in judged])
     stops = sum(false_alarms(one, Level.STOP, walking(one.seen)) for one in judged)
     found |= {"stops": float(stops), "stops_per_100_h_upper": 100.0 * rule_of_three(stops, hours)}
     others = [one.seen.healthy & ~walking(one.seen) for one in judged]
@@ -262,7 +262,17 @@ def _rates(judged: Sequence[Judged]) -> dict[str, float]:
     return found
 
 
-def _shares(name: str, flags: Sequence[bool]) -> dict[str, float]:
+def per_hour(judged: Sequence[Judged], level: Level, name: str, rows: Sequence[Flags]) -> dict[str, float]:
+    """How often a level was reached anew in an hour of these moments, with its interval."""
+    hours = sum(float(own.sum()) for own in rows) * PERIOD_S / 3600.0
+    count = sum(false_alarms(one, level, own) for one, own in zip(judged, rows, strict=True))
+    low, high = rate_interval(count, hours) if hours else (float("nan"), float("nan"))
+    each = count / hours if hours else float("nan")
+    return {f"{name}_per_hour": each, f"{name}_low": low, f"{name}_high": high}
+
+
+def shares(name: str, flags: Sequence[bool]) -> dict[str, float]:
+    """A share with its interval."""
     low, high = share_interval(sum(flags), len(flags)) if flags else (float("nan"), float("nan"))
     return {name: _mean(flags), f"{name}_low": low, f"{name}_high": high}
 

@@ -126,7 +126,8 @@ def _alone(distance: Floats) -> Floats:
     """
     ranked = np.sort(distance)
     others = np.where(distance <= ranked[2], ranked[3], ranked[2])  # the median of the other five
-    return np.maximum(1.0 - distance / np.maximum(others, 1e-9), 0.0)
+    share: Floats = np.maximum(1.0 - distance / np.maximum(others, 1e-9), 0.0)
+    return share
 
 
 class Kind:

@@ -12,7 +12,7 @@ from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.upload import send
 from tests.unit.recording.robots import CHANNELS, batch, description
 
-PARAMETERS = {"gain": 2.0, "step": 1.0000020756226495}
+PARAMETERS: dict[str, float | int | None] = {"gain": 2.0, "step": 1.0000020756226495}
 BATCHES, ROWS = 20, 5
 UNITS = {"left_knee.position": "rad", "left_knee.velocity": "rad/s", "trunk.tilt_forward": "rad"}
 
