@@ -64,7 +64,7 @@ def details(one: Active, now_s: float, *, each: bool = False) -> list[str]:
 def fewer(said: list[str]) -> tuple[str, ...]:
     """These details as one text, and less and less of them: what to check stays longest, then since when."""
     since, check = said[0].partition(" · ")[0], [one for one in said[1:] if one.startswith(REMEDY)]
-    shorter = said, [since, *said[1:]], said[1:], [since, *check], check, [since], []
+    shorter: tuple[list[str], ...] = said, [since, *said[1:]], said[1:], [since, *check], check, [since], []
     return tuple(dict.fromkeys(map(" · ".join, shorter)))
 
 
