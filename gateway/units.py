@@ -1,6 +1,7 @@
 """Units for people: inside everything is SI, and no digit is lost on the way out and back."""
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from decimal import ROUND_HALF_EVEN, Context, Decimal
@@ -10,6 +11,7 @@ from types import MappingProxyType
 _EXACT = Context(prec=40, rounding=ROUND_HALF_EVEN)
 _PI = Decimal("3.141592653589793238462643383279502884197")
 _GRAVITY = Decimal("9.80665")
+_SIGN = re.compile(r"(?<![\w)])-(?=[\d.])|(?<=\de)-(?=\d)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,8 +133,8 @@ def rounded(value: float, digits: int, sign: str = "") -> str:
 
 
 def with_minus(number: str) -> str:
-    """Return a number for reading: with the sign for minus, as wide as +."""
-    return number.replace("-", "−")
+    """Return numbers for reading: with the sign for minus, as wide as +; dates and words keep hyphens."""
+    return _SIGN.sub("−", number)
 
 
 def percent_body_weight(body_mass: float) -> Unit:

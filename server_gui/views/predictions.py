@@ -231,7 +231,9 @@ def _knows(shown: Told) -> bool:
 
 
 def _as_predicted(line: Line) -> Line:
-    """As it is said where other things stand beside it."""
+    """As it is said where other things stand beside it; what is old is no prediction."""
+    if line.mark.word == "old":
+        return line
     return replace(line, detail=" · ".join(filter(None, ("predicted", line.detail))))
 
 

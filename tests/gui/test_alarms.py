@@ -197,6 +197,19 @@ def test_a_headline_is_whole_when_the_text_has_grown(window: MainWindow, bench: 
         window.alarms.more.click()  # it is closed again
 
 
+def test_what_to_check_is_on_the_strip_also_where_there_is_little_room(
+    window: MainWindow, bench: Bench, theme: Theme
+) -> None:
+    window.resize(1024, 700)
+    theme.set(scale=1.5)
+    fault(bench)
+    settle(window, bench)
+    assert "0x2310" in window.alarms.headline.text()
+    assert "→ check that" in window.alarms.details.text()
+    assert is_whole(window.alarms.headline)
+    assert is_whole(window.alarms.details)
+
+
 def test_while_the_list_is_open_no_row_moves(around: Around, bench: Bench) -> None:
     fault(bench)
     (row,) = (row for row in opened(around, bench) if "left knee" in row.headline.text())

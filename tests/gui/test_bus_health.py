@@ -14,6 +14,7 @@ from server_gui.views.pace import SLOW
 from server_gui.views.resources.bus_health import NOT_NOW, TOO_OLD, BusHealthView
 from server_gui.views.theme import Theme
 from tests.gui.fakes import Bench, destroy
+from tests.support.desk import walking
 
 NODE = NodeInfo(2, ["left_knee"], 0.44, 12.0, 88, 3, 0, 0.0)
 TALKS = [TalkInfo("TPDO", 2, 900.0), TalkInfo("SYNC", None, 100.0)]
@@ -84,6 +85,14 @@ def test_the_last_line_has_the_worst_bus(window: MainWindow, bench: Bench) -> No
         "CAN main 100 %, 4 errors: it is full: 100 % of its time is taken · most: left knee 90 %"
     )
     assert window._bar._bus_icon.accessibleName() == "ALARM"
+
+
+def test_no_bus_is_good_on_the_last_line_where_nothing_new_comes(window: MainWindow, bench: Bench) -> None:
+    good = replace(BUS, load_percent=13.0, findings=(), nodes=())
+    for age_s, said in ((70.0, "bus not known"), (0.0, "CAN main 13 %")):
+        bench.station.take([walking(10, age_s), BusesSeen((good,), time.monotonic_ns())])
+        bench.draw(window)
+        assert window._bar.bus.text().startswith(said), age_s
 
 
 def test_page_and_alarms_tell_of_a_full_bus_in_the_same_frame(window: MainWindow, bench: Bench) -> None:

@@ -1,6 +1,7 @@
 """An active alarm: what is wrong, where, since when, what the robot did, and what to check."""
 
 import dataclasses
+import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -8,6 +9,7 @@ from typing import Final
 from server_gui.core.alarms.marks import Mark
 from server_gui.core.alarms.texts import TEXTS, Kind
 
+ASIDE: Final = re.compile(r" \([^()]*\)$")
 SHORT: Final = 100  # letters that have room on a card
 
 
@@ -72,6 +74,12 @@ class Alarm:
         """The line where there is little room: of several reasons the first, and that there are more."""
         first, more, _ = self.what.partition("; ")
         return self._said(f"{first} …" if more and len(self.what) > SHORT else self.what)
+
+    @property
+    def least(self) -> str:
+        """The line with the cause alone, where what to check needs the room: the list has all of it."""
+        first = ASIDE.sub("", self.what.partition("; ")[0])
+        return self._said(self.what if first == self.what else f"{first} …")
 
     def _said(self, what: str) -> str:
         return ": ".join(filter(None, (self.mark.word, self.where or self.subject.replace("_", " "), what)))

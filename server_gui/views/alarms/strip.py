@@ -3,14 +3,14 @@
 import time
 from typing import Final
 
-from PySide6.QtCore import QRect, QSize, Qt, Signal
+from PySide6.QtCore import QEvent, QRect, QSize, Qt, Signal
 from PySide6.QtGui import QFontMetrics, QResizeEvent
-from PySide6.QtWidgets import QHBoxLayout, QPushButton, QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QApplication, QHBoxLayout, QPushButton, QScrollArea, QVBoxLayout, QWidget
 
 from server_gui.core.alarms.texts import Kind
 from server_gui.core.desk.desk import Desk
 from server_gui.views.alarms.full_list import AlarmButtons, AlarmList, style
-from server_gui.views.alarms.words import Told, details, headline, key_of, now_s, quiet
+from server_gui.views.alarms.words import REMEDY, Told, details, fewer, headline, key_of, now_s, quiet
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text, set_tone
 from server_gui.views.widgets.choosable import Choosable
@@ -88,6 +88,11 @@ class AlarmStrip(Choosable):
         self.buttons.acknowledge.setEnabled(time.monotonic() - self._changed_s >= HOLD_S)
         self.more.setVisible(bool(self.told))
         set_button(self.more, "Details …" if len(self.told) == 1 else f"All {len(self.told)} …")
+        for one in (
+            self,
+            self._words.widget(),
+        ):  # else a frame is drawn with the sizes of what was said before
+            QApplication.sendPostedEvents(one, QEvent.Type.LayoutRequest)
         self.list.refresh()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -157,11 +162,9 @@ class AlarmStrip(Choosable):
             fuller: tuple[str, ...] = (rest,)
         else:
             mark = first[1].alarm.mark
-            wordings = headline(first, named=self.named), headline(first, named=self.named, is_brief=True)
+            wordings = tuple(headline(first, named=self.named, brief=brief) for brief in range(3))
             wordings = wordings[:1] if first[1].alarm.kind is Kind.NOT_STOPPED else wordings
-            said = details(first[1], now_s(first[0]))
-            since = said[0].partition(" · ")[0]
-            fuller = " · ".join(said), " · ".join((since, *said[1:])), " · ".join(said[1:]), since, ""
+            fuller = fewer(details(first[1], now_s(first[0])))
         self._icon.show_mark(mark)
         set_tone(self, mark.colour)
         self.setAccessibleDescription("; ".join(filter(None, (wordings[0], fuller[0]))))
@@ -180,12 +183,17 @@ class AlarmStrip(Choosable):
 
         line = self.details.fontMetrics().lineSpacing()  # that since when, and what to check, have room too
         sizes = {text: high(self.headline, text) for text in wordings}
+        rests = {text: high(self.details, text) for text in fuller}
+        told = [
+            (main, rest) for main in wordings for rest in fuller if sizes[main] + rests[rest] <= room.height()
+        ]
         fits = [
             text for most in (room.height() - line, room.height()) for text in wordings if sizes[text] <= most
         ]
         main = next(iter(fits), wordings[-1])
-        left = room.height() - sizes[main]
-        rest = next((text for text in fuller if high(self.details, text) <= left), "")
+        rest = next((rest for one, rest in told if one == main), "")
+        checked = (pair for pair in told if REMEDY in pair[1])  # what to check goes before what is longer
+        main, rest = next(checked, (main, rest))
         set_text(self.headline, main)
         set_text(self.details, rest)
         self.details.setVisible(bool(rest))

@@ -2,6 +2,7 @@
 
 import datetime
 import time
+from typing import Final
 
 from server_gui.core.alarms.alarm import Active
 from server_gui.core.alarms.marks import age_text
@@ -11,6 +12,7 @@ from server_gui.views.marks import Mark
 
 Told = tuple[Station | None, Active]  # without a robot: of what this window records
 Key = tuple[str, tuple[Kind, str]]
+REMEDY: Final = "→"  # what there is to check, or to do
 
 
 def key_of(told: Told) -> Key:
@@ -32,13 +34,12 @@ def quiet(station: Station | None) -> tuple[Mark, str, str]:
     return Mark("disc", "good"), "No alarms", "all ok"
 
 
-def headline(told: Told, *, named: bool, more: str = "", is_brief: bool = False) -> str:
-    """Whose it is, what is wrong, and whether that is now."""
+def headline(told: Told, *, named: bool, more: str = "", brief: int = 0) -> str:
+    """Whose it is, what is wrong, and whether that is now; `brief` is 0 for all, to 2 for its cause alone."""
     station, one = told
     alarm = one.alarm
-    line = " · ".join(
-        filter(None, (station.title if station and named else "", alarm.brief if is_brief else alarm.line))
-    )
+    said_of = (alarm.line, alarm.brief, alarm.least)[brief]
+    line = " · ".join(filter(None, (station.title if station and named else "", said_of)))
     marks = [more, "" if alarm.is_now else "last known", "acknowledged" if one.is_acknowledged else ""]
     said = ", ".join(filter(None, marks))
     return f"{line} ({said})" if said else line
@@ -57,7 +58,14 @@ def details(one: Active, now_s: float, *, each: bool = False) -> list[str]:
     lines = [f"{first} · robot: {alarm.did}" if alarm.did else first]
     if alarm.under:
         lines += [f"with it: {under.line}" for under in alarm.under] if each else [alarm.consequences]
-    return [*lines, f"→ {alarm.check}"] if alarm.check else lines
+    return [*lines, f"{REMEDY} {alarm.check}"] if alarm.check else lines
+
+
+def fewer(said: list[str]) -> tuple[str, ...]:
+    """These details as one text, and less and less of them: what to check stays longest, then since when."""
+    since, check = said[0].partition(" · ")[0], [one for one in said[1:] if one.startswith(REMEDY)]
+    shorter: tuple[list[str], ...] = said, [since, *said[1:]], said[1:], [since, *check], check, [since], []
+    return tuple(dict.fromkeys(map(" · ".join, shorter)))
 
 
 def lasting(for_s: float) -> str:

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gateway.units import UNITS, Unit, Units, percent_body_weight, unit_named
+from gateway.units import UNITS, Unit, Units, percent_body_weight, unit_named, with_minus
 
 ALL = [unit for units in UNITS.values() for unit in units] + [percent_body_weight(81.4)]
 values = st.floats(allow_nan=False, allow_infinity=False)
@@ -113,3 +113,15 @@ def test_a_number_beyond_all_floats_is_refused_in_every_unit() -> None:
 )
 def test_what_was_set_is_read_in_few_digits(si: str, value: float | None, text: str) -> None:
     assert UNITS[si][0].brief(value) == text
+
+
+@pytest.mark.parametrize(
+    ("written", "read"),
+    [
+        ("-5.7 … -.5", "−5.7 … −.5"),
+        ("1e-05", "1e−05"),
+        ("2026-11-24T01:13:48Z exo-01", "2026-11-24T01:13:48Z exo-01"),
+    ],
+)
+def test_numbers_have_a_sign_for_minus_and_dates_their_hyphens(written: str, read: str) -> None:
+    assert with_minus(written) == read
