@@ -73,8 +73,9 @@ def _statement(lines: list[str]) -> tuple[dict[str, Any], int]:
     for count in range(1, len(lines) + 1):
         try:
             return tomllib.loads("\n".join(lines[:count])), count
-        except tomllib.TOMLDecodeError:
-            continue
+        except tomllib.TOMLDecodeError as error:
+            if "end of document" not in str(error):
+                break  # more lines mend nothing: it is within a value that is too long
     return {}, 1
 
 

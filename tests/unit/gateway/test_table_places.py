@@ -1,5 +1,7 @@
 """What is said of a file says at which line: of the key, or of its table."""
 
+import tomllib
+
 import pytest
 
 from gateway.tables.finding import Finding
@@ -69,3 +71,19 @@ def test_keys_without_a_table_and_dotted_ones_are_found() -> None:
     places = Places('nmae = "x"\nrobot.name = "y"\n')
     assert places.line(Finding("the file", "nmae", "is not known")) == 1
     assert places.line(Finding("[robot]", "name", "is wrong")) == 2
+
+
+def test_a_value_of_thousands_of_lines_costs_no_more_than_to_pass_over_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    parsed: list[str] = []
+    loads = tomllib.loads
+
+    def counted(text: str) -> dict[str, object]:
+        parsed.append(text)
+        return loads(text)
+
+    monkeypatch.setattr(tomllib, "loads", counted)
+    places = Places("a = [\n" + "  1,\n" * 3000 + "]\n[can.main]\nbitrate = 1\n")
+    assert places.line(Finding("[can.main]", "bitrate", "is wrong")) == 3004
+    assert len(parsed) < 4000  # and not 400 for each line
