@@ -13,7 +13,7 @@ from ml.benchmarks.report import number, page
 from ml.store.private import private_files
 
 EPILOG = f"""benchmarks
-{chr(10).join(f"  {one.name:<16} {one.asks}" for one in BENCHMARKS.values())}
+{chr(10).join(f"  {one.name:<18} {one.asks}" for one in BENCHMARKS.values())}
 
 The recordings are .npz files of their own; gwrms docs explanation/prediction says where they come from and
 what is in them.
