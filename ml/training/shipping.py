@@ -1,6 +1,7 @@
 """The models that come with GWRMS: learned from simulated wearers, for robots that have learned nothing yet.
 
-`./dev models` makes them again: python -m ml.training.shipping RECORDING, which `gwrms sim-record` wrote.
+`./dev models` makes them again: python -m ml.training.shipping RECORDING, which `gwrms sim-record` wrote. It
+may be several, one behind the other, of wearers who walk in different ways.
 """
 
 import sys
@@ -27,12 +28,12 @@ from ml.training.judging import judge
 from ml.training.simulated import Session, examples, read, stepping
 
 SEED: Final = 0
-HELD_OUT: Final = 4  # one person in so many
+HELD_OUT: Final = 4  # one person in so many of those who walk alike
 STEPS: Final = {"activity": 10, "gait_phase": 10, "falling": 2}  # grid samples between decisions
 STEADY_SHARE: Final = 6  # one decision in so many is learned from where nothing happens: they are alike
 NOTES: Final = (
-    "Learned from simulated wearers: right for the simulated robot, and a beginning for one of its kind. "
-    "A robot's own sessions make a better one: gwrms train."
+    "Learned from simulated wearers, some of whom are slow, impaired or on crutches: right for the simulated "
+    "robot, and a beginning for one of its kind. A robot's own sessions make a better one: gwrms train."
 )
 
 
@@ -59,12 +60,19 @@ def ship(recording: Path, folder: Path = SHIPPED) -> list[Shipped]:
         return [_ship(registry, task, sessions) for task in TASKS.values()]
 
 
+def held_out(sessions: Sequence[Session]) -> set[str]:
+    """Whom no model learns from; whoever also walks in another way is left out of that, too."""
+    by_walks: dict[str, set[str]] = {}
+    for session in sessions:
+        by_walks.setdefault(session.walks, set()).add(session.subject)
+    return {one for alike in by_walks.values() for one in sorted(alike, key=int)[HELD_OUT - 1 :: HELD_OUT]}
+
+
 def _ship(registry: Registry, task: Task, sessions: Sequence[Session]) -> Shipped:
     recipe = task.recipe(frozenset(sessions[0].channels))
     if recipe is None:
         raise ValueError(f"no recipe of {task.name} for {', '.join(sessions[0].channels)}")
-    people = sorted({session.subject for session in sessions}, key=int)
-    held = people[HELD_OUT - 1 :: HELD_OUT]
+    held = held_out(sessions)
     parts = [_part(task, recipe, session) for session in sessions]
     lessons = [_thinned(part) for part in parts if part.group not in held]
     judges = [part for part in parts if part.group in held]

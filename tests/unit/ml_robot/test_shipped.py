@@ -16,6 +16,8 @@ from ml.robot.groups import unit
 from ml.robot.learned import Learned
 from ml.robot.task import STRIDE, TASKS
 from ml.serving.predictor import Prediction, replayed
+from ml.training.shipping import held_out
+from ml.training.simulated import Session
 
 PERSON = 77  # whom no model has seen
 PACE = (0.47, 1.2)  # another one than usual
@@ -51,6 +53,18 @@ def test_a_robot_without_models_is_served_by_a_sound_one_that_says_simulated(
 
 def _units(channels: tuple[str, ...]) -> dict[str, str]:
     return {name: UNITS[name] for name in channels}
+
+
+def test_one_in_four_of_those_who_walk_alike_is_held_out_of_all_of_his_walks() -> None:
+    walks = {"ordinary": range(1, 9), "crouch": (17, 18, 19, 20, 8), "slow": (21, 22, 23)}
+    sessions = [_session(str(person), name) for name, people in walks.items() for person in people]
+    assert held_out(sessions) == {"4", "8", "19"}
+
+
+def _session(person: str, walks: str) -> Session:
+    return Session(
+        "", person, (), np.zeros(0, np.int64), np.zeros((0, 0)), np.zeros(0, str), np.zeros((0, 2)), walks
+    )
 
 
 def test_they_are_small() -> None:
