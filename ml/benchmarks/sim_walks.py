@@ -1,4 +1,4 @@
-"""`sim-walks`: the shipped models on people who walk otherwise than those they learned from, group by group.
+"""`sim-walks`: the shipped models on people whom they do not know, who walk differently, group by group.
 
 Nothing is learned from the recording, but for what a minute of each wearer adapts; what comes later judges
 the phase before and after. The worst group and the worst third of the wearers count, not the mean.
@@ -34,7 +34,8 @@ LEAST_LATER: Final = 100  # decisions in steps, to judge an adapted model by
 STEPS: Final = {"activity": 10, "gait_phase": 3}  # grid samples between decisions: 200 and 60 ms
 WHY: Final = (
     "synthetic: simulated people (gwrms sim-record --walks), judged by the shipped models, which have learned"
-    " from ordinary walks alone. adapted: the phase after the first minute of each recording has taught it."
+    " from others who walk in the same ways. adapted: the phase after the first minute of each recording has"
+    " taught it."
 )
 
 Floats = npt.NDArray[np.float64]
@@ -97,7 +98,7 @@ def _shipped(registry: Registry, task: Task, sessions: Sequence[Session]) -> Lea
 
 
 def _check_people(card: Card, sessions: Sequence[Session]) -> None:
-    known = {name.rpartition("-")[2] for name in (*card.learned, *card.held_out)}
+    known = {name.split("-")[2] for name in (*card.learned, *card.held_out)}  # sim-SEED-PERSON[-WALKS]
     both = sorted({session.subject for session in sessions} & known, key=int)
     if both:
         raise UnusableData(

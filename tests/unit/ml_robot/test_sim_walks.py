@@ -75,9 +75,10 @@ def test_too_short_a_recording_says_nothing_of_adaptation(tmp_path: Path) -> Non
     assert outcome.by_group["ordinary"]["adapted_rmse_percent"] != outcome.figures["rmse_percent"]
 
 
-def test_people_whom_the_shipped_models_know_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(UnusableData, match="has learned from simulated people 3: record others"):
-        sim_walks.evaluate(written(tmp_path / "walks.jsonl", [3, 101], rounds=1), False)
+@pytest.mark.parametrize("known", [3, 29])  # an ordinary wearer, one in crouch
+def test_people_whom_the_shipped_models_know_are_refused(known: int, tmp_path: Path) -> None:
+    with pytest.raises(UnusableData, match=f"has learned from simulated people {known}: record others"):
+        sim_walks.evaluate(written(tmp_path / "walks.jsonl", [known, 101], rounds=1), False)
 
 
 def test_a_robot_on_one_leg_is_offered_nothing_that_needs_both() -> None:
