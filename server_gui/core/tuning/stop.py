@@ -179,14 +179,14 @@ class StopProgress:
         return [f"{_listed([drive])}: {proof.text}" for drive, proof in self.proofs.items()]
 
     @property
-    def said(self) -> str:
-        """How the stop that is held came about."""
+    def said(self) -> tuple[str, str]:
+        """How the stop that is held came about, and by whose word where more is known than that."""
         own = self.text.removeprefix("STOP ") if self.state is StopState.CONFIRMED else ""
-        return "; ".join(filter(None, (own, self.reason))) or "it is held until it is reset"
+        return (own, self.reason) if own else (self.reason or "it is held until it is reset", "")
 
     def _holds(self, entry: Mapping[str, Any]) -> None:
         who, reason = entry.get("who"), entry.get("reason")
-        said = " ".join(filter(None, (str(reason or ""), f"by {who}" if who else "")))
+        said = ", ".join(filter(None, (str(reason or ""), f"by {who}" if who else "")))
         if not self.held or not self.reason:
             self.reason = said
         if not self.held:

@@ -159,7 +159,8 @@ def _outcome(station: Station) -> Words:
     stopping = station.stopping
     if stopping.state is StopState.IDLE:
         mark, main = Mark("triangle", "warn", "STOPPED"), "STOP held"
-        return Words(mark, main, ("until it is reset",), f"STOP held: {stopping.said}")
+        said = "; ".join(filter(None, stopping.said))
+        return Words(mark, main, ("until it is reset",), f"STOP held: {said}")
     tip = "\n".join(filter(None, (stopping.text, *stopping.proof_lines)))
     parts: dict[StopState, tuple[str, ...]] = {
         StopState.SENT: ("the drives are asked",),
@@ -211,7 +212,7 @@ def _link(station: Station) -> Words:
     old = f" · {age} old" if robot.age_s() is not None else ""
     if not station.is_linked:
         main = f"No link{old}" if link.links else "Never reached"
-        return Words(Mark("cross", "bad"), main, (link.problem or link.state.value,))
+        return Words(Mark("cross", "bad"), main, ("trying again", link.problem or link.state.value))
     lost = link.missed + link.dropped
     trip = "–" if link.round_trip_ns is None else f"{link.round_trip_ns / 1e6:.1f} ms"
     again = (f"linked {link.links} times",) if link.links > 1 else ()
