@@ -27,7 +27,7 @@ class Stop:
 STOPS: Final = (
     Stop(
         "one look",
-        "robot, drives, status, link and recording stand at the top, alarms below, whatever tab is open. "
+        "the robot's drives and link stand at the top beside STOP, alarms below, whatever tab is open. "
         "What is not known now is grey.",
         lambda window: window.header,
     ),
