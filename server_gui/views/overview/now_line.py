@@ -177,7 +177,8 @@ def _drives(station: Station) -> tuple[Mark, tuple[str, ...], tuple[str, ...]]:
     count = enabled_text(station.robot, live=station.is_live)
     if not station.is_live:
         return Mark("ring", "old", "not known"), ("Drives not known",), (count,)
-    mark = drives_mark(station.robot, is_unproven=station.stopping.is_unproven)
-    if station.stopping.held and mark.colour == "dim":  # off, and held so
+    unproven = station.stopping.is_unproven
+    mark = drives_mark(station.robot, is_unproven=unproven)
+    if station.stopping.held and not unproven and mark.colour == "dim":  # off, and held so
         return Mark("triangle", "warn", "STOPPED"), ("STOPPED",), (f"{mark.word} · {count}", count)
     return mark, (mark.word.capitalize(),), (count,)

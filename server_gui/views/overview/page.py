@@ -212,7 +212,7 @@ class Overview(QWidget):
         judged = live and not not_judged(station)
         phases = {leg: leg_phase(derived, leg, derived.stamp_ns) if judged else None for leg in Leg}
         modelled = model_phases(station) if judged else dict.fromkeys(Leg)
-        if slow:
+        if slow or not live:
             self._word = self._words(station)
         self._ring.show_phases(phases, modelled, *self._word, live=live)
         if slow:
