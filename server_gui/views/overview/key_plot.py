@@ -20,7 +20,7 @@ from server_gui.views.widgets.wrapped import Wrapped
 
 SECONDS: Final = 10.0
 WIDE_NUMBER: Final = re.compile(r"^−?\d+")
-LETTERS: Final = {"left": "L", "right": "R"}  # as on the cards beside it
+LETTERS: Final = {"left": "L", "right": "R"}  # alone in their colours, as on the cards beside it
 AT_FLAG: Final = 0.01  # of what is in sight, that the pointer may be beside a flag
 
 
@@ -102,8 +102,8 @@ class KeyPlot(Card):
         limits = _limit_texts(self._limits(station), unit)
 
         def parts(texts: Collection[str], limit: str, words: Mapping[str, str]) -> list[Part]:
-            named = zip(inks, self._curves, texts, strict=True)
-            curves = [(ink, "━", f"{words.get(word, word)} {text}") for ink, (_, _, word), text in named]
+            named, drawn = zip(inks, self._curves, texts, strict=True), "" if words else "━"
+            curves = [(ink, drawn, f"{words.get(word, word)} {text}") for ink, (_, _, word), text in named]
             return [*curves, (css(self._theme, "bad"), "┅", f"{limit}{limits}")] if limits else curves
 
         widest = [WIDE_NUMBER.sub("−88", text) for text in told.values()]  # else it changes with the number
