@@ -177,7 +177,7 @@ def test_a_recorder_that_stands_still_is_not_said_to_record(
     monkeypatch.setattr(collector._spool, "append", lambda *_: go_on.wait(WAIT_S))
     until(lambda: troubles(collector))
     recording, status = said(collector)
-    assert "ALARM  the thread “recorder” stands still" in status
+    assert "ALARM  its part “recorder” has not moved" in status
     assert (recording.said(None).tone, recording.said(None).text) == (Tone.BAD, "RECORDING HAS STOPPED")
     monkeypatch.undo()
     go_on.set()
