@@ -61,7 +61,7 @@ class RobotNews:
             if part.state != before:
                 why = f": {part.problem}" if part.problem else ""
                 kind = KINDS.get(part.state, NewsKind.WARNING)
-                self._tell(kind, f"{_spoken(part.name)}: {part.state}{why}")
+                self._tell(kind, f"{_spoken(part.name)} {part.state}{why}")
             self._parts[part.name] = part.state
 
     def _look_at_drives(self, robot: Robot) -> None:
