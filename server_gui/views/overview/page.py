@@ -70,7 +70,6 @@ class Overview(QWidget):
         self._station: Station | None = None
         self._soles = dict.fromkeys(SIDES, Sole())
         self._share: float | None = None  # of the left foot, as it was read last
-        self._word = "", ""
         self._angles: dict[str, list[str]] = {}
         self.setObjectName("page")
         self.now = NowLine(desk, theme)
@@ -212,9 +211,8 @@ class Overview(QWidget):
         judged = live and not not_judged(station)
         phases = {leg: leg_phase(derived, leg, derived.stamp_ns) if judged else None for leg in Leg}
         modelled = model_phases(station) if judged else dict.fromkeys(Leg)
-        if slow or not live:
-            self._word = self._words(station)
-        self._ring.show_phases(phases, modelled, *self._word, live=live)
+        word, below = self._words(station)
+        self._ring.show_phases(phases, modelled, word, below, live=live)
         if slow:
             sources = {one.value.replace("_", " ") for one in derived.sources.values() if one is not None}
             model = any(modelled.values())
