@@ -63,8 +63,8 @@ def test_stop_is_sent_then_confirmed(header: Header, bench: Bench) -> None:
 @pytest.mark.parametrize(
     ("drives", "said"),
     [
-        ({**ALL.drives, "left_knee": "unconfirmed"}, "left_knee unconfirmed"),
-        ({**ALL.drives, "left_knee": "unreachable"}, "left_knee unreachable"),
+        ({**ALL.drives, "left_knee": "unconfirmed"}, "left knee unconfirmed"),
+        ({**ALL.drives, "left_knee": "unreachable"}, "left knee unreachable"),
         ({}, "no drive answered"),
     ],
 )

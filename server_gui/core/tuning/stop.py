@@ -108,7 +108,7 @@ class StopProgress:
         if self.at_ns is not None:
             self.answered_ms = ((time.monotonic_ns() if at_ns is None else at_ns) - self.at_ns) / 1e6
         outcomes = stopped.drives | {f"controller {name}": said for name, said in stopped.controllers.items()}
-        missing = [f"{name} {said}" for name, said in outcomes.items() if said != "confirmed"]
+        missing = [f"{_listed([name])} {said}" for name, said in outcomes.items() if said != "confirmed"]
         if missing or not stopped.drives:
             self._not_confirmed(", ".join(missing) or "no drive answered")
         else:
