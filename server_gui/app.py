@@ -40,6 +40,7 @@ from server_gui.views.first_run.demo_bar import DemoBar
 from server_gui.views.first_run.opening import Opening
 from server_gui.views.frame.application import application, kept_settings, kept_theme
 from server_gui.views.frame.closing import wait_closed
+from server_gui.views.frame.empty import STARTS
 from server_gui.views.frame.garbage import Garbage
 from server_gui.views.frame.kept import kept_units
 from server_gui.views.frame.main_window import MainWindow
@@ -247,7 +248,7 @@ class App:
         station = self._stations[robot]
         sent = station.send_stop(reason)
         self._poster.deliver(lambda: station.note_stop(sent))
-        return sent
+        return sent.future
 
     def tick(self) -> None:
         """Take what has come, and draw."""
@@ -290,6 +291,8 @@ class App:
             self.demo.refresh()
         elif own.problem:
             self.window.empty.say(own.problem, again=True)
+        elif self._opening is not None and not self._opening.is_over:
+            self.window.empty.say(STARTS, again=False)
         if self._opening is not None:
             self._opening.look(self.desk.selected, window=self.window.isVisible())
 

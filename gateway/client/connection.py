@@ -127,7 +127,7 @@ class Connection(asyncio.Protocol):
 
         """
         if self._transport is None or self.closed.done():
-            raise NotConnected(f"the link to {self.address} is closed; {method} was not sent")
+            raise NotConnected(f"the link to {self.address} is closed: nothing was sent")
         number = next(self._ids)
         answer: asyncio.Future[msgspec.Raw] = asyncio.get_running_loop().create_future()
         self._waiting[number] = (answer, on_result)

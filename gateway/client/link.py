@@ -136,7 +136,7 @@ class Link:
         """
         if self._connection is None:
             why = f" ({self.problem})" if self.problem is not None else ""
-            raise NotConnected(f"there is no link to {self.address} now{why}; {method.name} was not sent")
+            raise NotConnected(f"there is no link to {self.address} now, and nothing was sent{why}")
         return await self._ask(self._connection, method, params, timeout_s)
 
     async def subscribe(self, request: StreamStartParams, depth: int) -> Subscription:

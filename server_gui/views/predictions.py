@@ -29,6 +29,7 @@ LEARNED: Final = {state: ("ring", "dim", state.value) for state in State} | {
 }  # shape, colour and word of what is learned from the wearer
 AGREES: Final = 8.0  # % of a stride, that steps and a model may be apart
 STOPPED: Final = "stopped"
+OLD: Final = "old"  # what a model said is no prediction any more
 NOT_JUDGED: Final = "Not judged while stopped"
 
 
@@ -62,7 +63,7 @@ def said(shown: Told, *, stopped: str = "", unseen: str = "") -> Line:
     """
     prediction = shown.prediction
     if shown.is_stale():
-        return Line(Mark("ring", "old", "old"), "No prediction now", f"the last {shown.age_s():.0f} s ago")
+        return Line(Mark("ring", "old", OLD), "No prediction now", f"the last {shown.age_s():.0f} s ago")
     falls = prediction.task == FALLING and prediction.label not in (STEADY, ABNORMAL, UNKNOWN)
     if stopped and not falls and (prediction.task == ACTIVITY or not _knows(shown)):
         return unjudged(stopped)
@@ -232,7 +233,7 @@ def _knows(shown: Told) -> bool:
 
 def _as_predicted(line: Line) -> Line:
     """As it is said where other things stand beside it; what is old is no prediction."""
-    if line.mark.word == "old":
+    if line.mark.word == OLD:
         return line
     return replace(line, detail=" · ".join(filter(None, ("predicted", line.detail))))
 

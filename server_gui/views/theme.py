@@ -124,6 +124,7 @@ QDockWidget {{ font-weight: bold; }}
 QDockWidget::title {{ background: {card}; padding: 6px 8px; border-bottom: 1px solid {border}; }}
 QFrame#card {{ background: {card}; border: 1px solid {border}; border-radius: 6px; }}
 QFrame#card[selected="true"] {{ border: 1px solid {accent}; border-left: 3px solid {accent}; }}
+QFrame#card[selected="false"] {{ padding-left: 2px; }}
 QLabel, QCheckBox {{ background: transparent; }}
 QLabel#dim, QLabel#note {{ color: {dim}; }}
 QLabel#title[tone="old"] {{ color: {old}; }}
@@ -134,7 +135,7 @@ QLabel#banner[tone="plain"] {{ background: {card}; border-color: {border}; }}
 QLabel#banner[tone="bad"] {{ border-color: {bad}; }}
 QLabel#banner[tone="good"] {{ background: {card}; border-color: {good}; }}
 QTabWidget::pane {{ border: none; border-top: 1px solid {border}; }}
-QTabBar {{ background: {panel}; }}
+QTabBar {{ background: {panel}; qproperty-drawBase: 0; }}
 QTabBar::tab {{ background: transparent; color: {dim}; padding: 7px {loose}px; border: none;
     border-bottom: 2px solid transparent; }}
 QTabBar::tab:selected {{ color: {text}; border-bottom: 2px solid {accent}; }}

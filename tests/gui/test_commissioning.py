@@ -143,8 +143,8 @@ def test_a_refusal_and_the_unit_stand_beside_the_field(page: CommissionPage, pla
     assert page.question.refused.text() == KNEE["refused"]
     assert page.question.news.text().startswith("left knee is node 7"), "and not the refusal again"
     assert KNEE["refused"] not in page.question.news.text()
-    assert (page.question.unit.text(), page.question.range.text()) == ("°", "-180 to 360 °")
-    assert page.question.live.texts == [("node 7", "-30500 counts · no power")]
+    assert (page.question.unit.text(), page.question.range.text()) == ("°", "−180 to 360 °")
+    assert page.question.live.texts == [("node 7", "−30500 counts · no power")]
 
 
 def test_what_is_typed_stays_while_live_values_come(page: CommissionPage, played: Played) -> None:

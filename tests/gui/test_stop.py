@@ -1,6 +1,8 @@
 """STOP: always there, at once, and never taken for done before the drives say so."""
 
+import time
 from collections.abc import Iterator
+from concurrent.futures import Future
 
 import pytest
 from PySide6.QtCore import Qt
@@ -10,7 +12,7 @@ from PySide6.QtWidgets import QApplication, QPushButton
 
 from gateway.client import LinkLost, NotConnected
 from gateway.wire.stop import Reset, Stopped
-from server_gui.core.tuning.stop import StopProgress, StopState
+from server_gui.core.tuning.stop import Sent, StopProgress, StopState
 from server_gui.views.ask import Question
 from server_gui.views.frame.header import Header
 from server_gui.views.frame.main_window import MainWindow
@@ -61,8 +63,8 @@ def test_stop_is_sent_then_confirmed(header: Header, bench: Bench) -> None:
 @pytest.mark.parametrize(
     ("drives", "said"),
     [
-        ({**ALL.drives, "left_knee": "unconfirmed"}, "left_knee unconfirmed"),
-        ({**ALL.drives, "left_knee": "unreachable"}, "left_knee unreachable"),
+        ({**ALL.drives, "left_knee": "unconfirmed"}, "left knee unconfirmed"),
+        ({**ALL.drives, "left_knee": "unreachable"}, "left knee unreachable"),
         ({}, "no drive answered"),
     ],
 )
@@ -249,6 +251,20 @@ def test_a_held_stop_that_was_not_confirmed_is_ended_by_whoever_resets_it() -> N
     stopping.answered(stopping.sent(), Stopped({"left_knee": "unreachable"}, held=True))
     stopping.read([{"n": 1, "what": "reset", "held": False}])
     assert (stopping.state, stopping.held) == (StopState.IDLE, False)
+
+
+def test_a_stop_is_timed_where_it_is_sent_however_late_the_window_notes_it() -> None:
+    stopping, future = StopProgress(), Future[Stopped]()
+    sent = Sent(time.monotonic_ns() - 3_000_000_000, future)
+    future.set_result(ALL)
+    number = stopping.sent(at_ns=sent.at_ns)
+    stopping.answered(number, ALL, sent.at_ns + 40_000_000)
+    assert sent.answered_ns is not None
+    assert sent.answered_ns - sent.at_ns >= 3_000_000_000
+    assert stopping.text == f"STOP confirmed by all {len(JOINTS)} drives in 40 ms"
+    assert time.time() - (stopping.since_s or 0.0) >= 2.9
+    stopping.show([sent.at_ns + 20_000_000], {"left_knee": ["quick stop active"]}, offset_ns=0)
+    assert stopping.proofs["left_knee"].when == "20 ms"
 
 
 def test_a_name_that_has_room_beside_the_word_is_not_cut(theme: Theme) -> None:

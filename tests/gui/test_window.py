@@ -93,7 +93,7 @@ def test_a_robot_is_chosen_by_keyboard(window: MainWindow, bench: Bench) -> None
 def test_the_same_news_twice_in_a_row_are_told_once(bench: Bench) -> None:
     for _ in range(3):
         bench.look_again([looked(state="lost", problem="no heartbeat")])
-    assert [item.text for item in bench.desk.news.items].count("left_knee lost: no heartbeat") == 1
+    assert [item.text for item in bench.desk.news.items].count("left knee lost: no heartbeat") == 1
 
 
 def test_the_layout_is_kept_and_can_be_reset(window: MainWindow, bench: Bench, theme: Theme) -> None:

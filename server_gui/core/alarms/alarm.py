@@ -33,6 +33,7 @@ class Alarm:
     is_now: bool = True  # else it is what was last known
     node: str = ""  # the bus of what is a node
     under: "tuple[Alarm, ...]" = ()  # what it explains
+    aside: str = ""  # said only where there is room for all
 
     @property
     def key(self) -> tuple[Kind, str]:
@@ -67,7 +68,7 @@ class Alarm:
     @property
     def line(self) -> str:
         """Cause first: `fault: left knee: 0x2310 continuous overcurrent at the output`."""
-        return self._said(self.what)
+        return self._said("; ".join(filter(None, (self.what, self.aside))))
 
     @property
     def brief(self) -> str:

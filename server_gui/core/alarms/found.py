@@ -85,13 +85,15 @@ def _of_stop(robot: Robot, stopping: StopProgress) -> Iterator[Alarm]:
         check = remedy(robot)
         yield Alarm(Kind.NOT_STOPPED, "", what, did=now, check=check, since_s=stopping.since_s)
     elif stopping.held:
+        what, by = stopping.said
         yield Alarm(
             Kind.STOPPED,
             "",
-            stopping.said,
+            what,
             did=_after_stop(robot, stopping),
             check=check_of(Kind.STOPPED),
             since_s=stopping.since_s,
+            aside=by,
         )
     elif stopping.was_ended and not any_enabled(robot):
         yield Alarm(
@@ -323,7 +325,7 @@ def _of_buses(robot: Robot) -> Iterator[Alarm]:
             continue
         what, check = said
         kind = Kind.BUS_FAILS if bus_health.level(bus) is bus_health.Level.ALARM else Kind.BUS
-        where, is_now = f"bus {bus.name}", now is not None
+        where, is_now = bus.name, now is not None
         yield Alarm(kind, f"bus.{bus.name}", what, where, check=check or check_of(kind), is_now=is_now)
 
 

@@ -4,6 +4,8 @@ from typing import Final
 
 import msgspec
 
+from gateway.units import with_minus
+
 ENTER: Final = " Then press Enter."
 
 
@@ -19,7 +21,7 @@ class Reading(msgspec.Struct, frozen=True):
         """The value with its unit; a dash where there is none."""
         if self.value is None:
             return f"— {self.unit}".rstrip()
-        told = self.value if isinstance(self.value, str) else f"{self.value:.10g}"
+        told = self.value if isinstance(self.value, str) else with_minus(f"{self.value:.10g}")
         return f"{told} {self.unit}".rstrip()
 
 

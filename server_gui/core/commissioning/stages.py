@@ -38,7 +38,7 @@ class Look:
     answers: bool = False
 
 
-GO_ON: Final = "What was found is kept: the same goes on there."
+GO_ON: Final = "What was found is kept: “Go on” takes it up again."
 BY_HAND: Final = "Use the hardware emergency stop."
 LOOKS: Final = {
     Stage.NOT_STARTED: Look(
@@ -73,10 +73,10 @@ LOOKS: Final = {
         Mark("triangle", "warn", "STOP sent"), "STOP is sent, and not confirmed yet …", runs=True
     ),
     Stage.STOPPED: Look(
-        Mark("square", "good", "STOP confirmed"), f"Every drive has confirmed the STOP. {GO_ON}"
+        Mark("triangle", "warn", "STOP confirmed"), f"Every drive has confirmed the STOP. {GO_ON}"
     ),
-    Stage.NOT_CONFIRMED: Look(Mark("triangle", "bad", "STOP NOT CONFIRMED"), BY_HAND),
-    Stage.ENDING: Look(Mark("half", "dim", "being ended"), "It is being ended …", runs=True),
+    Stage.NOT_CONFIRMED: Look(Mark("square", "bad", "STOP NOT CONFIRMED"), BY_HAND),
+    Stage.ENDING: Look(Mark("half", "dim", "ending"), "The command is ending …", runs=True),
     Stage.WRITTEN: Look(Mark("disc", "good", "written"), "The robot's file is written, and can be used."),
     Stage.UNUSABLE: Look(
         Mark("triangle", "warn", "not usable yet"),

@@ -56,7 +56,7 @@ from server_gui.core.tuning.edits import Change, Edits
 from server_gui.core.tuning.flash import Flash
 from server_gui.core.tuning.lease import LeaseState
 from server_gui.core.tuning.link import LEASE_S
-from server_gui.core.tuning.stop import ENABLED, StopProgress, StopState
+from server_gui.core.tuning.stop import ENABLED, Sent, StopProgress, StopState
 from server_gui.core.tuning.storing import Storing
 from server_gui.core.tuning.taken_back import OVERDUE_S, TakenBack
 from server_gui.core.tuning.writing import WriteProgress, WriteState, written_line
@@ -312,24 +312,24 @@ class Station:
         """Quick stop on every drive."""
         self.note_stop(self.send_stop(reason))
 
-    def send_stop(self, reason: str) -> "Future[Stopped]":
+    def send_stop(self, reason: str) -> Sent:
         """Send a quick stop from any thread, at once; its answer is for `note_stop`."""
-        return self._commands.stop(reason)
+        return Sent(time.monotonic_ns(), self._commands.stop(reason))
 
-    def note_stop(self, future: "Future[Stopped]") -> None:
+    def note_stop(self, sent: Sent) -> None:
         """Follow what becomes of a STOP that was sent."""
         joints = self.robot.names("joint") if self.is_live else ()
-        states = {joint: self.robot.word(f"{joint}.state") for joint in joints}
-        number = self.stopping.sent({joint for joint, word in states.items() if word not in (None, ENABLED)})
+        off = {joint for joint in joints if self.robot.word(f"{joint}.state") not in (None, ENABLED)}
+        number = self.stopping.sent(off, sent.at_ns)
         when_done(
-            future,
+            sent.future,
             self._deliver,
-            lambda stopped: self._stopped(number, stopped),
+            lambda stopped: self._stopped(number, stopped, sent.answered_ns),
             lambda error: self._stop_failed(number, error),
         )
 
-    def _stopped(self, number: int, stopped: Stopped) -> None:
-        self.stopping.answered(number, stopped)
+    def _stopped(self, number: int, stopped: Stopped, at_ns: int | None) -> None:
+        self.stopping.answered(number, stopped, at_ns)
         self._tell_stop()
 
     def _stop_failed(self, number: int, error: Exception) -> None:

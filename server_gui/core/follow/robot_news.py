@@ -61,7 +61,7 @@ class RobotNews:
             if part.state != before:
                 why = f": {part.problem}" if part.problem else ""
                 kind = KINDS.get(part.state, NewsKind.WARNING)
-                self._tell(kind, f"{part.name} {part.state}{why}")
+                self._tell(kind, f"{_spoken(part.name)} {part.state}{why}")
             self._parts[part.name] = part.state
 
     def _look_at_drives(self, robot: Robot) -> None:
@@ -76,7 +76,7 @@ class RobotNews:
                 changed.setdefault((before, word), []).append(joint)
         for (before, word), joints in changed.items():
             kind = NewsKind.FAULT if "fault" in word else NewsKind.STATE
-            self._tell(kind, f"{', '.join(joints)}: {before} → {word}")
+            self._tell(kind, f"{', '.join(map(_spoken, joints))}: {before} → {word}")
         self._look_at_errors(robot)
 
     def _look_at_errors(self, robot: Robot) -> None:
@@ -86,4 +86,8 @@ class RobotNews:
                 continue
             self._errors[joint] = code
             if code:
-                self._tell(NewsKind.FAULT, f"{joint}: error code 0x{int(code):04X}")
+                self._tell(NewsKind.FAULT, f"{_spoken(joint)}: error code 0x{int(code):04X}")
+
+
+def _spoken(name: str) -> str:
+    return name.replace("_", " ")

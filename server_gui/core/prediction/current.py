@@ -14,7 +14,7 @@ from server_gui.core.prediction.news import Endangered, Predicted, PredictionNew
 from server_gui.core.settings.prediction import RuleSettings
 
 STALE_S: Final = 2.0  # what is older is no longer so
-NOT_YET: Final = "models are looked for"
+NOT_YET: Final = "looking for models"
 OFF: Final = "prediction is off: write enabled = true into [prediction] of the server's file"
 
 

@@ -93,6 +93,7 @@ def worst(robot: Robot) -> tuple[Level, tuple[str, ...]]:
     most = next((one for one in talking(bus) if one.names), None)
     who = "" if most is None else f" · most: {_names(most)}"
     if (why := reason(bus)) is not None:
+        why = tuple(one.removesuffix(f": {load_text(bus)} {TAKEN}") for one in why)
         said = [f"{load}, {errors_text(bus)}: {why[0]}{who}", *(f"{load}: {one}" for one in why)]
         return level(bus), (*said, f"CAN {load_text(bus)}: {why[-1]}")
     said = [f"{load}, {errors_text(bus)}{who}", f"{load}, {errors_text(bus)}"]
@@ -110,10 +111,10 @@ def findings(bus: BusInfo) -> list[tuple[str, str]]:
     if level(bus) is Level.GOOD:
         return []
     load, full = bus.load_percent or 0.0, []
-    if (load >= BUSY_PERCENT and not bus.findings) or load >= FULL_PERCENT:
+    own = [one for one in bus.findings if not one.words.endswith(TAKEN)]  # by the load of a moment ago
+    if len(own) < len(bus.findings) or load >= (FULL_PERCENT if own else BUSY_PERCENT):
         said = "it is full" if load >= FULL_PERCENT else "it is busy"
         full = [(f"{said}: {load_text(bus)} {TAKEN}", FEWER)]
-    own = [one for one in bus.findings if not (full and one.words.endswith(TAKEN))]  # says no more
     told = [
         (bus.problem or "", ""),
         (bus.state if bus.state != ACTIVE else "", ""),

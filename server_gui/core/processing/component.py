@@ -73,7 +73,7 @@ class ComponentProcessing:
         taken = Found([], [])
         for row, stamp_ns in enumerate(stamps_ns):
             self._stamp_ns = stamp_ns
-            self._measures.begin(stamp_ns)
+            self._measures.see(stamp_ns)
             self._joints(wiring, stamp_ns, row, columns)
             for event in self._found(wiring, stamp_ns, row, columns):
                 taken.events.append(event)

@@ -10,6 +10,7 @@ from server_gui.core.processing.gait_events import EventKind, GaitEvent, Leg
 STRIDES = 10  # the measures are over so many of the newest strides of each leg
 LONGEST_STRIDE_NS = 3_500_000_000  # who takes longer has stood in between
 WALKING_NS = 2_500_000_000  # since the last heel strike; who takes longer has stopped
+UNSEEN_NS = 500_000_000  # a gap in which a step may have been made
 FEWEST = 5  # strides for a variability
 
 
@@ -79,12 +80,14 @@ class GaitMeasures:
 
     def __init__(self) -> None:
         self._legs = {leg: _Leg() for leg in Leg}
-        self._began_ns: int | None = None
+        self._began_ns: int | None = None  # of what was seen without a gap
+        self._seen_ns = 0
 
-    def begin(self, stamp_ns: int) -> None:
-        """Take the first instant that was seen, where it was not yet: from then on nobody may walk."""
-        if self._began_ns is None:
+    def see(self, stamp_ns: int) -> None:
+        """Take an instant that was seen: who makes no step then does not walk, but nobody knows of a gap."""
+        if self._began_ns is None or stamp_ns - self._seen_ns > UNSEEN_NS:
             self._began_ns = stamp_ns
+        self._seen_ns = stamp_ns
 
     def take(self, event: GaitEvent, ranges: Mapping[str, float] | None = None) -> Stride | None:
         """Take one event; the stride that it ends, where it does and nothing of it was missed.
@@ -108,11 +111,12 @@ class GaitMeasures:
     def now(self, now_ns: int) -> Gait:
         """Return the walk at `now_ns` on the robot's clock."""
         strikes = [leg.strike_ns for leg in self._legs.values() if leg.strike_ns is not None]
-        newest_ns = max(strikes, default=self._began_ns)
-        if newest_ns is None:
-            return Gait()
-        if now_ns - newest_ns > WALKING_NS:
+        began_ns = self._began_ns if self._began_ns is not None else min(strikes, default=now_ns)
+        newest_ns = max(strikes, default=began_ns)
+        if now_ns - max(newest_ns, began_ns) > WALKING_NS:
             return Gait(walking=False)
+        if now_ns - newest_ns > WALKING_NS:
+            return Gait()
         return summary({leg: found.strides for leg, found in self._legs.items()})
 
 

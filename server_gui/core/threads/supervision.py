@@ -90,13 +90,13 @@ class Worker:
             if self._died_s < self._began_s:
                 self._deaths, self._died_s = self._deaths + 1, now_s
             if self._deaths > 1 and now_s - self._began_s < AGAIN_S:
-                return Trouble(self.name, f"the thread “{self.name}” has died: {self._why}", works=False)
+                return Trouble(self.name, f"the part “{self.name}” has died: {self._why}", works=False)
             self.start()
         if now_s - self._beat_s > self._still_s:
-            still = f"the thread “{self.name}” stands still, longer than {self._still_s:g} s"
-            return Trouble(self.name, still, works=False)
+            still = f"the part “{self.name}” has not moved for {self._still_s:g} s"
+            return Trouble(self.name, f"{still}; is this computer too busy?", works=False)
         if self._deaths and now_s - self._died_s < HELD_S:
-            text = f"the thread “{self.name}” has died and was begun anew: {self._why}"
+            text = f"the part “{self.name}” has died and was begun anew: {self._why}"
             return Trouble(self.name, text, works=True)
         return None
 

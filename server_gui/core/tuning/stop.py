@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from concurrent.futures import Future
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
@@ -21,6 +22,19 @@ class StopState(Enum):
     NOT_CONFIRMED = "NOT CONFIRMED"
 
 
+class Sent:
+    """A STOP on its way, timed where it is sent and where its answer comes: however late that is noted."""
+
+    def __init__(self, at_ns: int, future: Future[Stopped]) -> None:
+        self.at_ns = at_ns
+        self.answered_ns: int | None = None
+        self.future = future
+        future.add_done_callback(self._done)
+
+    def _done(self, _future: Future[Stopped]) -> None:
+        self.answered_ns = time.monotonic_ns()
+
+
 @dataclass(frozen=True, slots=True)
 class Proof:
     """A drive's first state that is not enabled, and how long after the STOP it came; 0: it was so before."""
@@ -36,12 +50,12 @@ class Proof:
     @property
     def when(self) -> str:
         """After the STOP."""
-        return "off before" if self.was_so else f"{self.after_ms:.0f} ms"
+        return "before" if self.was_so else f"{max(self.after_ms, 1.0):.0f} ms"
 
     @property
     def text(self) -> str:
         """`switch on disabled 34 ms after the STOP`."""
-        return f"{self.state} {'before' if self.was_so else f'{self.after_ms:.0f} ms after'} the STOP"
+        return f"{self.state} {'before' if self.was_so else f'{self.when} after'} the STOP"
 
 
 @dataclass(slots=True)
@@ -76,23 +90,25 @@ class StopProgress:
         """Whether drives were told to stop and have not shown it: then "enabled" is no good state."""
         return self.state is StopState.NOT_CONFIRMED
 
-    def sent(self, off: Collection[str] = ()) -> int:
+    def sent(self, off: Collection[str] = (), at_ns: int | None = None) -> int:
         """Note that a STOP has gone out, and return its number; `off` drives are seen not to be enabled."""
         self.number += 1
-        self.state, self.text, self.at_ns = StopState.SENT, "STOP sent …", time.monotonic_ns()
-        self.why, self.since_s, self.answered_ms, self.was_ended = "", time.time(), None, False
+        now_ns = time.monotonic_ns()
+        self.state, self.text, self.at_ns = StopState.SENT, "STOP sent …", now_ns if at_ns is None else at_ns
+        self.why, self.answered_ms, self.was_ended = "", None, False
+        self.since_s = time.time() - (now_ns - self.at_ns) / 1e9
         self.proofs, self._off = {}, off
         return self.number
 
-    def answered(self, number: int, stopped: Stopped) -> None:
-        """What the drives said."""
+    def answered(self, number: int, stopped: Stopped, at_ns: int | None = None) -> None:
+        """What the drives said, and when that was here; by default it is now."""
         if number != self.number:
             return
         self.held = stopped.held
         if self.at_ns is not None:
-            self.answered_ms = (time.monotonic_ns() - self.at_ns) / 1e6
+            self.answered_ms = ((time.monotonic_ns() if at_ns is None else at_ns) - self.at_ns) / 1e6
         outcomes = stopped.drives | {f"controller {name}": said for name, said in stopped.controllers.items()}
-        missing = [f"{name} {said}" for name, said in outcomes.items() if said != "confirmed"]
+        missing = [f"{_listed([name])} {said}" for name, said in outcomes.items() if said != "confirmed"]
         if missing or not stopped.drives:
             self._not_confirmed(", ".join(missing) or "no drive answered")
         else:
@@ -163,7 +179,7 @@ class StopProgress:
         """What each drive's own state has shown since: `all 6 switch on disabled within 34 ms`."""
         if not self.proofs:
             return ""
-        slowest = max(proof.after_ms for proof in self.proofs.values())
+        slowest = max(1.0, *(proof.after_ms for proof in self.proofs.values()))
         by_state: dict[str, list[str]] = {}
         for drive, proof in self.proofs.items():
             by_state.setdefault(proof.state, []).append(drive)
@@ -179,14 +195,14 @@ class StopProgress:
         return [f"{_listed([drive])}: {proof.text}" for drive, proof in self.proofs.items()]
 
     @property
-    def said(self) -> str:
-        """How the stop that is held came about."""
+    def said(self) -> tuple[str, str]:
+        """How the stop that is held came about, and by whose word where more is known than that."""
         own = self.text.removeprefix("STOP ") if self.state is StopState.CONFIRMED else ""
-        return "; ".join(filter(None, (own, self.reason))) or "it is held until it is reset"
+        return (own, self.reason) if own else (self.reason or "it is held until it is reset", "")
 
     def _holds(self, entry: Mapping[str, Any]) -> None:
         who, reason = entry.get("who"), entry.get("reason")
-        said = " ".join(filter(None, (str(reason or ""), f"by {who}" if who else "")))
+        said = ", ".join(filter(None, (str(reason or ""), f"by {who}" if who else "")))
         if not self.held or not self.reason:
             self.reason = said
         if not self.held:

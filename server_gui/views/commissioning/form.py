@@ -17,7 +17,7 @@ from server_gui.views.widgets.plain import PlainLabel, set_tip
 from server_gui.views.widgets.whole import WholeLabel
 
 ABOUT: Final = (
-    "From a bus of unknown drives to a robot's file that is true: it asks, and you move the joints by hand, "
+    "Makes a robot's file from a bus of unknown drives: it asks, and you move the joints by hand, "
     "without power. Switch the drives' power off (emergency stop, STO, or the controller off), leave their "
     "logic supply on, and plug the sensors in. The how-to “Commission a robot” says more."
 )
@@ -99,7 +99,7 @@ class Form(Card):
     def refresh(self) -> None:
         """Say whether an earlier dialogue is gone on with."""
         kept = self.wish.left
-        text = "" if kept is None else f"{kept.name} is there: what was found before is gone on with."
+        text = "" if kept is None else f"{kept.name} is there: what was found before is taken up again."
         if self.left.text() != text or self.left.isHidden() == bool(text):
             self.left.setText(text)
             self.left.setVisible(bool(text))
@@ -116,7 +116,7 @@ class Form(Card):
             ("Bit rate", self.bitrate, None),
             ("EDS folders", self.eds, self._browse("EDS folder: …", self._choose_eds)),
             ("Serial ports", self.serial, self._browse("All serial ports", self._take_ports)),
-            ("Who does it", self.who, None),
+            ("Your name", self.who, None),
             ("Computer", self.computer, None),
         )
         for place, (name, field, button) in enumerate(rows):

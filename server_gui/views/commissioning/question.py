@@ -6,6 +6,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QApplication, QGridLayout, QHBoxLayout, QLineEdit, QPushButton, QWidget
 
+from gateway.units import with_minus
 from server_gui.core.commissioning.commissioning import Commissioning
 from server_gui.core.commissioning.spoken import Line
 from server_gui.views.theme import Theme
@@ -100,7 +101,7 @@ class Question(Card):
             self.field.setText(typed.default or "")
             self.field.setAccessibleName(f"Answer: {typed.question}")
             set_text(self.unit, typed.unit)
-            set_text(self.range, typed.range)
+            set_text(self.range, with_minus(typed.range))
         self.unit.setVisible(bool(self.unit.text()))
         self.range.setVisible(bool(self.range.text()))
         self.send.setEnabled(False)

@@ -16,7 +16,8 @@ from server_gui.views.first_run.tour import Tour
 from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
-from server_gui.views.widgets.plain import PlainLabel, set_tip
+from server_gui.views.widgets.plain import set_tip
+from server_gui.views.widgets.whole import WholeLabel
 
 TOURED: Final = "toured"  # kept: the tour begins by itself only until somebody has left it
 HELD: Final = "A stop is held: end it first with “Reset stop…” above. Then this lets the robot walk again."
@@ -63,9 +64,7 @@ class DemoBar(QToolBar):
         )
         self.breaking = QPushButton("Break something")
         self.faults = QMenu(self.breaking)
-        self.said = PlainLabel()
-        self.said.setObjectName("dim")
-        self.said.setWordWrap(True)
+        self.said = WholeLabel("dim")
         self.tour = Tour(window, theme)
         self._build()
         window.addToolBar(self)

@@ -21,11 +21,11 @@ class Opening:
         self.own = own
         self._steps = steps
         self._splash = splash
-        self._is_over = False
+        self.is_over = False
 
     def look(self, station: "Station | None" = None, *, window: bool = False) -> None:
         """Count what is so; `window`: it is there."""
-        if self._is_over:
+        if self.is_over:
             return
         for part in self.own.ready:
             self._steps.reach(STEPS[part])
@@ -39,5 +39,5 @@ class Opening:
         self._splash.refresh()
         too_long = self._steps.elapsed_s > LONGEST_S
         if too_long or self.own.problem or self._steps.now is None:
-            self._is_over = True
+            self.is_over = True
             self._splash.close()

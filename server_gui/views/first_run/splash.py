@@ -31,7 +31,7 @@ class Splash(QFrame):
         self.setAccessibleName("GWRMS is starting")
         self.setAttribute(Qt.WidgetAttribute.WA_ShowWithoutActivating)
         title, below = PlainLabel("GWRMS"), PlainLabel("A simulated exoskeleton starts on this computer")
-        title.setObjectName("brand")
+        title.setStyleSheet(f"color: {theme.colour('accent').name()};")  # no margin: in line with the rest
         title.setFont(theme.text_font(1.6, bold=True))
         below.setObjectName("dim")
         grid = QGridLayout()

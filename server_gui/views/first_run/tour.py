@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QDockWidget, QHBoxLayout, QPushButton, QWidget
 
 from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.theme import Theme
-from server_gui.views.widgets.plain import PlainLabel
+from server_gui.views.widgets.whole import WholeLabel
 
 FRAME: Final = 3  # wide
 
@@ -27,7 +27,7 @@ class Stop:
 STOPS: Final = (
     Stop(
         "one look",
-        "robot, drives, status, link and recording stand at the top, alarms below, whatever tab is open. "
+        "the robot's drives and link stand at the top beside STOP, alarms below, whatever tab is open. "
         "What is not known now is grey.",
         lambda window: window.header,
     ),
@@ -94,8 +94,7 @@ class Tour(QWidget):
         self._window = window
         self._outline = Outline(window, theme)
         self.at = 0
-        self.words = PlainLabel()
-        self.words.setWordWrap(True)
+        self.words = WholeLabel()
         self.back, self.next, self.skip = (
             QPushButton("Back"),
             QPushButton("Next"),

@@ -13,13 +13,14 @@ from server_gui.views.widgets.plain import PlainLabel
 
 WIDTH = 560  # at text of 100 %: longer lines are not read
 ADD = (
-    "Type where its gateway listens, HOST:PORT, as gwrms gateway prints it. One that has keys shows a code "
-    "with sudo gwrms keys pair: pair with that. Robots that are always there go into "
+    "Type where its gateway listens, HOST:PORT, as gwrms gateway prints it. With one that has keys, pair: "
+    "sudo gwrms keys pair shows a code there. Robots to be followed at every start go into "
     "~/.config/gwrms/server.toml."
 )
 SIMULATE = "A whole exoskeleton without hardware walks on this computer. It can be stopped, tuned and broken."
 COMMISSION = "Drives that nobody knows yet become a robot's file: it asks, and you move the joints by hand."
 OPEN = "Everything that was recorded, played in the same views; no robot is needed."
+STARTS = "The simulated robot is starting; this takes a few seconds …"
 
 
 class EmptyView(QWidget):
@@ -115,7 +116,7 @@ class EmptyView(QWidget):
         self.added.emit(where)
 
     def _start(self) -> None:
-        self.say("The simulated robot is starting; this takes a few seconds …", again=False)
+        self.say(STARTS, again=False)
         self.simulator.emit()
 
     def _restyle(self) -> None:

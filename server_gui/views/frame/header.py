@@ -15,7 +15,7 @@ from server_gui.core.tuning.stop import StopState
 from server_gui.views.frame.chip import Chip, Words
 from server_gui.views.frame.recording_chip import NAME, RecordingChip
 from server_gui.views.marks import Mark, age_text, drives_mark, enabled_text
-from server_gui.views.predictions import status
+from server_gui.views.predictions import OLD, status
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.plain import PlainLabel, set_tip
 from server_gui.views.widgets.stop_button import StopButton
@@ -159,7 +159,8 @@ def _outcome(station: Station) -> Words:
     stopping = station.stopping
     if stopping.state is StopState.IDLE:
         mark, main = Mark("triangle", "warn", "STOPPED"), "STOP held"
-        return Words(mark, main, ("until it is reset",), f"STOP held: {stopping.said}")
+        said = "; ".join(filter(None, stopping.said))
+        return Words(mark, main, ("until it is reset",), f"STOP held: {said}")
     tip = "\n".join(filter(None, (stopping.text, *stopping.proof_lines)))
     parts: dict[StopState, tuple[str, ...]] = {
         StopState.SENT: ("the drives are asked",),
@@ -192,11 +193,12 @@ def _status(station: Station) -> Words:
     if not station.is_live:
         return Words(Mark("ring", "old"), "Status not known", ("no live data",))
     line = status(station)
-    if line is not None:
+    if line is not None and line.mark.word != OLD:
         parts = ("predicted", line.short) if line.detail.startswith("predicted") else (line.detail,)
         return Words(line.mark, line.text, tuple(filter(None, parts)), f"{line.text}\n{line.detail}")
     gait, problem = station.processing.derived().gait, station.predictions.problem
-    parts = ("by steps", f"not predicted: {problem}" if problem else "not predicted")
+    why_not = f"not predicted: {problem}" if problem else "not predicted"
+    parts = ("by steps", why_not if line is None else f"no prediction now, {line.detail}")
     if gait.walking is None:
         return Words(Mark("ring", "old"), "Activity not known", parts)
     if not gait.walking:
@@ -211,7 +213,7 @@ def _link(station: Station) -> Words:
     old = f" · {age} old" if robot.age_s() is not None else ""
     if not station.is_linked:
         main = f"No link{old}" if link.links else "Never reached"
-        return Words(Mark("cross", "bad"), main, (link.problem or link.state.value,))
+        return Words(Mark("cross", "bad"), main, ("trying again", link.problem or link.state.value))
     lost = link.missed + link.dropped
     trip = "–" if link.round_trip_ns is None else f"{link.round_trip_ns / 1e6:.1f} ms"
     again = (f"linked {link.links} times",) if link.links > 1 else ()

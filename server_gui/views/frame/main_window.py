@@ -50,6 +50,7 @@ from server_gui.views.frame.status_bar import StatusBar
 from server_gui.views.pace import Pace
 from server_gui.views.parameters.panel import ParametersPanel
 from server_gui.views.parameters.trial_bar import TrialBar
+from server_gui.views.predictions import activity
 from server_gui.views.robots.panel import RobotsPanel
 from server_gui.views.robots.reset import ask_clear, ask_reset
 from server_gui.views.theme import Look, Theme
@@ -196,9 +197,14 @@ class MainWindow(QMainWindow):
         self.trial.refresh(shown=not any(is_seen(one) for one in elsewhere))
 
     def _is_due(self) -> bool:
-        """Whether what is read now and then is: at once where another robot is named, or a STOP goes on."""
+        """Whether what is read now and then is: at once where that is about something else.
+
+        Another robot is named, a STOP goes on, or its wearer does something else, as the ring shows at once.
+        """
         station, page = self._desk.selected, self.tabs.currentIndex()
-        about = (station.is_live, *station.stopping.stage) if station is not None else ()
+        if station is None:
+            return self._pace.is_due((page, station))
+        about = (station.is_live, *station.stopping.stage, activity(station).mark.word)
         return self._pace.is_due((page, station, *about))
 
     def show_signals(self, globs: Sequence[str]) -> None:

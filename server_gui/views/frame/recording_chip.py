@@ -93,5 +93,6 @@ def _words(recording: Recording, said: Said, address: str | None) -> Words:
     if said.tone in (Tone.BAD, Tone.OFF) or since_s is None:
         return Words(mark, first, (rest,) if rest else (), tip)
     clock = clock_text(max(0.0, time.time() - since_s))
-    parts = (rest.partition(" · ")[0], link.notes) if link is not None and link.notes else (rest,)
+    said_of = tuple(rest.split(" · "))
+    parts = (said_of[0], link.notes) if link is not None and link.notes else said_of
     return Words(mark, f"{first} {clock}", parts, tip)

@@ -36,7 +36,7 @@ COLUMNS: Final = (
     ("Current", "current"),
     ("Temp.", "temperature"),
     ("Error", "error_code"),
-    ("Stopped", ""),
+    ("Off after", ""),
 )
 JOINT, STATE, ANGLE, VELOCITY, TORQUE, CURRENT, TEMPERATURE, ERROR, STOP = range(len(COLUMNS))
 SI: Final = {

@@ -1,6 +1,7 @@
 """A plot of the overview: its channels with their values, its limits, and what happened when."""
 
-from collections.abc import Sequence
+import re
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -18,7 +19,12 @@ from server_gui.views.widgets.time_axis import time_text
 from server_gui.views.widgets.wrapped import Wrapped
 
 SECONDS: Final = 10.0
+WIDE_NUMBER: Final = re.compile(r"^−?\d+")
+LETTERS: Final = {"left": "L", "right": "R"}  # alone in their colours, as on the cards beside it
 AT_FLAG: Final = 0.01  # of what is in sight, that the pointer may be beside a flag
+
+
+Part = tuple[str, str, str]  # of the legend: colour, what is drawn, what it says
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,17 +98,18 @@ class KeyPlot(Card):
         self.set_title(f"{self._kind.title} ({unit.symbol})", whole=True)
         values = self._values(station)
         told = {word: unit.text(value) for (_, _, word), value in zip(self._curves, values, strict=True)}
-        inks = [colour if live else "old" for _, colour, _ in self._curves]
-        parts = [
-            (css(self._theme, ink), "━", f"{word} {told[word]}")
-            for ink, (_, _, word) in zip(inks, self._curves, strict=True)
-        ]
+        inks = [css(self._theme, colour if live else "old") for _, colour, _ in self._curves]
         limits = _limit_texts(self._limits(station), unit)
-        if limits:
-            red = css(self._theme, "bad")
-            full = [*parts, (red, "┅", f"limit {limits}")]
-            parts = full if self.legend.is_one_line(full) else [*parts, (red, "┅", limits)]
-        self.legend.say(parts)
+
+        def parts(texts: Collection[str], limit: str, words: Mapping[str, str]) -> list[Part]:
+            named, drawn = zip(inks, self._curves, texts, strict=True), "" if words else "━"
+            curves = [(ink, drawn, f"{words.get(word, word)} {text}") for ink, (_, _, word), text in named]
+            return [*curves, (css(self._theme, "bad"), "┅", f"{limit}{limits}")] if limits else curves
+
+        widest = [WIDE_NUMBER.sub("−88", text) for text in told.values()]  # else it changes with the number
+        wordings: tuple[tuple[str, Mapping[str, str]], ...] = ("limit ", {}), ("", {}), ("", LETTERS)
+        fits = (one for one in wordings if self.legend.is_one_line(parts(widest, *one)))
+        self.legend.say(parts(told.values(), *next(fits, wordings[1])))
         self.plot.setAccessibleDescription(
             ", ".join(f"{word} {text} {unit.symbol}" for word, text in told.items())
         )

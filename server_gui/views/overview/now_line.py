@@ -176,6 +176,9 @@ class NowLine(QFrame):
 def _drives(station: Station) -> tuple[Mark, tuple[str, ...], tuple[str, ...]]:
     count = enabled_text(station.robot, live=station.is_live)
     if not station.is_live:
-        return Mark("ring", "old", "not known"), ("Drives not known now",), (count,)
-    mark = drives_mark(station.robot, is_unproven=station.stopping.is_unproven)
+        return Mark("ring", "old", "not known"), ("Drives not known",), (count,)
+    unproven = station.stopping.is_unproven
+    mark = drives_mark(station.robot, is_unproven=unproven)
+    if station.stopping.held and not unproven and mark.colour == "dim":  # off, and held so
+        return Mark("triangle", "warn", "STOPPED"), ("STOPPED",), (f"{mark.word} · {count}", count)
     return mark, (mark.word.capitalize(),), (count,)

@@ -35,6 +35,8 @@ from server_gui.views.widgets.pressure_map import PressureMap
 SHARES: Final = (10, 9, 11)  # of the width, where three cards stand beside each other
 A_COLUMN: Final = 190  # wide at least, at text of 100 %
 STATUS_LINES: Final = 3
+WIDEST_N: Final = 888.0  # of what a foot carries
+SHARE: Final = 0.05  # of both feet: a figure that is further off than its picture is read at once
 SIDES: Final = ("left", "right")
 PLOTS: Final = (
     Kind(
@@ -67,6 +69,7 @@ class Overview(QWidget):
         self.is_paced = True  # by itself; else only as it is told: with what stands beside it
         self._station: Station | None = None
         self._soles = dict.fromkeys(SIDES, Sole())
+        self._share: float | None = None  # of the left foot, as it was read last
         self._angles: dict[str, list[str]] = {}
         self.setObjectName("page")
         self.now = NowLine(desk, theme)
@@ -246,7 +249,7 @@ class Overview(QWidget):
 
     def _refresh_pressure(self, station: Station, *, slow: bool) -> None:
         live, values = station.is_live, station.robot.values
-        if slow:
+        if slow or self._is_off(station):
             self._refresh_soles(station, live=live)
         for side, known in self._soles.items():
             pressures = [values.get(f"{side}_insole.cell_{number}") for number in range(known.count)]
@@ -254,16 +257,22 @@ class Overview(QWidget):
             cop = None if x is None or y is None else (x, y)
             self._maps[side].show_pressures(pressures, cop, live=live)
 
+    def _is_off(self, station: Station) -> bool:
+        """Whether a foot carries by much another share than its figure says."""
+        left = loads(station.robot)[SIDES[0]].share
+        return left is not None and (self._share is None or abs(left - self._share) > SHARE)
+
     def _refresh_soles(self, station: Station, *, live: bool) -> None:
         force = self._desk.shown.units.unit("force", "N")
         carried = loads(station.robot)
+        self._share = carried[SIDES[0]].share
         for side in SIDES:
             known = sole(station.robot, side)
             if known != self._soles[side]:
                 self._soles[side] = known
                 self._maps[side].set_cells(known.cells)
             wordings = _load_texts(side, carried[side], force)
-            self._loads[side].say(*wordings)
+            self._loads[side].say(*wordings, widest=_load_texts(side, Load(WIDEST_N, None), force))
             set_tone(self._loads[side], "" if live else "old")
             share = carried[side].share
             said = "–" if share is None else f"{100 * share:.0f} %"

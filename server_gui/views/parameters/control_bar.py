@@ -46,6 +46,9 @@ class ControlBar(QWidget):
         station = self._desk.selected
         self.setEnabled(station is not None and station.is_linked)
         if station is None:
+            self._release.hide()
+            self._icon.show_mark(Mark("ring", "dim", "not in control"))
+            set_text(self.words, "No robot")
             return
         left_s, why_not = station.control.left_s(), station.refused(CONTROL_ACQUIRE)
         self._take.setEnabled(not why_not)

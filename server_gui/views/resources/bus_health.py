@@ -294,5 +294,7 @@ def _texts(node_id: int | None, node: NodeInfo | None, talk: Talking | None) -> 
     if node is None:
         return NOBODY if node_id is None else str(node_id), names or "", share, frames, sends, "–", "–", "–"
     trips = "–" if node.sdo_p50_ms is None else f"{node.sdo_p50_ms:.1f} / {node.sdo_max_ms or 0.0:.1f} ms"
-    missing = "–" if node.pdos_missing_percent is None else f"{node.pdos_missing_percent:.1f} %"
+    percent = node.pdos_missing_percent
+    is_known = percent is not None and (percent > 0.0 or talk is not None)  # who is silent misses none
+    missing = f"{percent:.1f} %" if is_known else "–"
     return str(node_id), names, share, frames, sends, trips, str(node.sdo_timeouts), missing

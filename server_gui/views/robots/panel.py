@@ -135,9 +135,11 @@ class RobotsPanel(QWidget):
         scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         scroll.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.address = QLineEdit()
-        self.address.setPlaceholderText("Add a robot: HOST:PORT")
+        self.address.setPlaceholderText("Add a robot")
         self.address.setAccessibleName("Address of a robot to add")
-        self.address.setToolTip("NAME=HOST:PORT: called so in this window, whatever it calls itself")
+        self.address.setToolTip(
+            "HOST:PORT, or NAME=HOST:PORT: called so in this window, whatever it calls itself"
+        )
         self.address.returnPressed.connect(self._add)
         self.pair = QPushButton("Pair…")
         self.pair.setToolTip("With a robot that has keys: it shows a code (gwrms keys pair)")

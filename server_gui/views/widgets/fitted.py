@@ -19,13 +19,17 @@ class FittedLabel(PlainLabel):
         self.setObjectName(name)
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Preferred)
         self._wordings: tuple[str, ...] = ("",)
+        self._widest: tuple[str, ...] = ()
         self.alike: tuple[FittedLabel, ...] = (self,)
         self.say(text)
 
-    def say(self, *wordings: str) -> None:
-        """Say the first of these that has room, else the last."""
-        if wordings != self._wordings:
-            self._wordings = wordings
+    def say(self, *wordings: str, widest: tuple[str, ...] = ()) -> None:
+        """Say the first of these that has room, else the last.
+
+        `widest` are the same with the widest number: where it has no room, a smaller one is not said fuller.
+        """
+        if (wordings, widest) != (self._wordings, self._widest):
+            self._wordings, self._widest = wordings, widest
             self.setText(wordings[0])
             self.setAccessibleName(wordings[0])
             self.updateGeometry()
@@ -47,7 +51,9 @@ class FittedLabel(PlainLabel):
     def fullest(self) -> int:
         """Which of its wordings has room, the last where none has."""
         room, last = self.contentsRect().width(), len(self._wordings) - 1
-        fits = (number for number, text in enumerate(self._wordings) if self._width(text) <= room)
+        same = zip(self._wordings, self._widest or self._wordings, strict=True)
+        wide = [max(map(self._width, texts)) for texts in same]
+        fits = (number for number, width in enumerate(wide) if width <= room)
         return next(fits, last)
 
     @property

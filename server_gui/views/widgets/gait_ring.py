@@ -144,13 +144,21 @@ class GaitRing(QWidget):
     def _draw_words(self, painter: QPainter, box: QRectF) -> None:
         rows, line = self._rows(box)
         top = box.center().y() - line * len(rows) / 2
-        for text, colour, factor, bold in rows:
-            place = QRectF(0.0, top, self._room(box, top, line), line)
+        places: list[QRectF] = []
+        fonts: dict[float, QFont] = {}  # of lines that are to be as large, the smallest: both legs are alike
+        for number, (text, _, factor, bold) in enumerate(rows):
+            above = top + number * line
+            place = QRectF(0.0, above, self._room(box, above, line), line)
             place.moveCenter(QPointF(box.center().x(), place.center().y()))
-            painter.setFont(self._fitting(text, factor, place, bold=bold))
+            places.append(place)
+            font = self._fitting(text, factor, place, bold=bold)
+            fonts[factor] = min(fonts.get(factor, font), font, key=QFont.pointSizeF)
+        for place, (text, colour, factor, bold) in zip(places, rows, strict=True):
+            font = QFont(fonts[factor])
+            font.setBold(bold)
+            painter.setFont(font)
             painter.setPen(self._theme.colour(colour))
             painter.drawText(place, Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextDontClip, text)
-            top += line
 
     def _room(self, box: QRectF, top: float, line: float) -> float:
         """How wide the circle within the inner ring is where a line stands: less above and below."""

@@ -56,5 +56,5 @@ def _answered(hand: Hand) -> bool:
 
 
 def _has_moved(hand: Hand) -> bool:
-    told = [text for text in hand.ask(texts=1) if "counts moved" in text]
-    return any(abs(int(text.split()[0])) > 1000 for text in told if text.split()[0].lstrip("-").isdigit())
+    told = [text.lstrip("−").split()[0] for text in hand.ask(texts=1) if "counts moved" in text]
+    return any(int(count) > 1000 for count in told if count.isdigit())

@@ -58,7 +58,7 @@ def break_something(bench: Bench) -> None:
 def empty(bench: Bench) -> None:
     """Without a robot it offers three ways on; one that pairs, by a code, among them."""
     hand = bench.hand
-    hand.reveal("Add a robot: HOST:PORT", "Robots")
+    hand.reveal("Add a robot", "Robots")
     hand.click("Remove walker")
     hand.click("Remove", exactly=True)
     hand.sees("Welcome to GWRMS")

@@ -39,7 +39,7 @@ def stopped(bench: Bench) -> None:
     hand.misses("Abnormal")
     hand.keep("stopped")
     hand.click("Reset stop…")
-    hand.sees("The STOP of walker is held")
+    hand.sees("Reset the stop of walker?")
     hand.keep("reset")
     hand.click("Reset stop", exactly=True)
     hand.sees("stop reset")
@@ -75,8 +75,8 @@ def two_robots(bench: Bench) -> None:
     """A second one is added by its address; each STOP says whose it is, and stops that one alone."""
     hand = bench.hand
     where = bench.another()
-    hand.reveal("Add a robot: HOST:PORT", "Robots")
-    hand.click("Add a robot: HOST:PORT")
+    hand.reveal("Add a robot", "Robots")
+    hand.click("Add a robot")
     hand.type(where)
     hand.key("Return")
     hand.key("ctrl+2")

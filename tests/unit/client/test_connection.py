@@ -90,7 +90,7 @@ async def test_call_on_a_closed_connection_is_not_sent(robot: FakeRobot) -> None
     connection = await _open(robot)
     connection.close()
     connection.close()
-    with pytest.raises(NotConnected, match="was not sent"):
+    with pytest.raises(NotConnected, match="nothing was sent"):
         await connection.call("robot.stop", {}, 10.0)
 
 

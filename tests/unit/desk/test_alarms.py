@@ -237,7 +237,7 @@ def test_a_stop_that_never_went_out_has_stopped_no_drive_that_was_off(
     bench.station.take([states(5.0)])
     proofs = bench.station.stopping.proofs
     assert {joint for joint, proof in proofs.items() if not proof.was_so} == {"left_knee"}
-    assert proofs["left_hip"].when == "off before"
+    assert proofs["left_hip"].when == "before"
 
 
 def test_the_result_of_a_stop_does_not_hide_a_fault(bench: Bench) -> None:
@@ -318,7 +318,7 @@ def test_a_stop_of_somebody_else_is_read_in_the_journal_and_so_is_its_end(bench:
     stop = {"n": 7, "hash": "a", "who": "gwrms stop", "what": "stop", "reason": "door", "utc_ns": 5}
     bench.station.take([Journalled(JournalEntries([stop], None))])
     assert bench.station.stopping.held
-    assert "door by gwrms stop" in bench.station.alarms.active[0].alarm.what
+    assert "door, by gwrms stop" in bench.station.alarms.active[0].alarm.what
     reset = {"n": 8, "hash": "b", "who": "gwrms reset", "what": "reset", "held": False}
     bench.station.take([Journalled(JournalEntries([stop, reset], None))])
     assert not bench.station.stopping.held

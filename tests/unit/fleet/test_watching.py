@@ -99,7 +99,9 @@ def test_a_thread_that_stands_still_is_said_within_a_second_and_over_when_it_mov
     until(watch.look)
     assert STILL_S < 1.0
     assert watch.look() == (
-        Trouble("recorder", "the thread “recorder” stands still, longer than 0.75 s", False),
+        Trouble(
+            "recorder", "the part “recorder” has not moved for 0.75 s; is this computer too busy?", False
+        ),
     )
     go_on.set()
     until(lambda: not watch.look())
@@ -160,7 +162,7 @@ def test_a_dead_thread_of_a_collector_is_an_alarm_everywhere_and_works_again(
         monkeypatch.setattr(owner, {"_recorder": "_turn", "_uploader": "_empty"}[name], die)
     until(lambda: troubles(collector))
     recording, status = said(collector)
-    assert f"ALARM  the thread “{owner.worker.name}” has died and was begun anew: SystemExit" in status
+    assert f"ALARM  the part “{owner.worker.name}” has died and was begun anew: SystemExit" in status
     assert recording.said(None).tone is Tone.WARNING
     assert any(owner.worker.name in news.text for news in recording._news.items)
     before = collector.report().result(WAIT_S).recorder.recorded
@@ -175,7 +177,7 @@ def test_a_recorder_that_stands_still_is_not_said_to_record(
     monkeypatch.setattr(collector._spool, "append", lambda *_: go_on.wait(WAIT_S))
     until(lambda: troubles(collector))
     recording, status = said(collector)
-    assert "ALARM  the thread “recorder” stands still" in status
+    assert "ALARM  the part “recorder” has not moved" in status
     assert (recording.said(None).tone, recording.said(None).text) == (Tone.BAD, "RECORDING HAS STOPPED")
     monkeypatch.undo()
     go_on.set()

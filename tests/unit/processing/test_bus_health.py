@@ -74,7 +74,7 @@ def test_the_worst_bus_is_said_with_its_load_its_errors_and_who_talks_most() -> 
     full = replace(BUS, name="legs", load_percent=97.0, error_frames=3, bus_offs=2)
     bad, wordings = worst(robot(BUS, full))
     assert bad is Level.ALARM
-    why = "it is full: 97 % of its time is taken"
+    why = "it is full"
     assert wordings[0] == f"CAN legs 97 %, 3 errors, 2 × bus off: {why} · most: left knee 90 %"
     assert wordings[-1] == "CAN 97 %: full"
 

@@ -96,11 +96,21 @@ def test_who_has_stopped_has_no_cadence() -> None:
 def test_whoever_is_seen_too_briefly_is_not_said_to_stand() -> None:
     measures = GaitMeasures()
     assert measures.now(0).walking is None
-    measures.begin(round(1.0e9))
+    for stamp_s in (1.0, 1.4, 1.8, 2.2, 2.6, 3.0, 3.4, 3.8):
+        measures.see(round(stamp_s * 1e9))
     assert measures.now(round(3.0e9)).walking is None
     assert measures.now(round(4.0e9)).walking is False
     measures.take(event(Leg.LEFT, EventKind.HEEL_STRIKE, 4.5))
     assert measures.now(round(5.0e9)).walking is None, "one step is no whole stride yet"
+
+
+def test_who_was_not_seen_for_a_while_is_not_said_to_stand() -> None:
+    measures, _ = taken(walk(6))
+    for stamp_s in (7.0, 7.2, 11.0):
+        measures.see(round(stamp_s * 1e9))
+    assert measures.now(round(11.1e9)).walking is None, "steps may have been made meanwhile"
+    measures.see(round(11.4e9))
+    assert measures.now(round(13.6e9)).walking is False
 
 
 def test_another_walk_begins_anew() -> None:

@@ -64,7 +64,7 @@ def test_each_state_is_what_has_happened(played: Played, state: Callable[[Played
 
 def test_only_what_is_proved_is_shown_as_good() -> None:
     good = {stage for stage, look in LOOKS.items() if look.mark.colour == "good"}
-    assert good == {Stage.STOPPED, Stage.WRITTEN}
+    assert good == {Stage.WRITTEN}
     assert set(LOOKS) == set(Stage) == set(STATES.values())
 
 
