@@ -181,11 +181,11 @@ def _robot(station: Station) -> Words:
 
 
 def _drives(station: Station) -> Words:
-    count = enabled_text(station.robot, live=station.is_live)
+    counts = enabled_text(station.robot, live=station.is_live).split(", ")
     if not station.is_live:
-        return Words(Mark("ring", "old"), "Drives not known", (count, "CiA 402"))
+        return Words(Mark("ring", "old"), "Drives not known", (*counts, "CiA 402"))
     mark = drives_mark(station.robot, is_unproven=station.stopping.is_unproven)
-    return Words(mark, mark.word.capitalize(), (count, "CiA 402"))
+    return Words(mark, mark.word.capitalize(), (*counts, "CiA 402"))
 
 
 def _status(station: Station) -> Words:
