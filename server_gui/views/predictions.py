@@ -155,7 +155,7 @@ def _learning(adapting: Adapting) -> Line:
         State.COLLECTING: (f"Learning {adapting.stepped_s:.0f} of {LEARNED_S:.0f} s", whom),
         State.LEARNING: ("Learning", whom),
         State.TRYING: (f"Trying {adapting.stepped_s:.0f} of {TRIED_S:.0f} s", f"what was learned {whom}"),
-    }.get(adapting.state, ("Not learned from", adapting.text))
+    }.get(adapting.state, ("Nothing is learned", adapting.text))
     return Line(Mark(*LEARNED[adapting.state]), text, detail, "", adapting.text)
 
 
@@ -231,8 +231,8 @@ def _knows(shown: Told) -> bool:
 
 
 def _as_predicted(line: Line) -> Line:
-    """As it is said where other things stand beside it; what is old is no prediction."""
-    if line.mark.word == "old":
+    """As it is said where other things stand beside it; what is old or not judged is no prediction."""
+    if line.mark.word in ("old", "not judged"):
         return line
     return replace(line, detail=" · ".join(filter(None, ("predicted", line.detail))))
 

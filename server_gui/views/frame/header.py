@@ -202,7 +202,7 @@ def _status(station: Station) -> Words:
     if not gait.walking:
         return Words(Mark("ring", "dim"), "Not walking", parts)
     cadence = "–" if gait.cadence_spm is None else f"{gait.cadence_spm:.0f}"
-    return Words(Mark("diamond", "accent"), f"Walking  {cadence} steps/min", parts)
+    return Words(Mark("diamond", "accent"), "Walking", (f"{cadence} steps/min", *parts))
 
 
 def _link(station: Station) -> Words:

@@ -60,7 +60,7 @@ class SessionModel(RowsModel[Session]):
             case _ if role == SORT_ROLE:
                 return _keys(session)[column]
             case Qt.ItemDataRole.ToolTipRole:
-                return tip(session.session)
+                return tip("\n".join(filter(None, (session.session, session.notes))))
             case Qt.ItemDataRole.TextAlignmentRole if column in NUMBERS:
                 return Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
             case Qt.ItemDataRole.FontRole if column in NUMBERS:

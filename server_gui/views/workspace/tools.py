@@ -4,8 +4,8 @@ from collections.abc import Callable, Sequence
 from typing import Final
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QKeySequence, QShortcut
-from PySide6.QtWidgets import QBoxLayout, QComboBox, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtGui import QKeySequence, QResizeEvent, QShortcut
+from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLayout, QPushButton, QVBoxLayout, QWidget
 
 from server_gui.views.widgets.elided import ElidedLabel
 from server_gui.views.widgets.plain import set_tip
@@ -14,7 +14,7 @@ SPANS_S: Final = (2, 5, 10, 30, 60, 100)
 
 
 class Tools(QWidget):
-    """Never shown itself: `rows` go into `page`, where the keys hold.
+    """Stand in as many lines as they need; keys hold in all of `page`.
 
     `looked` asks to see so many times of the time, moved by a share of it; `turned` for the event before (−1)
     or after (1); `noted` for a note.
@@ -26,7 +26,7 @@ class Tools(QWidget):
 
     def __init__(self, page: QWidget, menus: Sequence[QPushButton]) -> None:
         super().__init__(page)
-        self.hide()
+        self.setMinimumWidth(1)  # whatever lines they stand in now
         self.span = QComboBox()
         self.span.addItems([f"{seconds} s" for seconds in SPANS_S])
         self.span.setCurrentIndex(SPANS_S.index(10))
@@ -54,28 +54,46 @@ class Tools(QWidget):
         self.note.setToolTip("A note on the time axis, kept in the recording: at the active cursor, or now")
         self.note.clicked.connect(self.noted)
         self.said = ElidedLabel("dim")
-        self._first = QBoxLayout(QBoxLayout.Direction.LeftToRight)
-        self._view = _row((self.span, self.pause, self.follow, self.box, self.cursors))
-        self._first.addLayout(self._view)
-        self._events = _row((self.before, self.next, self.as_csv, self.as_png))
-        self._first.addLayout(self._events)
-        self._first.addStretch(1)
-        self._second = _row((*menus, self.expression, self.trigger, self.note))
-        self._second.addWidget(self.said, 100)
-        self.rows = QVBoxLayout()
-        self.rows.addLayout(self._first)
-        self.rows.addLayout(self._second)
+        first = (self.span, self.pause, self.follow, self.box, self.cursors)
+        first += (self.before, self.next, self.as_csv, self.as_png)
+        self._groups = (first, (*menus, self.expression, self.trigger, self.note))
+        self._lines: list[list[QWidget]] = []
+        self._rows = QVBoxLayout(self)
+        self._rows.setContentsMargins(0, 0, 0, 0)
+        self._fit()
         self._keys(page)
 
-    def fit(self, width: int) -> None:
-        """Stand in more rows where the first is wider than this."""
-        wide = sum(row.sizeHint().width() for row in (self._view, self._events))
-        narrow = wide + self._first.spacing() > width
-        direction = QBoxLayout.Direction
-        self._first.setDirection(direction.TopToBottom if narrow else direction.LeftToRight)
-        for row in (self._events, self._second):
-            row.removeWidget(self.said)
-        (self._events if narrow else self._second).addWidget(self.said, 100)
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._fit()
+
+    def _fit(self) -> None:
+        """What is said stands where most room is left."""
+        lines = [line for group in self._groups for line in self._broken(group)]
+        if lines == self._lines:
+            return
+        self._lines = lines
+        while (old := self._rows.takeAt(0)) is not None:
+            if isinstance(old, QLayout):
+                old.deleteLater()
+        rows = [_row(line) for line in lines]
+        for row in rows:
+            self._rows.addLayout(row)
+        widths = [row.sizeHint().width() for row in rows]
+        rows[widths.index(min(widths))].addWidget(self.said, 100)
+
+    def _broken(self, group: Sequence[QWidget]) -> list[list[QWidget]]:
+        """Return these in lines that are not wider than this."""
+        lines: list[list[QWidget]] = [[]]
+        left = width = self.width()
+        for widget in group:
+            needs = widget.sizeHint().width()
+            if needs > left and lines[-1]:
+                lines.append([])
+                left = width
+            lines[-1].append(widget)
+            left -= needs + self._rows.spacing()
+        return lines
 
     def _keys(self, page: QWidget) -> None:
         """Keys of this page; the sheet of keys tells them."""

@@ -98,7 +98,7 @@ def test_two_edits_that_overlap_say_so_and_share_nothing() -> None:
     assert first.after == [(202 * SECOND, 221 * SECOND)]
     assert len(first.before) == 1  # what came back is not what was before
     assert notes == (
-        f"another edit at {edits[1].utc} ({edits[1].id}, {NAME}) cuts short what is known of after",
+        f"the edit of {NAME} at {edits[1].utc} ({edits[1].id}) leaves fewer cycles after this one",
     )
     second, notes = spell(edits[1], edits)
     assert second.before == [(202 * SECOND, 220 * SECOND)]
