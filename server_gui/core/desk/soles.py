@@ -1,7 +1,6 @@
 """Where the cells of an insole are: as the robot describes them, or else by a shipped layout of as many."""
 
 import tomllib
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
@@ -19,7 +18,6 @@ ORDER: Final = "in their order: the robot does not say where they are, and no la
 
 SIDES: Final = ("left", "right")
 LEAST_N: Final = 20.0  # of both feet: with less nobody stands on them
-TURN: Final = 0.1  # of the load: with more the pressures beside a figure already show something else
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,12 +65,6 @@ def loads(robot: Robot) -> dict[str, Load]:
         )
         for side, force in forces.items()
     }
-
-
-def has_turned(before: Mapping[str, Load], after: Mapping[str, Load]) -> bool:
-    """Tell whether figures of `before` would contradict pressures of `after`: the load is on the other foot."""
-    shares = [(load.share, after[side].share) for side, load in before.items()]
-    return any(old is not None and new is not None and abs(old - new) > TURN for old, new in shares)
 
 
 def _problem(robot: Robot, side: str) -> str:

@@ -11,7 +11,7 @@ from gateway.units import Unit, rounded
 from server_gui.core.desk.belief import not_judged
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.leg_phase import leg_phase
-from server_gui.core.desk.soles import Load, Sole, has_turned, loads, sole
+from server_gui.core.desk.soles import Load, Sole, loads, sole
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.moment import now_ns
 from server_gui.core.processing.gait_events import Leg
@@ -67,7 +67,6 @@ class Overview(QWidget):
         self.is_paced = True  # by itself; else only as it is told: with what stands beside it
         self._station: Station | None = None
         self._soles = dict.fromkeys(SIDES, Sole())
-        self._carried: dict[str, Load] = {}  # as it was said last
         self._angles: dict[str, list[str]] = {}
         self.setObjectName("page")
         self.now = NowLine(desk, theme)
@@ -247,18 +246,17 @@ class Overview(QWidget):
 
     def _refresh_pressure(self, station: Station, *, slow: bool) -> None:
         live, values = station.is_live, station.robot.values
-        carried = loads(station.robot)
-        if slow or has_turned(self._carried, carried):
-            self._refresh_soles(station, carried, live=live)
+        if slow:
+            self._refresh_soles(station, live=live)
         for side, known in self._soles.items():
             pressures = [values.get(f"{side}_insole.cell_{number}") for number in range(known.count)]
             x, y = values.get(f"{side}_insole.cop_x"), values.get(f"{side}_insole.cop_y")
             cop = None if x is None or y is None else (x, y)
             self._maps[side].show_pressures(pressures, cop, live=live)
 
-    def _refresh_soles(self, station: Station, carried: dict[str, Load], *, live: bool) -> None:
+    def _refresh_soles(self, station: Station, *, live: bool) -> None:
         force = self._desk.shown.units.unit("force", "N")
-        self._carried = carried
+        carried = loads(station.robot)
         for side in SIDES:
             known = sole(station.robot, side)
             if known != self._soles[side]:
