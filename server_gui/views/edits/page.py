@@ -1,6 +1,7 @@
 """Edits: what each change of a parameter did to the walk, in words and as strides before and after."""
 
 import datetime
+import re
 from typing import Final
 
 from PySide6.QtCore import Qt
@@ -264,7 +265,8 @@ class Edits(QWidget):
 
     def _line(self, told: Told) -> str:
         ended = told.edit.became if told.experiment is None else told.experiment.kind
-        values = self._what(told).replace(" → ", ARROW)  # no line ends within them
+        values = self._what(told).replace(" → ", ARROW)  # no line ends within them, nor before a unit
+        values = re.sub(r"(?<=\d) (?=[^\W\d]|[°%])", "\N{NO-BREAK SPACE}", values)
         return f"{_when(told.edit)}  {values}\n{ended} · {word(told)}"
 
     def _verdict(self, told: Told) -> str:

@@ -5,7 +5,7 @@ from typing import Final
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeySequence, QResizeEvent, QShortcut
-from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLayout, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QComboBox, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
 from server_gui.views.widgets.elided import ElidedLabel
 from server_gui.views.widgets.plain import set_tip
@@ -58,8 +58,12 @@ class Tools(QWidget):
         first += (self.before, self.next, self.as_csv, self.as_png)
         self._groups = (first, (*menus, self.expression, self.trigger, self.note))
         self._lines: list[list[QWidget]] = []
-        self._rows = QVBoxLayout(self)
-        self._rows.setContentsMargins(0, 0, 0, 0)
+        rows = QVBoxLayout(self)
+        rows.setContentsMargins(0, 0, 0, 0)
+        self._rows = [QHBoxLayout() for _ in range(sum(map(len, self._groups)))]  # most of them empty
+        for row in self._rows:
+            row.addStretch(1)
+            rows.addLayout(row)
         self._fit()
         self._keys(page)
 
@@ -72,15 +76,16 @@ class Tools(QWidget):
         lines = [line for group in self._groups for line in self._broken(group)]
         if lines == self._lines:
             return
+        for row, line in zip(self._rows, self._lines, strict=False):
+            for widget in (*line, self.said):
+                row.removeWidget(widget)
         self._lines = lines
-        while (old := self._rows.takeAt(0)) is not None:
-            if isinstance(old, QLayout):
-                old.deleteLater()
-        rows = [_row(line) for line in lines]
-        for row in rows:
-            self._rows.addLayout(row)
-        widths = [row.sizeHint().width() for row in rows]
-        rows[widths.index(min(widths))].addWidget(self.said, 100)
+        for row, line in zip(self._rows, lines, strict=False):
+            for place, widget in enumerate(line):
+                row.insertWidget(place, widget)
+        widths = [sum(widget.sizeHint().width() for widget in line) for line in lines]
+        shortest = widths.index(min(widths))
+        self._rows[shortest].insertWidget(len(lines[shortest]), self.said, 100)
 
     def _broken(self, group: Sequence[QWidget]) -> list[list[QWidget]]:
         """Return these in lines that are not wider than this."""
@@ -92,7 +97,7 @@ class Tools(QWidget):
                 lines.append([])
                 left = width
             lines[-1].append(widget)
-            left -= needs + self._rows.spacing()
+            left -= needs + self._rows[0].spacing()
         return lines
 
     def _keys(self, page: QWidget) -> None:
@@ -127,11 +132,3 @@ def _switch(text: str, tip: str) -> QPushButton:
     button.setCheckable(True)
     set_tip(button, tip)
     return button
-
-
-def _row(widgets: Sequence[QWidget]) -> QHBoxLayout:
-    row = QHBoxLayout()
-    for widget in widgets:
-        row.addWidget(widget)
-    row.addStretch(1)
-    return row
