@@ -16,7 +16,7 @@ from server_gui.views.widgets.whole import WholeLabel
 
 TITLES: Final = ("Channel", "A", "B", "B − A", "Min", "Max", "Mean", "SD", "Unit")
 SPARE: Final = (7, 5, 4, 6, 8)  # left out in this order where there is less room
-NAME: Final = 90  # wide at least, at text of 100 %: a channel
+NAME: Final = 130  # wide at least, at text of 100 %: a channel
 ROWS: Final = 6  # that are in sight at most
 FAR: Final = 10  # samples, with Shift
 KEYS: Final = {Qt.Key.Key_A: 0, Qt.Key.Key_B: 1}
