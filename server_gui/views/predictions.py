@@ -30,6 +30,7 @@ LEARNED: Final = {state: ("ring", "dim", state.value) for state in State} | {
 AGREES: Final = 8.0  # % of a stride, that steps and a model may be apart
 STOPPED: Final = "stopped"
 NOT_JUDGED: Final = "Not judged while stopped"
+UNSEEN: Final = "not judged"  # for the model does not see all
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +70,7 @@ def said(shown: Told, *, stopped: str = "", unseen: str = "") -> Line:
     word, worth = label_text(prediction.label), belief(shown)
     details = (" · ".join(filter(None, (worth.wordings[0], _runner_up(shown)))), worth.wordings[-1])
     if prediction.label == ABNORMAL and unseen:
-        return Line(Mark("ring", "old", "not judged"), "Not judged", unseen, unseen, _tip(shown))
+        return Line(Mark("ring", "old", UNSEEN), "Not judged", unseen, unseen, _tip(shown))
     if prediction.label == ABNORMAL:
         novelty = f"novelty {prediction.novelty:.1f}"
         return Line(
@@ -97,7 +98,10 @@ def status(station: Station) -> Line | None:
             return _as_predicted(line)
     if stopped:
         return unjudged(stopped)
-    return _as_predicted(said(shown[ACTIVITY], unseen=blind(station))) if ACTIVITY in shown else None
+    if ACTIVITY not in shown:
+        return None
+    line = said(shown[ACTIVITY], unseen=blind(station))
+    return line if line.mark.word == UNSEEN else _as_predicted(line)  # no prediction is not called one
 
 
 def activity(station: Station) -> Line:
@@ -231,8 +235,8 @@ def _knows(shown: Told) -> bool:
 
 
 def _as_predicted(line: Line) -> Line:
-    """As it is said where other things stand beside it; what is old or not judged is no prediction."""
-    if line.mark.word in ("old", "not judged"):
+    """As it is said where other things stand beside it; what is old is no prediction."""
+    if line.mark.word == "old":
         return line
     return replace(line, detail=" · ".join(filter(None, ("predicted", line.detail))))
 
