@@ -54,9 +54,12 @@ class Tools(QWidget):
         self.note.setToolTip("A note on the time axis, kept in the recording: at the active cursor, or now")
         self.note.clicked.connect(self.noted)
         self.said = ElidedLabel("dim")
-        first = (self.span, self.pause, self.follow, self.box, self.cursors)
-        first += (self.before, self.next, self.as_csv, self.as_png)
-        self._groups = (first, (*menus, self.expression, self.trigger, self.note))
+        view = (self.span, self.pause, self.follow, self.box, self.cursors)
+        events = (self.before, self.next, self.as_csv, self.as_png)
+        self._groups: tuple[Sequence[QWidget], ...] = (
+            (*view, *events),
+            (*menus, self.expression, self.trigger, self.note),
+        )
         self._lines: list[list[QWidget]] = []
         rows = QVBoxLayout(self)
         rows.setContentsMargins(0, 0, 0, 0)
