@@ -48,7 +48,7 @@ ROLLBACK_EPILOG: Final = """Said again, it goes back further. Before the first m
 that for all robots, and before the first of these what comes with GWRMS."""
 KEY_EPILOG: Final = """Whoever may promote models by which a rule stops robots stands with that line in
 [promoters] of the server's file, on every computer that records these robots."""
-SHIPPED: Final = f"where no other does ({UNSIGNED})"
+SHIPPED: Final = f"by default ({UNSIGNED})"
 NOTHING: Final = "nothing"  # that serves
 
 

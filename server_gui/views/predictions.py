@@ -31,6 +31,7 @@ AGREES: Final = 8.0  # % of a stride, that steps and a model may be apart
 STOPPED: Final = "stopped"
 OLD: Final = "old"  # what a model said is no prediction any more
 NOT_JUDGED: Final = "Not judged while stopped"
+UNSEEN: Final = "not judged"  # for the model does not see all
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +71,7 @@ def said(shown: Told, *, stopped: str = "", unseen: str = "") -> Line:
     word, worth = label_text(prediction.label), belief(shown)
     details = (" · ".join(filter(None, (worth.wordings[0], _runner_up(shown)))), worth.wordings[-1])
     if prediction.label == ABNORMAL and unseen:
-        return Line(Mark("ring", "old", "not judged"), "Not judged", unseen, unseen, _tip(shown))
+        return Line(Mark("ring", "old", UNSEEN), "Not judged", unseen, unseen, _tip(shown))
     if prediction.label == ABNORMAL:
         novelty = f"novelty {prediction.novelty:.1f}"
         return Line(
@@ -98,7 +99,10 @@ def status(station: Station) -> Line | None:
             return _as_predicted(line)
     if stopped:
         return unjudged(stopped)
-    return _as_predicted(said(shown[ACTIVITY], unseen=blind(station))) if ACTIVITY in shown else None
+    if ACTIVITY not in shown:
+        return None
+    line = said(shown[ACTIVITY], unseen=blind(station))
+    return line if line.mark.word == UNSEEN else _as_predicted(line)  # no prediction is not called one
 
 
 def activity(station: Station) -> Line:
@@ -156,7 +160,7 @@ def _learning(adapting: Adapting) -> Line:
         State.COLLECTING: (f"Learning {adapting.stepped_s:.0f} of {LEARNED_S:.0f} s", whom),
         State.LEARNING: ("Learning", whom),
         State.TRYING: (f"Trying {adapting.stepped_s:.0f} of {TRIED_S:.0f} s", f"what was learned {whom}"),
-    }.get(adapting.state, ("Not learned from", adapting.text))
+    }.get(adapting.state, ("Nothing is learned", adapting.text))
     return Line(Mark(*LEARNED[adapting.state]), text, detail, "", adapting.text)
 
 

@@ -11,14 +11,18 @@ from PySide6.QtWidgets import QApplication
 from gateway.units import Units
 from server_gui.core.evidence.comparison import Word, compare
 from server_gui.core.evidence.curves import Curves, Side
+from server_gui.core.evidence.cycles import DRAWN
 from server_gui.core.evidence.edits import Change, State
 from server_gui.core.evidence.file import Told
 from server_gui.core.tuning.writing import Trial
+from server_gui.views.edits.page import Edits
 from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.framed import draw_frame
+from server_gui.views.widgets.scrolled import Scrolled
 from server_gui.views.widgets.stride_curves import CYCLE
-from tests.gui.fakes import Bench, Parts
+from tests.gui.fakes import Bench, Parts, destroy
+from tests.gui.rules import settle
 from tests.support.desk import looked
 from tests.unit.evidence.synthetic import cycles, spell
 from tests.unit.evidence.test_comparison import ERROR, times
@@ -62,6 +66,24 @@ def test_values_and_metrics_are_in_the_units_that_were_chosen(bench: Bench, part
     parts.edits.refresh()
     assert "gait.step_length 0.40 → 0.43 m: worse" in parts.edits.verdict.text()
     assert "0.001046 rad" in parts.edits.words.toolTip()
+
+
+def test_strides_stand_below_each_other_rather_than_beyond_the_edge(bench: Bench, theme: Theme) -> None:
+    page = Edits(bench.desk, theme)
+    scrolled = Scrolled(page)
+    one = worse()
+    curves = tuple(replace(one.curves[0], channel=f"left_knee.{name}") for name in DRAWN)
+    bench.station.take_evidence(replace(one, curves=curves))
+    page.refresh()
+    scrolled.show()
+    rows = {}
+    for width in (1000, 600, 400, 240):
+        scrolled.resize(width, 500)
+        settle()
+        assert page.width() <= scrolled.viewport().width()
+        rows[width] = len({one.y() for one in page.curves.values()})
+    assert rows == {1000: 1, 600: 1, 400: 2, 240: 4}
+    destroy(scrolled)
 
 
 @pytest.mark.parametrize("scale", [1.0, 2.0])

@@ -57,7 +57,7 @@ def cell(view: Measuring, row: int, title: str) -> str:
 def title(signals: Signals) -> str:
     signals._frame = 0
     signals.refresh()
-    return " ".join(signals.measuring._title.text().split())
+    return " ".join(signals.measuring.times.text().split())
 
 
 def wheel(plot: Plot, at: QPointF, turns: int) -> None:

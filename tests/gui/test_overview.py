@@ -238,6 +238,20 @@ def test_a_sole_that_tells_nothing_says_why_and_leaves_the_other_no_share(
     assert overview._shares["right"].text() == "– of the load"
 
 
+def test_figures_of_the_load_never_wait_where_the_pressures_show_the_other_foot(
+    overview: Overview, bench: Bench
+) -> None:
+    bench.station.take([walking(20, -3600.0)])
+    overview.read_now()
+    newest_ns = bench.station.rings.newest_ns or 0
+    for step, (left, right) in enumerate([(900.0, 0.0), (0.0, 900.0)], 1):
+        columns: dict[str, list[float | None]] = {"left_insole.force": [left], "right_insole.force": [right]}
+        bench.station.take([telemetry([newest_ns + step], columns)])
+        overview.refresh()
+        assert overview._loads["left"].text() == f"LEFT  {left:.0f} N"
+        assert overview._shares["right"].text() == f"{right / 9:.0f} % of the load"
+
+
 def test_a_joint_in_trouble_is_in_words_with_its_code_and_no_zero_is_negative(
     theme: Theme, bench: Bench
 ) -> None:

@@ -5,14 +5,17 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from PySide6.QtWidgets import QPushButton
 
 from gateway.units import Units
 from server_gui.core.desk.flags import Flag, FlagKind
 from server_gui.core.workspace.workspace import MOST_CURVES
 from server_gui.views.theme import Theme
+from server_gui.views.widgets.scrolled import Scrolled
 from server_gui.views.widgets.time_axis import NOW, PAUSED
 from server_gui.views.workspace.page import Signals
 from tests.gui.fakes import Bench, destroy
+from tests.gui.rules import settle
 from tests.support.desk import JOINTS, telemetry, walking
 
 
@@ -33,6 +36,25 @@ def test_channels_of_one_unit_share_a_plot(signals: Signals) -> None:
         ("left_hip.position", "right_hip.position"),
         ("left_hip.torque",),
     ]
+
+
+@pytest.mark.parametrize("scale", [1.0, 1.5])
+def test_a_narrow_page_is_never_scrolled_sideways(theme: Theme, bench: Bench, scale: float) -> None:
+    theme.set(scale=scale)
+    bench.station.take([walking(300)])
+    page = Signals(bench.desk, theme)
+    page.cursors.setChecked(True)
+    scrolled = Scrolled(page)
+    scrolled.show()
+    for width in (1000, 600, 470, 320):
+        scrolled.resize(width, 500)
+        settle()
+        page.refresh()
+        settle()
+        assert page.width() <= scrolled.viewport().width()
+        buttons = page.tools.findChildren(QPushButton)
+        assert max(button.geometry().right() for button in buttons) < page.tools.width()
+    destroy(scrolled)
 
 
 def test_nothing_ticked_says_what_to_do(signals: Signals) -> None:

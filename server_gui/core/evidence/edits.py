@@ -271,5 +271,4 @@ def _disturbances(
         if since_ns - SETTLE_NS <= at_ns <= until_ns and other.id not in told:
             told.add(other.id)
             side = "before" if at_ns <= edit.began_ns else "after"
-            who = f"{other.id}, {other.names}"
-            yield f"another edit at {other.utc} ({who}) cuts short what is known of {side}"
+            yield f"the edit of {other.names} at {other.utc} ({other.id}) leaves fewer cycles {side} this one"

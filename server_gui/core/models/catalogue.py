@@ -71,7 +71,7 @@ class Entry:
     @property
     def whom(self) -> str:
         """Return whom it serves, in words."""
-        return "where no other does" if self.shipped else ", ".join(self.serves) or "nobody"
+        return "by default" if self.shipped else ", ".join(self.serves) or "nobody"
 
     @property
     def signature(self) -> str:

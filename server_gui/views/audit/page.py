@@ -133,9 +133,10 @@ class Audit(QWidget):
             [line for name, history in self._called.items() for line in self._lines(name, history)]
         )
         self.table.setColumnHidden(ROBOT, len(self._called) < 2)
-        policy = Qt.ScrollBarPolicy  # titles alone are nothing to scroll to
+        policy, has_rows = Qt.ScrollBarPolicy, bool(self.model.rows)
+        self.table.horizontalHeader().setVisible(has_rows)  # titles alone say nothing, and are cut
         self.table.setHorizontalScrollBarPolicy(
-            policy.ScrollBarAsNeeded if self.model.rows else policy.ScrollBarAlwaysOff
+            policy.ScrollBarAsNeeded if has_rows else policy.ScrollBarAlwaysOff
         )
         _offer(self.robot, list(self._called))
         _offer(self.who, sorted({line.act.who for line in self.model.rows}))

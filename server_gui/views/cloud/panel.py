@@ -44,6 +44,7 @@ NO_STORE: Final = (
     "Nothing has been uploaded yet. What is recorded comes here by itself, a batch at a time; "
     "Upload now brings it at once."
 )
+NOT_READ: Final = "What it holds is not known while it is not reached."
 NO_JOBS: Final = "Uploads, verifications and downloads that you begin here show how far they are."
 
 
@@ -177,7 +178,9 @@ class Cloud(QWidget):
         self._icon.show_mark(mark)
         set_text(self.state, text)
         set_text(self._facts["Holds"], self._holds())
-        self.hint.setVisible(found.is_empty)
+        away = library.looked_s is not None and found.problem is not None
+        set_text(self.hint, NOT_READ if away and not found.usage else NO_STORE)
+        self.hint.setVisible(found.is_empty or (away and not found.usage))
         there = bool(found.usage)
         self.verify.setEnabled(there)
         self.download.setEnabled(there)

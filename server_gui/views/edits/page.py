@@ -1,6 +1,7 @@
 """Edits: what each change of a parameter did to the walk, in words and as strides before and after."""
 
 import datetime
+import re
 from typing import Final
 
 from PySide6.QtCore import Qt
@@ -39,6 +40,7 @@ from server_gui.views.widgets.stride_curves import StrideCurves
 LIST: Final = 240  # wide, at text of 100 %
 # Wide, likewise: below that four strides have no room beside the list, which then is above them, and so high.
 NARROW, ABOVE = 780, 84
+LEAST: Final = 130  # wide, likewise: what a stride has at least
 MOST_PX: Final = 16_777_215  # what Qt takes for no end
 MOST: Final = 8  # metrics that are told one by one
 UNIT: Final = {"position": "rad", "following_error": "rad", "current": "A", "torque": "N·m"}
@@ -225,20 +227,30 @@ class Edits(QWidget):
 
     def _draw(self, told: Told | None) -> None:
         found = {} if told is None else {one.channel: one for one in told.curves}
-        joints = list(dict.fromkeys(channel.rpartition(".")[0] for channel in found))
         for channel in self.curves.keys() - found.keys():
             gone = self.curves.pop(channel)
             gone.hide()  # at once: what comes in its place is drawn before it is gone
             self._grid.removeWidget(gone)
             gone.deleteLater()
         for channel, one in found.items():
-            joint, _, quantity = channel.rpartition(".")
+            quantity = channel.rpartition(".")[2]
             if channel not in self.curves:
                 self.curves[channel] = StrideCurves(self._theme)
                 self.curves[channel].hovered.connect(self._hover)
-            widget = self.curves[channel]
-            self._grid.addWidget(widget, joints.index(joint), DRAWN.index(quantity))
-            widget.show_curves(one, self._desk.shown.units.unit(quantity, UNIT[quantity]))
+            self.curves[channel].show_curves(one, self._desk.shown.units.unit(quantity, UNIT[quantity]))
+        self._place()
+
+    def _place(self) -> None:
+        """A joint a row; where that has no room, two rows or four."""
+        told, px = self._drawn, self._theme.px
+        room = self.width() - (0 if self._is_narrow else px(LIST))
+        columns = next((one for one in (len(DRAWN), 2) if one * px(LEAST) <= room), 1)
+        channels = [] if told is None else [one.channel for one in told.curves]
+        joints = list(dict.fromkeys(channel.rpartition(".")[0] for channel in channels))
+        for channel in channels:
+            joint, _, quantity = channel.rpartition(".")
+            place = joints.index(joint) * len(DRAWN) + DRAWN.index(quantity)
+            self._grid.addWidget(self.curves[channel], place // columns, place % columns)
 
     def _hover(self, at: float | None) -> None:
         """All are read at the same percent of the stride."""
@@ -253,7 +265,8 @@ class Edits(QWidget):
 
     def _line(self, told: Told) -> str:
         ended = told.edit.became if told.experiment is None else told.experiment.kind
-        values = self._what(told).replace(" → ", ARROW)  # no line ends within them
+        values = self._what(told).replace(" → ", ARROW)  # no line ends within them, nor before a unit
+        values = re.sub(r"(?<=\d) (?=[^\W\d]|[°%])", "\N{NO-BREAK SPACE}", values)
         return f"{_when(told.edit)}  {values}\n{ended} · {word(told)}"
 
     def _verdict(self, told: Told) -> str:
@@ -268,13 +281,17 @@ class Edits(QWidget):
         super().resizeEvent(event)
         self._scale()
 
+    @property
+    def _is_narrow(self) -> bool:
+        return self.width() < self._theme.px(NARROW)
+
     def _scale(self) -> None:
         """The list is beside the strides, or above them where there is less room."""
-        px, direction = self._theme.px, QBoxLayout.Direction
-        is_narrow = self.width() < px(NARROW)
+        px, direction, is_narrow = self._theme.px, QBoxLayout.Direction, self._is_narrow
         self._row.setDirection(direction.TopToBottom if is_narrow else direction.LeftToRight)
         self.list.setMaximumSize(MOST_PX if is_narrow else px(LIST), px(ABOVE) if is_narrow else MOST_PX)
         self.list.setMinimumWidth(0 if is_narrow else px(LIST))
+        self._place()
 
 
 def _when(edit: Edit) -> str:

@@ -182,11 +182,11 @@ def _robot(station: Station) -> Words:
 
 
 def _drives(station: Station) -> Words:
-    count = enabled_text(station.robot, live=station.is_live)
+    counts = enabled_text(station.robot, live=station.is_live).split(", ")
     if not station.is_live:
-        return Words(Mark("ring", "old"), "Drives not known", (count, "CiA 402"))
+        return Words(Mark("ring", "old"), "Drives not known", (*counts, "CiA 402"))
     mark = drives_mark(station.robot, is_unproven=station.stopping.is_unproven)
-    return Words(mark, mark.word.capitalize(), (count, "CiA 402"))
+    return Words(mark, mark.word.capitalize(), (*counts, "CiA 402"))
 
 
 def _status(station: Station) -> Words:
@@ -204,7 +204,7 @@ def _status(station: Station) -> Words:
     if not gait.walking:
         return Words(Mark("ring", "dim"), "Not walking", parts)
     cadence = "–" if gait.cadence_spm is None else f"{gait.cadence_spm:.0f}"
-    return Words(Mark("diamond", "accent"), f"Walking  {cadence} steps/min", parts)
+    return Words(Mark("diamond", "accent"), "Walking", (f"{cadence} steps/min", *parts))
 
 
 def _link(station: Station) -> Words:

@@ -32,7 +32,7 @@ MARKS: Final = {
     "alike": ("= alike", "dim"),
     "": ("", "dim"),
 }
-NARROW: Final = 800  # at text of 100 %: no room for the plot beside the figures
+NARROW: Final = 940  # at text of 100 %: no room for the plot beside the figures
 CHOOSE: Final = "Choose a model above to see how well it was judged."
 NARROW_ROW: Final = 480  # likewise, for the choice beside the words
 

@@ -68,7 +68,7 @@ class TrainForm(Card):
     def refresh(self) -> None:
         """Show how far trainings are."""
         self.jobs.refresh()
-        self.jobs.setVisible(bool(self._models.jobs.jobs))
+        self.jobs.setVisible(self._models.is_training)  # what came of one, the page says
         self.begin.setEnabled(not self._models.is_training)
 
     def _begin(self) -> None:

@@ -20,9 +20,9 @@ from server_gui.core.cloud.tape import Tape
 from server_gui.views.recordings.timeline import SECOND_NS, Timeline, clock_text
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
-from server_gui.views.widgets.elided import ElidedLabel
 from server_gui.views.widgets.fitted import FittedLabel
 from server_gui.views.widgets.plain import set_tip
+from server_gui.views.widgets.whole import WholeLabel
 
 LABEL_ROLE: Final = Qt.ItemDataRole.UserRole + 1
 
@@ -37,7 +37,7 @@ class LabelBar(QWidget):
         self._theme = theme
         self._tape: Tape | None = None
         self._revision = -1
-        self.span, self.said = FittedLabel("dim"), ElidedLabel("dim")
+        self.span, self.said = FittedLabel("dim"), WholeLabel("dim")
         self.list = QListWidget()
         self.list.setAccessibleName("Labels of this recording")
         self.list.setObjectName("framed")
@@ -67,7 +67,6 @@ class LabelBar(QWidget):
         if tape is not self._tape or self._revision != self._labels.revision:
             self._tape, self._revision = tape, self._labels.revision
             set_text(self.said, self._labels.said or self._hint())
-            set_tip(self.said, self._labels.said)
             self._timeline.show_labels(self._labels.labels)
             self._fill(tape)
 

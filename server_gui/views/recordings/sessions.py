@@ -34,7 +34,7 @@ from server_gui.views.widgets.rows import SORT_ROLE, Filtered, Index, RowsModel,
 TITLES: Final = ("Began", "Robot", "Length", "Rows", "Size", "State", "Operator", "Notes")
 BEGAN, ROBOT, LENGTH, ROWS, SIZE, STATE, OPERATOR, NOTES = range(len(TITLES))
 NUMBERS: Final = frozenset({LENGTH, ROWS, SIZE})
-NAMES: Final = {NOTES: 60, ROBOT: 60, OPERATOR: 60, STATE: 60}  # wide at least, at text of 100 %
+NAMES: Final = {NOTES: 140, ROBOT: 60, OPERATOR: 60, STATE: 60}  # wide at least, at text of 100 %
 SPARE: Final = (ROWS, SIZE, STATE, OPERATOR, NOTES)  # left out in this order where there is less room
 EMPTY: Final = (
     "Nothing is recorded yet. What a robot sends while this window is open is recorded by itself: "
@@ -60,7 +60,7 @@ class SessionModel(RowsModel[Session]):
             case _ if role == SORT_ROLE:
                 return _keys(session)[column]
             case Qt.ItemDataRole.ToolTipRole:
-                return tip(session.session)
+                return tip("\n".join(filter(None, (session.session, session.notes))))
             case Qt.ItemDataRole.TextAlignmentRole if column in NUMBERS:
                 return Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
             case Qt.ItemDataRole.FontRole if column in NUMBERS:

@@ -171,7 +171,7 @@ class BusCard(Card):
     def _show_nodes(self, bus: BusInfo) -> None:
         talks = {one.node_id: one for one in talking(bus)}
         nodes = {node.node_id: node for node in bus.nodes}
-        rows = sorted(talks.keys() | nodes.keys(), key=lambda known: -_rate(talks.get(known)))
+        rows = sorted(talks.keys() | nodes.keys(), key=lambda known: _order(known, talks.get(known)))
         if self.table.rowCount() != len(rows):
             self.table.setRowCount(len(rows))
             height = self._theme.px(22)
@@ -282,8 +282,9 @@ def _kinds(bus: BusInfo) -> list[tuple[str, float]]:
     return sorted(found.items(), key=lambda item: -item[1])
 
 
-def _rate(talk: Talking | None) -> float:
-    return 0.0 if talk is None else talk.frames_per_s
+def _order(node_id: int | None, talk: Talking | None) -> tuple[float, bool, int]:
+    """The largest share first; of one and the same, as it is shown, the lowest node."""
+    return 0.0 if talk is None else -round(100 * talk.share), node_id is None, node_id or 0
 
 
 def _texts(node_id: int | None, node: NodeInfo | None, talk: Talking | None) -> tuple[str, ...]:

@@ -23,6 +23,7 @@ COLUMNS, ROWS = 40, 104  # pixels of the picture
 SPREAD_M: Final = 0.017  # of one cell
 TRAIL: Final = 18
 HALF: Final = 0.5  # of what a pixel shows, that must be known
+DARK: Final = "#1b2128"  # around the trail, in either look: pressures have the same colours in both
 STEPS: Final = 255  # colours of the scale; the last place of the table is transparent
 
 # The left foot from above (x forward, y left, mm): heel, outer side, toes, inner side.
@@ -165,7 +166,7 @@ class PressureMap(QWidget):
         painter.setCompositionMode(QPainter.CompositionMode.CompositionMode_Clear)
         painter.fillPath(self._path, QColor("black"))
         painter.setCompositionMode(QPainter.CompositionMode.CompositionMode_SourceOver)
-        painter.setPen(self._cosmetic("dim" if self._live else "old", 1.4))
+        painter.setPen(_cosmetic(self._theme.colour("dim" if self._live else "old"), 1.4))
         painter.drawPath(self._path)
         if self._cells is not None:
             self._draw_dots(painter, self._cells, 1.6 / scale)
@@ -195,18 +196,19 @@ class PressureMap(QWidget):
         if newest is None or not self._live:
             return
         painter.setBrush(Qt.BrushStyle.NoBrush)
-        painter.setPen(self._cosmetic("card", 3.4))
+        painter.setPen(_cosmetic(QColor(DARK), 3.4))
         painter.drawPolyline(points)
-        painter.setPen(QPen(QColor("white"), 0))
+        painter.setPen(_cosmetic(QColor("white"), 1.4))
         painter.drawPolyline(points)
         painter.setBrush(QColor("white"))
-        painter.setPen(self._cosmetic("stop", 1.5))
+        painter.setPen(_cosmetic(self._theme.colour("stop"), 1.5))
         painter.drawEllipse(points[-1], radius, radius)
 
-    def _cosmetic(self, colour: str, width: float) -> QPen:
-        pen = QPen(self._theme.colour(colour), width)
-        pen.setCosmetic(True)
-        return pen
+
+def _cosmetic(colour: QColor, width: float) -> QPen:
+    pen = QPen(colour, width)
+    pen.setCosmetic(True)
+    return pen
 
 
 def size_of(cells: Sequence[Cell]) -> float:

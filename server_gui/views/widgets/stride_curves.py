@@ -43,7 +43,7 @@ class StrideCurves(QWidget):
         return QSize(self._theme.px(180), self._theme.px(130))
 
     def minimumSizeHint(self) -> QSize:
-        return QSize(self._theme.px(120), self._theme.px(90))
+        return QSize(self._theme.px(100), self._theme.px(90))
 
     @property
     def title(self) -> str:

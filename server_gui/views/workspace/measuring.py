@@ -11,11 +11,12 @@ from gateway.units import Unit, with_minus
 from server_gui.core.desk.measuring import Measured
 from server_gui.views.theme import Theme
 from server_gui.views.widgets import columns
-from server_gui.views.widgets.card import Card
+from server_gui.views.widgets.card import Card, set_text
+from server_gui.views.widgets.whole import WholeLabel
 
 TITLES: Final = ("Channel", "A", "B", "B − A", "Min", "Max", "Mean", "SD", "Unit")
 SPARE: Final = (7, 5, 4, 6, 8)  # left out in this order where there is less room
-NAME: Final = 90  # wide at least, at text of 100 %: a channel
+NAME: Final = 130  # wide at least, at text of 100 %: a channel
 ROWS: Final = 6  # that are in sight at most
 FAR: Final = 10  # samples, with Shift
 KEYS: Final = {Qt.Key.Key_A: 0, Qt.Key.Key_B: 1}
@@ -44,6 +45,8 @@ class Measuring(Card):
         self.table.setShowGrid(False)
         self.table.verticalHeader().hide()
         columns.prepare(self.table)
+        self.times = WholeLabel("title")
+        self.body.addWidget(self.times)
         self.body.addWidget(self.table)
         self.hide()
 
@@ -52,10 +55,8 @@ class Measuring(Card):
         apart_s = b_s - a_s
         rate = "" if apart_s == 0.0 else f" · 1/Δt {1 / abs(apart_s):.4g} Hz"
         marks = ["▸ " if place == active else "" for place in (0, 1)]
-        self.set_title(
-            with_minus(f"{marks[0]}A {a_s:.3f} s   {marks[1]}B {b_s:.3f} s   Δt {apart_s:+.3f} s{rate}"),
-            whole=True,
-        )
+        said = f"{marks[0]}A {a_s:.3f} s   {marks[1]}B {b_s:.3f} s   Δt {apart_s:+.3f} s{rate}"
+        set_text(self.times, with_minus(said))
         if self.table.rowCount() != len(rows):
             self.table.setRowCount(len(rows))
             self._fit(len(rows))

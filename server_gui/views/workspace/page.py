@@ -8,8 +8,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QLineEdit, QSplitter, QTreeWidgetItem, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QLineEdit, QTreeWidgetItem, QVBoxLayout, QWidget
 
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.measuring import measure, nearest, row_at
@@ -28,6 +27,7 @@ from server_gui.views.widgets.elided import ElidedLabel
 from server_gui.views.widgets.files import ask_save, save_whole
 from server_gui.views.widgets.plain import PlainLabel, set_tip
 from server_gui.views.widgets.scrolled import bring_into_sight
+from server_gui.views.widgets.split import Split
 from server_gui.views.workspace.beside_menu import BesideMenu, others_of
 from server_gui.views.workspace.channel_tree import NAME_ROLE, ChannelTree
 from server_gui.views.workspace.drawing import AnyPlot, draw, flag, read
@@ -42,7 +42,8 @@ from server_gui.views.workspace.trigger_bar import TriggerBar
 from server_gui.views.workspace.unit_plot import UnitPlot
 
 Floats = npt.NDArray[np.float64]
-LIST, MARGIN = 150, 8  # wide: the channels at least, at text of 100 %; beside everything
+LIST, LOW, MARGIN = 150, 90, 8  # the channels at least: wide, high; beside everything
+NARROW: Final = 380  # wide: with less the plots stand below the channels
 GONE: Final = "Live: that instant is gone from here, see Recordings"
 AROUND_S: Final = 5.0  # that are shown before and after an event
 SLOW: Final = 5  # frames between two looks at what people read
@@ -199,9 +200,9 @@ class Signals(QWidget):
     # --- how it is put together
 
     def _lay_out(self) -> None:
-        everything, splitter = QVBoxLayout(self), QSplitter()
+        everything, splitter = QVBoxLayout(self), Split(self._theme, NARROW)
         everything.setContentsMargins(MARGIN, MARGIN, MARGIN, 0)
-        everything.addLayout(self.tools.rows)
+        everything.addWidget(self.tools)
         everything.addWidget(splitter, 1)
         left, right = QWidget(splitter), QWidget(splitter)
         left_box, right_box = QVBoxLayout(left), QVBoxLayout(right)
@@ -233,10 +234,6 @@ class Signals(QWidget):
         tools.as_csv.clicked.connect(lambda: self._ask("csv", self.save_csv))
         tools.as_png.clicked.connect(lambda: self._ask("png", self.save_png))
 
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
-        self.tools.fit(self.width() - 2 * MARGIN)
-
     def _build(self) -> None:
         """Make the plots anew; what part of the time is in sight stays."""
         self.area.build(self._seconds, self._window if self.plots else None)
@@ -248,7 +245,7 @@ class Signals(QWidget):
 
     def _restyle(self) -> None:
         self.channels.setIndentation(self._theme.px(10))
-        self.channels.setMinimumWidth(self._theme.px(LIST))
+        self.channels.setMinimumSize(self._theme.px(LIST), self._theme.px(LOW))
         self._build()
 
     # --- curves

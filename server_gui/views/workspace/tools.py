@@ -4,8 +4,8 @@ from collections.abc import Callable, Sequence
 from typing import Final
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QKeySequence, QShortcut
-from PySide6.QtWidgets import QBoxLayout, QComboBox, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtGui import QKeySequence, QResizeEvent, QShortcut
+from PySide6.QtWidgets import QComboBox, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
 from server_gui.views.widgets.elided import ElidedLabel
 from server_gui.views.widgets.plain import set_tip
@@ -14,7 +14,7 @@ SPANS_S: Final = (2, 5, 10, 30, 60, 100)
 
 
 class Tools(QWidget):
-    """Never shown itself: `rows` go into `page`, where the keys hold.
+    """Stand in as many lines as they need; keys hold in all of `page`.
 
     `looked` asks to see so many times of the time, moved by a share of it; `turned` for the event before (−1)
     or after (1); `noted` for a note.
@@ -26,7 +26,7 @@ class Tools(QWidget):
 
     def __init__(self, page: QWidget, menus: Sequence[QPushButton]) -> None:
         super().__init__(page)
-        self.hide()
+        self.setMinimumWidth(1)  # whatever lines they stand in now
         self.span = QComboBox()
         self.span.addItems([f"{seconds} s" for seconds in SPANS_S])
         self.span.setCurrentIndex(SPANS_S.index(10))
@@ -54,28 +54,54 @@ class Tools(QWidget):
         self.note.setToolTip("A note on the time axis, kept in the recording: at the active cursor, or now")
         self.note.clicked.connect(self.noted)
         self.said = ElidedLabel("dim")
-        self._first = QBoxLayout(QBoxLayout.Direction.LeftToRight)
-        self._view = _row((self.span, self.pause, self.follow, self.box, self.cursors))
-        self._first.addLayout(self._view)
-        self._events = _row((self.before, self.next, self.as_csv, self.as_png))
-        self._first.addLayout(self._events)
-        self._first.addStretch(1)
-        self._second = _row((*menus, self.expression, self.trigger, self.note))
-        self._second.addWidget(self.said, 100)
-        self.rows = QVBoxLayout()
-        self.rows.addLayout(self._first)
-        self.rows.addLayout(self._second)
+        view = (self.span, self.pause, self.follow, self.box, self.cursors)
+        events = (self.before, self.next, self.as_csv, self.as_png)
+        self._groups: tuple[Sequence[QWidget], ...] = (
+            (*view, *events),
+            (*menus, self.expression, self.trigger, self.note),
+        )
+        self._lines: list[list[QWidget]] = []
+        rows = QVBoxLayout(self)
+        rows.setContentsMargins(0, 0, 0, 0)
+        self._rows = [QHBoxLayout() for _ in range(sum(map(len, self._groups)))]  # most of them empty
+        for row in self._rows:
+            row.addStretch(1)
+            rows.addLayout(row)
+        self._fit()
         self._keys(page)
 
-    def fit(self, width: int) -> None:
-        """Stand in more rows where the first is wider than this."""
-        wide = sum(row.sizeHint().width() for row in (self._view, self._events))
-        narrow = wide + self._first.spacing() > width
-        direction = QBoxLayout.Direction
-        self._first.setDirection(direction.TopToBottom if narrow else direction.LeftToRight)
-        for row in (self._events, self._second):
-            row.removeWidget(self.said)
-        (self._events if narrow else self._second).addWidget(self.said, 100)
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._fit()
+
+    def _fit(self) -> None:
+        """What is said stands where most room is left."""
+        lines = [line for group in self._groups for line in self._broken(group)]
+        if lines == self._lines:
+            return
+        for row, line in zip(self._rows, self._lines, strict=False):
+            for widget in (*line, self.said):
+                row.removeWidget(widget)
+        self._lines = lines
+        for row, line in zip(self._rows, lines, strict=False):
+            for place, widget in enumerate(line):
+                row.insertWidget(place, widget)
+        widths = [sum(widget.sizeHint().width() for widget in line) for line in lines]
+        shortest = widths.index(min(widths))
+        self._rows[shortest].insertWidget(len(lines[shortest]), self.said, 100)
+
+    def _broken(self, group: Sequence[QWidget]) -> list[list[QWidget]]:
+        """Return these in lines that are not wider than this."""
+        lines: list[list[QWidget]] = [[]]
+        left = width = self.width()
+        for widget in group:
+            needs = widget.sizeHint().width()
+            if needs > left and lines[-1]:
+                lines.append([])
+                left = width
+            lines[-1].append(widget)
+            left -= needs + self._rows[0].spacing()
+        return lines
 
     def _keys(self, page: QWidget) -> None:
         """Keys of this page; the sheet of keys tells them."""
@@ -109,11 +135,3 @@ def _switch(text: str, tip: str) -> QPushButton:
     button.setCheckable(True)
     set_tip(button, tip)
     return button
-
-
-def _row(widgets: Sequence[QWidget]) -> QHBoxLayout:
-    row = QHBoxLayout()
-    for widget in widgets:
-        row.addWidget(widget)
-    row.addStretch(1)
-    return row

@@ -98,12 +98,12 @@ def test_two_edits_that_overlap_say_so_and_share_nothing() -> None:
     assert first.after == [(202 * SECOND, 221 * SECOND)]
     assert len(first.before) == 1  # what came back is not what was before
     assert notes == (
-        f"another edit at {edits[1].utc} ({edits[1].id}, {NAME}) cuts short what is known of after",
+        f"the edit of {NAME} at {edits[1].utc} ({edits[1].id}) leaves fewer cycles after this one",
     )
     second, notes = spell(edits[1], edits)
     assert second.before == [(202 * SECOND, 220 * SECOND)]
     assert second.after == [(222 * SECOND, 231 * SECOND)]
-    assert "of before" in notes[0]
+    assert "before this one" in notes[0]
 
 
 def test_a_trial_that_takes_over_another_is_judged_against_what_it_found() -> None:

@@ -64,7 +64,7 @@ def test_models_are_listed_with_what_they_serve(desk: Desk) -> None:
     assert desk.ask("promote", own.id, "--robot", "exo-01", "--who", "Ada")["now"]["who"] == "Ada"
     shipped, first, second = desk.run("ls").splitlines()[1:]
     assert "shipped, simulated" in shipped
-    assert "where no other does" in shipped
+    assert "by default" in shipped
     assert first.split()[0] == one.id
     assert first.endswith("every robot (unsigned)")
     assert second.endswith("exo-01 (unsigned)")
