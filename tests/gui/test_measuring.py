@@ -104,7 +104,9 @@ def test_what_is_missing_is_missing_and_the_rest_is_measured() -> None:
 # Zoom
 
 
-def test_the_wheel_zooms_every_plot_while_data_go_on(signals: Signals, bench: Bench) -> None:
+def test_the_wheel_zooms_every_plot_while_data_go_on_and_shows_a_part_of_the_past(
+    signals: Signals, bench: Bench
+) -> None:
     first, second = (plot.plot for plot in signals.plots)
     wheel(first, QPointF(place(first, 0.5)), 10)
     left, right = first.window_s
@@ -115,30 +117,20 @@ def test_the_wheel_zooms_every_plot_while_data_go_on(signals: Signals, bench: Be
     signals.refresh()
     assert first.window_s == (left, right), "new rows moved what somebody has zoomed to"
     assert not np.array_equal(picture, first._lines.strip.pixels), "new rows are not drawn"
-
-
-def test_the_zoom_shows_its_part_of_the_past(signals: Signals, bench: Bench) -> None:
-    plot = signals.plots[0].plot
-    plot.show_window(-6.0, -4.0)
+    first.show_window(-6.0, -4.0)
     signals.refresh()
-    strip = plot._lines.strip
+    strip = first._lines.strip
     newest_s = bench.station.rings.times(1.0)[-1]
     assert strip._newest_s == pytest.approx(newest_s - 4.0)
     assert strip._key[1].seconds == pytest.approx(2.0)  # type: ignore[attr-defined]
-    low, high = plot.getViewBox().viewRange()[1]
-    assert low < math.degrees(4.0)
-    assert high > math.degrees(5.98)
+    low, high = first.getViewBox().viewRange()[1]
+    assert low < math.degrees(4.0 + 1.0)
+    assert high > math.degrees(5.98 + 1.0)
 
 
-def test_the_wheel_over_an_axis_zooms_only_that(signals: Signals) -> None:
-    plot = signals.plots[0].plot
-    axis = plot.mapFromScene(plot.getPlotItem().getAxis("left").sceneBoundingRect()).boundingRect().center()
-    wheel(plot, QPointF(axis), 5)
-    assert plot.window_s == (-10.0, 0.0)
-    assert not plot.follows
-
-
-def test_a_box_chooses_what_is_seen_and_fit_takes_it_back(signals: Signals) -> None:
+def test_a_box_chooses_what_is_seen_fit_takes_it_back_and_the_wheel_over_an_axis_zooms_only_that(
+    signals: Signals,
+) -> None:
     plot = signals.plots[0].plot
     signals.box.click()
     viewport = plot.viewport()
@@ -155,6 +147,11 @@ def test_a_box_chooses_what_is_seen_and_fit_takes_it_back(signals: Signals) -> N
     signals.fit.click()
     assert plot.window_s == (-10.0, 0.0)
     assert plot.follows
+    plot = signals.plots[0].plot
+    axis = plot.mapFromScene(plot.getPlotItem().getAxis("left").sceneBoundingRect()).boundingRect().center()
+    wheel(plot, QPointF(axis), 5)
+    assert plot.window_s == (-10.0, 0.0)
+    assert not plot.follows
 
 
 def test_an_export_has_what_is_in_sight(signals: Signals, tmp_path: Path) -> None:
@@ -168,7 +165,9 @@ def test_an_export_has_what_is_in_sight(signals: Signals, tmp_path: Path) -> Non
 # Cursors
 
 
-def test_two_cursors_tell_values_and_their_difference(signals: Signals) -> None:
+def test_two_cursors_tell_values_their_difference_and_statistics_of_what_is_in_sight(
+    signals: Signals,
+) -> None:
     signals.cursors.click()
     signals._move(0, -6.004)
     signals._move(1, -4.0)
@@ -181,6 +180,11 @@ def test_two_cursors_tell_values_and_their_difference(signals: Signals) -> None:
         "°",
     ]
     assert cell(signals.measuring, 1, "B − A") == "0"
+    signals.plots[0].plot.show_window(-2.0, -1.0)
+    title(signals)
+    low, high, mean = (cell(signals.measuring, 0, name) for name in ("Min", "Max", "Mean"))
+    assert (low, high, mean) == tuple(f"{math.degrees(angle):.5g}" for angle in (7.99, 8.99, 8.49))
+    assert cell(signals.measuring, 1, "SD") == "0"
 
 
 def test_names_are_whole_in_a_small_window(signals: Signals) -> None:
@@ -192,17 +196,17 @@ def test_names_are_whole_in_a_small_window(signals: Signals) -> None:
     assert table.columnWidth(0) >= table.fontMetrics().horizontalAdvance(name)
 
 
-def test_statistics_are_of_what_is_in_sight(signals: Signals) -> None:
+def test_a_cursor_is_dragged_or_moved_by_keys_and_the_plot_stays(signals: Signals) -> None:
     signals.cursors.click()
-    signals.plots[0].plot.show_window(-2.0, -1.0)
-    title(signals)
-    low, high, mean = (cell(signals.measuring, 0, name) for name in ("Min", "Max", "Mean"))
-    assert (low, high, mean) == tuple(f"{math.degrees(angle):.5g}" for angle in (7.99, 8.99, 8.49))
-    assert cell(signals.measuring, 1, "SD") == "0"
-
-
-def test_cursors_are_moved_by_keys(signals: Signals) -> None:
-    signals.cursors.click()
+    signals._move(0, -5.0)
+    plot = signals.plots[0].plot
+    viewport = plot.viewport()
+    QTest.mousePress(viewport, Qt.MouseButton.LeftButton, pos=place(plot, 0.5))
+    QTest.mouseMove(viewport, place(plot, 0.3))
+    QTest.mouseRelease(viewport, Qt.MouseButton.LeftButton, pos=place(plot, 0.3))
+    assert signals._at[0] == pytest.approx(-7.0, abs=0.1)
+    assert plot.window_s == (-10.0, 0.0)
+    assert plot.follows
     assert signals.measuring.isVisible()
     signals._move(1, -2.0)
     signals._move(0, -5.0)
@@ -214,19 +218,6 @@ def test_cursors_are_moved_by_keys(signals: Signals) -> None:
     ):
         QTest.keyClick(signals.measuring, key, modifier)
     assert title(signals).startswith("A −4.990 s ▸ B −2.110 s Δt +2.880 s")
-
-
-def test_a_cursor_is_dragged_and_the_plot_stays(signals: Signals) -> None:
-    signals.cursors.click()
-    signals._move(0, -5.0)
-    plot = signals.plots[0].plot
-    viewport = plot.viewport()
-    QTest.mousePress(viewport, Qt.MouseButton.LeftButton, pos=place(plot, 0.5))
-    QTest.mouseMove(viewport, place(plot, 0.3))
-    QTest.mouseRelease(viewport, Qt.MouseButton.LeftButton, pos=place(plot, 0.3))
-    assert signals._at[0] == pytest.approx(-7.0, abs=0.1)
-    assert plot.window_s == (-10.0, 0.0)
-    assert plot.follows
 
 
 def test_a_paused_view_is_measured_as_it_stands(signals: Signals, bench: Bench) -> None:
