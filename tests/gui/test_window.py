@@ -141,6 +141,7 @@ def luminance(colour: str) -> float:
 def test_a_window_without_room_has_its_panels_behind_each_other_and_gives_them_back(
     window: MainWindow, bench: Bench, theme: Theme
 ) -> None:
+    window.setUpdatesEnabled(True)  # its layouts come to rest as it is painted
     window.resize(1366, 768)
     bench.draw(window)
     before = [dock.geometry() for dock in window.docks]
