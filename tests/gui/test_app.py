@@ -99,13 +99,13 @@ def test_processes_and_objects_are_asked_for_only_while_they_are_looked_at(
     wait(lambda: page.count.text() == f"{len(OBJECTS)} objects, {len(OBJECTS)} read", "said so")
     app.window.tabs.setCurrentIndex(0)
     app.window.refresh()
-    asked = len(robot.called("object.read"))
+    reads = len(robot.called("object.read"))
     rows = app.desk.stations[0].rings.newest_ns
     wait(
         lambda: (app.desk.stations[0].rings.newest_ns or 0) > (rows or 0) + 1_500_000_000,
         "went on for a while",
     )
-    assert len(robot.called("object.read")) <= asked + 1, "what was under way"
+    assert len(robot.called("object.read")) <= reads + 1, "what was under way"
 
 
 def test_robots_are_added_and_left_while_the_window_runs_and_come_back_by_the_names_that_the_user_gave(
