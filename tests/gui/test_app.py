@@ -57,22 +57,25 @@ def test_a_value_goes_from_the_table_to_the_robot_on_trial_and_back_and_a_wrong_
     assert robot.parameters["gait.step_length"] == 0.4
 
 
-def test_stop_is_not_confirmed_without_a_robot_and_is_by_one_that_comes_back(
-    app: App, robot: FakeRobot
-) -> None:
-    """Which is followed again; control was lost meanwhile."""
+def test_stop_is_confirmed_by_the_robot_and_not_confirmed_without_one(app: App, robot: FakeRobot) -> None:
+    station = app.desk.stations[0]
+    QTest.mousePress(app.window.header.stop, Qt.MouseButton.LeftButton)
+    wait(lambda: station.stopping.state is StopState.CONFIRMED, "confirmed the stop")
+    robot.refuse()
+    wait(lambda: not station.is_linked, "lost the link")
+    app.stop("test")
+    wait(lambda: station.stopping.state is StopState.NOT_CONFIRMED, "said that it was not confirmed")
+
+
+def test_a_robot_that_comes_back_is_followed_again_and_control_was_lost(app: App, robot: FakeRobot) -> None:
     station = app.desk.stations[0]
     station.take_control()
     wait(lambda: station.control.left_s() is not None, "had control")
     robot.refuse()
     wait(lambda: not station.is_linked and station.robot.is_stale(), "was stale")
     assert station.control.left_s() is None
-    app.stop("test")
-    wait(lambda: station.stopping.state is StopState.NOT_CONFIRMED, "said that it was not confirmed")
     robot.listen()
     wait(lambda: station.is_linked and not station.robot.is_stale(), "was live again")
-    QTest.mousePress(app.window.header.stop, Qt.MouseButton.LeftButton)
-    wait(lambda: station.stopping.state is StopState.CONFIRMED, "confirmed the stop")
 
 
 def test_processes_and_objects_are_asked_for_only_while_they_are_looked_at(
