@@ -25,7 +25,7 @@ from server_gui.views.models.panel import ModelsPage
 from server_gui.views.pace import SLOW
 from server_gui.views.recordings.panel import Recordings
 from server_gui.views.theme import Theme
-from tests.gui.fakes import Bench, destroy, draw_frames
+from tests.gui.fakes import Bench, destroy, draw_frames, leave_unpainted
 from tests.gui.foreseen import predicted
 from tests.gui.running import wait
 from tests.support.commissioning import Played
@@ -94,6 +94,7 @@ def full_window(
     made = MainWindow(bench.desk, theme, kept, archive, played.model)
     made.resize(USUAL)
     made.resize(1480, 900)
+    leave_unpainted(made)
     made.show()
     yield made
     destroy(made)

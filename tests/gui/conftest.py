@@ -27,7 +27,7 @@ from tests.gui.archives import (  # noqa: F401  # fixtures, for every test here
     shown,
     whole,
 )
-from tests.gui.fakes import Around, Bench, Parts, destroy
+from tests.gui.fakes import Around, Bench, Parts, destroy, leave_unpainted
 from tests.support.desk import described, looked
 
 
@@ -101,6 +101,7 @@ def window(qt: QApplication, theme: Theme, bench: Bench, tmp_path: Path) -> Iter
     kept = QSettings(str(tmp_path / "kept.ini"), QSettings.Format.IniFormat)
     made = MainWindow(bench.desk, theme, kept)
     made.resize(USUAL)  # the screen of no display is small
+    leave_unpainted(made)
     made.show()
     bench.draw(made)
     yield made

@@ -1,7 +1,7 @@
 """What no picture of the window may show: green for the unknown, half a number, a control out of reach."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from PySide6.QtCore import QModelIndex, Qt
 from PySide6.QtGui import QColor, QFontMetrics
@@ -31,9 +31,23 @@ QTS_OWN = ("qt_", "ScrollLeftButton", "ScrollRightButton")  # parts of other con
 
 def seen(window: QWidget) -> Iterator[QWidget]:
     """Everything of which something is on the screen."""
-    for widget in window.findChildren(QWidget):
-        if widget.isVisible() and not widget.visibleRegion().isEmpty():
-            yield widget
+    return (widget for widget in shown(window) if not widget.visibleRegion().isEmpty())
+
+
+def shown(window: QWidget) -> Iterator[QWidget]:
+    """Everything that is not hidden, also what is scrolled out of sight."""
+    return (widget for widget in window.findChildren(QWidget) if widget.isVisible())
+
+
+def broken(window: QWidget) -> Iterator[str]:
+    """Every rule that is not kept, but for what is green, by one look at all that is shown."""
+    every = list(shown(window))
+    sight = [widget for widget in every if not widget.visibleRegion().isEmpty()]
+    yield from (f"half a number: {one}" for one in halved_numbers(window, sight))
+    yield from (f"out of reach: {one}" for one in out_of_reach(window, every))
+    yield from (f"nameless: {one}" for one in nameless(window, every))
+    yield from (f"no room for: {one}" for one in cut_words(window, sight))
+    yield from (f"no room for the title: {one}" for one in cut_titles(window, sight))
 
 
 def green(window: QWidget, theme: Theme) -> list[str]:
@@ -59,10 +73,10 @@ def green(window: QWidget, theme: Theme) -> list[str]:
     return found
 
 
-def halved_numbers(window: QWidget) -> list[str]:
+def halved_numbers(window: QWidget, sight: Iterable[QWidget] | None = None) -> list[str]:
     """Every number of which a digit is missing for want of room."""
     found = []
-    for widget in seen(window):
+    for widget in seen(window) if sight is None else sight:
         if (
             isinstance(widget, QLabel)
             and _has_number(widget)
@@ -81,11 +95,11 @@ def halved_numbers(window: QWidget) -> list[str]:
     return found
 
 
-def cut_words(window: QWidget) -> list[str]:
+def cut_words(window: QWidget, sight: Iterable[QWidget] | None = None) -> list[str]:
     """Every text of several lines of which some have no room."""
     return [
         f"{_path(label)}: {label.text()}"
-        for label in seen(window)
+        for label in (seen(window) if sight is None else sight)
         if isinstance(label, QLabel)
         and label.wordWrap()
         and label.text()
@@ -93,34 +107,34 @@ def cut_words(window: QWidget) -> list[str]:
     ]
 
 
-def cut_titles(window: QWidget) -> list[str]:
+def cut_titles(window: QWidget, sight: Iterable[QWidget] | None = None) -> list[str]:
     """Every title of a column of which letters have no room."""
     across = Qt.Orientation.Horizontal
     return [
         f"{_path(header)}: {header.model().headerData(place, across)}"
-        for header in seen(window)
+        for header in (seen(window) if sight is None else sight)
         if isinstance(header, QHeaderView) and header.orientation() is across
         for place in range(header.count())
         if not header.isSectionHidden(place) and header.sectionSize(place) < _title_wide(header, place)
     ]
 
 
-def out_of_reach(window: QWidget) -> list[str]:
+def out_of_reach(window: QWidget, every: Iterable[QWidget] | None = None) -> list[str]:
     """Every control that is not whole on the screen, and to which nothing scrolls."""
     found = []
-    for widget in window.findChildren(QWidget):
-        if not widget.isVisible() or not widget.focusPolicy() & Qt.FocusPolicy.TabFocus:
+    for widget in shown(window) if every is None else every:
+        if not widget.focusPolicy() & Qt.FocusPolicy.TabFocus:
             continue
         if not _is_inside(widget, window) and not _is_scrolled(widget) and not _is_behind(widget):
             found.append(f"{_path(widget)} at {widget.mapTo(window, widget.rect().topLeft()).toTuple()}")
     return found
 
 
-def nameless(window: QWidget) -> list[str]:
+def nameless(window: QWidget, every: Iterable[QWidget] | None = None) -> list[str]:
     """Every place where Tab stops without a word of what it is."""
     found = []
-    for widget in window.findChildren(QWidget):
-        if not widget.isVisible() or not widget.isEnabled():
+    for widget in shown(window) if every is None else every:
+        if not widget.isEnabled():
             continue
         if not widget.focusPolicy() & Qt.FocusPolicy.TabFocus or widget.objectName().startswith(QTS_OWN):
             continue

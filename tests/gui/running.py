@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QApplication
 from server_gui.app import FOLLOWING, App
 from server_gui.core.desk.feeds import Record
 from server_gui.core.settings.server_file import ServerSettings
-from tests.gui.fakes import destroy
+from tests.gui.fakes import destroy, leave_unpainted
 from tests.support.waiting import until
 
 FRAME_MS = 120  # rather than 33: to draw all the time leaves little to what is waited for
@@ -23,6 +23,7 @@ def running(
     """The window of these robots, shown."""
     with App(qt, settings, kept, FOLLOWING, record) as app:
         app._timer.setInterval(FRAME_MS)
+        leave_unpainted(app.window)
         app.window.show()
         yield app
         app.window.hide()

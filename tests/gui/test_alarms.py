@@ -141,14 +141,17 @@ def test_nothing_that_is_clicked_moves_while_alarms_come_and_go(
         assert stop_is_whole(window)
 
 
-def test_what_may_be_done_is_whole_in_the_list_beside_panels_and_with_large_text(
+def test_what_to_check_is_on_the_strip_and_what_may_be_done_whole_in_the_list_with_large_text(
     theme: Theme, window: MainWindow, bench: Bench
 ) -> None:
     theme.set(scale=1.5)
     window.resize(1024, 700)
-    window.show()
     fault(bench)
     settle(window, bench)
+    assert "0x2310" in window.alarms.headline.text()
+    assert "→ check that" in window.alarms.details.text()
+    assert is_whole(window.alarms.headline)
+    assert is_whole(window.alarms.details)
     window.panels_button.click()
     settle(window, bench)
     window.alarms.list.turn()
@@ -159,15 +162,17 @@ def test_what_may_be_done_is_whole_in_the_list_beside_panels_and_with_large_text
         assert button.visibleRegion().boundingRect() == button.rect(), button.text()
 
 
-def test_the_joint_table_is_whole_beside_an_alarm(window: MainWindow, bench: Bench) -> None:
+@pytest.mark.parametrize(("width", "height"), [(1024, 700), (1366, 768), (1920, 1080)])
+def test_the_joint_table_is_whole_beside_an_alarm(
+    window: MainWindow, bench: Bench, width: int, height: int
+) -> None:
     fault(bench)
     bench.station.take_prediction(predicted("steady", {"steady": 0.99, "fall": 0.01}, "falling"))
-    for size in ((1024, 700), (1366, 768), (1920, 1080)):
-        window.resize(*size)
-        settle(window, bench)
-        table = window.tabs.overview.findChild(JointTable)
-        assert isinstance(table, JointTable)
-        assert table.visibleRegion().boundingRect().height() == table.height(), size
+    window.resize(width, height)
+    settle(window, bench)
+    table = window.tabs.overview.findChild(JointTable)
+    assert isinstance(table, JointTable)
+    assert table.visibleRegion().boundingRect().height() == table.height()
 
 
 def test_without_an_alarm_the_strip_says_so_where_that_is_known(around: Around, bench: Bench) -> None:
@@ -190,24 +195,11 @@ def test_a_headline_is_whole_when_the_text_has_grown(window: MainWindow, bench: 
         assert headline.visibleRegion().boundingRect().height() == headline.height(), scale
         rows = opened(window, bench)
         assert rows, scale
+        settle(window, bench)
         for row in rows:
-            settle(window, bench)
             assert is_whole(row.headline), scale
             assert is_whole(row.details), scale
         window.alarms.more.click()  # it is closed again
-
-
-def test_what_to_check_is_on_the_strip_also_where_there_is_little_room(
-    window: MainWindow, bench: Bench, theme: Theme
-) -> None:
-    window.resize(1024, 700)
-    theme.set(scale=1.5)
-    fault(bench)
-    settle(window, bench)
-    assert "0x2310" in window.alarms.headline.text()
-    assert "→ check that" in window.alarms.details.text()
-    assert is_whole(window.alarms.headline)
-    assert is_whole(window.alarms.details)
 
 
 def test_while_the_list_is_open_no_row_moves(around: Around, bench: Bench) -> None:
@@ -323,28 +315,9 @@ def test_events_of_the_only_robot_do_not_spend_their_room_on_its_name(around: Ar
     assert said(len(around.events.pinned) + 1) != "recording: the disk is full"
 
 
-def test_a_fault_is_cleared_after_a_question_and_enables_nothing(window: MainWindow, bench: Bench) -> None:
-    fault(bench)
-    bench.draw(window)
-    window.alarms.buttons.clear.click()
-    assert bench.first.named("reset") == [], "nothing is done before it is answered"
-    asked = question(window)
-    assert QApplication.activeModalWidget() is None, "STOP would be out of reach"
-    assert "None is enabled" in asked.words.text()
-    asked.act.click()
-    assert [name for name, _ in bench.first.asked if name != "show_processes"] == ["reset"]
-
-
-def test_a_question_names_the_drives_that_lose_their_torque(window: MainWindow, bench: Bench) -> None:
-    fault(bench)
-    now_ns = time.monotonic_ns()
-    bench.station.take([telemetry([now_ns + 2], {"right_hip.state": [4.0]}, now_ns)])
-    bench.draw(window)
-    window.alarms.buttons.clear.click()
-    assert "STILL ENABLED, and without torque then: right hip" in question(window).words.text()
-
-
-def test_the_signal_of_a_fault_is_shown_around_its_instant(window: MainWindow, bench: Bench) -> None:
+def test_the_signal_of_a_fault_is_shown_and_it_is_cleared_after_a_question_that_says_who_loses_torque(
+    window: MainWindow, bench: Bench
+) -> None:
     fault(bench)
     bench.draw(window)
     window.alarms.buttons.show_signal.click()
@@ -354,6 +327,17 @@ def test_the_signal_of_a_fault_is_shown_around_its_instant(window: MainWindow, b
     left, right = window.tabs.signals.plots[0].plot.window_s
     assert -8.0 < left <= -5.0
     assert right <= 0.0
+    now_ns = time.monotonic_ns()
+    bench.station.take([telemetry([now_ns + 2], {"right_hip.state": [4.0]}, now_ns)])
+    bench.draw(window)
+    window.alarms.buttons.clear.click()
+    assert bench.first.named("reset") == [], "nothing is done before it is answered"
+    asked = question(window)
+    assert QApplication.activeModalWidget() is None, "STOP would be out of reach"
+    assert "None is enabled" in asked.words.text()
+    assert "STILL ENABLED, and without torque then: right hip" in asked.words.text()
+    asked.act.click()
+    assert [name for name, _ in bench.first.asked if name != "show_processes"] == ["reset"]
 
 
 def test_what_is_acknowledged_is_one_line_until_it_is_over(around: Around, bench: Bench) -> None:
@@ -394,10 +378,15 @@ def test_the_result_of_a_stop_leaves_the_alarms_in_sight(around: Around, bench: 
     assert len(around.alarms.texts) == 2
 
 
-def test_a_held_stop_is_reset_after_a_question_about_that_robot(window: MainWindow, bench: Bench) -> None:
+def test_a_held_stop_is_reset_after_a_question_about_that_robot_once_it_is_answered(
+    window: MainWindow, bench: Bench
+) -> None:
     bench.station.stop("test")
     bench.first.answer(Stopped(dict.fromkeys(JOINTS, "confirmed"), held=True))
     bench.draw(window)
+    window.header.reset_button.click()
+    QTest.keyClick(question(window), Qt.Key.Key_Escape)
+    assert bench.first.named("reset") == []
     window.header.reset_button.click()
     asked = question(window)
     assert "exo-01" in asked.windowTitle()
@@ -413,14 +402,6 @@ def test_a_held_stop_is_reset_after_a_question_about_that_robot(window: MainWind
     assert any("to go on: enable the drives" in text for text in window.alarms.texts)
 
 
-def test_a_question_that_is_not_answered_does_nothing(window: MainWindow, bench: Bench) -> None:
-    bench.station.stopping.held = True
-    bench.draw(window)
-    window.header.reset_button.click()
-    QTest.keyClick(question(window), Qt.Key.Key_Escape)
-    assert bench.first.named("reset") == []
-
-
 def test_each_stop_names_its_robot_and_all_says_all(around: Around, bench: Bench) -> None:
     other = bench.add("a-robot-with-quite-a-long-name-of-its-own", 7421)
     other.is_named = True
@@ -433,9 +414,11 @@ def test_each_stop_names_its_robot_and_all_says_all(around: Around, bench: Bench
     assert around.robots.all_stop.text() == "STOP  ALL"
 
 
-def test_a_robot_is_removed_after_a_question(window: MainWindow, bench: Bench) -> None:
+def test_a_robot_is_chosen_by_keyboard_and_removed_after_a_question(window: MainWindow, bench: Bench) -> None:
     other = bench.add("exo-02", 7421)
     bench.draw(window)
+    QTest.keyClick(window.robots.cards[1], Qt.Key.Key_Return)
+    assert bench.desk.selected is other
     removed: list[object] = []
     window.removed.connect(removed.append)
     window.robots.cards[1].remove.click()

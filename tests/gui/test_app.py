@@ -35,7 +35,9 @@ def app(qt: QApplication, robot: FakeRobot, tmp_path: Path) -> Iterator[App]:
         yield made
 
 
-def test_a_value_goes_from_the_table_to_the_robot_on_trial_and_back(app: App, robot: FakeRobot) -> None:
+def test_a_value_goes_from_the_table_to_the_robot_on_trial_and_back_and_a_wrong_one_is_refused(
+    app: App, robot: FakeRobot
+) -> None:
     station = app.desk.stations[0]
     wait(lambda: not station.robot.is_stale(), "saw live data")
     app.window.parameters.stage_text("gait.step_length", "430")
@@ -47,6 +49,11 @@ def test_a_value_goes_from_the_table_to_the_robot_on_trial_and_back(app: App, ro
     wait(lambda: station.robot.parameters["gait.step_length"].value == 0.43, "saw the new value")
     station.end_trial()
     wait(lambda: station.writing.trial is None, "went back")
+    assert robot.parameters["gait.step_length"] == 0.4
+    station.edits.stage("gait.step_length", 9.0, station.robot.parameters["gait.step_length"])
+    station.write(station.difference(app.desk.shown.units))
+    wait(lambda: station.writing.state is WriteState.FAILED, "was refused")
+    assert "above 0.6" in station.writing.text
     assert robot.parameters["gait.step_length"] == 0.4
 
 
@@ -71,25 +78,15 @@ def test_a_robot_that_comes_back_is_followed_again_and_control_was_lost(app: App
     wait(lambda: station.is_linked and not station.robot.is_stale(), "was live again")
 
 
-def test_a_refused_write_leaves_the_robot_as_it_is(app: App, robot: FakeRobot) -> None:
-    station = app.desk.stations[0]
-    station.edits.stage("gait.step_length", 9.0, station.robot.parameters["gait.step_length"])
-    station.write(station.difference(app.desk.shown.units))
-    wait(lambda: station.writing.state is WriteState.FAILED, "was refused")
-    assert "above 0.6" in station.writing.text
-    assert robot.parameters["gait.step_length"] == 0.4
-
-
-def test_processes_are_asked_for_only_while_they_are_looked_at(app: App, robot: FakeRobot) -> None:
-    """But for the one that uses most, which costs a hundredth of the table's bytes."""
+def test_processes_and_objects_are_asked_for_only_while_they_are_looked_at(
+    app: App, robot: FakeRobot
+) -> None:
+    """But for the process that uses most, which costs a hundredth of the table's bytes."""
     wait(lambda: bool(robot.called("resource.snapshot")), "looked at the computer")
     asked = [params for params in robot.called("resource.snapshot") if params.get("processes", True)]
     assert [params for params in asked if params.get("limit") != 1 or params["include"]] == []
     app.window.tabs.setCurrentIndex(2)
     wait(lambda: app.window.tabs.resources.table.processes.rowCount() == 12, "showed the processes")
-
-
-def test_objects_are_asked_for_only_while_they_are_looked_at(app: App, robot: FakeRobot) -> None:
     told = msgspec.to_builtins(ObjectList("left_knee", list(OBJECTS)))
     robot.overrides["object.list"] = lambda _params: told
     robot.overrides["object.read"] = lambda params: {
@@ -105,52 +102,37 @@ def test_objects_are_asked_for_only_while_they_are_looked_at(app: App, robot: Fa
     wait(lambda: page.count.text() == f"{len(OBJECTS)} objects, {len(OBJECTS)} read", "said so")
     app.window.tabs.setCurrentIndex(0)
     app.window.refresh()
-    asked = len(robot.called("object.read"))
+    reads = len(robot.called("object.read"))
     rows = app.desk.stations[0].rings.newest_ns
     wait(
         lambda: (app.desk.stations[0].rings.newest_ns or 0) > (rows or 0) + 1_500_000_000,
         "went on for a while",
     )
-    assert len(robot.called("object.read")) <= asked + 1, "what was under way"
+    assert len(robot.called("object.read")) <= reads + 1, "what was under way"
 
 
-def test_a_robot_is_added_while_the_window_runs(app: App, robot: FakeRobot) -> None:
-    with FakeRobot() as other:
-        app.window.added.emit(other.address)
-        wait(lambda: app.desk.stations[1].is_linked, "followed the other")
-        assert app.desk.selected is app.desk.stations[0]
-        other.refuse()
-        wait(lambda: not app.desk.stations[1].is_linked, "lost the other")
-        assert app.desk.stations[0].is_linked
-
-
-def test_a_robot_is_left_while_the_window_runs_and_can_come_back(app: App, robot: FakeRobot) -> None:
-    with FakeRobot() as other:
-        app.window.added.emit(other.address)
-        wait(lambda: app.desk.stations[1].is_linked, "followed the other")
-        app.window.removed.emit(app.desk.stations[1])
-        wait(lambda: len(app.window.robots.cards) == 1, "left the other")
-        assert other.called("robot.stop") == []
-        app.window.added.emit(other.address)
-        wait(lambda: app.desk.stations[1].is_linked, "followed the other again")
-    assert app.desk.stations[0].is_linked
-
-
-def test_robots_that_call_themselves_alike_keep_the_names_that_the_user_gave(
+def test_robots_are_added_and_left_while_the_window_runs_and_come_back_by_the_names_that_the_user_gave(
     app: App, robot: FakeRobot
 ) -> None:
     """Also when one is removed, and added again by its address alone."""
     with FakeRobot() as other:
         app.window.added.emit(f"second={other.address}")
         wait(lambda: app.desk.stations[1].is_linked, "followed the other")
+        assert app.desk.selected is app.desk.stations[0]
         for station in app.desk.stations[:]:
             title, address = station.title, station.address
             app.window.removed.emit(station)
+            wait(lambda: len(app.window.robots.cards) == 1, "left it")
+            assert other.called("robot.stop") == robot.called("robot.stop") == []
             app.window.added.emit(address)
             wait(lambda: app.desk.stations[-1].is_linked, "followed it again")
             assert app.desk.stations[-1].title == title
         assert len({station.called for station in app.desk}) == 1
         assert "second" in [station.title for station in app.desk]
+        (second,) = (station for station in app.desk if station.title == "second")
+        other.refuse()
+        wait(lambda: not second.is_linked, "lost the other")
+    assert all(station.is_linked for station in app.desk if station is not second)
 
 
 def test_the_simulator_that_is_offered_at_first_walks_in_the_window(qt: QApplication, tmp_path: Path) -> None:

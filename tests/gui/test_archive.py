@@ -74,7 +74,7 @@ def test_recordings_can_be_looked_at_without_a_robot(
     assert full_window.empty.isVisible()
 
 
-def test_playback_is_marked_and_never_mixed_with_what_is_live(
+def test_playback_is_marked_never_mixed_with_what_is_live_and_shows_what_was_predicted_then(
     whole: Shown, full_window: MainWindow, archive: Archive, settings: ServerSettings, bench: Bench
 ) -> None:
     record(settings)
@@ -97,15 +97,6 @@ def test_playback_is_marked_and_never_mixed_with_what_is_live(
     bench.first.answer(Stopped({"left_knee": "confirmed"}, True))
     assert bench.station.stopping.state is StopState.CONFIRMED
     assert played.stopping.state is StopState.IDLE
-
-
-def test_playback_shows_what_was_predicted_then_and_nothing_where_nothing_was(
-    whole: Shown, full_window: MainWindow, archive: Archive, settings: ServerSettings, bench: Bench
-) -> None:
-    record(settings)
-    play(whole, archive)
-    tape, player = archive.playback.tape, full_window.tabs.recordings.player
-    assert tape is not None
     archive.playback.seek(tape.first_ns + SECONDS * 10**9 // 4)
     whole.until(lambda: player.banner.text().endswith(" · predicted then: Walk 94 %"), "showed it")
     lines, activity = player.overview.status_lines, player.overview.now.activity
@@ -131,8 +122,8 @@ def test_the_audit_shows_the_journal_of_a_robot_that_is_away(
     assert "exo-07: collected were 1 entry" in full_window.tabs.audit.verdict.text()
 
 
-def test_the_bar_of_time_is_used_by_keys_and_by_mouse(
-    shown: Shown, archive: Archive, settings: ServerSettings
+def test_the_bar_of_time_is_used_by_keys_and_by_mouse_and_a_span_exported_in_the_background(
+    shown: Shown, archive: Archive, settings: ServerSettings, tmp_path: Path
 ) -> None:
     record(settings)
     play(shown, archive)
@@ -157,6 +148,17 @@ def test_the_bar_of_time_is_used_by_keys_and_by_mouse(
     QTest.keyClick(timeline, Qt.Key.Key_Space)
     assert playback.playing
     assert (clock_text(3725.04, 1), clock_text(11.98, 1)) == ("1:02:05.0", "0:12.0")
+    playback.play(False)
+    player, tape = shown.window.tabs.recordings.player, archive.playback.tape
+    assert tape is not None
+    player.timeline.choose(tape.first_ns + 2 * 10**9, tape.first_ns + 4 * 10**9)
+    player.export_to("csv", tmp_path / "walk.csv")
+    job = archive.jobs.jobs[0]
+    shown.until(lambda: job.is_over, "exported it")
+    assert job.state is JobState.DONE
+    assert len((tmp_path / "walk.csv").read_text().splitlines()) == 1 + 2 * RATE_HZ
+    shown.open("Cloud")
+    assert cell(shown, 2).endswith("walk.csv: 100 rows")
 
 
 def test_a_span_is_labelled_a_contradiction_is_refused_and_a_label_taken_back(
@@ -189,41 +191,6 @@ def test_a_span_is_labelled_a_contradiction_is_refused_and_a_label_taken_back(
     shown.until(lambda: not archive.labels.labels, "took it back")
 
 
-def test_the_chosen_span_is_exported_in_the_background(
-    shown: Shown, archive: Archive, settings: ServerSettings, tmp_path: Path
-) -> None:
-    record(settings)
-    play(shown, archive)
-    player, tape = shown.window.tabs.recordings.player, archive.playback.tape
-    assert tape is not None
-    player.timeline.choose(tape.first_ns + 2 * 10**9, tape.first_ns + 4 * 10**9)
-    player.export_to("csv", tmp_path / "walk.csv")
-    job = archive.jobs.jobs[0]
-    shown.until(lambda: job.is_over, "exported it")
-    assert job.state is JobState.DONE
-    assert len((tmp_path / "walk.csv").read_text().splitlines()) == 1 + 2 * RATE_HZ
-    shown.open("Cloud")
-    assert cell(shown, 2).endswith("walk.csv: 100 rows")
-
-
-def test_everything_that_can_be_reached_has_a_name(
-    shown: Shown, archive: Archive, settings: ServerSettings
-) -> None:
-    record(settings)
-    play(shown, archive)
-    assert shown.window.tabs.recordings.changed is not None  # made now
-    nameless = [
-        f"{type(widget).__name__} {widget.objectName()}"
-        for tab in (shown.window.tabs.recordings, shown.window.tabs.cloud)
-        for widget in tab.findChildren(QWidget)
-        if isinstance(widget, QAbstractButton | QLineEdit)
-        and widget.focusPolicy() & Qt.FocusPolicy.TabFocus
-        and not (widget.accessibleName() or (isinstance(widget, QAbstractButton) and widget.text()))
-        and not isinstance(widget.parent(), QComboBox)
-    ]
-    assert nameless == []
-
-
 def test_the_controls_of_the_player_stay_in_sight_at_every_size(
     whole: Shown, full_window: MainWindow, archive: Archive, settings: ServerSettings, theme: Theme
 ) -> None:
@@ -249,7 +216,7 @@ def test_the_controls_of_the_player_stay_in_sight_at_every_size(
         assert seen >= theme.px(20), "what is labelled is not seen"
 
 
-def test_both_tabs_are_drawn_dark_and_light(
+def test_both_tabs_are_drawn_dark_and_light_and_everything_in_reach_has_a_name(
     shown: Shown, archive: Archive, settings: ServerSettings, theme: Theme
 ) -> None:
     record(settings)
@@ -265,6 +232,17 @@ def test_both_tabs_are_drawn_dark_and_light(
             seen = {image.pixel(x, y) for x, y in places}
             assert len(seen) > 40
             assert theme.colour("card").rgb() in seen
+    assert shown.window.tabs.recordings.changed is not None  # made now
+    nameless = [
+        f"{type(widget).__name__} {widget.objectName()}"
+        for tab in (shown.window.tabs.recordings, shown.window.tabs.cloud)
+        for widget in tab.findChildren(QWidget)
+        if isinstance(widget, QAbstractButton | QLineEdit)
+        and widget.focusPolicy() & Qt.FocusPolicy.TabFocus
+        and not (widget.accessibleName() or (isinstance(widget, QAbstractButton) and widget.text()))
+        and not isinstance(widget.parent(), QComboBox)
+    ]
+    assert nameless == []
 
 
 def test_what_a_recording_began_with_is_in_the_window_s_units(archive: Archive, bench: Bench) -> None:

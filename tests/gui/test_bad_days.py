@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PySide6.QtCore import QSettings
-from PySide6.QtWidgets import QApplication, QFileDialog, QMessageBox
+from PySide6.QtWidgets import QApplication, QFileDialog, QMessageBox, QWidget
 
 from gateway.client import ConnectionState
 from gateway.wire.component import LayoutInfo
@@ -17,9 +17,13 @@ from server_gui.core.follow.events import LinkChanged
 from server_gui.core.follow.news import NewsKind
 from server_gui.core.settings.server_file import ServerSettings, add_robots
 from server_gui.views.frame.main_window import MainWindow
+from server_gui.views.overview.page import Overview
+from server_gui.views.pace import SLOW
+from server_gui.views.theme import Theme
 from server_gui.views.widgets.files import ask_open, ask_save
+from server_gui.views.workspace.page import Signals
 from tests.fake_robot import FakeRobot
-from tests.gui.fakes import Bench
+from tests.gui.fakes import Around, Bench, destroy
 from tests.gui.running import running, wait
 from tests.support.desk import HELD, described, looked, telemetry, walking
 
@@ -65,22 +69,22 @@ def test_a_robot_that_was_gone_for_an_hour_says_so_and_is_live_again(
 
 
 def test_two_robots_with_one_name_are_told_apart_wherever_they_are_named(
-    window: MainWindow, bench: Bench
+    around: Around, bench: Bench
 ) -> None:
     other = bench.add("second", 7421)
     other.take([described("exo-01")])
-    bench.draw(window)
-    assert [card.texts[0] for card in window.robots.cards] == [
+    bench.draw(around)
+    assert [card.texts[0] for card in around.robots.cards] == [
         "exo-01 at 127.0.0.1:7420",
         "exo-01 at 127.0.0.1:7421",
     ]
-    assert window.header.stop.text() == "STOP  exo-01 at 127.0.0.1:7420"
+    assert around.header.stop.text() == "STOP  exo-01 at 127.0.0.1:7420"
     assert bench.desk.news.items[0].robot == "exo-01 at 127.0.0.1:7421"
     assert "give one another [robot] name" in bench.desk.news.items[0].text
-    window.header.stop.pressed.emit()
+    around.header.stop.pressed.emit()
     other.take([described("exo-02")])
-    bench.draw(window)
-    assert window.header.stop.text() == "STOP  exo-01"
+    bench.draw(around)
+    assert around.header.stop.text() == "STOP  exo-01"
 
 
 @pytest.fixture
@@ -145,19 +149,29 @@ def test_parameters_that_a_new_firmware_no_longer_has_go_with_what_was_to_be_wri
     assert any("gait.trunk_angle is not undone" in text for text in said(bench, NewsKind.WARNING))
 
 
-def test_an_insole_that_nobody_describes_is_said_to_be_drawn_in_order(
-    window: MainWindow, bench: Bench
-) -> None:
+def test_an_insole_that_nobody_describes_is_said_to_be_drawn_in_order(theme: Theme, bench: Bench) -> None:
     bench.station.take([described(cells=7), walking(20, -HOUR_S, cells=7)])  # not stale within this test
+    overview = Overview(bench.desk, theme)
+    overview.resize(1000, 800)
+    overview.show()
+
+    def note() -> str:
+        overview.read_now()
+        overview.refresh()
+        return overview.notes[2]
+
     order = "7 cells in their order: the robot does not say where they are"
-    shown(window, lambda: window.tabs.overview.notes[2].startswith(order), "said that nobody describes it")
+    wait(lambda: note().startswith(order), "said that nobody describes it")
     bench.station.take(
         [described(cells=7, layout=LayoutInfo("seven", [(0.03 * n, 0.0, 1e-3) for n in range(7)]))]
     )
-    shown(window, lambda: window.tabs.overview.notes[2] == "7 cells, seven", "took the layout")
+    wait(lambda: note() == "7 cells, seven", "took the layout")
+    destroy(overview)
 
 
-def test_what_is_asked_about_files_stands_in_nobody_s_way(window: MainWindow, tmp_path: Path) -> None:
+def test_what_is_asked_about_files_stands_in_nobody_s_way(qt: QApplication, tmp_path: Path) -> None:
+    window = QWidget()
+    window.show()
     path, chosen = tmp_path / "walk.csv", list[Path]()
     path.write_text("before", encoding="utf-8")
     dialogs = [
@@ -176,16 +190,18 @@ def test_what_is_asked_about_files_stands_in_nobody_s_way(window: MainWindow, tm
     assert chosen == [path]
     for dialog in dialogs:
         dialog.close()
+    destroy(window)
 
 
 @pytest.mark.parametrize("kind", ["csv", "png"])
 def test_a_full_disk_keeps_the_export_that_was_there_and_says_so(
-    window: MainWindow, bench: Bench, tmp_path: Path, kind: str
+    theme: Theme, bench: Bench, tmp_path: Path, kind: str
 ) -> None:
-    signals, path = window.tabs.signals, tmp_path / f"walk.{kind}"
-    window.tabs.setCurrentIndex(1)
     bench.station.take([walking(50)])
-    bench.draw(window)
+    signals, path = Signals(bench.desk, theme), tmp_path / f"walk.{kind}"
+    signals.resize(900, 600)
+    signals.show()
+    signals.refresh()
     signals.export(signals.save_csv if kind == "csv" else signals.save_png, path)
     before = path.read_bytes()
 
@@ -197,6 +213,8 @@ def test_a_full_disk_keeps_the_export_that_was_there_and_says_so(
     assert path.read_bytes() == before
     assert [file.name for file in tmp_path.glob("walk*")] == [path.name]
     bench.station.take([telemetry([time.monotonic_ns()], {"left_hip.position": [0.1]})])
-    bench.draw(window)
+    for _ in range(SLOW + 1):
+        signals.refresh()
     assert f"NOT SAVED as {path.name}: No space left on device" in signals.said.text()
     assert "rows/s" in signals.said.text()
+    destroy(signals)

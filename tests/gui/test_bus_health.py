@@ -10,6 +10,7 @@ from gateway.wire.bus import BusInfo, NodeInfo, TalkInfo
 from server_gui.core.follow.events import BusesSeen
 from server_gui.core.processing.bus_health import TAKEN
 from server_gui.views.frame.main_window import MainWindow
+from server_gui.views.frame.status_bar import StatusBar
 from server_gui.views.pace import SLOW
 from server_gui.views.resources.bus_health import NOT_NOW, TOO_OLD, BusHealthView
 from server_gui.views.theme import Theme
@@ -25,6 +26,14 @@ BUS = BusInfo("main", "error active", 1_000_000, 41.2, 1010.0, 4, 0, 1, 0, [NODE
 def view(theme: Theme, bench: Bench) -> Iterator[BusHealthView]:
     made = BusHealthView(bench.desk, theme)
     made.resize(900, 500)
+    made.show()
+    yield made
+    destroy(made)
+
+
+@pytest.fixture
+def bar(theme: Theme, bench: Bench) -> Iterator[StatusBar]:
+    made = StatusBar(bench.desk, theme)
     made.show()
     yield made
     destroy(made)
@@ -75,22 +84,22 @@ def test_what_is_not_known_is_no_card_and_no_zero(view: BusHealthView, bench: Be
     assert not view.cards[0].isVisible()
 
 
-def test_the_last_line_has_the_worst_bus(window: MainWindow, bench: Bench) -> None:
-    bench.draw(window)
-    assert window._bar.bus.text() == "bus not known"
-    assert window._bar.computer.text() == "CPU – · memory –"
+def test_the_last_line_has_the_worst_bus(bar: StatusBar, bench: Bench) -> None:
+    bar.refresh()
+    assert bar.bus.text() == "bus not known"
+    assert bar.computer.text() == "CPU – · memory –"
     bench.station.take([BusesSeen((replace(BUS, load_percent=100.0),), time.monotonic_ns())])
-    bench.draw(window)
-    assert window._bar.bus.text() == ("CAN main 100 %, 4 errors: it is full · most: left knee 90 %")
-    assert window._bar._bus_icon.accessibleName() == "ALARM"
+    bar.refresh()
+    assert bar.bus.text() == "CAN main 100 %, 4 errors: it is full · most: left knee 90 %"
+    assert bar._bus_icon.accessibleName() == "ALARM"
 
 
-def test_no_bus_is_good_on_the_last_line_where_nothing_new_comes(window: MainWindow, bench: Bench) -> None:
+def test_no_bus_is_good_on_the_last_line_where_nothing_new_comes(bar: StatusBar, bench: Bench) -> None:
     good = replace(BUS, load_percent=13.0, findings=(), nodes=())
     for age_s, said in ((70.0, "bus not known"), (0.0, "CAN main 13 %")):
         bench.station.take([walking(10, age_s), BusesSeen((good,), time.monotonic_ns())])
-        bench.draw(window)
-        assert window._bar.bus.text().startswith(said), age_s
+        bar.refresh()
+        assert bar.bus.text().startswith(said), age_s
 
 
 def test_page_and_alarms_tell_of_a_full_bus_in_the_same_frame(window: MainWindow, bench: Bench) -> None:

@@ -12,6 +12,7 @@ from server_gui.core.evidence.file import Told
 from server_gui.core.experiments.machine import Event, State
 from server_gui.core.tuning.commands import ReadBack
 from server_gui.views.frame.main_window import MainWindow
+from server_gui.views.parameters.panel import ParametersPanel
 from tests.gui.fakes import Bench, Parts
 from tests.gui.rules import settle
 from tests.gui.running import wait
@@ -53,10 +54,10 @@ def swept() -> Told:
     return replace(told(), evidence=found, experiment=tried, curves=())
 
 
-def begun(bench: Bench, window: MainWindow | Parts) -> None:
+def begun(bench: Bench, parts: Parts) -> None:
     """An A/B trial of two step lengths."""
     bench.station.take([looked()])
-    edits = window.edits if isinstance(window, Parts) else window.tabs.edits
+    edits = parts.edits
     edits.refresh()
     edits.ab.click()
     form = edits.form
@@ -80,36 +81,38 @@ def test_the_form_says_what_it_will_do_and_what_cannot_be(bench: Bench, parts: P
     form.reject()
 
 
-def test_stop_and_take_back_is_in_sight_until_it_was_read_back(bench: Bench, window: MainWindow) -> None:
-    begun(bench, window)
+def test_stop_and_take_back_is_in_sight_until_it_was_read_back(
+    bench: Bench, parts: Parts, panel: ParametersPanel
+) -> None:
+    begun(bench, parts)
     run = bench.station.experiment
     assert run is not None
     run._do(Event.READY)
     bench.first.answer(Written(5, {NAME: 0.4}, {NAME: 0.4}, 40.0))
-    window.experiment.refresh()
-    assert window.experiment.isVisible()
-    assert "back by itself in" in window.experiment.words.text()
-    window.parameters.refresh()
-    assert "a write of yours ends it" in window.parameters.banner.text()
+    parts.experiment.refresh()
+    assert parts.experiment.isVisible()
+    assert "back by itself in" in parts.experiment.words.text()
+    panel.refresh()
+    assert "a write of yours ends it" in panel.banner.text()
     part = told(5)
     bench.station.take_evidence(replace(part, edit=replace(part.edit, boot_id=run.boot_id)))
-    window.tabs.edits.refresh()
-    assert window.tabs.edits.list.count() == 0
-    window.experiment.end.click()
+    parts.edits.refresh()
+    assert parts.edits.list.count() == 0
+    parts.experiment.end.click()
     assert bench.first.named("revert") == [(5,)]
     assert run.state is State.TAKING_BACK
     bench.first.answer(Reverted(5, {NAME: "taken back"}))
-    window.experiment.refresh()
+    parts.experiment.refresh()
     assert bench.first.named("read_back") == [(NAME,)]
     bench.first.answer(ReadBack(0.4, None, on_trial=False))
-    window.experiment.refresh()
-    assert "the original value is back" in window.experiment.words.text()
-    assert "ended early: asked for" in window.experiment.words.text()
-    window.tabs.edits.refresh()
-    assert window.tabs.edits.list.count() == 1
-    assert "A/B" in window.tabs.edits.list.item(0).text()
-    window.experiment.end.click()
-    assert not window.experiment.isVisible()
+    parts.experiment.refresh()
+    assert "the original value is back" in parts.experiment.words.text()
+    assert "ended early: asked for" in parts.experiment.words.text()
+    parts.edits.refresh()
+    assert parts.edits.list.count() == 1
+    assert "A/B" in parts.edits.list.item(0).text()
+    parts.experiment.end.click()
+    assert not parts.experiment.isVisible()
 
 
 def test_from_a_trials_bar_both_of_its_values_are_asked_about(bench: Bench, window: MainWindow) -> None:

@@ -111,7 +111,15 @@ def below(menu: QMenu, *path: str) -> QMenu:
     return menu
 
 
-def test_what_walks_already_is_not_offered_to_start(demo: Demo, bench: Bench) -> None:
+def test_walking_is_offered_where_it_is_over_and_no_stop_is_held_and_the_simulator_runs(
+    demo: Demo, bench: Bench
+) -> None:
+    bench.station.stopping.held = True
+    demo.draw()
+    assert not demo.bar.walk.isEnabled()
+    assert "reset it" in demo.bar.said.text()
+    bench.station.stopping.held = False
+    demo.draw()
     assert demo.bar.walk.isEnabled(), "nobody knows yet whether it walks"
     bench.station.take([walking(600)])
     demo.draw()
@@ -120,6 +128,16 @@ def test_what_walks_already_is_not_offered_to_start(demo: Demo, bench: Bench) ->
     fault(bench)
     demo.draw()
     assert demo.bar.walk.isEnabled()
+    assert demo.control.active == ()
+    words = "Simulated robot. Tripped: left knee. Clear fault, then Start walking"
+    assert demo.bar.said.text() == words, "called whole once the cause is over"
+    click(demo.bar.walk)
+    demo.until(lambda: demo.control.asked == ["walk"], "told it to walk")
+    demo.own.runs, demo.own.problem = False, "the simulator has ended (killed by SIGKILL)"
+    demo.draw()
+    assert "has ended: the simulator has ended (killed by SIGKILL)" in demo.bar.said.text()
+    assert not demo.bar.walk.isEnabled()
+    assert not demo.bar.breaking.isEnabled()
 
 
 # --- without a robot
@@ -133,6 +151,7 @@ def test_an_empty_window_offers_to_add_a_robot_to_simulate_one_and_to_open_a_rec
     window = MainWindow(bench.desk, theme, kept)
     window.show()
     bench.draw(window)
+    assert window.empty.isVisible()
     added, asked = list[str](), list[str]()
     window.added.connect(added.append)
     window.simulator.connect(lambda: asked.append("simulator"))
@@ -190,7 +209,7 @@ def test_the_three_offers_are_whole_on_small_screens_and_with_large_text(
 # --- with a simulated one
 
 
-def test_faults_are_chosen_by_name_and_device_and_shown_until_they_are_mended(demo: Demo) -> None:
+def test_faults_are_chosen_by_name_and_device_and_shown_until_mended_and_refusals_said(demo: Demo) -> None:
     demo.bar.faults.aboutToShow.emit()
     menu = below(demo.bar.faults, "Node on the bus", "node lost")
     assert [action.text() for action in menu.actions()] == ["left knee", "right knee", "gait"]
@@ -200,6 +219,10 @@ def test_faults_are_chosen_by_name_and_device_and_shown_until_they_are_mended(de
     demo.until(lambda: "Broken: node lost on left knee" in demo.bar.said.text(), "said what is broken")
     click(demo.bar.mend)
     demo.until(lambda: "nothing is broken" in demo.bar.said.text(), "mended it")
+    demo.control.problem = "node_lost is already on left_knee; clear it first"
+    demo.bar.faults.aboutToShow.emit()
+    below(demo.bar.faults, "Node on the bus", "node lost").actions()[0].trigger()
+    demo.until(lambda: "Not done: node_lost is already on" in demo.bar.said.text(), "said why")
 
 
 def test_what_is_on_already_cannot_be_broken_again(qt: QApplication) -> None:
@@ -221,41 +244,6 @@ def test_a_fault_that_nobody_has_grouped_is_in_the_menu_all_the_same() -> None:
         "Others",
     ]
     assert sum(len(kinds) for kinds in found.values()) == len(KINDS) + 1
-
-
-def test_what_the_simulator_refuses_is_said(demo: Demo) -> None:
-    demo.control.problem = "node_lost is already on left_knee; clear it first"
-    demo.bar.faults.aboutToShow.emit()
-    below(demo.bar.faults, "Node on the bus", "node lost").actions()[0].trigger()
-    demo.until(lambda: "Not done: node_lost is already on" in demo.bar.said.text(), "said why")
-
-
-def test_walking_begins_again_only_after_a_held_stop_was_reset(demo: Demo, bench: Bench) -> None:
-    station = bench.desk.stations[0]
-    station.stopping.held = True
-    demo.draw()
-    assert not demo.bar.walk.isEnabled()
-    assert "reset it" in demo.bar.said.text()
-    station.stopping.held = False
-    demo.draw()
-    click(demo.bar.walk)
-    demo.until(lambda: demo.control.asked == ["walk"], "told it to walk")
-
-
-def test_a_drive_that_tripped_is_not_called_whole_once_its_cause_is_over(demo: Demo, bench: Bench) -> None:
-    fault(bench)
-    demo.draw()
-    assert demo.control.active == ()
-    words = "Simulated robot. Tripped: left knee. Clear fault, then Start walking"
-    assert demo.bar.said.text() == words
-
-
-def test_a_simulator_that_has_ended_says_so(demo: Demo) -> None:
-    demo.own.runs, demo.own.problem = False, "the simulator has ended (killed by SIGKILL)"
-    demo.draw()
-    assert "has ended: the simulator has ended (killed by SIGKILL)" in demo.bar.said.text()
-    assert not demo.bar.walk.isEnabled()
-    assert not demo.bar.breaking.isEnabled()
 
 
 def test_the_tour_has_five_steps_and_is_not_offered_again_once_it_was_left(
@@ -282,21 +270,8 @@ def test_the_tour_has_five_steps_and_is_not_offered_again_once_it_was_left(
     assert again.bar.end(30.0)
 
 
-def test_the_frame_of_the_tour_ends_where_what_it_is_about_is_scrolled_away(
-    demo: Demo, window: MainWindow, theme: Theme
-) -> None:
-    window.resize(1024, 700)
-    theme.set(scale=1.5)
-    for place in range(len(STOPS)):
-        demo.bar.tour.go(place)
-        demo.draw()
-        outline = demo.bar.tour._outline
-        assert outline.isVisible()
-        assert not outline.geometry().intersects(window.statusBar().geometry()), STOPS[place].title
-
-
 @pytest.mark.parametrize(("width", "height", "scale"), [(1024, 700, 1.0), (1024, 700, 1.5), (1366, 768, 1.5)])
-def test_stop_and_every_button_of_the_demo_are_whole_on_small_screens(
+def test_stop_demo_and_tour_are_whole_on_small_screens(
     demo: Demo, window: MainWindow, theme: Theme, width: int, height: int, scale: float
 ) -> None:
     window.resize(width, height)
@@ -308,6 +283,11 @@ def test_stop_and_every_button_of_the_demo_are_whole_on_small_screens(
     for button in (bar.walk, bar.breaking, bar.mend, bar.again, tour.next, tour.skip):
         assert button.width() >= button.sizeHint().width(), button.text()
         assert window.rect().contains(button.mapTo(window, button.rect().bottomRight())), button.text()
+    for place in range(len(STOPS)):
+        tour.go(place)
+        demo.draw()
+        assert tour._outline.isVisible()
+        assert not tour._outline.geometry().intersects(window.statusBar().geometry()), STOPS[place].title
 
 
 # --- the splash

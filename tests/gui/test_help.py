@@ -21,13 +21,19 @@ def test_the_sections_are_the_documents_own_without_pictures_and_links() -> None
     assert all("](" not in text for text in sections.values())
 
 
-def test_every_tab_and_panel_has_its_section(window: MainWindow) -> None:
+def test_every_tab_and_panel_has_its_section_by_f1_and_by_a_button(window: MainWindow) -> None:
     titles = {window.tabs.tabText(place).replace("&", "") for place in range(window.tabs.count())}
     assert titles | {"Parameters", "Recordings", "Cloud"} <= manual.sections().keys()
-
-
-def test_f1_tells_of_the_tab_or_of_the_panel_that_has_the_keyboard(window: MainWindow) -> None:
     assert not window.help.isVisible()
+    window.tabs.setCurrentIndex(1)
+    window.help_button.click()
+    QApplication.processEvents()
+    assert window.help.choice.currentText() == "Signals"
+    assert window.header.stop.isVisible()
+    assert QApplication.activeModalWidget() is None
+    window.reset_layout()
+    assert not window.help.isVisible()
+    assert all(dock.isVisible() for dock in window.findChildren(QDockWidget) if dock.windowTitle() != "Help")
     for place in range(window.tabs.count()):
         window.tabs.setCurrentIndex(place)
         window.tabs.setFocus()
@@ -38,19 +44,3 @@ def test_f1_tells_of_the_tab_or_of_the_panel_that_has_the_keyboard(window: MainW
     QTest.keyClick(window.parameters.filters.words, Qt.Key.Key_F1)
     assert window.help.choice.currentText() == "Parameters"
     assert "the robot column shows four" in " ".join(window.help.text.toPlainText().split())
-
-
-def test_the_button_beside_the_tabs_does_the_same_and_stop_stays_in_sight(window: MainWindow) -> None:
-    window.tabs.setCurrentIndex(1)
-    window.help_button.click()
-    QApplication.processEvents()
-    assert window.help.choice.currentText() == "Signals"
-    assert window.header.stop.isVisible()
-    assert QApplication.activeModalWidget() is None
-
-
-def test_a_reset_layout_has_no_help(window: MainWindow) -> None:
-    window.help_button.click()
-    window.reset_layout()
-    assert not window.help.isVisible()
-    assert all(dock.isVisible() for dock in window.findChildren(QDockWidget) if dock.windowTitle() != "Help")

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtCore import QByteArray, QPoint, QSettings, QSize, Qt
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QDockWidget, QMainWindow
 
 from gateway.units import Units
 from server_gui.core.settings.server_file import ServerSettings
@@ -26,8 +26,11 @@ def kept(tmp_path: Path) -> QSettings:
     return QSettings(str(tmp_path / "gui.ini"), QSettings.Format.IniFormat)
 
 
-def test_bytes_of_which_one_is_damaged_are_never_given_to_qt(kept: QSettings, window: MainWindow) -> None:
+def test_bytes_of_which_one_is_damaged_are_never_given_to_qt(qt: QApplication, kept: QSettings) -> None:
     """A flipped bit in them is a segmentation fault in restoreState, Qt 6.11."""
+    window = QMainWindow()
+    for area in AREAS:
+        window.addDockWidget(area, QDockWidget())
     keep_bytes(kept, "state", window.saveState(1))
     whole = kept_bytes(kept, "state")
     assert whole == window.saveState(1)
@@ -38,6 +41,7 @@ def test_bytes_of_which_one_is_damaged_are_never_given_to_qt(kept: QSettings, wi
         assert kept_bytes(kept, "state") is None
     kept.setValue("state", "text")
     assert kept_bytes(kept, "state") is None
+    destroy(window)
 
 
 @pytest.mark.parametrize(

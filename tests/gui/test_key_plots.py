@@ -68,7 +68,9 @@ def ranges(overview: Overview) -> list[tuple[tuple[float, float], tuple[float, f
     return [((round(x[0], 6), round(x[1], 6)), (y[0], y[1])) for x, y in views]
 
 
-def test_the_wheel_zooms_the_time_of_all_plots_and_nothing_else(overview: Overview, bench: Bench) -> None:
+def test_the_wheel_zooms_the_time_of_all_plots_and_a_double_click_shows_all_of_it_again(
+    overview: Overview, bench: Bench
+) -> None:
     before = ranges(overview)
     wheel(overview._plots[0], 2)
     draw(overview)
@@ -77,11 +79,6 @@ def test_the_wheel_zooms_the_time_of_all_plots_and_nothing_else(overview: Overvi
     assert len({time_range for time_range, _ in after}) == 1, "all have the same time"
     assert [values for _, values in after] == [values for _, values in before]
     assert all(plot.plot.follows for plot in overview._plots), "the range goes on following the data"
-
-
-def test_a_double_click_shows_all_of_the_time_again_as_does_another_robot(
-    overview: Overview, bench: Bench
-) -> None:
     plot = overview._plots[1]
     opened: list[object] = []
     overview.opened.connect(opened.append)
@@ -110,16 +107,22 @@ def test_a_click_opens_the_channels_in_signals(window: MainWindow, bench: Bench)
     assert window.tabs.signals.chosen == ["left_knee.position", "right_knee.position"]
 
 
-def test_each_curve_is_named_with_its_value_in_the_legend(overview: Overview) -> None:
+def test_each_curve_is_named_with_its_value_in_the_legend_and_times_have_their_unit(
+    overview: Overview,
+) -> None:
     angle, torque, tilt = (plot.legend for plot in overview._plots)
     assert angle.accessibleDescription().startswith("left ")
     assert "right" in angle.accessibleDescription()
     assert torque.accessibleDescription().endswith("limit ±80")
     assert "forward 2.9" in tilt.accessibleDescription()
     assert "sideways –" in tilt.accessibleDescription()
+    axis = overview._plots[0].plot.getPlotItem().getAxis("bottom")
+    assert axis.tickStrings([-10.0, -2.5, 0.0], 1.0, 2.0) == ["−10 s", "−2.5 s", "now"]
 
 
-def test_a_limit_is_a_line_where_it_is_in_sight(overview: Overview, bench: Bench) -> None:
+def test_a_limit_is_a_line_where_it_is_in_sight_and_so_is_where_the_guard_trips(
+    overview: Overview, bench: Bench
+) -> None:
     torque = overview._plots[1]
     assert len(torque.plot._marks._shown.limits) == 0
     newest_ns = bench.station.rings.newest_ns or 0
@@ -132,9 +135,6 @@ def test_a_limit_is_a_line_where_it_is_in_sight(overview: Overview, bench: Bench
     shares: list[float] = list(torque.plot._marks._shown.limits)
     assert len(shares) == 1
     assert 0.0 < shares[0] < 0.5
-
-
-def test_where_the_guard_trips_is_a_line_too(overview: Overview, bench: Bench) -> None:
     about = ("knee_range", "joint_limit", "outside", ["left_knee"], ["quick_stop"], "alarm", "watching")
     knee = GuardRuleInfo(*about, 0, None, 0, [], ["position"], -0.1, 0.2)
     hip = msgspec.structs.replace(knee, on=["right_hip"], low=-9.0)
@@ -194,11 +194,6 @@ def test_a_plot_without_data_says_so_and_has_no_numbers(theme: Theme, bench: Ben
     assert made._plots[0].plot._marks._shown.words == ""
     assert made._plots[0].plot.getPlotItem().getAxis("left").style["showValues"]
     destroy(made)
-
-
-def test_times_have_their_unit(overview: Overview) -> None:
-    axis = overview._plots[0].plot.getPlotItem().getAxis("bottom")
-    assert axis.tickStrings([-10.0, -2.5, 0.0], 1.0, 2.0) == ["−10 s", "−2.5 s", "now"]
 
 
 @pytest.mark.parametrize("height", [30.0, 60.0, 200.0])

@@ -13,6 +13,7 @@ from server_gui.core.processing.process_names import arguments_of
 from server_gui.core.tuning.writing import Trial
 from server_gui.views.frame.keys_sheet import KEYS
 from server_gui.views.frame.main_window import MainWindow
+from server_gui.views.parameters.panel import ParametersPanel
 from server_gui.views.parameters.tree import NEW, SAID
 from server_gui.views.resources.processes import COMMAND, CPU, NAME, ProcessTable
 from server_gui.views.theme import Theme
@@ -25,7 +26,14 @@ TOLD_AS_ONE = {f"Ctrl+{place}" for place in range(2, 10)}  # with Ctrl+1
 NOT_THE_WINDOWS = {"F12", "Ctrl+Space", "Alt+O", "F2"}  # of STOP, and Qt's own
 
 
-def test_the_sheet_tells_every_key_of_the_window_and_no_other(window: MainWindow) -> None:
+def test_the_sheet_tells_every_key_of_the_window_and_comes_and_goes_with_one(window: MainWindow) -> None:
+    window.tabs.setFocus()
+    QTest.keyClick(window.tabs, Qt.Key.Key_Question)
+    assert window.keys.isVisible()
+    assert stop_is_whole(window)
+    assert not window.header.stop.visibleRegion().isEmpty()
+    QTest.keyClick(window.keys.close_button, Qt.Key.Key_Escape)
+    assert not window.keys.isVisible()
     text = QKeySequence.SequenceFormat.PortableText
     make_every_page(window)
     held = {shortcut.key().toString(text) for shortcut in window.findChildren(QShortcut)}
@@ -37,16 +45,6 @@ def test_the_sheet_tells_every_key_of_the_window_and_no_other(window: MainWindow
     held = {key for key in held if key and not key.startswith("Alt+")} - TOLD_AS_ONE - {"Del", "Escape"}
     assert held - told == set()
     assert told - held - NOT_THE_WINDOWS == {"Esc"} - held
-
-
-def test_the_sheet_comes_and_goes_with_a_key_and_leaves_stop_alone(window: MainWindow) -> None:
-    window.tabs.setFocus()
-    QTest.keyClick(window.tabs, Qt.Key.Key_Question)
-    assert window.keys.isVisible()
-    assert stop_is_whole(window)
-    assert not window.header.stop.visibleRegion().isEmpty()
-    QTest.keyClick(window.keys.close_button, Qt.Key.Key_Escape)
-    assert not window.keys.isVisible()
 
 
 @pytest.mark.parametrize(("width", "height", "scale"), [(1024, 700, 1.0), (1366, 768, 1.5)])
@@ -75,7 +73,9 @@ def test_ctrl_f_shows_the_panel_that_it_types_into(window: MainWindow, bench: Be
     assert window.parameters.filters.words.hasFocus() or not window.isActiveWindow()
 
 
-def test_a_trial_is_in_sight_whatever_panel_is_hidden(window: MainWindow, bench: Bench) -> None:
+def test_a_trial_is_in_sight_whatever_panel_is_hidden_and_another_robot_s_with_its_name(
+    window: MainWindow, bench: Bench
+) -> None:
     station = bench.station
     bench.look_again([walking(10), looked()])
     bench.draw(window)
@@ -95,6 +95,17 @@ def test_a_trial_is_in_sight_whatever_panel_is_hidden(window: MainWindow, bench:
     assert window.trial.isVisible()
     assert "430" in window.trial.words.text()
     station.writing.trial = None
+    other = bench.add("exo-02", 7421)  # which is not looked at
+    other.take([described("exo-02")])
+    until_ns = time.monotonic_ns() + 30_000_000_000
+    other.writing.trial = Trial(7, {"gait.step_length": 0.43}, {"gait.step_length": 0.4}, until_ns)
+    bench.draw(window)
+    assert window.trial.isVisible()
+    assert window.trial.words.text().startswith("exo-02: on trial: gait step length 400 → 430 mm")
+    window.trial.take_back.emit()
+    assert bench.commands[1].named("revert") == [(7,)]
+    assert not bench.first.named("revert")
+    other.writing.trial = None
 
 
 def test_the_first_click_on_cpu_gives_the_most_and_keys_do_the_same(theme: Theme) -> None:
@@ -132,57 +143,36 @@ def test_processes_of_one_name_are_told_apart_by_their_command(line: str, told: 
     assert COMMAND != NAME
 
 
-def test_clearing_the_filter_leaves_groups_and_the_choice_as_they_were(
-    window: MainWindow, bench: Bench
-) -> None:
-    bench.look_again([looked()])
-    bench.draw(window)
-    tree, words = window.parameters.tree, window.parameters.filters.words
+def test_clearing_the_filter_leaves_groups_and_the_choice_as_they_were(panel: ParametersPanel) -> None:
+    tree, words = panel.tree, panel.filters.words
     tree.select_name("left_knee.max_torque")
     tree.setExpanded(tree.filter.index(0, 0), False)
     words.setText("nothing is called so")
-    bench.draw(window)
+    panel.refresh()
     words.clear()
-    bench.draw(window)
+    panel.refresh()
     assert tree.current_name == "left_knee.max_torque"
     assert not tree.isExpanded(tree.filter.index(0, 0))
     assert tree.isExpanded(tree.filter.index(1, 0))
     words.setText("gait")
-    bench.draw(window)
+    panel.refresh()
     assert tree.isExpanded(tree.filter.index(0, 0)), "what was found is not seen"
-    assert window.parameters.detail.accessibleName()
-    assert window.parameters.detail._name == "left_knee.max_torque", "another one was chosen by nobody"
+    assert panel.detail.accessibleName()
+    assert panel.detail._name == "left_knee.max_torque", "another one was chosen by nobody"
 
 
-def test_what_the_robot_would_refuse_is_marked_while_it_is_staged(window: MainWindow, bench: Bench) -> None:
-    bench.look_again([looked()])
-    window.parameters.stage("left_knee.max_torque", 200.0)  # as of a file; what is typed so is not staged
-    bench.draw(window)
-    row = window.parameters.tree._rows["left_knee.max_torque"]
+def test_what_the_robot_would_refuse_is_marked_while_it_is_staged(panel: ParametersPanel) -> None:
+    panel.stage("left_knee.max_torque", 200.0)  # as of a file; what is typed so is not staged
+    panel.refresh()
+    row = panel.tree._rows["left_knee.max_torque"]
     assert (row[NEW].text(), row[SAID].text()) == ("200", "✕ limit")
-    assert "above the largest allowed, 80" in window.parameters.banner.text()
+    assert "above the largest allowed, 80" in panel.banner.text()
     assert "above the largest allowed, 80" in row[NEW].toolTip()
-    window.parameters.stage_text("left_knee.max_torque", "70")
-    bench.draw(window)
+    panel.stage_text("left_knee.max_torque", "70")
+    panel.refresh()
     assert row[SAID].text() == "●"
     assert HELD["left_knee.max_torque"] == 80.0
 
 
 def _names(table: ProcessTable) -> list[str]:
     return [str(table.model().index(row, NAME).data()) for row in range(table.model().rowCount())]
-
-
-def test_a_trial_on_a_robot_that_is_not_looked_at_is_shown_with_its_name(
-    window: MainWindow, bench: Bench
-) -> None:
-    other = bench.add("exo-02", 7421)
-    other.take([described("exo-02")])
-    until_ns = time.monotonic_ns() + 30_000_000_000
-    other.writing.trial = Trial(7, {"gait.step_length": 0.43}, {"gait.step_length": 0.4}, until_ns)
-    bench.draw(window)
-    assert window.trial.isVisible()
-    assert window.trial.words.text().startswith("exo-02: on trial: gait step length 400 → 430 mm")
-    window.trial.take_back.emit()
-    assert bench.commands[1].named("revert") == [(7,)]
-    assert not bench.first.named("revert")
-    other.writing.trial = None

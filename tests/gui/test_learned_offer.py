@@ -1,20 +1,22 @@
 """What was learned from the wearer is offered with what it is worth, and one click takes it back."""
 
 import dataclasses
+from collections.abc import Iterator
 
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QLineEdit
+from PySide6.QtWidgets import QApplication, QLineEdit, QWidget
 
 from server_gui.core.desk.station import Station
 from server_gui.core.prediction.adaptation import NEXT, Adapting, Happening, State, Tried
 from server_gui.views.ask import Question
-from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.frame.recording_chip import ask_name
 from server_gui.views.overview.learned_offer import wordings
+from server_gui.views.overview.page import Overview
 from server_gui.views.predictions import LEARNED, lines
-from tests.gui.fakes import Bench
+from server_gui.views.theme import Theme
+from tests.gui.fakes import Bench, destroy
 from tests.gui.foreseen import predicted
 from tests.support.desk import looked, walking
 
@@ -30,34 +32,40 @@ def station(bench: Bench) -> Station:
     return bench.station
 
 
-def show(window: MainWindow, station: Station, adapting: Adapting) -> list[str]:
+@pytest.fixture
+def overview(theme: Theme, bench: Bench) -> Iterator[Overview]:
+    made = Overview(bench.desk, theme)
+    made.show()
+    yield made
+    destroy(made)
+
+
+def show(overview: Overview, station: Station, adapting: Adapting) -> list[str]:
     """Which buttons there are."""
     station.take_prediction(adapting)
-    window.tabs.overview.read_now()
-    window.refresh()
-    return [
-        button.text() for button in window.tabs.overview.learned.buttons.values() if not button.isHidden()
-    ]
+    overview.read_now()
+    overview.refresh()
+    return [button.text() for button in overview.learned.buttons.values() if not button.isHidden()]
 
 
 def test_an_offer_is_accepted_and_taken_back_with_a_click_each(
-    window: MainWindow, station: Station, bench: Bench
+    overview: Overview, station: Station, bench: Bench
 ) -> None:
     said: list[tuple[str, int, Happening]] = []
     bench.desk.adapt = lambda *what: said.append(what)
-    offer = window.tabs.overview.learned
+    offer = overview.learned
     assert offer.isHidden()
-    assert show(window, station, OFFERED) == ["Use it", "No"]
+    assert show(overview, station, OFFERED) == ["Use it", "No"]
     assert not offer.isHidden()
     assert "3.4 → 2.1 %" in offer.words.text()
     assert offer.accessibleDescription().startswith("learned from P01: 3.4 → 2.1 %")
     QTest.mouseClick(offer.buttons[Happening.ACCEPT], Qt.MouseButton.LeftButton)
-    assert show(window, station, dataclasses.replace(OFFERED, state=State.SERVING)) == ["Take back"]
+    assert show(overview, station, dataclasses.replace(OFFERED, state=State.SERVING)) == ["Take back"]
     QTest.mouseClick(offer.buttons[Happening.TAKE_BACK], Qt.MouseButton.LeftButton)
     name = station.name
     assert said == [(name, 7, Happening.ACCEPT), (name, 7, Happening.TAKE_BACK)]
-    assert show(window, station, dataclasses.replace(OFFERED, state=State.TAKEN_BACK)) == ["Learn again"]
-    show(window, station, dataclasses.replace(OFFERED, state=State.COLLECTING))
+    assert show(overview, station, dataclasses.replace(OFFERED, state=State.TAKEN_BACK)) == ["Learn again"]
+    show(overview, station, dataclasses.replace(OFFERED, state=State.COLLECTING))
     assert offer.isHidden(), "there is nothing to decide"
 
 
@@ -86,7 +94,9 @@ def test_the_model_that_has_learned_from_the_wearer_is_called_so(station: Statio
     assert ", learned from P01, gait_phase-3fa2c1" in line.tip
 
 
-def test_a_recording_is_begun_of_who_is_named(window: MainWindow) -> None:
+def test_a_recording_is_begun_of_who_is_named(qt: QApplication) -> None:
+    window = QWidget()
+    window.show()
     begun: list[tuple[str, str]] = []
     ask_name(window, lambda *what: begun.append(what), "P01")
     ask_name(window, lambda *what: begun.append(what), "P01")  # it is asked once
@@ -97,6 +107,7 @@ def test_a_recording_is_begun_of_who_is_named(window: MainWindow) -> None:
     wearer.setText(" P02 ")
     question.act.click()
     assert begun == [("stairs", "P02")]
+    destroy(window)
 
 
 @pytest.mark.parametrize(

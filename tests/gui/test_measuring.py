@@ -130,15 +130,9 @@ def test_the_zoom_shows_its_part_of_the_past(signals: Signals, bench: Bench) -> 
     assert high > math.degrees(5.98)
 
 
-def test_the_wheel_over_an_axis_zooms_only_that(signals: Signals) -> None:
-    plot = signals.plots[0].plot
-    axis = plot.mapFromScene(plot.getPlotItem().getAxis("left").sceneBoundingRect()).boundingRect().center()
-    wheel(plot, QPointF(axis), 5)
-    assert plot.window_s == (-10.0, 0.0)
-    assert not plot.follows
-
-
-def test_a_box_chooses_what_is_seen_and_fit_takes_it_back(signals: Signals) -> None:
+def test_a_box_chooses_what_is_seen_fit_takes_it_back_and_the_wheel_over_an_axis_zooms_only_that(
+    signals: Signals,
+) -> None:
     plot = signals.plots[0].plot
     signals.box.click()
     viewport = plot.viewport()
@@ -155,6 +149,11 @@ def test_a_box_chooses_what_is_seen_and_fit_takes_it_back(signals: Signals) -> N
     signals.fit.click()
     assert plot.window_s == (-10.0, 0.0)
     assert plot.follows
+    plot = signals.plots[0].plot
+    axis = plot.mapFromScene(plot.getPlotItem().getAxis("left").sceneBoundingRect()).boundingRect().center()
+    wheel(plot, QPointF(axis), 5)
+    assert plot.window_s == (-10.0, 0.0)
+    assert not plot.follows
 
 
 def test_an_export_has_what_is_in_sight(signals: Signals, tmp_path: Path) -> None:
@@ -168,7 +167,9 @@ def test_an_export_has_what_is_in_sight(signals: Signals, tmp_path: Path) -> Non
 # Cursors
 
 
-def test_two_cursors_tell_values_and_their_difference(signals: Signals) -> None:
+def test_two_cursors_tell_values_their_difference_and_statistics_of_what_is_in_sight(
+    signals: Signals,
+) -> None:
     signals.cursors.click()
     signals._move(0, -6.004)
     signals._move(1, -4.0)
@@ -181,6 +182,11 @@ def test_two_cursors_tell_values_and_their_difference(signals: Signals) -> None:
         "°",
     ]
     assert cell(signals.measuring, 1, "B − A") == "0"
+    signals.plots[0].plot.show_window(-2.0, -1.0)
+    title(signals)
+    low, high, mean = (cell(signals.measuring, 0, name) for name in ("Min", "Max", "Mean"))
+    assert (low, high, mean) == tuple(f"{math.degrees(angle):.5g}" for angle in (7.99, 8.99, 8.49))
+    assert cell(signals.measuring, 1, "SD") == "0"
 
 
 def test_names_are_whole_in_a_small_window(signals: Signals) -> None:
@@ -192,17 +198,17 @@ def test_names_are_whole_in_a_small_window(signals: Signals) -> None:
     assert table.columnWidth(0) >= table.fontMetrics().horizontalAdvance(name)
 
 
-def test_statistics_are_of_what_is_in_sight(signals: Signals) -> None:
+def test_a_cursor_is_dragged_or_moved_by_keys_and_the_plot_stays(signals: Signals) -> None:
     signals.cursors.click()
-    signals.plots[0].plot.show_window(-2.0, -1.0)
-    title(signals)
-    low, high, mean = (cell(signals.measuring, 0, name) for name in ("Min", "Max", "Mean"))
-    assert (low, high, mean) == tuple(f"{math.degrees(angle):.5g}" for angle in (7.99, 8.99, 8.49))
-    assert cell(signals.measuring, 1, "SD") == "0"
-
-
-def test_cursors_are_moved_by_keys(signals: Signals) -> None:
-    signals.cursors.click()
+    signals._move(0, -5.0)
+    plot = signals.plots[0].plot
+    viewport = plot.viewport()
+    QTest.mousePress(viewport, Qt.MouseButton.LeftButton, pos=place(plot, 0.5))
+    QTest.mouseMove(viewport, place(plot, 0.3))
+    QTest.mouseRelease(viewport, Qt.MouseButton.LeftButton, pos=place(plot, 0.3))
+    assert signals._at[0] == pytest.approx(-7.0, abs=0.1)
+    assert plot.window_s == (-10.0, 0.0)
+    assert plot.follows
     assert signals.measuring.isVisible()
     signals._move(1, -2.0)
     signals._move(0, -5.0)
@@ -214,19 +220,6 @@ def test_cursors_are_moved_by_keys(signals: Signals) -> None:
     ):
         QTest.keyClick(signals.measuring, key, modifier)
     assert title(signals).startswith("A −4.990 s ▸ B −2.110 s Δt +2.880 s")
-
-
-def test_a_cursor_is_dragged_and_the_plot_stays(signals: Signals) -> None:
-    signals.cursors.click()
-    signals._move(0, -5.0)
-    plot = signals.plots[0].plot
-    viewport = plot.viewport()
-    QTest.mousePress(viewport, Qt.MouseButton.LeftButton, pos=place(plot, 0.5))
-    QTest.mouseMove(viewport, place(plot, 0.3))
-    QTest.mouseRelease(viewport, Qt.MouseButton.LeftButton, pos=place(plot, 0.3))
-    assert signals._at[0] == pytest.approx(-7.0, abs=0.1)
-    assert plot.window_s == (-10.0, 0.0)
-    assert plot.follows
 
 
 def test_a_paused_view_is_measured_as_it_stands(signals: Signals, bench: Bench) -> None:

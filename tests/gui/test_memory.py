@@ -68,6 +68,7 @@ def held() -> tuple[int, int]:
 
 @pytest.mark.timeout(300 + 12 * RATE_HZ)
 def test_eight_hours_leave_nothing_behind(window: MainWindow, bench: Bench) -> None:
+    window.setUpdatesEnabled(True)  # it is painted here, too
     source, settled = walked(RATE_HZ), (0, 0)
     for second in range(0, HOURS * HOUR_S, BATCH_S):
         bench.station.take([next(source)])

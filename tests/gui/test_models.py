@@ -214,21 +214,21 @@ def test_a_store_that_is_gone_is_a_sentence_above_the_list(
     assert not page.promote.isEnabled()
 
 
+@pytest.mark.parametrize("scale", [1.5, 1.0])
 def test_every_control_of_the_page_fits_into_its_width_at_large_text(
-    whole: Shown, both: tuple[Card, Card]
+    whole: Shown, both: tuple[Card, Card], theme: Theme, scale: float
 ) -> None:
+    theme.set(scale=scale)
     page = opened(whole)
     page.new.setChecked(True)
-    for width, scale in ((1024, 1.5), (1024, 1.0)):
-        whole.window.resize(width, 700)
-        page._theme.set(scale=scale)
-        whole.draw()
-        whole.draw()
-        assert page.robot.width() >= page.robot.sizeHint().width(), (width, scale)
-        for control in (page.new, page.robot, page.promote, page.back, page.compare.other, page.form.begin):
-            corner = control.mapTo(page, control.rect().bottomRight())
-            assert corner.x() <= page.visibleRegion().boundingRect().right(), (control, width, scale)
-            assert control.height() >= control.minimumSizeHint().height(), (control, width, scale)
+    whole.window.resize(1024, 700)
+    whole.draw()
+    whole.draw()
+    assert page.robot.width() >= page.robot.sizeHint().width()
+    for control in (page.new, page.robot, page.promote, page.back, page.compare.other, page.form.begin):
+        corner = control.mapTo(page, control.rect().bottomRight())
+        assert corner.x() <= page.visibleRegion().boundingRect().right(), control
+        assert control.height() >= control.minimumSizeHint().height(), control
 
 
 def test_the_jobs_of_training_hold_up_no_other(archive: Archive) -> None:

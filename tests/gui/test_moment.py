@@ -33,6 +33,8 @@ def test_all_of_a_frame_is_judged_by_one_moment(
         colours = {icon._mark.colour for one in (chip, fact) for icon in one.findChildren(MarkIcon)}
         assert len(colours) == 1, said
         said.append(colours.pop())
+        if said[-1] == "old":
+            break
     assert {said[0], said[-1]} == {"good", "old"}
 
 

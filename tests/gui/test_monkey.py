@@ -114,6 +114,7 @@ def test_a_monkey_at_the_window_breaks_nothing_and_stop_stays_in_reach(
     bench.add("exo-02", 7421).take([described("exo-02")])
     for station in bench.desk.stations:
         station._commands = Robot(SEED)
+    window.setUpdatesEnabled(True)  # it is painted here, too
     monkey, day = Monkey(SEED, window), Day(bench, SEED)
     raised: list[str] = []
     monkeypatch.setattr(

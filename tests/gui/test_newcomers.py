@@ -9,13 +9,14 @@ from gateway.client import NotConnected
 from server_gui.core.tuning.stop import Proof
 from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.overview.joint_table import STOP, JointModel
+from server_gui.views.overview.page import Overview
 from server_gui.views.parameters.panel import ParametersPanel
 from server_gui.views.parameters.tree import NAME, NEW
 from server_gui.views.predictions import lines
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.figure import Pose, StickFigure
 from server_gui.views.widgets.time_axis import LAST, NOW
-from tests.gui.fakes import Bench, destroy
+from tests.gui.fakes import Around, Bench, destroy
 from tests.gui.running import wait
 from tests.support.desk import JOINTS, looked, walking
 
@@ -56,13 +57,15 @@ def test_no_angle_beside_the_figure_is_cut(theme: Theme, width: int) -> None:
     destroy(figure)
 
 
-def test_what_is_old_looks_old_and_is_not_called_now(window: MainWindow, bench: Bench) -> None:
-    overview = window.tabs.overview
+def test_what_is_old_looks_old_and_is_not_called_now(theme: Theme, bench: Bench) -> None:
+    overview = Overview(bench.desk, theme)
+    overview.resize(1000, 800)
+    overview.show()
 
     def is_live() -> bool:
         bench.look_again([walking(200), looked()])
         overview.read_now()
-        bench.draw(window)
+        overview.refresh()
         return {label.property("tone") for label in overview._loads.values()} == {""}
 
     wait(is_live, "looked live")
@@ -71,11 +74,12 @@ def test_what_is_old_looks_old_and_is_not_called_now(window: MainWindow, bench: 
     live = overview._plots[0].legend.text()
     bench.look_again([walking(200, age_s=OLD_S), looked()])
     overview.read_now()
-    bench.draw(window)
+    overview.refresh()
     assert not bench.station.is_live
     assert axis.tickStrings([0.0], 1.0, 1.0) == [LAST]
     assert {label.property("tone") for label in overview._loads.values()} == {"old"}
     assert overview._plots[0].legend.text().split("color:")[1][:7] != live.split("color:")[1][:7]
+    destroy(overview)
 
 
 def test_a_robot_that_is_linked_again_is_not_said_to_have_no_link_now(bench: Bench) -> None:
@@ -88,14 +92,14 @@ def test_a_robot_that_is_linked_again_is_not_said_to_have_no_link_now(bench: Ben
     assert alarm.brief == "STOP NOT CONFIRMED: still moving: STOP again …"
 
 
-def test_a_card_stays_small_however_much_is_wrong(window: MainWindow, bench: Bench) -> None:
+def test_a_card_stays_small_however_much_is_wrong(around: Around, bench: Bench) -> None:
     bench.station.take([walking(100), looked(state="fault", problem=MANY)])
-    bench.draw(window)
+    bench.draw(around)
     QApplication.processEvents()
-    card = window.robots.cards[0]
+    card = around.robots.cards[0]
     assert card.texts[1].endswith("0x2310 …")
-    assert MANY.removesuffix(LASTING) in window.alarms.texts[0]
-    assert LASTING not in window.alarms.texts[0], "since when stands there already"
+    assert MANY.removesuffix(LASTING) in around.alarms.texts[0]
+    assert LASTING not in around.alarms.texts[0], "since when stands there already"
 
 
 def test_stop_names_the_robot_that_was_chosen_with_the_next_frame(window: MainWindow, bench: Bench) -> None:

@@ -83,12 +83,6 @@ def test_what_is_in_sight_is_shown_with_what_it_holds(page: ObjectsPage, theme: 
     assert _ink(page, theme, "0x6041:0", HOLDS) == "text"
 
 
-def test_nothing_is_asked_while_another_page_is_shown(window: MainWindow, bench: Bench) -> None:
-    bench.draw(window)
-    assert not bench.first.named("objects")
-    assert not bench.first.named("read_objects")
-
-
 def test_of_thousands_only_those_in_sight_are_asked_for(theme: Theme, bench: Bench) -> None:
     many = [one(f"0x{index:04X}:0", f"Thing {index}") for index in range(0x2000, 0x3000)]
     page = ObjectsPage(bench.desk, theme)
@@ -142,7 +136,12 @@ def test_its_facts_have_bits_by_name_and_why_it_is_locked(page: ObjectsPage) -> 
     assert '[channel."left_knee.following_error_window"]' in QGuiApplication.clipboard().text()
 
 
-def test_a_parameter_is_staged_where_parameters_are(window: MainWindow, bench: Bench) -> None:
+def test_nothing_is_asked_while_another_page_is_shown_and_a_parameter_staged_where_those_are(
+    window: MainWindow, bench: Bench
+) -> None:
+    bench.draw(window)
+    assert not bench.first.named("objects")
+    assert not bench.first.named("read_objects")
     bench.station.take([looked()])
     window.tabs.look_at(window.tabs.objects)
     bench.draw(window)
@@ -264,29 +263,28 @@ def test_an_object_is_pinned_for_its_robot(page: ObjectsPage, bench: Bench) -> N
     assert [info.object for info in page.table.rows] == ["0x6041:0"]
 
 
-SIZES = ((1366, 768, 1.0), (1024, 700, 2.0))
-
-
-def test_the_page_keeps_the_rules_at_every_size(window: MainWindow, bench: Bench, theme: Theme) -> None:
+@pytest.mark.parametrize(("width", "height", "scale"), [(1366, 768, 1.0), (1024, 700, 2.0)])
+def test_the_page_keeps_the_rules_at_every_size(
+    window: MainWindow, bench: Bench, theme: Theme, width: int, height: int, scale: float
+) -> None:
     """Full of values, also when the link has gone: then nothing is green."""
     window.tabs.look_at(window.tabs.objects)
-    page, broken = window.tabs.objects, list[str]()
-    for width, height, scale in SIZES:
-        bench.station.take([LinkChanged(ConnectionState.CONNECTED, None, 0), described(), looked()])
-        theme.set(scale=scale)
-        window.resize(width, height)
-        bench.draw(window)
-        _answer(page, bench)
-        page.table.choose("0x6065:0")
-        bench.draw(window)
-        rules.settle()
-        broken += [*rules.halved_numbers(window), *rules.out_of_reach(window), *rules.nameless(window)]
-        bench.station.take([LinkChanged(ConnectionState.WAITING, "no gateway", 0)])
-        bench.draw(window)
-        rules.settle()
-        broken += [*rules.halved_numbers(page), *rules.green(page, theme), *rules.out_of_reach(window)]
-        assert page.table.rows
-        assert stop_is_whole(window)
+    page = window.tabs.objects
+    bench.station.take([LinkChanged(ConnectionState.CONNECTED, None, 0), described(), looked()])
+    theme.set(scale=scale)
+    window.resize(width, height)
+    bench.draw(window)
+    _answer(page, bench)
+    page.table.choose("0x6065:0")
+    bench.draw(window)
+    rules.settle()
+    broken = [*rules.halved_numbers(window), *rules.out_of_reach(window), *rules.nameless(window)]
+    bench.station.take([LinkChanged(ConnectionState.WAITING, "no gateway", 0)])
+    bench.draw(window)
+    rules.settle()
+    broken += [*rules.halved_numbers(page), *rules.green(page, theme), *rules.out_of_reach(window)]
+    assert page.table.rows
+    assert stop_is_whole(window)
     assert not broken, "\n".join(sorted(set(broken)))
 
 

@@ -180,12 +180,19 @@ def greeted(bench: Bench, **more: Any) -> None:
     bench.station.take([dataclasses.replace(described(), hello=hello)])
 
 
-def test_what_one_may_not_is_grey_and_says_why_and_stop_is_not(window: MainWindow, bench: Bench) -> None:
+def test_what_one_may_not_is_grey_and_says_why_and_nothing_is_for_who_may_all_nor_stop(
+    window: MainWindow, bench: Bench
+) -> None:
+    greeted(bench)
+    window.parameters.stage("gait.step_length", 0.45)
+    bench.draw(window)
+    assert window.robots.cards[0].toolTip() == "You are anna, as viewer here."
+    assert window.parameters.review_button.isEnabled()
+    assert window.parameters.store_button.isEnabled()
     why = "anna is a viewer on this robot, and this is for an operator; ask one"
     methods = ("control.acquire", "parameter.write", "parameter.store", "robot.reset")
     greeted(bench, refused=dict.fromkeys(methods, why))
     bench.station.stopping.described(held=True, reason="test")
-    window.parameters.stage("gait.step_length", 0.45)
     bench.draw(window)
     parameters = window.parameters
     for button in (
@@ -201,15 +208,6 @@ def test_what_one_may_not_is_grey_and_says_why_and_stop_is_not(window: MainWindo
     assert not question.act.isEnabled()
     assert question.words.text().startswith(why)
     assert window.header.stop.isEnabled()
-
-
-def test_who_one_is_is_shown_and_who_may_all_finds_nothing_grey(window: MainWindow, bench: Bench) -> None:
-    greeted(bench)
-    window.parameters.stage("gait.step_length", 0.45)
-    bench.draw(window)
-    assert window.robots.cards[0].toolTip() == "You are anna, as viewer here."
-    assert window.parameters.review_button.isEnabled()
-    assert window.parameters.store_button.isEnabled()
 
 
 def test_another_robot_s_key_is_said_loudly(around: Around, bench: Bench) -> None:

@@ -235,7 +235,9 @@ def test_marks_and_uploads_are_asked_for_and_told() -> None:
 # --- the whole window
 
 
-def test_ctrl_r_asks_before_it_ends_a_recording_and_then_for_a_name(window: MainWindow, bench: Bench) -> None:
+def test_ctrl_r_asks_before_it_ends_a_recording_whose_chip_says_for_how_long_and_as_what(
+    window: MainWindow, bench: Bench
+) -> None:
     keeper = FakeKeeper(report())
     bench.desk.recording, _ = looked(keeper)
     bench.draw(window)
@@ -254,9 +256,6 @@ def test_ctrl_r_asks_before_it_ends_a_recording_and_then_for_a_name(window: Main
     asked.field.setText("Ada, stairs")
     QTest.keyClick(asked.field, Qt.Key.Key_Return)
     assert keeper.asked == ["pause", "go on Ada, stairs"]
-
-
-def test_the_recording_s_chip_says_for_how_long_and_as_what(window: MainWindow, bench: Bench) -> None:
     answer = report()
     since_s = time.time() - 3725
     link = replace(
@@ -296,7 +295,7 @@ def kept(tmp_path: Path) -> QSettings:
 def test_what_the_window_shows_is_in_the_store_and_came_by_one_link(
     qt: QApplication, settings: ServerSettings, kept: QSettings, robot: FakeRobot
 ) -> None:
-    with running(qt, settings, kept, Record("Ada", "first")) as app:
+    with FakeRobot() as other, running(qt, settings, kept, Record("Ada", "first")) as app:
         station = app.desk.stations[0]
         wait(lambda: not station.robot.is_stale() and bool(station.robot.parameters), "was live")
         wait(lambda: app.desk.recording.report is not None, "told how recording goes")
@@ -305,10 +304,15 @@ def test_what_the_window_shows_is_in_the_store_and_came_by_one_link(
         wait(lambda: station.robot.resources is not None, "saw the robot's computer")
         wait(lambda: rows(app, "exo-01") > 20, "recorded rows")
         assert len(robot.called("stream.start")) == 1
+        app.window.added.emit(other.address)
+        wait(lambda: not app.desk.stations[1].robot.is_stale(), "saw the one that was added")
+        name = app.desk.stations[1].name
+        wait(lambda: rows(app, name) > 5, "recorded it too")
         shown = app.window.statusBar().findChildren(FittedLabel)
         wait(lambda: any(label.text().startswith("Recording · ") for label in shown), "said so")
     store = Store(settings.store.url)
     assert store.dataset(TELEMETRY.location("exo-01", 1)).count_rows() > 10
+    assert store.dataset(TELEMETRY.location(name, 1)).count_rows() > 0
     assert store.dataset("sessions").to_table()["operator"].to_pylist()[-1] == "Ada"
     assert "stairs" in store.dataset("events").to_table()["text"].to_pylist()
 
@@ -349,34 +353,7 @@ def rows(app: App, robot: str) -> int:
     return 0 if report is None or robot not in report.robots else report.robots[robot].rows
 
 
-def test_a_robot_added_while_it_runs_is_recorded_too(
-    qt: QApplication, settings: ServerSettings, kept: QSettings
-) -> None:
-    with FakeRobot() as other, running(qt, settings, kept, Record()) as app:
-        app.window.added.emit(other.address)
-        wait(lambda: not app.desk.stations[1].robot.is_stale(), "saw the other")
-        name = app.desk.stations[1].name
-        wait(lambda: rows(app, name) > 5, "recorded it")
-    assert Store(settings.store.url).dataset(TELEMETRY.location(name, 1)).count_rows() > 0
-
-
-def test_where_a_collector_records_the_window_shows_and_says_who_records(
-    qt: QApplication, settings: ServerSettings, kept: QSettings
-) -> None:
-    with Collector(settings) as collector, running(qt, settings, kept, Record()) as app:
-        station = app.desk.stations[0]
-        wait(lambda: not station.robot.is_stale(), "was live")
-        wait(lambda: app.desk.recording.report is not None, "asked the collector")
-        assert app.desk.recording.by is By.OTHER
-        assert app.desk.recording.said(station.address).text.startswith("Recording by process")
-        wait(lambda: rows(app, "exo-01") > 0, "recorded")
-        app.desk.recording.mark("here")
-        wait(lambda: any("marked" in item.text for item in app.desk.news.items), "marked")
-        collector.wait(0.0)
-    assert "here" in Store(settings.store.url).dataset("events").to_table()["text"].to_pylist()
-
-
-def test_the_window_records_when_whoever_did_has_ended(
+def test_the_window_says_who_records_and_does_so_when_they_have_ended(
     qt: QApplication,
     settings: ServerSettings,
     kept: QSettings,
@@ -389,6 +366,11 @@ def test_the_window_records_when_whoever_did_has_ended(
         with running(qt, settings, kept, Record("Ada", "after")) as app:
             recording, station = app.desk.recording, app.desk.stations[0]
             wait(lambda: recording.report is not None and not station.robot.is_stale(), "asked the collector")
+            assert recording.by is By.OTHER
+            assert recording.said(station.address).text.startswith("Recording by process")
+            wait(lambda: rows(app, "exo-01") > 0, "was recorded")
+            recording.mark("here")
+            wait(lambda: any("marked in" in item.text for item in app.desk.news.items), "marked there")
             before = len(station.rings.times(60.0))
             other.close()
             wait(lambda: recording.by is By.WINDOW, "took over")
@@ -396,7 +378,7 @@ def test_the_window_records_when_whoever_did_has_ended(
             assert recording.said(station.address).tone is Tone.GOOD
             assert len(station.rings.times(60.0)) > before > 0, "what was shown stays"
             recording.mark("mine")
-            wait(lambda: any("marked in" in item.text for item in app.desk.news.items), "marked")
+            wait(lambda: sum("marked in" in item.text for item in app.desk.news.items) == 2, "marked")
             told = [item.text for item in app.desk.news.items]
             assert sum("this window does from now on" in text for text in told) == 1
     store = Store(settings.store.url)
@@ -406,7 +388,7 @@ def test_the_window_records_when_whoever_did_has_ended(
     stamps = [(row["session"], row["stamp_ns"]) for row in recorded]
     assert len(stamps) == len(set(stamps)), "no row is there twice"
     assert {session for session, _ in stamps} == set(sessions)
-    assert "mine" in store.dataset("events").to_table()["text"].to_pylist()
+    assert {"here", "mine"} <= set(store.dataset("events").to_table()["text"].to_pylist())
 
 
 def test_a_window_that_only_shows_never_records(

@@ -94,6 +94,7 @@ def test_every_tab_is_whole_on_every_screen(
 ) -> None:
     page: Shown = request.getfixturevalue("whole")
     full: MainWindow = request.getfixturevalue("full_window")
+    full.setUpdatesEnabled(True)  # it is painted here, too
     busy(bench)
     record(request.getfixturevalue("settings"))
     play(page, request.getfixturevalue("archive"))

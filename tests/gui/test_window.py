@@ -4,44 +4,28 @@ import re
 import time
 
 import pytest
-from PySide6.QtCore import QSettings, QSize, Qt
+from PySide6.QtCore import QSize, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QLineEdit, QTabBar, QWidget
 
 from gateway.client import ConnectionState, NotConnected
-from server_gui.core.desk.desk import Desk
 from server_gui.core.follow.events import LinkChanged
 from server_gui.views.frame.main_window import USUAL, MainWindow, opening_size
 from server_gui.views.parameters.tree import DEFAULT, RANGE
 from server_gui.views.robots.panel import RobotsPanel
 from server_gui.views.theme import PALETTES, Look, Theme
-from tests.gui.fakes import Bench, destroy, make_every_page, stop_is_whole
+from tests.gui.fakes import Around, Bench, destroy, make_every_page, stop_is_whole
 from tests.support.desk import described, looked, walking
 
 TEXT = ("text", "dim", "accent", "left", "right", "good", "warn", "bad")
 
 
-def test_without_a_robot_the_window_says_what_to_do_and_offers_the_simulator(
-    theme: Theme, tmp_path: object
-) -> None:
-    window = MainWindow(Desk(), theme, QSettings(f"{tmp_path}/none.ini", QSettings.Format.IniFormat))
-    asked: list[bool] = []
-    window.simulator.connect(lambda: asked.append(True))
-    window.show()
-    Bench(Desk()).draw(window)
-    assert window.empty.isVisible()
-    window.empty.start.click()
-    assert asked == [True]
-    assert not window.empty.start.isEnabled(), "it could be asked for twice"
-    destroy(window)
-
-
-def test_a_robot_that_is_gone_says_so_and_how_old_its_data_are(window: MainWindow, bench: Bench) -> None:
+def test_a_robot_that_is_gone_says_so_and_how_old_its_data_are(around: Around, bench: Bench) -> None:
     bench.station.take([walking(50, age_s=70.0)])
     why = "nothing came from 127.0.0.1:7420 for 3.0 s; the link is given up"
     bench.look_again([LinkChanged(ConnectionState.WAITING, why, time.monotonic_ns())])
-    bench.draw(window)
-    card = window.robots.cards[0]
+    bench.draw(around)
+    card = around.robots.cards[0]
     assert card.texts[:2] == ("exo-01", f"no link: {why}")
     assert re.fullmatch(r"7\d\.\d s old", card.texts[2])
     assert f"no link: {why}" in bench.desk.news.items[0].text
@@ -81,13 +65,6 @@ def test_an_address_is_added(theme: Theme, bench: Bench) -> None:
         panel.address.setText(typed)
         QTest.keyClick(panel.address, Qt.Key.Key_Return)
     assert added == ["192.0.2.7:7420", "left=192.0.2.8:7420"]
-
-
-def test_a_robot_is_chosen_by_keyboard(window: MainWindow, bench: Bench) -> None:
-    bench.add("exo-02", 7421)
-    bench.draw(window)
-    QTest.keyClick(window.robots.cards[1], Qt.Key.Key_Return)
-    assert bench.desk.selected is bench.desk.stations[1]
 
 
 def test_the_same_news_twice_in_a_row_are_told_once(bench: Bench) -> None:
@@ -164,6 +141,7 @@ def luminance(colour: str) -> float:
 def test_a_window_without_room_has_its_panels_behind_each_other_and_gives_them_back(
     window: MainWindow, bench: Bench, theme: Theme
 ) -> None:
+    window.setUpdatesEnabled(True)  # its layouts come to rest as it is painted
     window.resize(1366, 768)
     bench.draw(window)
     before = [dock.geometry() for dock in window.docks]
@@ -188,6 +166,9 @@ def test_a_window_without_room_has_its_panels_behind_each_other_and_gives_them_b
     assert not window.panels_button.isVisible()
     bars = window.findChildren(QTabBar, options=Qt.FindChildOption.FindDirectChildrenOnly)
     assert not any(bar.isVisible() for bar in bars), "names of panels are left over the pages"
+    tree = window.parameters.tree
+    bench.draw(window)
+    assert not any(tree.isColumnHidden(column) for column in (RANGE, DEFAULT))
 
 
 def test_a_tight_window_begins_with_the_robot_and_has_its_panels_a_click_away(
@@ -222,17 +203,20 @@ def test_a_tight_window_begins_with_the_robot_and_has_its_panels_a_click_away(
     assert all(dock.isVisible() for dock in window.docks)
 
 
-def test_every_page_is_in_sight_by_its_name(full_window: MainWindow, bench: Bench, theme: Theme) -> None:
+@pytest.mark.parametrize(
+    ("width", "height", "scale"), [(1366, 768, 1.0), (1024, 700, 1.0), (1024, 700, 2.0), (1920, 1080, 2.0)]
+)
+def test_every_page_is_in_sight_by_its_name(
+    full_window: MainWindow, bench: Bench, theme: Theme, width: int, height: int, scale: float
+) -> None:
     bar = full_window.page_bar
-    for scale, size in ((1.0, (1366, 768)), (1.0, (1024, 700)), (2.0, (1024, 700)), (2.0, (1920, 1080))):
-        if scale != theme.scale:
-            theme.set(scale=scale)
-        full_window.resize(*size)
-        bench.draw(full_window)
-        for button in (*bar.buttons, full_window.help_button):
-            assert button.width() >= button.sizeHint().width()
-            assert button.visibleRegion().boundingRect() == button.rect(), (button.text(), size, scale)
-        assert stop_is_whole(full_window)
+    theme.set(scale=scale)
+    full_window.resize(width, height)
+    bench.draw(full_window)
+    for button in (*bar.buttons, full_window.help_button):
+        assert button.width() >= button.sizeHint().width()
+        assert button.visibleRegion().boundingRect() == button.rect(), button.text()
+    assert stop_is_whole(full_window)
     for place, button in enumerate(bar.buttons):
         QTest.mouseClick(button, Qt.MouseButton.LeftButton)
         assert full_window.tabs.currentIndex() == place
@@ -271,14 +255,6 @@ def test_what_became_of_a_stop_is_read_in_full_in_a_small_window(
     assert window.header.reset_button.isVisible()
     assert (window.width(), window.height()) == (width, height)
     assert stop_is_whole(window)
-
-
-def test_range_and_default_of_parameters_are_seen_on_a_laptop(window: MainWindow, bench: Bench) -> None:
-    window.resize(1366, 768)
-    bench.draw(window)
-    bench.draw(window)
-    tree = window.parameters.tree
-    assert not any(tree.isColumnHidden(column) for column in (RANGE, DEFAULT))
 
 
 def test_a_window_with_large_text_opens_as_large_as_its_screen() -> None:

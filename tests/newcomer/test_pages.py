@@ -8,6 +8,7 @@ from typing import Final
 
 import pytest
 
+from tests.fake_robot import FakeRobot
 from tests.newcomer.newcomer import Newcomer, free_port
 from tests.newcomer.pages import BY_HAND, CLOSED, ROOT, SHELLS, TERMINAL, Command, Page, blocks, pages
 from tests.newcomer.walks import PASSED, WALKS
@@ -184,6 +185,16 @@ def test_what_the_page_shows_happens(walk: str, name: str, programs: Path) -> No
         for block in blocks(page):
             newcomer.type(block)
         newcomer.end()
+
+
+def test_the_script_of_the_readme_writes(capsys: pytest.CaptureFixture[str]) -> None:
+    """At a fake robot; at a simulated one by night."""
+    (script,) = (block for block in blocks(TYPED["README.md: You write software"]) if block.is_script)
+    with FakeRobot() as robot:
+        assert "127.0.0.1:7420" in script.text
+        exec(script.text.replace("127.0.0.1:7420", robot.address))
+        assert robot.parameters["gait.step_length"] == 0.42
+    assert capsys.readouterr().out == "{'gait.step_length': 0.42}\n"
 
 
 def test_every_page_on_which_something_is_typed_is_on_a_walk() -> None:
