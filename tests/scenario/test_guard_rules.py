@@ -286,8 +286,12 @@ def test_every_rule_is_tripped_here() -> None:
     assert {case.rule for case in CASES} | {"drift", "falling", "falling_fast"} == set(rules)
 
 
-@pytest.mark.parametrize("seconds", [9, 600])
-def test_walking_trips_nothing_and_nothing_is_blind(watched: Watched, seconds: int) -> None:
+@pytest.mark.parametrize(("seconds", "window_s"), [(4, 3.0), (600, 8.0)])
+def test_walking_trips_nothing_and_nothing_is_blind(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, seconds: int, window_s: float
+) -> None:
+    rules = RULES.replace("window_s = 8.0", f"window_s = {window_s}")
+    watched = Watched(tmp_path, monkeypatch, rules)
     watched.run(float(seconds))
     assert watched.changes == []
     assert set(watched.states().values()) == {State.WATCHING}

@@ -43,8 +43,14 @@ class Listener:
 class Outside:
     """The robot, its faults, a node that hears its bus and a listener on each port."""
 
-    def __init__(self, folder: Path, scenario: Scenario = Scenario.WALK, seed: int = 0) -> None:
-        self.robot = Exoskeleton(scenario, seed)
+    def __init__(
+        self,
+        folder: Path,
+        scenario: Scenario = Scenario.WALK,
+        seed: int = 0,
+        kind: type[Exoskeleton] = Exoskeleton,
+    ) -> None:
+        self.robot = kind(scenario, seed)
         self.faults = Faults(self.robot, folder, seed)
         self.ports = {name: Listener(line.baudrate) for name, line in self.robot.sensors.lines.items()}
         for name, line in self.robot.sensors.lines.items():

@@ -23,10 +23,19 @@ def labels(moments: list[Moment]) -> list[Label]:
 
 
 def through_all_pairs() -> list[Activity]:
-    """A tour in which each activity follows each other one at least once."""
-    pairs = list(permutations(Activity, 2))
-    random.Random(3).shuffle(pairs)
-    return [activity for pair in pairs for activity in pair]
+    """A tour in which each activity follows each other one once (Hierholzer's)."""
+    ways = {one: [other for other in Activity if other is not one] for one in Activity}
+    for after in ways.values():
+        random.Random(3).shuffle(after)
+    on_the_way, tour = [Activity.STAND], []
+    while on_the_way:
+        after = ways[on_the_way[-1]]
+        (on_the_way.append(after.pop()) if after else tour.append(on_the_way.pop()))
+    return tour[::-1]
+
+
+def test_the_tour_goes_from_each_activity_to_each_other() -> None:
+    assert set(pairwise(through_all_pairs())) == set(permutations(Activity, 2))
 
 
 def test_no_angle_and_no_velocity_jumps_between_any_two_activities() -> None:

@@ -22,7 +22,7 @@ from hil_sim.sensors.trunk_imu import quaternion, specific_force
 from tests.support.waiting import until
 from tests.unit.hil_sim.driven import STEP_NS, Bench, Watched, driven, steps_until
 
-STEPS = 60
+STEPS = 40
 AXES = "xyz"
 TILT = {"tilt_forward", "tilt_side"}
 ORIENTATION = {f"orientation_{part}" for part in "wxyz"}
