@@ -291,7 +291,10 @@ def test_walking_trips_nothing_and_nothing_is_blind(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, seconds: int, window_s: float
 ) -> None:
     rules = RULES.replace("window_s = 8.0", f"window_s = {window_s}")
-    watched = Watched(tmp_path, monkeypatch, rules)
+    watched = Watched(tmp_path, monkeypatch, rules, send_inputs_by_pdo)
     watched.run(float(seconds))
     assert watched.changes == []
     assert set(watched.states().values()) == {State.WATCHING}
+    watched.run(0.03)  # between two answers to SDO
+    watched.faults.begin("sto", "left_knee")
+    assert watched.until(lambda: watched.reasons("emergency_stop"), 0.02), "a frame brings it"

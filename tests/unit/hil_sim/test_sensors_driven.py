@@ -195,8 +195,13 @@ def talking(bench: Bench) -> Iterator[None]:
     [
         *((SensorChoice(imu=imu), TRUNK, (imu.removesuffix("-binary"), None)) for imu in SERIAL_IMUS),
         *(
-            (SensorChoice(insole=name), foot, (name, DESCRIBED.get(name)))
-            for name in INSOLES
+            pytest.param(
+                SensorChoice(insole=name),
+                foot,
+                (name, DESCRIBED.get(name)),
+                marks=[pytest.mark.nightly] * (foot is not FEET[number % 2]),  # one foot each by day
+            )
+            for number, name in enumerate(INSOLES)
             for foot in FEET
         ),
     ],
