@@ -14,7 +14,6 @@ from hil_sim.exoskeleton import Exoskeleton, Scenario
 from hil_sim.gait.activity import Activity, Label
 from tests.unit.hil_sim.bench import Heard
 
-
 USUAL = ((0x2001, 400, 2), (0x2002, 1600, 2), (0x2003, 60, 2), (0x2004, 0, 2), (0x2005, 1, 1))
 
 
