@@ -286,7 +286,7 @@ def test_every_rule_is_tripped_here() -> None:
     assert {case.rule for case in CASES} | {"drift", "falling", "falling_fast"} == set(rules)
 
 
-@pytest.mark.parametrize(("seconds", "window_s"), [(4, 3.0), (600, 8.0)])
+@pytest.mark.parametrize(("seconds", "window_s"), [(6, 4.8), (600, 8.0)])
 def test_walking_trips_nothing_and_nothing_is_blind(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, seconds: int, window_s: float
 ) -> None:

@@ -262,7 +262,7 @@ def test_one_that_is_killed_leaves_the_joint_without_power_and_the_next_puts_bac
 
 
 def moved_by_hand(robot: SimulatedRobot) -> tuple[str, str]:
-    """Why a test ended whose joint was moved before the phrase was typed, and all it said: it had no power."""
+    """Why a test ended whose joint was moved before the phrase was typed, and what it said."""
     angle = robot.exoskeleton.drives[KNEE].joint.position * robot.exoskeleton.mountings[KNEE].direction
     earlier, said = recordings(robot), []
     with begun(robot, "step", *ROOM) as process:
