@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from gateway.main import main as gwrms
 from hil_sim.cli.sim import main
 from hil_sim.robot import SimulatedRobot
 from tests.support.waiting import WAIT_S
@@ -75,7 +76,7 @@ def test_a_second_simulator_in_the_folder_is_refused_in_a_sentence(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with SimulatedRobot(tmp_path, virtual_channel=str(tmp_path)):
-        assert main(["--dir", str(tmp_path)]) == 1
+        assert gwrms(["sim", "--dir", str(tmp_path)]) == 1
     said = capsys.readouterr()
     assert said.out == ""
     assert said.err.strip() == (
@@ -109,5 +110,5 @@ def test_help_reads_like_a_manual(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_a_folder_that_cannot_be_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "file").write_text("", encoding="ascii")
-    assert main(["--dir", str(tmp_path / "file" / "robot")]) == 1
+    assert gwrms(["sim", "--dir", str(tmp_path / "file" / "robot")]) == 1
     assert str(tmp_path / "file" / "robot") in capsys.readouterr().err

@@ -32,7 +32,7 @@ class Frame(NamedTuple):
 @pytest.fixture(scope="module")
 def module_robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Outside]:
     """Without frames on its bus: its sensors are the same, and it costs a third."""
-    with closing(Outside(tmp_path_factory.mktemp("robot"), kind=BareExoskeleton)) as outside:
+    with closing(Outside(tmp_path_factory.mktemp("robot"), kind=BareExoskeleton, sensors=True)) as outside:
         yield outside
 
 
@@ -247,7 +247,7 @@ def test_imu_saturated_never_says_more_than_its_limit(shared: Outside) -> None:
 
 def test_swapped_feet_load_each_insole_in_the_other_ones_turn(tmp_path: Path) -> None:
     def loads(swapped: bool) -> dict[str, list[int]]:
-        with closing(Outside(tmp_path, kind=BareExoskeleton)) as outside:
+        with closing(Outside(tmp_path, kind=BareExoskeleton, sensors=True)) as outside:
             outside.run(1.0)
             if swapped:
                 outside.faults.begin("swapped_feet")

@@ -32,7 +32,7 @@ def test_whatever_a_wearer_does_raises_no_alarm(tmp_path: Path, scenario: Scenar
 @pytest.mark.parametrize("fault", ["gear_slip", "sto", "overcurrent", "drift", "runaway"])
 def test_other_faults_of_a_drive_are_none_of_its_encoder(tmp_path: Path, fault: str) -> None:
     robot = WatchedRobot(tmp_path, Scenario.WALK, whole=True)
-    robot.run(3)
+    robot.run(1)
     robot.faults.begin(fault, "left_knee")
     assert robot.run(3) == {}
 
@@ -72,7 +72,7 @@ def test_encoders_that_jump_are_named(tmp_path: Path) -> None:
 
 def test_a_joint_that_is_all_but_jammed_is_to_be_looked_at(tmp_path: Path) -> None:
     robot = WatchedRobot(tmp_path, Scenario.WALK)
-    robot.run(4)
+    robot.run(2)
     robot.faults.begin("following_error", "left_knee")
     robot.run(4)
     assert "check its encoder and the encoder's cable, and that the joint can move" in robot.words(
