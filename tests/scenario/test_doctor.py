@@ -40,7 +40,7 @@ class Ill:
 @pytest.fixture
 def ill(tmp_path: Path) -> Iterator[Ill]:
     with (
-        SimulatedRobot(tmp_path, virtual_channel=f"ill {tmp_path.name}", mistakes=MISTAKES) as robot,
+        SimulatedRobot(tmp_path, mistakes=MISTAKES) as robot,
         serving(load(robot.config)) as (host, port),
         Client((host, port)) as client,
     ):
