@@ -1,15 +1,17 @@
 """IMU streams with garbage in them: what was sent whole arrives, wherever the stream is cut."""
 
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drivers.imu.formats.witmotion import WitmotionParser
+from tests.support.examples import examples
 from tests.unit.imu.encode import witmotion
 
 word = st.integers(-32768, 32767)
 garbage = st.binary(max_size=60).map(lambda raw: raw.replace(b"\x55", b"\x54"))
 
 
+@settings(max_examples=examples(40))
 @given(st.lists(st.tuples(garbage, word, word, word), min_size=1, max_size=8), st.data())
 def test_witmotion_frames_survive_garbage_and_cuts(
     parts: list[tuple[bytes, int, int, int]], data: st.DataObject

@@ -5,13 +5,14 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import numpy.typing as npt
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ml.benchmarks import events, fall, ipol, status, strides
 from ml.benchmarks.models.gait_events import NONE
 from ml.benchmarks.sisfall import Recording
 from ml.errors import UnusableData
+from tests.support.examples import examples
 
 ROWS = st.integers(min_value=1, max_value=420)
 FEET = st.lists(st.integers(min_value=1, max_value=130), min_size=1, max_size=12)
@@ -47,6 +48,7 @@ def judged_or_refused(make: Callable[[], object]) -> bool:
     return True
 
 
+@settings(max_examples=examples(40))
 @given(trials())
 def test_walks_of_any_length_are_cut_into_strides(walks: list[ipol.Trial]) -> None:
     if judged_or_refused(lambda: strides.lessons(walks)):
@@ -55,12 +57,14 @@ def test_walks_of_any_length_are_cut_into_strides(walks: list[ipol.Trial]) -> No
         assert np.isfinite(data.features).all()
 
 
+@settings(max_examples=examples(40))
 @given(trials())
 def test_walks_of_any_length_are_decided_upon(walks: list[ipol.Trial]) -> None:
     data = status.decisions(walks)
     assert len(data.truth) == sum(len(range(status.FIRST, len(one.samples), status.STEP)) for one in walks)
 
 
+@settings(max_examples=examples(40))
 @given(trials())
 def test_feet_of_walks_of_any_length_have_their_moments_also_with_packets_lost(
     walks: list[ipol.Trial],
@@ -74,6 +78,7 @@ def test_feet_of_walks_of_any_length_have_their_moments_also_with_packets_lost(
                 assert (foot.offset != NONE).sum() <= len(foot.true)
 
 
+@settings(max_examples=examples(40))
 @given(ROWS, st.integers(min_value=0, max_value=419))
 def test_falls_at_any_moment_of_recordings_of_any_length(rows: int, impact: int) -> None:
     samples = np.full((rows, 6), 4.0)

@@ -185,7 +185,7 @@ def test_a_master_that_falls_silent_is_missed(world: World, device: canopen.Remo
 
 # -- SDO -------------------------------------------------------------------------------------------------
 
-SIZES = (1, 4, 5, 7, 8, 889, 890, 5000)
+SIZES = (1, 4, 5, 7, 8, 889, 890, 2000)
 
 
 def content(size: int) -> bytes:

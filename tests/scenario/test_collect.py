@@ -14,8 +14,9 @@ from pathlib import Path
 
 import pytest
 
+from gateway.main import main
 from tests.scenario.collecting import Collecting, Kept
-from tests.scenario.processes import Bench, gwrms
+from tests.scenario.processes import Bench
 from tests.support.waiting import WAIT_S, until
 
 FAST_S = (8, int(os.environ.get("GWRMS_SIMULATED_S", "60")))
@@ -88,19 +89,20 @@ def steady_robots() -> Iterator[dict[str, str]]:
 
 
 def test_a_killed_collector_loses_nothing_that_it_had_and_goes_on(
-    steady_robots: dict[str, str], start: Start
+    steady_robots: dict[str, str], start: Start, capsys: pytest.CaptureFixture[str]
 ) -> None:
     collecting = start(steady_robots)
-    collecting.until_more(150)
+    collecting.until_more(100)
     acknowledged = collecting.rows()
     # It commits in the order in which things come; records of other tables are fewer than a hundred.
     until(lambda: collecting.report().recorder.recorded >= sum(acknowledged.values()) + 100)
     collecting.kill()
     collecting.start()
-    collecting.until_more(150)
+    collecting.until_more(100)
     later = collecting.rows()
-    shown = gwrms("collect", "--status", "--config", str(collecting.config))
-    assert all(name in shown.stdout for name in steady_robots), shown.stderr
+    assert main(["collect", "--status", "--config", str(collecting.config)]) == 0
+    shown = capsys.readouterr()
+    assert all(name in shown.out for name in steady_robots), shown.err
     assert collecting.end() == 0
     for name in steady_robots:
         kept = collecting.kept(name)

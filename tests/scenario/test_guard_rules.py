@@ -181,6 +181,21 @@ CASES = [
 ]
 
 
+# One after another on one robot by day: each leaves the next to be seen. The bus goes last.
+TOGETHER = ("foot", "end_switch", "supply", "following", "lost", "emergency", "sync", "bus")
+
+
+def test_faults_that_come_one_after_another_trip_each_its_own_rule(watched: Watched) -> None:
+    watched.run(0.5)
+    assert watched.changes == []
+    for rule in TOGETHER:
+        case = next(case for case in CASES if case.rule == rule)
+        assert watched.reasons(rule) == [], "what came before has not tripped it"
+        watched.faults.begin(case.fault, case.on, params=case.params)
+        assert watched.until(lambda: watched.reasons(rule), case.within_s), watched.changes  # noqa: B023
+        assert watched.reasons(rule)[0].startswith(case.says)
+
+
 @pytest.mark.parametrize("case", CASES, ids=lambda case: f"{case.rule}-{case.fault}")
 def test_a_fault_trips_its_rule_which_says_what_it_saw(watched: Watched, case: Case) -> None:
     watched.run(case.after_s)
@@ -271,8 +286,15 @@ def test_every_rule_is_tripped_here() -> None:
     assert {case.rule for case in CASES} | {"drift", "falling", "falling_fast"} == set(rules)
 
 
-@pytest.mark.parametrize("seconds", [10, 600])
-def test_walking_trips_nothing_and_nothing_is_blind(watched: Watched, seconds: int) -> None:
+@pytest.mark.parametrize(("seconds", "window_s"), [(6, 4.8), (600, 8.0)])
+def test_walking_trips_nothing_and_nothing_is_blind(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, seconds: int, window_s: float
+) -> None:
+    rules = RULES.replace("window_s = 8.0", f"window_s = {window_s}")
+    watched = Watched(tmp_path, monkeypatch, rules, send_inputs_by_pdo)
     watched.run(float(seconds))
     assert watched.changes == []
     assert set(watched.states().values()) == {State.WATCHING}
+    watched.run(0.03)  # between two answers to SDO
+    watched.faults.begin("sto", "left_knee")
+    assert watched.until(lambda: watched.reasons("emergency_stop"), 0.02), "a frame brings it"

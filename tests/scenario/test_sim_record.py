@@ -10,7 +10,7 @@ from hil_sim.exoskeleton import Scenario
 from hil_sim.robot import SimulatedRobot
 from tests.unit.gateway.harness import Client, serving
 
-ROWS = 150  # of each channel
+ROWS = 60  # of each channel
 RESOLUTION = {"rad": 1.5e-4, "rad/s": 1e-6, "N": 1e-6, "m": 1e-6, "m/s²": 1e-6}  # a tilt goes round
 
 Heard = dict[str, list[float | None]]

@@ -272,7 +272,7 @@ class TestMaster:
             client.call("control.acquire", ttl_s=60)
             yield client
 
-    def test_a_robot_is_reset_and_enabled_one_transition_at_a_time_and_stopped_again(
+    def test_a_robot_is_reset_and_enabled_one_transition_at_a_time_and_a_stop_overtakes_the_next_way_up(
         self, robot: SimulatedRobot, client: Client
     ) -> None:
         assert client.call("robot.reset")["drives"] == dict.fromkeys(JOINTS, "switch on disabled")
@@ -292,9 +292,29 @@ class TestMaster:
         until(lambda: robot.exoskeleton.clock.now_s > since + 0.5, "it stands a while")
         after = {name: drive.joint.position for name, drive in robot.exoskeleton.drives.items()}
         assert all(abs(after[name] - before[name]) < 0.02 for name in JOINTS)
-        stopped = client.call("robot.stop", reason="scenario")
-        assert stopped["drives"] == dict.fromkeys(JOINTS, "confirmed")
+        self.stop_overtakes_the_way_up(robot, client)
         assert client.refused("robot.enable").kind == "stopped"
+
+    def stop_overtakes_the_way_up(self, robot: SimulatedRobot, client: Client) -> None:
+        client.call("robot.reset")
+        knee = robot.exoskeleton.drives["left_knee"]
+        take = knee.dictionary[od.CONTROLWORD].on_write
+        assert take is not None
+        knee.dictionary[od.CONTROLWORD].on_write = lambda value: None if value == 0x0007 else take(value)
+        enabling = client.request("robot.enable")
+        until(
+            lambda: (
+                {drive.power_state for drive in robot.exoskeleton.drives.values()}
+                == {PowerState.READY_TO_SWITCH_ON, PowerState.SWITCHED_ON}
+            ),
+            "under way",
+        )
+        assert client.call("robot.stop", reason="scenario")["held"] is True
+        answer = client.answer(enabling)
+        assert set(answer["problems"]) == set(JOINTS)
+        assert enabled(robot) == 0
+        # Where their confirmed quick stop has led them.
+        assert set(answer["drives"].values()) == {"switch on disabled"}
 
     def test_a_stop_goes_by_an_rpdo_that_our_sync_lets_take_effect(
         self, robot: SimulatedRobot, client: Client, tmp_path: Path
@@ -323,27 +343,6 @@ class TestMaster:
         assert "another drive was not led there" in answer["problems"]["right_hip"]
         assert set(answer["problems"]) == set(JOINTS)
         assert enabled(robot) == 0
-
-    def test_a_stop_overtakes_the_way_up(self, robot: SimulatedRobot, client: Client) -> None:
-        client.call("robot.reset")
-        knee = robot.exoskeleton.drives["left_knee"]
-        take = knee.dictionary[od.CONTROLWORD].on_write
-        assert take is not None
-        knee.dictionary[od.CONTROLWORD].on_write = lambda value: None if value == 0x0007 else take(value)
-        enabling = client.request("robot.enable")
-        until(
-            lambda: (
-                {drive.power_state for drive in robot.exoskeleton.drives.values()}
-                == {PowerState.READY_TO_SWITCH_ON, PowerState.SWITCHED_ON}
-            ),
-            "under way",
-        )
-        assert client.call("robot.stop", reason="scenario")["held"] is True
-        answer = client.answer(enabling)
-        assert set(answer["problems"]) == set(JOINTS)
-        assert enabled(robot) == 0
-        # Where their confirmed quick stop has led them.
-        assert set(answer["drives"].values()) == {"switch on disabled"}
 
 
 def all_seen(client: Client) -> bool:
@@ -403,12 +402,20 @@ class TestProcesses:
     def test_a_gateway_killed_in_the_middle_of_a_stop_has_stopped_and_the_next_one_holds(
         self, bench: Bench
     ) -> None:
-        hold = RecordsFolder(load(bench.config).records).hold
+        """It takes back a trial, too, though nobody asks it for anything."""
+        folder = RecordsFolder(load(bench.config).records)
+        before = cycle_time(bench)
         with Client(("127.0.0.1", bench.port)) as client:
+            client.call("control.acquire", ttl_s=300)
+            client.call("parameter.write", changes={"gait.cycle_time": 1.25}, trial_s=250)
             client.request("robot.stop", reason="and killed")
-            until(hold.exists)
+            until(folder.hold.exists)
             bench.kill(bench.gateway)
+        assert folder.undo.exists()
         bench.start_gateway()
+        until(lambda: not folder.undo.exists())
+        assert cycle_time(bench) == before
+        until(lambda: self.said(bench, "taken back"))
         until(lambda: self.said(bench, "stop still held"))
         until(lambda: not any(state == 4 for state in drive_states(bench)))
         assert bench.ask("robot.describe")["stop"]["reason"] == "and killed"
@@ -425,6 +432,12 @@ def is_dead(bench: Bench) -> bool:
     except ChildFailed:
         return True
     return False
+
+
+def cycle_time(bench: Bench) -> float | None:
+    read = bench.ask("parameter.read", names=["gait.cycle_time"])
+    found: float | None = read["values"]["gait.cycle_time"]["value"]
+    return found
 
 
 def drive_states(bench: Bench) -> list[float | None]:

@@ -112,20 +112,6 @@ def test_a_trial_reverts_when_its_terminal_is_killed(bench: Bench) -> None:
     assert (last["what"], last["reason"]) == ("taken back", "lease lost with the connection")
 
 
-def test_a_gateway_killed_during_a_trial_takes_it_back_when_it_starts_again(bench: Bench) -> None:
-    before = value(bench, "gait.cycle_time")
-    with Client(("127.0.0.1", bench.port)) as client:
-        client.call("control.acquire", ttl_s=300)
-        client.call("parameter.write", changes={"gait.cycle_time": 1.25}, trial_s=250)
-        bench.kill(bench.gateway)
-    bench.start_gateway()
-    # Client or not: nobody asks this gateway for anything before the value is back.
-    folder = RecordsFolder(load(bench.config).records)
-    until(lambda: not folder.undo.exists())
-    assert value(bench, "gait.cycle_time") == before
-    assert [one["what"] for one in read_verified(folder.journal)][-1] == "taken back"
-
-
 def test_a_gateway_killed_during_a_store_leaves_a_record_of_it_and_a_robot_that_answers(
     tmp_path: Path,
 ) -> None:

@@ -41,14 +41,23 @@ class Listener:
 
 
 class Outside:
-    """The robot, its faults, a node that hears its bus and a listener on each port."""
+    """The robot, its faults, a node that hears its bus and, with `sensors`, a listener on each port."""
 
-    def __init__(self, folder: Path, scenario: Scenario = Scenario.WALK, seed: int = 0) -> None:
-        self.robot = Exoskeleton(scenario, seed)
+    def __init__(
+        self,
+        folder: Path,
+        scenario: Scenario = Scenario.WALK,
+        seed: int = 0,
+        kind: type[Exoskeleton] = Exoskeleton,
+        *,
+        sensors: bool = False,
+    ) -> None:
+        self.robot = kind(scenario, seed)
         self.faults = Faults(self.robot, folder, seed)
         self.ports = {name: Listener(line.baudrate) for name, line in self.robot.sensors.lines.items()}
-        for name, line in self.robot.sensors.lines.items():
-            line.port = self.ports[name]
+        if sensors:  # what nobody hears costs nothing
+            for name, line in self.robot.sensors.lines.items():
+                line.port = self.ports[name]
         self.messages: list[can.Message] = []
         self._came: list[can.Message] = []
         self.robot.bus.attach(self, self._hear, self._hear_error)

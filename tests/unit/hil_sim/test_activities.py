@@ -23,10 +23,19 @@ def labels(moments: list[Moment]) -> list[Label]:
 
 
 def through_all_pairs() -> list[Activity]:
-    """A tour in which each activity follows each other one at least once."""
-    pairs = list(permutations(Activity, 2))
-    random.Random(3).shuffle(pairs)
-    return [activity for pair in pairs for activity in pair]
+    """A tour in which each activity follows each other one once (Hierholzer's)."""
+    ways = {one: [other for other in Activity if other is not one] for one in Activity}
+    for after in ways.values():
+        random.Random(3).shuffle(after)
+    on_the_way, tour = [Activity.STAND], []
+    while on_the_way:
+        after = ways[on_the_way[-1]]
+        (on_the_way.append(after.pop()) if after else tour.append(on_the_way.pop()))
+    return tour[::-1]
+
+
+def test_the_tour_goes_from_each_activity_to_each_other() -> None:
+    assert set(pairwise(through_all_pairs())) == set(permutations(Activity, 2))
 
 
 def test_no_angle_and_no_velocity_jumps_between_any_two_activities() -> None:
@@ -48,7 +57,7 @@ def test_no_angle_and_no_velocity_jumps_between_any_two_activities() -> None:
 
 def test_changed_parameters_bend_the_motion_without_a_jump() -> None:
     moving = Moving()
-    moving.do(Activity.WALK, 4.0)
+    moving.go(Activity.WALK, 4.0)
     moving.shape = replace(USUAL, step_length=0.6, cycle_time=1.2, toe_height=0.12, trunk_angle=0.3)
     knees = [moment.legs[0].knee for moment in moving.do(Activity.WALK, 2.0, dt=0.002)]
     speeds = [(b - a) / 0.002 for a, b in pairwise(knees)]
@@ -68,13 +77,13 @@ WAYS = [
 @pytest.mark.parametrize(("ways", "seen"), WAYS)
 def test_what_is_done_between_two_activities(ways: tuple[Activity, Activity], seen: list[str]) -> None:
     moving = Moving()
-    moving.do(ways[0], 5.0)
+    moving.go(ways[0], 5.0)
     assert labels([*moving.do(ways[0], 0.1), *moving.do(ways[1], 10.0)]) == seen
 
 
 def test_sitting_down_takes_its_time_and_is_not_broken_off() -> None:
     moving = Moving()
-    moving.do(Activity.SIT, 1.0)
+    moving.go(Activity.SIT, 1.0)
     moments = moving.do(Activity.STAND, 5.0)
     assert labels(moments) == ["stand_to_sit", "sit", "sit_to_stand", "stand"]
     rising = [moment for moment in moments if moment.label is Label.SIT_TO_STAND]
@@ -83,7 +92,7 @@ def test_sitting_down_takes_its_time_and_is_not_broken_off() -> None:
 
 def test_the_trunk_leans_over_the_feet_before_the_seat_is_left() -> None:
     moving = Moving()
-    moving.do(Activity.SIT, 4.0)
+    moving.go(Activity.SIT, 4.0)
     moments = moving.do(Activity.STAND, 3.0)
     leaning = max(range(len(moments)), key=lambda index: moments[index].trunk.pitch)
     left = next(index for index, moment in enumerate(moments) if moment.support == 0.0)
@@ -93,7 +102,7 @@ def test_the_trunk_leans_over_the_feet_before_the_seat_is_left() -> None:
 
 def test_between_walking_and_sitting_one_stands() -> None:
     moving = Moving()
-    moving.do(Activity.WALK, 4.0)
+    moving.go(Activity.WALK, 4.0)
     generator = moving.generator
     for _ in range(600):
         generator.step(0.01, Activity.SIT, USUAL)
@@ -104,7 +113,7 @@ def test_between_walking_and_sitting_one_stands() -> None:
 def test_the_trunk_leans_as_asked_and_hips_follow() -> None:
     upright, leaning = Moving(), Moving()
     leaning.shape = replace(USUAL, trunk_angle=0.2)
-    leaning.do(Activity.STAND, 5.0)
+    leaning.go(Activity.STAND, 5.0)
     assert leaning.generator.trunk == pytest.approx(0.2, abs=1e-4)
     hips = [moving.generator.legs()[0].hip for moving in (upright, leaning)]
     assert hips[1] - hips[0] == pytest.approx(0.2, abs=1e-4)
@@ -123,9 +132,9 @@ def test_left_and_right_are_alike_half_a_stride_apart(gait: Activity) -> None:
 
 def test_a_changed_cycle_time_changes_the_cadence() -> None:
     moving = Moving(replace(USUAL, cycle_time=3.2))
-    moving.do(Activity.WALK, 4.0)
+    moving.go(Activity.WALK, 4.0)
     before = moving.generator.phase
-    moving.do(Activity.WALK, 0.32)
+    moving.go(Activity.WALK, 0.32)
     assert (moving.generator.phase - before) % 1.0 == pytest.approx(0.1, abs=0.001)
 
 
@@ -154,10 +163,10 @@ def test_after_a_turn_the_way_goes_where_the_trunk_looks() -> None:
     """Braking and pushing turn with the wearer: after a quarter they lie along y."""
     moving = Moving()
     while moving.generator.heading < math.pi / 2.0:
-        moving.do(Activity.TURN_LEFT, 0.01)
-    moving.do(Activity.STAND, 4.0)
+        moving.go(Activity.TURN_LEFT, 0.01)
+    moving.go(Activity.STAND, 4.0)
     moving.generator.heading = math.pi / 2.0
-    moving.do(Activity.WALK, 3.0)
+    moving.go(Activity.WALK, 3.0)
     ahead = [moment.trunk.acceleration for moment in moving.do(Activity.WALK, 1.6)]
     straight = [moment.trunk.acceleration for moment in stride_of(Activity.WALK)]
     assert max(y for _, y, _ in ahead) == pytest.approx(max(x for x, _, _ in straight), rel=0.05)
@@ -168,7 +177,7 @@ def test_after_a_turn_the_way_goes_where_the_trunk_looks() -> None:
 
 def test_a_stumble_holds_the_swinging_leg_pitches_the_trunk_and_is_recovered() -> None:
     moving = Moving()
-    moving.do(Activity.WALK, 4.0)
+    moving.go(Activity.WALK, 4.0)
     moments = moving.do(Activity.STUMBLE, 8.0)
     assert labels(moments) == ["walk", "stumble", "walk"]
     during = [moment for moment in moments if moment.label is Label.STUMBLE]
@@ -189,7 +198,7 @@ def test_a_stumble_holds_the_swinging_leg_pitches_the_trunk_and_is_recovered() -
 
 def test_one_command_is_one_stumble_and_the_next_another() -> None:
     moving = Moving()
-    moving.do(Activity.WALK, 4.0)
+    moving.go(Activity.WALK, 4.0)
     once = moving.do(Activity.STUMBLE, 10.0)
     again = [*moving.do(Activity.WALK, 0.5), *moving.do(Activity.STUMBLE, 6.0)]
     assert labels(once).count(Label.STUMBLE) == 1
@@ -198,7 +207,7 @@ def test_one_command_is_one_stumble_and_the_next_another() -> None:
 
 def test_a_fall_takes_the_trunk_down_and_the_feet_off_the_ground() -> None:
     moving = Moving()
-    moving.do(Activity.WALK, 4.0)
+    moving.go(Activity.WALK, 4.0)
     moments = moving.do(Activity.FALL, 4.0)
     assert labels(moments) == ["fall", "lying"]
     fall = [moment for moment in moments if moment.label is Label.FALL]
@@ -227,7 +236,7 @@ def test_the_trunk_falls_as_far_as_it_is_high() -> None:
 
 def test_who_lies_stays_until_told_to_get_up() -> None:
     moving = Moving()
-    moving.do(Activity.FALL, 30.0)
+    moving.go(Activity.FALL, 30.0)
     assert moving.generator.label is Label.LYING
     assert moving.generator.at_rest is Activity.FALL
     moments = moving.do(Activity.STAND, 6.0)
@@ -270,7 +279,7 @@ def test_subjects_are_people_each_of_their_own_and_always_the_same() -> None:
 def test_any_subject_obeys_newton_and_moves_within_the_joints(number: int) -> None:
     person = subject(number)
     moving = Moving(who=person, seed=number)
-    moving.do(Activity.WALK, 3.0)
+    moving.go(Activity.WALK, 3.0)
     moments = [*moving.do(Activity.WALK, 16.0), *moving.do(Activity.STAIRS_UP, 5.0)]
     weight = person.mass * GRAVITY
     assert statistics.fmean(moment.vertical for moment in moments) == pytest.approx(weight, rel=0.03)

@@ -5,6 +5,7 @@ from itertools import islice
 
 import pytest
 
+from hil_sim.bare import BareExoskeleton
 from hil_sim.controller import ControllerState
 from hil_sim.exoskeleton import Exoskeleton, Scenario
 from hil_sim.gait.activity import Activity, Label
@@ -44,7 +45,7 @@ def test_every_scenario_has_a_beginning(scenario: Scenario) -> None:
 
 
 def test_the_robot_follows_a_timetable_of_anybodys() -> None:
-    robot = Exoskeleton()
+    robot = BareExoskeleton()
     robot.power_on()
     robot.follow(
         [Entry(Activity.STAND, 1.0), Entry(Activity.SIT, 3.0), Entry(Activity.WALK, math.inf, (0.5, 1.2))]
@@ -86,7 +87,7 @@ def test_a_robot_whose_controller_was_reset_goes_on_with_its_scenario() -> None:
 
 def test_another_person_lives_the_same_day_differently() -> None:
     def lived(person: int) -> list[float]:
-        robot = Exoskeleton(Scenario.WALK, person=person)
+        robot = BareExoskeleton(Scenario.WALK, person=person)
         robot.power_on()
         robot.clock.run_until(1_500_000_000)
         return [drive.joint.position for drive in robot.drives.values()]

@@ -103,11 +103,11 @@ def test_an_overload_that_is_over_is_said_and_a_nearly_full_bus_is_none() -> Non
     said = list[str]()
     LoadWatch(bus, said.append)
     overloading(clock, bus, frames_a_millisecond=8)
-    clock.run_until(3 * SECOND_NS)
+    clock.run_until(2 * SECOND_NS)
     assert said == []
-    for _ in range(3000):
+    for _ in range(1000):
         bus.send(Frame(0x100, bytes(8)), "sender")
-    clock.run_until(15 * SECOND_NS)
+    clock.run_until(7 * SECOND_NS)
     assert [sentence.split(" at ")[0] for sentence in said] == [
         "the bus is overloaded",
         "the bus is no longer overloaded",

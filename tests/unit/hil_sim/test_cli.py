@@ -12,7 +12,9 @@ from pathlib import Path
 
 import pytest
 
+from gateway.main import main as gwrms
 from hil_sim.cli.sim import main
+from hil_sim.robot import SimulatedRobot
 from tests.support.waiting import WAIT_S
 
 
@@ -70,13 +72,14 @@ def test_after_kill_9_the_same_folder_has_the_same_port_and_paths(tmp_path: Path
         os.close(os.open(tmp_path / "trunk", os.O_RDWR | os.O_NOCTTY))
 
 
-def test_a_second_simulator_in_the_folder_is_refused_in_a_sentence(tmp_path: Path) -> None:
-    with sim(tmp_path):
-        command = [sys.executable, "-m", "gateway.main", "sim", "--dir", str(tmp_path)]
-        second = subprocess.run(command, capture_output=True, text=True, timeout=WAIT_S, check=False)
-    assert second.returncode == 1
-    assert second.stdout == ""
-    assert second.stderr.strip() == (
+def test_a_second_simulator_in_the_folder_is_refused_in_a_sentence(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with SimulatedRobot(tmp_path, virtual_channel=str(tmp_path)):
+        assert gwrms(["sim", "--dir", str(tmp_path)]) == 1
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert said.err.strip() == (
         f"gwrms sim: another simulator is running in {tmp_path}; stop it first, or choose another --dir"
     )
 
@@ -105,9 +108,7 @@ def test_help_reads_like_a_manual(capsys: pytest.CaptureFixture[str]) -> None:
         assert word in text
 
 
-def test_a_folder_that_cannot_be_is_named(tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "file").write_text("", encoding="ascii")
-    command = [sys.executable, "-m", "gateway.main", "sim", "--dir", str(tmp_path / "file" / "robot")]
-    failed = subprocess.run(command, capture_output=True, text=True, timeout=WAIT_S, check=False)
-    assert failed.returncode == 1
-    assert str(tmp_path / "file" / "robot") in failed.stderr
+    assert gwrms(["sim", "--dir", str(tmp_path / "file" / "robot")]) == 1
+    assert str(tmp_path / "file" / "robot") in capsys.readouterr().err

@@ -153,7 +153,7 @@ _ANYTHING = st.recursive(
 _KEYS = st.sampled_from(["fault", "on", "for_s", "params", "clear", "activity", "controller", "list"])
 
 
-@settings(max_examples=examples(300))
+@settings(max_examples=examples(120))
 @given(st.dictionaries(_KEYS, _ANYTHING, max_size=4) | _ANYTHING)
 def test_whatever_is_asked_is_done_or_refused(operator: Operator, request_: object) -> None:
     with suppress(SimulatorError):

@@ -6,12 +6,15 @@ from itertools import pairwise
 
 import pytest
 
+from hil_sim.bare import BareExoskeleton
 from hil_sim.bus.can_bus import Frame
 from hil_sim.controller import ControllerState
 from hil_sim.drive.power_state import PowerState
 from hil_sim.exoskeleton import Exoskeleton, Scenario
 from hil_sim.gait.activity import Activity, Label
 from tests.unit.hil_sim.bench import Heard
+
+USUAL = ((0x2001, 400, 2), (0x2002, 1600, 2), (0x2003, 60, 2), (0x2004, 0, 2), (0x2005, 1, 1))
 
 
 class Robot:
@@ -52,22 +55,28 @@ class Robot:
     def states(self) -> set[PowerState]:
         return {drive.power_state for drive in self.exo.drives.values()}
 
-    def hip_range(self, seconds: float) -> float:
-        angles = []
-        for _ in range(round(seconds * 50)):
-            self.run(0.02)
-            angles.append(self.exo.drives["left_hip"].joint.position)
-        return max(angles) - min(angles)
-
-
-@pytest.fixture
-def robot() -> Robot:
-    return running()
-
 
 @pytest.fixture(scope="module")
 def shared() -> Robot:
     """For what changes nothing that another test looks at."""
+    return running()
+
+
+@pytest.fixture
+def robot(shared: Robot) -> Robot:
+    """The same one, brought up again where a test has stopped it, with the gait that it has at first."""
+    if shared.exo.controller.controller_state is not ControllerState.RUNNING:
+        assert shared.download(16, 0x2000, 1, 1) == "ok"
+        shared.until(lambda: shared.exo.controller.controller_state is ControllerState.RUNNING)
+    for index, value, size in USUAL:
+        assert shared.download(16, index, value, size) == "ok"
+    shared.heard.clear()
+    return shared
+
+
+@pytest.fixture
+def alone() -> Robot:
+    """One of a test's own, which leaves it otherwise."""
     return running()
 
 
@@ -190,7 +199,8 @@ def test_it_shows_its_own_heartbeat(robot: Robot) -> None:
     assert set(beats) == {b"\x05"}
 
 
-def test_every_activity_is_one_that_the_drives_can_follow(robot: Robot) -> None:
+def test_every_activity_is_one_that_the_drives_can_follow(alone: Robot) -> None:
+    robot = alone
     controller = robot.exo.controller
     for activity in (*Activity, Activity.WALK):
         controller.go(activity, pace=(0.45, 1.4))
@@ -201,7 +211,8 @@ def test_every_activity_is_one_that_the_drives_can_follow(robot: Robot) -> None:
         assert max(abs(a - b) for a, b in zip(wanted, actual, strict=True)) < 0.25
 
 
-def test_who_is_stopped_on_the_ground_stays_there(robot: Robot) -> None:
+def test_who_is_stopped_on_the_ground_stays_there(alone: Robot) -> None:
+    robot = alone
     robot.exo.controller.go(Activity.FALL)
     robot.run(3.0)
     assert robot.download(16, 0x2000, 0, 1) == "ok"
@@ -209,8 +220,9 @@ def test_who_is_stopped_on_the_ground_stays_there(robot: Robot) -> None:
     assert robot.exo.controller.generator.label is Label.LYING
 
 
-def test_where_the_drive_stays_in_quick_stop_the_controllers_next_command_wins(robot: Robot) -> None:
+def test_where_the_drive_stays_in_quick_stop_the_controllers_next_command_wins(alone: Robot) -> None:
     """605Ah = 6: transition 16 lets 0Fh enable the drive again before a TPDO has shown that it stopped."""
+    robot = alone
     robot.download(2, 0x605A, 6, 2)
     robot.download(2, 0x6040, 0x02, 2)
     robot.run(0.1)
@@ -235,17 +247,32 @@ def test_where_the_drive_stays_in_quick_stop_the_controllers_next_command_wins(r
         (0x2005, 1, 11, "06090031"),
     ],
 )
-def test_gait_parameters_have_limits(shared: Robot, index: int, size: int, value: int, answer: str) -> None:
-    assert shared.download(16, index, value, size) == answer
+def test_gait_parameters_have_limits(robot: Robot, index: int, size: int, value: int, answer: str) -> None:
+    assert robot.download(16, index, value, size) == answer
 
 
-def test_the_hip_swings_further_with_longer_steps(robot: Robot) -> None:
+def test_the_hip_swings_further_with_longer_steps() -> None:
+    robot = BareExoskeleton(Scenario.WALK)
+    robot.power_on()
+    run(robot, 1.5)
     ranges = []
     for step_length in (200, 600):
-        robot.download(16, 0x2001, step_length, 2)
-        robot.run(2.0)
-        ranges.append(robot.hip_range(1.6))
+        robot.controller.dictionary.write(0x2001, 0, step_length.to_bytes(2, "little"))
+        run(robot, 2.0)
+        ranges.append(hip_range(robot, 1.6))
     assert ranges[1] - ranges[0] > 0.3
+
+
+def run(robot: Exoskeleton, seconds: float) -> None:
+    robot.clock.run_until(robot.clock.now_ns + round(seconds * 1e9))
+
+
+def hip_range(robot: Exoskeleton, seconds: float) -> float:
+    angles = []
+    for _ in range(round(seconds * 50)):
+        run(robot, 0.02)
+        angles.append(robot.drives["left_hip"].joint.position)
+    return max(angles) - min(angles)
 
 
 def test_setpoints_never_jump_when_parameters_do(robot: Robot) -> None:
@@ -265,7 +292,8 @@ def test_setpoints_never_jump_when_parameters_do(robot: Robot) -> None:
 
 def test_the_scenarios_end_in_their_postures() -> None:
     for scenario, hip, knee in ((Scenario.STAND, 0.12, 0.14), (Scenario.SIT, 1.53, 1.57)):
-        robot = Robot(scenario)
-        robot.run(4.0)
-        assert robot.exo.drives["left_hip"].joint.position == pytest.approx(hip, abs=0.05)
-        assert robot.exo.drives["right_knee"].joint.position == pytest.approx(knee, abs=0.05)
+        robot = BareExoskeleton(scenario)
+        robot.power_on()
+        run(robot, 4.0)
+        assert robot.drives["left_hip"].joint.position == pytest.approx(hip, abs=0.05)
+        assert robot.drives["right_knee"].joint.position == pytest.approx(knee, abs=0.05)

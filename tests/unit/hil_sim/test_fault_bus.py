@@ -42,7 +42,8 @@ def test_frame_loss_is_the_same_with_the_same_seed_only(tmp_path: Path) -> None:
 
 
 def test_error_frames_delay_and_lose_nothing(shared: Outside) -> None:
-    before = {cob_id: count(shared.run(1.0), cob_id) for cob_id in (0x080, 0x180 + KNEE, 0x700 + KNEE)}
+    quiet = shared.run(1.0)
+    before = {cob_id: count(quiet, cob_id) for cob_id in (0x080, 0x180 + KNEE, 0x700 + KNEE)}
     shared.faults.begin("error_frames", params={"percent": 40})
     messages = shared.run(1.0)
     frames = len(messages) - errors(messages)

@@ -60,7 +60,7 @@ def test_a_robot_that_is_built_in_otherwise_walks_as_ever() -> None:
     usual, other = Exoskeleton(), Exoskeleton(mountings=mountings)
     for robot in (usual, other):
         robot.power_on()
-        robot.clock.run_until(3_500_000_000)
+        robot.clock.run_until(2_500_000_000)
     for name in JOINTS:
         angles = [robot.mountings[name].seen(robot.drives[name].joint.position) for robot in (usual, other)]
         assert angles[0] == pytest.approx(angles[1], abs=math.radians(0.5)), name

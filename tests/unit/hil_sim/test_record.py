@@ -40,7 +40,7 @@ def test_a_session_has_a_head_and_a_line_each_cycle() -> None:
 
 
 def test_a_robot_on_one_leg_has_that_legs_joints_both_insoles_and_both_phases() -> None:
-    head, *lines = (json.loads(line) for line in recorded("walk", 3.0, assists="right"))
+    head, *lines = (json.loads(line) for line in recorded("walk", 2.0, assists="right"))
     assert len(head["columns"]) == len(head["units"]) == len(lines[-1]) == len(COLUMNS) - 6
     assert not [name for name in head["columns"] if name.startswith(("left_hip", "left_knee", "left_ankle"))]
     last = dict(zip(head["columns"], lines[-1], strict=True))

@@ -3,8 +3,6 @@
 import json
 import os
 import selectors
-import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from itertools import pairwise
@@ -14,10 +12,10 @@ from typing import Any
 import can
 import pytest
 
+from gateway.main import main as gwrms
 from hil_sim.cli.sim import main
 from hil_sim.replay.can_log import ReplayError
 from hil_sim.replay.robot import ReplayedRobot
-from tests.support.waiting import WAIT_S
 from tests.unit.hil_sim.outside import of
 from tests.unit.hil_sim.recording import Recording, keep_bytes, record
 
@@ -262,29 +260,28 @@ def test_nothing_to_play_is_refused(tmp_path: Path) -> None:
         ReplayedRobot(tmp_path, [])
 
 
-def command(*arguments: str) -> "subprocess.CompletedProcess[str]":
-    line = [sys.executable, "-m", "gateway.main", "sim", *arguments]
-    return subprocess.run(line, capture_output=True, text=True, timeout=WAIT_S, check=False)
-
-
-def test_the_command_plays_to_the_end_and_writes_a_beginning_of_robot_toml(tmp_path: Path) -> None:
+def test_the_command_plays_to_the_end_and_writes_a_beginning_of_robot_toml(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     log = candump(tmp_path / "a.log", "(1.0) can0 702#05", "(1.1) can0 702#05")
     keep_bytes(tmp_path / "left.bin", b"x" * 9, 115200, seconds=0.1)
-    done = command(
-        "--dir", str(tmp_path), "--replay", str(log), "--replay-serial", f"left={tmp_path / 'left.bin'}"
-    )
-    assert done.returncode == 0, done.stderr
-    assert json.loads(done.stdout) == {"ready": True, "config": str(tmp_path / "robot.toml")}
-    assert "no eds for node 2" in done.stderr
+    serial = ("--replay-serial", f"left={tmp_path / 'left.bin'}")
+    status = gwrms(["sim", "--dir", str(tmp_path), "--replay", str(log), *serial])
+    said = capsys.readouterr()
+    assert status == 0, said.err
+    assert json.loads(said.out) == {"ready": True, "config": str(tmp_path / "robot.toml")}
+    assert "no eds for node 2" in said.err
     assert str(tmp_path / "left") in (tmp_path / "robot.toml").read_text(encoding="utf-8")
 
 
-def test_the_command_names_file_and_line_of_a_broken_log(tmp_path: Path) -> None:
+def test_the_command_names_file_and_line_of_a_broken_log(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     log = candump(tmp_path / "a.log", "(1.0) can0 702#05", "what")
-    done = command("--dir", str(tmp_path), "--replay", str(log))
-    assert done.returncode == 1
-    assert done.stderr.startswith(f"gwrms sim: {log}, line 2: ")
-    assert done.stdout == ""
+    assert gwrms(["sim", "--dir", str(tmp_path), "--replay", str(log)]) == 1
+    said = capsys.readouterr()
+    assert said.err.startswith(f"gwrms sim: {log}, line 2: ")
+    assert said.out == ""
 
 
 @pytest.mark.parametrize(

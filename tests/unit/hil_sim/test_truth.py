@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from hil_sim.bare import BareExoskeleton
 from hil_sim.errors import SimulatorError
 from hil_sim.exoskeleton import Exoskeleton, Scenario
 from hil_sim.gait.activity import Activity
@@ -55,7 +56,7 @@ def test_times_are_of_both_clocks(tmp_path: Path) -> None:
 
 
 def test_who_walks_has_phases_and_alternating_events(tmp_path: Path) -> None:
-    _, rows = recorded(tmp_path / "truth", Exoskeleton(Scenario.WALK, seed=1), 5.5)
+    _, rows = recorded(tmp_path / "truth", Exoskeleton(Scenario.WALK, seed=1), 4.5)
     assert rows[10]["label"] == "stand"
     assert rows[10]["left_phase"] is None
     even = rows[250:]
@@ -75,7 +76,7 @@ def test_who_walks_has_phases_and_alternating_events(tmp_path: Path) -> None:
 
 
 def test_the_file_alone_shows_that_newton_holds(tmp_path: Path) -> None:
-    robot = Exoskeleton(Scenario.FALL, seed=2)
+    robot = BareExoskeleton(Scenario.FALL, seed=2)
     robot.follow([Entry(Activity.WALK, 3.0), Entry(Activity.FALL, 2.5), Entry(Activity.STAND)])
     header, rows = recorded(tmp_path / "truth", robot, 7.0)
     mass = header["wearer"]["mass"]
@@ -87,7 +88,7 @@ def test_the_file_alone_shows_that_newton_holds(tmp_path: Path) -> None:
 
 
 def test_velocities_are_those_of_the_joints(tmp_path: Path) -> None:
-    _, rows = recorded(tmp_path / "truth", Exoskeleton(Scenario.WALK), 3.5)
+    _, rows = recorded(tmp_path / "truth", BareExoskeleton(Scenario.WALK), 3.5)
     for joint in ("left_hip", "right_knee"):
         slopes = [(b[f"{joint}.position"] - a[f"{joint}.position"]) / 0.01 for a, b in pairwise(rows)]
         told = [(a[f"{joint}.velocity"] + b[f"{joint}.velocity"]) / 2.0 for a, b in pairwise(rows)]
@@ -96,7 +97,7 @@ def test_velocities_are_those_of_the_joints(tmp_path: Path) -> None:
 
 def lived(truth: Path | None) -> list[float]:
     """Where the first seconds of a day have brought the joints."""
-    robot = Exoskeleton(Scenario.DAY, seed=7, person=2)
+    robot = BareExoskeleton(Scenario.DAY, seed=7, person=2)
     if truth is not None:
         recorded(truth, robot, 1.2)
     else:

@@ -108,7 +108,7 @@ def test_the_acceleration_of_sitting_down_and_getting_up_takes_the_trunk_to_the_
 
 def test_getting_up_loads_the_feet_with_more_than_the_body() -> None:
     moving = Moving()
-    moving.do(Activity.SIT, 4.0)
+    moving.go(Activity.SIT, 4.0)
     seated = moving.do(Activity.SIT, 1.0)
     assert all(0.1 < moment.vertical / 882.6 - moment.support / 882.6 < 0.3 for moment in seated)
     rising = moving.do(Activity.STAND, 3.0)
