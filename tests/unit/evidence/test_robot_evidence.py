@@ -34,6 +34,12 @@ def followed(events: Iterable[Event | Recorded], robot: RobotEvidence | None = N
     return {one.edit.write: one for one in (*told, *robot.end())}
 
 
+@pytest.fixture(scope="module")
+def worse(events: list[Event]) -> Told:
+    """What is known of the edit where nothing is amiss."""
+    return followed(events)[WORSE.write]
+
+
 def words(told: Told) -> dict[str, Word]:
     return {one.series: one.word for one in told.evidence.metrics}
 
@@ -44,8 +50,7 @@ def changed(events: Sequence[Event], change: Callable[[Telemetry], Event | None]
     return [event for event in made if event is not None]
 
 
-def test_a_worse_gain_is_seen_at_its_joint_and_at_no_other(events: list[Event]) -> None:
-    worse = followed(events)[WORSE.write]
+def test_a_worse_gain_is_seen_at_its_joint_and_at_no_other(worse: Told) -> None:
     assert words(worse)["left_knee.error_rms"] is Word.WORSE
     assert [one for one, word in words(worse).items() if word in DIFFER and "left_knee" not in one] == []
     assert worse.evidence.strongest.startswith("left_knee.")
@@ -67,8 +72,10 @@ def test_evidence_grows_while_a_trial_counts_down(events: list[Event]) -> None:
     assert robot.look() == []  # nothing new has come
 
 
-def test_a_link_that_is_lost_in_the_middle_costs_the_cycles_it_has_cut(events: list[Event]) -> None:
-    whole = followed(events)[WORSE.write].evidence
+def test_a_link_that_is_lost_in_the_middle_costs_the_cycles_it_has_cut(
+    events: list[Event], worse: Told
+) -> None:
+    whole = worse.evidence
     lost = changed(events, lambda one: one if not 30e9 < one.batch.stamps_ns[0] < 32e9 else None)
     cut = followed(lost)[WORSE.write].evidence
     assert whole.cycles_after - 12 <= cut.cycles_after < whole.cycles_after
@@ -194,13 +201,13 @@ def test_values_that_no_joint_can_have_are_no_values(events: list[Event]) -> Non
     assert found["left_knee.error_rms"] is Word.WORSE
 
 
-def test_an_edit_that_nobody_heard_the_end_of_cuts_the_walk_short(events: list[Event]) -> None:
+def test_an_edit_that_nobody_heard_the_end_of_cuts_the_walk_short(events: list[Event], worse: Told) -> None:
     """Whether its values are in force is not known: the strides after it say nothing of the one before."""
     (told,) = (one for one in events if isinstance(one, Journalled))
     asked = entry(3, 32 * SECOND, "write", 32, {"left_knee.max_torque": 40.0})
     both = Journalled(JournalEntries([*told.journal.entries, asked]))
     evidence = followed([*events, both])[WORSE.write].evidence
-    assert evidence.cycles_after < followed(events)[WORSE.write].evidence.cycles_after // 2 + 2
+    assert evidence.cycles_after < worse.evidence.cycles_after // 2 + 2
     assert "another edit" in evidence.notes[0]
 
 
@@ -250,13 +257,14 @@ def split(events: Sequence[Event], at_s: float, *names: str) -> list[Event | Rec
 
 
 @pytest.mark.parametrize("at_s", [10.0, 30.0])
-def test_nobody_is_compared_with_who_wears_the_robot_next(events: list[Event], at_s: float) -> None:
-    whole = followed(events)[WORSE.write].evidence
+def test_nobody_is_compared_with_who_wears_the_robot_next(
+    events: list[Event], worse: Told, at_s: float
+) -> None:
     robot = RobotEvidence("exo-01")
     told = followed(split(events, at_s, "anna", "bert"), robot)[WORSE.write]
     assert robot.session_of(told.edit) == ("bert" if at_s < WORSE.at_s else "anna")
     assert OUTSIDE in told.evidence.notes
-    assert (whole.word, told.evidence.word) == (Word.WORSE, Word.FEW)
+    assert (worse.evidence.word, told.evidence.word) == (Word.WORSE, Word.FEW)
 
 
 def test_what_is_walked_in_no_recording_belongs_to_none(events: list[Event]) -> None:
