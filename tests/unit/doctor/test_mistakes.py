@@ -17,7 +17,7 @@ from hil_sim.exoskeleton import JOINTS
 from hil_sim.mistakes.registry import MISTAKES
 from tests.unit.doctor.patient import Patient
 
-WALK_S = 10.0
+WALK_S = 8.0
 
 # mistake → rule, what it is about, and of the first fix so much as says it
 EXPECTED = {
@@ -109,7 +109,7 @@ def test_a_mistake_of_file_or_computer_is_found_with_the_right_fix_first(name: s
 
 @pytest.mark.parametrize("name", OF_BUS)
 def test_a_mistake_on_the_bus_is_found_with_the_right_fix_first(name: str, tmp_path: Path) -> None:
-    found = findings(Patient(tmp_path, [name], warm_s=1.0).seen())
+    found = findings(Patient(tmp_path, [name], seconds=1.0, warm_s=1.0).seen())
     assert {one.rule for one in found} == {EXPECTED[name][0]}
     check(name, found)
 
