@@ -55,12 +55,12 @@ def test_it_rests_in_little_memory_before_and_after_it_has_served_until_a_signal
 def test_nobody_is_lost_who_comes_while_it_goes_to_rest_or_comes_back(running: Running) -> None:
     address = processes.address(running)
     answered = 0
-    for turn in range(5):  # at different moments of its way there and back
+    for turn in (0, 2, 4):  # at different moments of its way there and back
         with socket.create_connection(address, WAIT_S) as one:
             one.sendall(CLOCK)
             answered += one.makefile().readline().startswith('{"id":1,"result"')
         time.sleep(0.05 + turn / 30)  # they are what is tried, not waited for
-    assert answered == 5
+    assert answered == 3
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])

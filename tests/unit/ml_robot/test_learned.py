@@ -30,6 +30,7 @@ def learned(name: str = "activity") -> Learned:
 def briefly(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where it does not matter how well something is learned."""
     monkeypatch.setattr(learning, "EPOCHS", 2)
+    monkeypatch.setattr(learning, "FOLDS", 2)
 
 
 def test_new_people_are_told_right() -> None:
