@@ -2,7 +2,6 @@
 
 import atexit
 import gc
-import itertools
 import os
 import re
 import signal
@@ -155,24 +154,12 @@ def _children() -> list[psutil.Process]:
     return psutil.Process().children(recursive=True)
 
 
-NUMBERS = itertools.count()
-
-
 @pytest.fixture(autouse=True)
-def records_of_its_own(
-    request: pytest.FixtureRequest,
-    tmp_path_factory: pytest.TempPathFactory,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """No test sees what another one's gateway or server has kept, nor that of this computer's user.
-
-    Most keep nothing: those that ask for no folder have none before somebody makes it.
-    """
-    own = str(tmp_path_factory.getbasetemp() / f"own-{next(NUMBERS)}")
-    if "tmp_path" in request.fixturenames:
-        own = str(request.getfixturevalue("tmp_path"))
-    for name in ("state", "data", "config"):
-        monkeypatch.setenv(f"XDG_{name.upper()}_HOME", f"{own}/{name}")
+def records_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """No test sees what another one's gateway or server has kept, nor that of this computer's user."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "data"))
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
     monkeypatch.delenv("STATE_DIRECTORY", raising=False)
 
 
