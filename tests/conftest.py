@@ -2,6 +2,7 @@
 
 import atexit
 import gc
+import itertools
 import os
 import re
 import signal
@@ -39,6 +40,7 @@ LONG = (
     "tests/explore_store/",
     "tests/gui/walks/",
 )
+_tests = itertools.count()
 ENDS_S = 30.0  # what is ending, and not leaked, has ended within, also on a computer that does much else
 SMOKE = "tests/unit/store/test_store.py"  # of all that is tried on an S3 server too, this always is
 
@@ -155,12 +157,21 @@ def _children() -> list[psutil.Process]:
 
 
 @pytest.fixture(autouse=True)
-def records_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """No test sees what another one's gateway or server has kept, nor that of this computer's user."""
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
-    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "data"))
-    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
-    monkeypatch.delenv("STATE_DIRECTORY", raising=False)
+def records_of_its_own(request: pytest.FixtureRequest) -> Iterator[None]:
+    """No test sees what another one's gateway or server has kept, nor that of this computer's user.
+
+    They are in its `tmp_path`, if it has one; to make one for each would take longer than most tests do.
+    """
+    if "tmp_path" in request.fixturenames:
+        own: Path = request.getfixturevalue("tmp_path")
+    else:
+        factory: pytest.TempPathFactory = request.getfixturevalue("tmp_path_factory")
+        own = factory.getbasetemp() / f"own-{next(_tests)}"
+    with pytest.MonkeyPatch.context() as patch:
+        for name in ("state", "data", "config"):
+            patch.setenv(f"XDG_{name.upper()}_HOME", str(own / name))
+        patch.delenv("STATE_DIRECTORY", raising=False)
+        yield
 
 
 @pytest.fixture(autouse=True)

@@ -8,6 +8,9 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from drivers.imu import rotation
+from drivers.imu.attitude import ComplementaryFilter
+from drivers.imu.motion import tilt
 from ml.benchmarks.danger import Judged, per_hour
 from ml.benchmarks.danger_data import HEALTHY, Seen
 from ml.danger.combine import Calibration
@@ -19,10 +22,6 @@ from ml.danger.watch import Watch
 Floats = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 
-GRAVITY: Final = 9.81
-FOLLOWS_S: Final = 2.0  # of the tilt by gravity, as the drivers' complementary filter has it
-TRUSTED: Final = 0.15  # acceleration further from gravity than this share says nothing about up
-LONGEST_S: Final = 0.2  # without a sample: the tilt begins anew
 PAUSE_S: Final = 1.0  # of the watch's clock between two recordings: what is compared over time begins anew
 OWN: Final = [CHANNELS.index(name) for name in TRUNK]
 NOTE: Final = (
@@ -48,30 +47,13 @@ def upright(samples: Floats, standing: Floats, axes: Sequence[Sequence[int]]) ->
 
 
 def channels(trunk: Floats, rate_hz: float) -> Floats:
-    """`trunk` (rows, 6) as rows of `CHANNELS`, with the tilt of a complementary filter; NaN where missing."""
+    """`trunk` (rows, 6) as rows of `CHANNELS`, with the tilt of the drivers' filter; NaN where missing."""
     rows = np.full((len(trunk), len(CHANNELS)), np.nan)
-    there = np.flatnonzero(np.isfinite(trunk).all(axis=1))
-    up, last = (0.0, 0.0, 1.0), -np.inf
-    tilts = []
-    for at, (ax, ay, az, wx, wy, wz) in zip(there.tolist(), trunk[there].tolist(), strict=True):
-        step, last = (at - last) / rate_hz, at
-        length = max(float(np.sqrt(ax * ax + ay * ay + az * az)), 1e-9)
-        share = 1.0 if step > LONGEST_S else step / FOLLOWS_S if abs(length / GRAVITY - 1) < TRUSTED else 0.0
-        x, y, z = up
-        if step <= LONGEST_S:  # the world turns the other way round
-            x, y, z = (
-                x + step * (y * wz - z * wy),
-                y + step * (z * wx - x * wz),
-                z + step * (x * wy - y * wx),
-            )
-        x, y, z = (one + share * (felt / length - one) for one, felt in ((x, ax), (y, ay), (z, az)))
-        whole = max(float(np.sqrt(x * x + y * y + z * z)), 1e-9)
-        up = (x / whole, y / whole, z / whole)
-        tilts.append(up)
-    ups = np.array(tilts).reshape(-1, 3)
-    forward = np.arctan2(-ups[:, 0], np.hypot(ups[:, 1], ups[:, 2]))
-    side = np.arctan2(-ups[:, 1], np.hypot(ups[:, 0], ups[:, 2]))
-    rows[there[:, None], OWN] = np.column_stack([trunk[there], forward, side])
+    attitudes = ComplementaryFilter()
+    for at in np.flatnonzero(np.isfinite(trunk).all(axis=1)).tolist():
+        ax, ay, az, wx, wy, wz = sample = trunk[at].tolist()
+        attitude = attitudes.update(round(at / rate_hz * 1e9), (wx, wy, wz), (ax, ay, az))
+        rows[at, OWN] = (*sample, *((np.nan, np.nan) if attitude is None else tilt(rotation.up(attitude))))
     return rows
 
 
