@@ -17,7 +17,7 @@ from hil_sim.exoskeleton import JOINTS
 from hil_sim.mistakes.registry import MISTAKES
 from tests.unit.doctor.patient import Patient
 
-WALK_S = 8.0
+WALK_S = 10.0
 
 # mistake → rule, what it is about, and of the first fix so much as says it
 EXPECTED = {

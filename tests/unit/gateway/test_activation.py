@@ -178,4 +178,3 @@ def test_the_abstract_name_of_a_manager_is_met_and_none_is_no_trouble() -> None:
 )
 def test_the_watchdog_s_period_is_for_us_or_not(environ: dict[str, str], period_s: float | None) -> None:
     assert notify.watchdog_s(environ) == period_s
-
