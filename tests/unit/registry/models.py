@@ -38,7 +38,6 @@ def learned(task: str = "falling", seed: int = 0) -> Learned:
     rows, truth = features(task, seed)
     with threadpool_limits(1), pytest.MonkeyPatch.context() as patch:
         patch.setattr(learning, "EPOCHS", 2)  # how well it has learned does not matter
-        patch.setattr(learning, "FOLDS", 2)
         return learn(TASKS[task], recipe, rows, truth, np.arange(ROWS) % 3, seed)
 
 
