@@ -45,7 +45,7 @@ def uploaded(store_libraries: None, tmp_path_factory: pytest.TempPathFactory) ->
 def folder(request: pytest.FixtureRequest, tmp_path: Path, store_libraries: None) -> Path:
     """Of the server: empty, but for tests of what it has recorded."""
     has = "labelling" in request.fixturenames
-    return request.getfixturevalue("uploaded").anew() if has else tmp_path  # type: ignore[no-any-return]
+    return request.getfixturevalue("uploaded").anew() if has else tmp_path
 
 
 @pytest.fixture
