@@ -5,6 +5,7 @@ that go beyond are counted, and one entry sums them up (ADR 13).
 """
 
 import re
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
@@ -22,6 +23,7 @@ CLIENTS: Final = 512  # accounts at a time, two a client; who comes then shares 
 NAMES_OF_ONE_ADDRESS: Final = 16  # clients of one address with accounts of their own; those beyond share one
 FIELD_BYTES: Final = 16 * 1024  # of one field of an entry, as JSON
 WHO_BYTES: Final = 256
+LOOK_EVERY_NS: Final = 1_000_000_000 // ENTRIES_A_SECOND  # in less nobody has room for one entry more
 SUM_UP_S: Final = 5.0  # what is left out is summed up so often
 LEFT_OUT: Final = "not written out"
 OWN: Final = frozenset(
@@ -95,6 +97,8 @@ class Limits:
 
     def __init__(self) -> None:
         self._accounts: dict[tuple[str, bool], _Account] = {}
+        self._addresses: Counter[str] = Counter()  # how many accounts there are of each, two a client
+        self._looked_ns: int | None = None  # when somebody was looked for who can be forgotten
         self._left_out: dict[str, _LeftOut] = {}
 
     def refusal(self, who: str, what: str, share: Share, size: int, now_ns: int) -> str | None:
@@ -130,27 +134,32 @@ class Limits:
     def _account(self, whose: str, share: Share, now_ns: int) -> tuple[str, _Account] | None:
         """With its name; `None` for a stop of who has none, which is not left out because of strangers."""
         key = whose, share is Share.ACT
-        if key not in self._accounts and self._neighbours(whose) >= 2 * NAMES_OF_ONE_ADDRESS:
+        if key not in self._accounts and self._addresses[_address(whose)] >= 2 * NAMES_OF_ONE_ADDRESS:
             key = f"others of {_address(whose)}", share is Share.ACT
         if key not in self._accounts and len(self._accounts) >= CLIENTS:
             self._forget_full(now_ns)
             if len(self._accounts) >= CLIENTS and share is Share.ACT:
                 return None
             key = key if len(self._accounts) < CLIENTS else (OTHERS, False)
-        account = self._accounts.setdefault(key, _Account(now_ns))
+        if key not in self._accounts:
+            self._accounts[key] = _Account(now_ns)
+            self._addresses[_address(key[0])] += 1
+        account = self._accounts[key]
         account.refill(now_ns)
         return key[0], account
 
-    def _neighbours(self, whose: str) -> int:
-        """How many accounts there are of its address, two a client."""
-        address = _address(whose)
-        return sum(_address(one) == address for one, _is_act in self._accounts)
-
     def _forget_full(self, now_ns: int) -> None:
-        """Whoever has written nothing for a while has as much as who comes new."""
+        """Whoever has written nothing for a while has as much as who comes new.
+
+        However many come, all accounts are not looked at for each of them.
+        """
+        if self._looked_ns is not None and now_ns - self._looked_ns < LOOK_EVERY_NS:
+            return
+        self._looked_ns = now_ns
         for account in self._accounts.values():
             account.refill(now_ns)
         self._accounts = {key: one for key, one in self._accounts.items() if not one.full}
+        self._addresses = Counter(_address(whose) for whose, _is_act in self._accounts)
 
 
 def client(who: str) -> str:

@@ -24,6 +24,7 @@ from pyarrow.dataset import ParquetFileFragment, get_partition_keys
 from ml.store import reading
 from ml.store.compaction_lock import alone
 from ml.store.errors import NoSuchTable, StoreError, StoreRefused
+from ml.store.fragments import as_dataset
 from ml.store.store import NO_HOOKS, Store, writer_properties
 from ml.store.tables import TABLES, Table
 from ml.store.translation import translated
@@ -313,7 +314,7 @@ def _put_together(store: Store, location: str) -> Compacted:
         )
         store.make_last(location, delta, checkpoint=True)
     if not delta.metadata().partition_columns:
-        _with_plain_texts(store, location, list(store.dataset(location).get_fragments()))
+        _with_plain_texts(store, location, list(as_dataset(delta, location, store.files).get_fragments()))
     return Compacted(location, before, len(delta.file_uris()))
 
 
@@ -322,8 +323,11 @@ def _with_plain_texts(store: Store, location: str, files: Sequence[ParquetFileFr
 
     It writes texts as Arrow's `string_view` then, and Arrow cannot look for one in a file with several.
     """
-    delta, views = store.table(location), filter(_has_views, files)
+    views = filter(_has_views, files)
     partitions = {tuple(get_partition_keys(file.partition_expression).items()) for file in views}
+    if not partitions:
+        return
+    delta = store.table(location)
     for partition in sorted(partitions):
         with store.unfinished(location):
             delta.optimize.z_order(

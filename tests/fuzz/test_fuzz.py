@@ -15,14 +15,17 @@ from tests.fuzz.seeding import DEFECTS
 
 INPUTS = 200
 FEWER = {"dcf": 40, "eds_file": 100}  # each of theirs takes long
+BY_DAY = 0.3  # of them
 MOST_BYTES, MOST_BYTES_TOGETHER = 4096, 300_000
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_nothing_but_expected_errors_comes_of_any_input(name: str) -> None:
+@pytest.mark.parametrize("share", [BY_DAY, 1.0])
+def test_nothing_but_expected_errors_comes_of_any_input(share: float, name: str) -> None:
     tried = target(name)
     known = list(corpus(name))
-    made = itertools.islice(mutations(known, tried.tokens, seed=1), FEWER.get(name, INPUTS))
+    count = round(share * FEWER.get(name, INPUTS))
+    made = itertools.islice(mutations(known, tried.tokens, seed=1), count)
     for data in (b"", *known, *made):
         try:
             tried.fuzz(data)

@@ -30,19 +30,6 @@ def export(server: Server, session: str, file: Path, status: int = 0) -> Path:
     return file
 
 
-def test_files_as_they_were_made_are_removed_and_those_of_others_stay(server: Server, tmp_path: Path) -> None:
-    hers = [export(server, HERS, tmp_path / f"hers.{kind}") for kind in ("csv", "parquet", "mcap")]
-    his = export(server, HIS, tmp_path / "his.csv")
-    told = server.run("forget", "--wearer", "P01", "--dry-run")
-    assert all(f"exported: {file} (as it was made)" in told for file in hers)
-    assert str(his) not in told
-    assert all(file.exists() for file in hers)
-    server.run(*FORGET)
-    assert [file.exists() for file in (*hers, his)] == [False, False, False, True]
-    assert len(list(exports_folder().iterdir())) == 1
-    assert exports_folder().stat().st_mode & 0o077 == 0
-
-
 def _edited(file: Path) -> None:
     file.write_bytes(file.read_bytes() + b"more")
 
@@ -91,7 +78,16 @@ def test_what_came_to_its_place_since_it_was_found_is_not_removed(
 def test_what_stays_is_named_with_why_and_all_else_is_removed(
     server: Server, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Also in a folder whose name a shell would take for a pattern, and what the window has exported."""
+    """Also in a folder whose name a shell would take for a pattern, and what the window has exported.
+
+    What was exported of others stays.
+    """
+    hers = [export(server, HERS, tmp_path / f"hers.{kind}") for kind in ("csv", "parquet", "mcap")]
+    his = export(server, HIS, tmp_path / "his.csv")
+    told = server.run("forget", "--wearer", "P01", "--dry-run")
+    assert all(f"exported: {file} (as it was made)" in told for file in hers)
+    assert str(his) not in told
+    assert all(file.exists() for file in hers)
     folder, copied, windows = tmp_path / "wal[k] *?", tmp_path / "copied", tmp_path / "window's.csv"
     folder.mkdir()
     said = {
@@ -116,6 +112,11 @@ def test_what_stays_is_named_with_why_and_all_else_is_removed(
     assert f"{exports_folder() / '0.json'} is an entry of the list of exports that cannot be read" in told
     assert "gone:" not in told
     assert not windows.exists()
+    assert [file.exists() for file in (*hers, his)] == [False, False, False, True]
+    known = "".join(each.read_text() for each in exports_folder().iterdir() if each.is_file())
+    assert str(his) in known
+    assert not any(str(file) in known for file in (*hers, windows))
+    assert exports_folder().stat().st_mode & 0o077 == 0
     assert server.rows() == {HIS}
 
 
@@ -186,16 +187,31 @@ def test_what_cannot_be_noted_is_not_exported(server: Server, tmp_path: Path) ->
 def test_other_computers_are_named_and_their_second_copies_forgotten_there(
     server: Server, tmp_path: Path
 ) -> None:
-    """Whose store has nothing of her any more: what is left of her is in that computer's spool alone."""
+    """Whose store has nothing of her any more: what is left of her is in that computer's spool alone.
+
+    One whose second copies are gone is told why its rows are missing.
+    """
     there, name = tmp_path / "there", "20261121T193000Z-eeeeee"
-    with Spool(there, reserve_bytes=0) as opened:
-        opened.append([run(name)], recorded(name, "P01"))
-        opened.freeze()
-        for number in opened.waiting():
-            send(opened, number, server.store)
-    assert f"other computers that write to this store ({identity(there)})" in server.run(*FORGET)
+    without = tmp_path / "without"
+    for spool, session in ((there, name), (without, f"{name[:-1]}f")):
+        with Spool(spool, reserve_bytes=0) as opened:
+            opened.append([run(session)], recorded(session, "P01"))
+            opened.freeze()
+            for number in opened.waiting():
+                send(opened, number, server.store)
+                if spool is without:
+                    opened.drop(number)
+    said = server.run(*FORGET)
+    assert "other computers that write to this store (" in said
+    assert all(identity(spool) in said for spool in (there, without))
     assert any(name.encode() in file.read_bytes() for file in there.glob("*.db"))
     server.config.write_text(f'[recorder]\nspool = "{there}"\n[store]\nurl = "{server.url}"\n')
+    config = tmp_path / "without.toml"
+    config.write_text(f'[recorder]\nspool = "{without}"\n[store]\nurl = "{server.url}"\n')
+    assert main(["cloud", "mend", "--config", str(config)]) == 1
+    said = server.told()
+    assert "A wearer was forgotten here on 20" in said
+    assert "--accept-loss counts what is there as what was sent" in said
     server.run(*FORGET)
     assert not any(name.encode() in file.read_bytes() for file in there.glob("*.db"))
     server.run("verify")

@@ -15,7 +15,6 @@ from ml.store import Store, StoreUnreachable, upkeep
 from ml.store.labels import WEARER, Label
 from ml.store.sessions import rows_of, sessions
 from ml.store.tables import EVENTS, LABELS, PREDICTIONS, SESSIONS, TELEMETRY
-from server_gui.core.cloud import spool_reader
 from server_gui.core.cloud.forget import digest
 from server_gui.core.recording import records
 from server_gui.core.recording.records import Facts, Worn
@@ -113,7 +112,18 @@ def test_consent_and_wearer_are_told_with_a_session(server: Server) -> None:
     assert (one.wearer, one.consent) == ("p01 ", "study 12, signed")
 
 
+def is_told_by_a_hash_alone(server: Server) -> None:
+    (event,) = server.store.dataset(EVENTS.name).to_table().to_pylist()
+    assert (event["kind"], json.loads(event["data"])["sessions"]) == ("forgotten", 3)
+    assert json.loads(event["data"])["wearer_sha256"] == digest("p-01")
+    assert "P01" not in json.dumps(event, default=str)
+
+
 def test_nothing_of_a_wearer_is_left_and_others_keep_all(server: Server) -> None:
+    """Nor of what an interrupted writer has left: no log names such a file, so no version has it."""
+    folder = Path(server.url.removeprefix("file://"))
+    (some,) = [file for file in folder.rglob("*.parquet") if f"session={HERS}" in str(file)]
+    (some.parent / "left.parquet").write_bytes(some.read_bytes())
     before = rows_of(server.store, next(s for s in sessions(server.store) if s.session == HIS), LABELS)
     upkeep.compact(server.store)  # their rows are in files of older versions, too
     said = server.run("forget", "--wearer", "p 1", "--yes")
@@ -124,17 +134,10 @@ def test_nothing_of_a_wearer_is_left_and_others_keep_all(server: Server) -> None
         assert server.bytes_of(name) == []
         assert name.encode() not in b"".join(file.read_bytes() for file in server.spool.glob("*.db"))
     assert rows_of(server.store, next(iter(sessions(server.store))), LABELS) == before
+    is_told_by_a_hash_alone(server)
     server.run("verify")  # and what is gone is missed by nobody
     server.run("mend")
     assert server.rows() == {HIS}
-
-
-def test_it_is_told_by_a_hash_alone(server: Server) -> None:
-    server.run("forget", "--wearer", "P01", "--yes")
-    (event,) = server.store.dataset(EVENTS.name).to_table().to_pylist()
-    assert (event["kind"], json.loads(event["data"])["sessions"]) == ("forgotten", 3)
-    assert json.loads(event["data"])["wearer_sha256"] == digest("p-01")
-    assert "P01" not in json.dumps(event, default=str)
 
 
 def test_a_dry_run_and_a_no_remove_nothing(server: Server, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -192,15 +195,6 @@ def test_what_was_cut_off_goes_on(server: Server, monkeypatch: pytest.MonkeyPatc
     server.run("forget", "--wearer", "P01", "--yes", status=1)
 
 
-def test_what_an_interrupted_writer_has_left_is_found(server: Server) -> None:
-    """No log names such a file, so no version has it: but it is there."""
-    folder = Path(server.url.removeprefix("file://"))
-    (some,) = [file for file in folder.rglob("*.parquet") if f"session={HERS}" in str(file)]
-    (some.parent / "left.parquet").write_bytes(some.read_bytes())
-    server.run("forget", "--wearer", "P01", "--yes")
-    assert server.bytes_of(HERS) == []
-
-
 def test_what_stays_beside_theirs_is_found_by_whose_it_is(server: Server) -> None:
     """A file that is written anew has texts as others have: else nothing is found by them any more."""
     for number, robot in enumerate(("left", "right", "exo")):
@@ -216,21 +210,3 @@ def test_what_stays_beside_theirs_is_found_by_whose_it_is(server: Server) -> Non
     found = server.store.dataset(SESSIONS.name)
     for robot, count in (("left", 1), ("exo", 2), ("nobody", 0)):
         assert found.count_rows(filter=column("robot") == robot) == count
-
-
-def test_another_computer_is_told_why_its_rows_are_missing(server: Server, tmp_path: Path) -> None:
-    spool = tmp_path / "other"
-    with Spool(spool, reserve_bytes=0) as opened:
-        opened.append([run("20261121T193000Z-eeeeee")], recorded("20261121T193000Z-eeeeee", "P01"))
-        opened.freeze()
-        for number in opened.waiting():
-            send(opened, number, server.store)
-        for number in spool_reader.uploaded(spool):
-            opened.drop(number)
-    server.run("forget", "--wearer", "P01", "--yes")
-    config = tmp_path / "other.toml"
-    config.write_text(f'[recorder]\nspool = "{spool}"\n[store]\nurl = "{server.url}"\n')
-    assert main(["cloud", "mend", "--config", str(config)]) == 1
-    said = server.told()
-    assert "A wearer was forgotten here on 20" in said
-    assert "--accept-loss counts what is there as what was sent" in said

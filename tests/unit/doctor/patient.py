@@ -1,7 +1,7 @@
 """A simulated robot in simulated time, looked at from outside: bus, SDO answers, sensors by robot.toml."""
 
 import tomllib
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 from functools import cache
@@ -174,32 +174,37 @@ class Patient:
             self._rows.append(dict(zip(UNITS, reported(self.robot), strict=True)))
 
     def _samples(self, config: RobotConfig) -> Samples:
-        columns: dict[str, list[float | None]] = defaultdict(list)
-        for row in self._walked:
-            for name, value in self._told(config, row):
-                columns[name].append(value)
-        return Samples(0.01 * EVERY, {name: tuple(column) for name, column in columns.items()})
+        return Samples(0.01 * EVERY, dict(self._told(config)))
 
-    def _told(
-        self, config: RobotConfig, row: Mapping[str, float | None]
-    ) -> Iterator[tuple[str, float | None]]:
-        """What a gateway with that file makes of one moment."""
+    def _told(self, config: RobotConfig) -> Iterator[tuple[str, tuple[float | None, ...]]]:
+        """What a gateway with that file makes of what was walked."""
         drives = {node: name for name, node in JOINTS.items()}
         for name, table in config.joint.items():
-            drive = drives[table.node_id]
+            drive, known = drives[table.node_id], scalings(table, {})
+            per_radian = self.robot.drives[drive].counts_per_radian
             for quantity in ("position", "velocity"):
-                value, scaling = row[f"{drive}.{quantity}"], scalings(table, {})[quantity]
-                assert value is not None
+                scaling = known[quantity]
                 assert scaling is not None
-                counts = value * self.robot.drives[drive].counts_per_radian
-                yield f"{name}.{quantity}", counts * scaling.scale + scaling.offset
+                values = self._numbers(f"{drive}.{quantity}")
+                yield (
+                    f"{name}.{quantity}",
+                    tuple(value * per_radian * scaling.scale + scaling.offset for value in values),
+                )
         for name, insole in config.insole.items():
-            yield f"{name}.force", row[f"{Path(insole.port).name}.force"]
+            port = Path(insole.port).name
+            yield f"{name}.force", tuple(row[f"{port}.force"] for row in self._walked)
         for name, imu in config.imu.items():
-            x, y, z = (row[f"trunk.acceleration_{axis}"] or 0.0 for axis in "xyz")
-            turned = rotation.rotate(rotation.from_axes(imu.axes or ("x", "y", "z")), (x, y, z))
-            for axis, value in zip("xyz", turned, strict=True):
-                yield f"{name}.acceleration_{axis}", value
+            turn = rotation.from_axes(imu.axes or ("x", "y", "z"))
+            felt = [tuple(row[f"trunk.acceleration_{axis}"] or 0.0 for axis in "xyz") for row in self._walked]
+            turned = zip(*(rotation.rotate(turn, (x, y, z)) for x, y, z in felt), strict=True)
+            for axis, column in zip("xyz", turned, strict=True):
+                yield f"{name}.acceleration_{axis}", tuple(column)
+
+    def _numbers(self, channel: str) -> Iterator[float]:
+        for row in self._walked:
+            value = row[channel]
+            assert value is not None
+            yield value
 
 
 @cache

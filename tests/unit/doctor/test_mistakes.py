@@ -81,6 +81,12 @@ def walker(tmp_path_factory: pytest.TempPathFactory) -> Patient:
     return Patient(tmp_path_factory.mktemp("walker"), seconds=WALK_S)
 
 
+@pytest.fixture(scope="module")
+def drives(tmp_path_factory: pytest.TempPathFactory) -> Patient:
+    """With every mistake that drives alone show."""
+    return Patient(tmp_path_factory.mktemp("drives"), OF_DRIVES)
+
+
 def test_every_mistake_that_can_be_made_is_expected_and_every_rule_has_one() -> None:
     assert set(EXPECTED) == set(MISTAKES)
     assert {rule for rule, *_ in EXPECTED.values()} == {rule.name for rule in RULES} - {"component"}
@@ -103,16 +109,20 @@ def test_a_mistake_of_file_or_computer_is_found_with_the_right_fix_first(name: s
 
 @pytest.mark.parametrize("name", OF_BUS)
 def test_a_mistake_on_the_bus_is_found_with_the_right_fix_first(name: str, tmp_path: Path) -> None:
-    found = findings(Patient(tmp_path, [name], warm_s=1.0).seen())
+    found = findings(Patient(tmp_path, [name], seconds=1.0, warm_s=1.0).seen())
     assert {one.rule for one in found} == {EXPECTED[name][0]}
     check(name, found)
 
 
-@pytest.mark.parametrize(("names", "seconds"), [(OF_DRIVES, 1.5), (OF_SENSORS, WALK_S)])
-def test_many_mistakes_at_once_are_found_each_with_the_right_fix_first(
-    names: tuple[str, ...], seconds: float, tmp_path: Path
-) -> None:
-    found = findings(Patient(tmp_path, names, seconds).seen())
+def test_many_mistakes_of_drives_at_once_are_found_each_with_the_right_fix_first(drives: Patient) -> None:
+    check_all(OF_DRIVES, findings(drives.seen()))
+
+
+def test_many_mistakes_of_sensors_at_once_are_found_each_with_the_right_fix_first(tmp_path: Path) -> None:
+    check_all(OF_SENSORS, findings(Patient(tmp_path, OF_SENSORS, WALK_S, warm_s=1.5).seen()))
+
+
+def check_all(names: tuple[str, ...], found: list[Finding]) -> None:
     assert {(one.rule, one.about) for one in found} == {EXPECTED[name][:2] for name in names}
     for name in names:
         check(name, found)
@@ -174,10 +184,9 @@ def test_a_heartbeat_is_not_proposed_slower_than_what_waits_for_it(walker: Patie
     assert found.fixes[0].words.startswith("SDO: gwrms set left_hip.0x1017:0=40")
 
 
-def test_what_is_to_be_written_is_told_in_its_parameters_unit(tmp_path: Path) -> None:
-    seen = Patient(tmp_path, ["following_window"], warm_s=1.0).seen()
-    window = replace(seen, units={"right_knee.0x6065:0": (math.tau / 409600, "rad")})
-    (found,) = findings(window)
+def test_what_is_to_be_written_is_told_in_its_parameters_unit(drives: Patient) -> None:
+    window = replace(drives.seen(), units={"right_knee.0x6065:0": (math.tau / 409600, "rad")})
+    (found,) = (one for one in findings(window) if one.rule == "following_window")
     assert "right_knee.0x6065:0=0.349057328283rad" in found.fixes[0].words
     assert "22755 of the device's own" in found.fixes[0].words
 

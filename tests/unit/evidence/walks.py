@@ -8,9 +8,9 @@ from typing import Any, Final
 
 from gateway.client import Batch
 from gateway.wire.control import JournalEntries
+from hil_sim.bare import BareExoskeleton
 from hil_sim.channels import UNITS, reported
 from hil_sim.clock import SECOND_NS
-from hil_sim.controller.objects import ControllerState
 from hil_sim.drive import objects
 from hil_sim.drive.drive import JointDrive
 from hil_sim.exoskeleton import Exoskeleton, Scenario
@@ -87,12 +87,11 @@ def walk(
     `each_s` may do something to the robot once a second.
     """
     yield described()
-    robot = Exoskeleton(Scenario.WALK, seed, person=person)
+    robot = BareExoskeleton(Scenario.WALK, seed, person=person)
     rows: list[tuple[int, Row]] = []
 
     def listen() -> None:
-        if robot.controller.controller_state is ControllerState.RUNNING:
-            rows.append((robot.clock.now_ns, [*reported(robot), *_of_drives(robot)]))
+        rows.append((robot.clock.now_ns, [*reported(robot), *_of_drives(robot)]))
 
     robot.measured.append(listen)
     robot.power_on()

@@ -12,7 +12,7 @@ import pytest
 
 from gateway.connections.listeners import HandoverError, inherited
 from gateway.process import notify
-from tests.support.waiting import WAIT_S, until
+from tests.support.waiting import WAIT_S
 from tests.unit.gateway import processes
 from tests.unit.gateway.harness import Client
 
@@ -178,16 +178,3 @@ def test_the_abstract_name_of_a_manager_is_met_and_none_is_no_trouble() -> None:
 )
 def test_the_watchdog_s_period_is_for_us_or_not(environ: dict[str, str], period_s: float | None) -> None:
     assert notify.watchdog_s(environ) == period_s
-
-
-def test_by_hand_it_says_where_it_listens_only_once(file: Path) -> None:
-    with processes.process(*processes.GATEWAY, str(file)) as running:
-        address = processes.address(running)
-        for _ in range(2):
-            until(lambda: processes.rests(running.pid), "it rests")
-            with Client(address) as client:
-                assert client.call("clock.read")
-        until(lambda: processes.rests(running.pid), "it rests")
-        running.terminate()
-        assert running.stdout is not None
-        assert running.stdout.read() == ""

@@ -244,7 +244,7 @@ def test_strangers_by_the_hundred_keep_nobody_s_stop_out(come: Connect, address:
     for one in knocking:
         one.start()
     try:
-        for _ in range(20):
+        for _ in range(10):
             assert operator.call("robot.stop", reason="now")["held"] is True
         assert let_in(come, "viewer")
     finally:

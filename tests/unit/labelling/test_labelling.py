@@ -22,6 +22,7 @@ from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.upload import send
 from server_gui.core.settings.server_file import RecordingSettings, ServerSettings, StoreSettings, Upload
 from tests.support.waiting import until
+from tests.unit.cloud.filled import Filled
 
 S = 10**9
 BEGAN = 1_800_000_000 * S
@@ -29,17 +30,32 @@ LENGTH = 60 * S
 ROBOT, SESSION = "exo-01", "20270115T080000Z-abcdef"
 
 
+def settings_in(folder: Path) -> ServerSettings:
+    store = StoreSettings((folder / "store").as_uri())
+    return ServerSettings({}, store, RecordingSettings(spool=folder / "spool", batch_s=1.0))
+
+
+@pytest.fixture(scope="module")
+def uploaded(store_libraries: None, tmp_path_factory: pytest.TempPathFactory) -> Filled:
+    """Where a server has recorded a session of a minute, and uploaded it."""
+    return Filled(tmp_path_factory.mktemp("labelled"), lambda folder: recorded(settings_in(folder)))
+
+
 @pytest.fixture
-def settings(tmp_path: Path, folder_url: str) -> ServerSettings:
-    return ServerSettings(
-        {}, StoreSettings(folder_url), RecordingSettings(spool=tmp_path / "spool", batch_s=1.0)
-    )
+def folder(request: pytest.FixtureRequest, tmp_path: Path, store_libraries: None) -> Path:
+    """Of the server: empty, but for tests of what it has recorded."""
+    has = "labelling" in request.fixturenames
+    return request.getfixturevalue("uploaded").anew() if has else tmp_path
+
+
+@pytest.fixture
+def settings(folder: Path) -> ServerSettings:
+    return settings_in(folder)
 
 
 @pytest.fixture
 def labelling(settings: ServerSettings) -> Labelling:
     """Of a server that has recorded a session of a minute, and uploaded it."""
-    recorded(settings)
     return Labelling(settings)
 
 

@@ -11,6 +11,7 @@ import pytest
 
 from ml.errors import UnusableData, UnusableModel
 from ml.features import FeatureStream
+from ml.robot import learn as learning
 from ml.robot.learn import learn
 from ml.robot.learned import ABNORMAL_FROM, NONE, Learned, Verdicts
 from ml.robot.task import STRIDE, TASKS, Task, recipe_named
@@ -23,6 +24,13 @@ def learned(name: str = "activity") -> Learned:
     recipe = task.recipe(HIPS)
     assert recipe is not None
     return learn(task, recipe, *lessons(task, range(1, 7)))
+
+
+@pytest.fixture
+def briefly(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where it does not matter how well something is learned."""
+    monkeypatch.setattr(learning, "EPOCHS", 2)
+    monkeypatch.setattr(learning, "FOLDS", 2)
 
 
 def test_new_people_are_told_right() -> None:
@@ -118,6 +126,7 @@ def test_a_state_is_restored_as_it_was(task: Task) -> None:
     assert same(restored.judge(rows), model.judge(rows), slice(None))
 
 
+@pytest.mark.usefixtures("briefly")
 def test_a_class_that_one_person_alone_shows_is_learned_all_the_same() -> None:
     most, sitting = lessons(ACTIVITY, range(1, 5), ["stand", "walk"]), lessons(ACTIVITY, [9], ["sit"])
     taught = [np.concatenate(column) for column in zip(most, sitting, strict=True)]
@@ -125,6 +134,7 @@ def test_a_class_that_one_person_alone_shows_is_learned_all_the_same() -> None:
     assert model.classes == ("stand", "walk", "sit")
 
 
+@pytest.mark.usefixtures("briefly")
 def test_labels_that_the_sensors_cannot_tell_are_left_out() -> None:
     rows, truth, group = lessons(ACTIVITY, range(1, 5))
     model = learn(
@@ -216,6 +226,7 @@ def test_a_state_that_is_no_model_of_ours_is_refused_in_a_sentence(case: str) ->
     Learned.restored(learned().state())
 
 
+@pytest.mark.usefixtures("briefly")
 def test_one_prediction_is_quick_and_fifty_are_not_fifty_times_as_slow() -> None:
     """Limits by the CPU time of this thread: the computer may be busy with other things."""
     recipe = recipe_named("activity/hips+knees+ankles+feet+trunk")

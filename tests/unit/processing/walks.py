@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from hil_sim.exoskeleton import Exoskeleton
+from hil_sim.bare import BareExoskeleton
 from hil_sim.gait.timetable import Entry
 from hil_sim.truth import TruthFile
 from server_gui.core.processing.gait_events import GaitEvent
@@ -41,7 +41,7 @@ def kind_of(event: GaitEvent) -> str:
 
 def record(entries: Iterable[Entry], seconds: float, file: Path, seed: int = 0, person: int = 0) -> Walk:
     """Let the simulator do that, and listen to its sensors before they speak any language."""
-    robot = Exoskeleton(seed=seed, person=person)
+    robot = BareExoskeleton(seed=seed, person=person)
     truth = TruthFile(file, robot)
     rows: list[tuple[float, ...]] = []
 

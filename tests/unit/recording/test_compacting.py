@@ -12,6 +12,7 @@ import pytest
 
 from ml.store import Store
 from ml.store.tables import TELEMETRY
+from server_gui.core.recording import compaction
 from server_gui.core.recording.compaction import Compaction
 from server_gui.core.recording.recorder import Recorder
 from server_gui.core.recording.spool import Spool
@@ -67,8 +68,10 @@ def test_the_first_time_is_one_period_after_the_first_use(tmp_path: Path) -> Non
 
 
 def test_a_compaction_that_fails_is_said_and_not_tried_again_at_once(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
+    program = "import sys; sys.exit(f'gwrms cloud: {sys.argv[1]!r} is no store')"
+    monkeypatch.setattr(compaction, "COMMAND", ("-c", program))
     compacting = Compaction("ftp://nowhere", tmp_path, HOUR_S)
     (tmp_path / "compacted").touch()
     long_ago(tmp_path)

@@ -312,8 +312,8 @@ def test_lines_of_any_length_are_found(size: int) -> None:
 
 
 def test_only_what_is_taken_is_read() -> None:
-    file = Counting(b"".join(b"%d\n" % number for number in range(1_000_000)))
-    assert list(itertools.islice(journal_files.lines_backwards(file), 3)) == [b"999999", b"999998", b"999997"]
+    file = Counting(b"".join(b"%d\n" % number for number in range(300_000)))
+    assert list(itertools.islice(journal_files.lines_backwards(file), 3)) == [b"299999", b"299998", b"299997"]
     assert file.bytes_read <= 200_000
 
 

@@ -5,10 +5,12 @@ from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
+import pytest
 from threadpoolctl import threadpool_limits
 
 from ml.registry.card import Card, Source
 from ml.registry.code import features_hash, versions
+from ml.robot import learn as learning
 from ml.robot.groups import GROUPS
 from ml.robot.learn import learn
 from ml.robot.learned import Learned
@@ -34,7 +36,8 @@ def learned(task: str = "falling", seed: int = 0) -> Learned:
     recipe = TASKS[task].recipe(CHANNELS)
     assert recipe is not None
     rows, truth = features(task, seed)
-    with threadpool_limits(1):
+    with threadpool_limits(1), pytest.MonkeyPatch.context() as patch:
+        patch.setattr(learning, "EPOCHS", 2)  # how well it has learned does not matter
         return learn(TASKS[task], recipe, rows, truth, np.arange(ROWS) % 3, seed)
 
 

@@ -63,7 +63,7 @@ def test_an_append_that_is_cut_at_any_length_is_made_once(url: str) -> None:
     data = entry(url, 3).read_bytes()
     assert not any(torn.whole(data[:length]) for length in range(len(data)))
     ends = [at for at in range(len(data)) if data[at : at + 1] == b"\n"]
-    for length in sorted({*ends, *(end + 1 for end in ends), *range(0, len(data), 307), len(data) - 1}):
+    for length in sorted({*ends, *(end + 1 for end in ends), *range(0, len(data), 613), len(data) - 1}):
         cut(entry(url, 3), data[:length])
         assert append(url, 3), length
         assert texts(url) == [1, 2, 3], length
@@ -74,7 +74,7 @@ def test_an_append_that_is_cut_at_any_length_is_made_once(url: str) -> None:
 def _lengths(data: bytes) -> list[int]:
     """Every end of a line, with and without it, and what lies between at intervals."""
     ends = [at for at in range(len(data)) if data[at : at + 1] == b"\n"]
-    return sorted({*ends, *(end + 1 for end in ends), *range(0, len(data), 307)} - {len(data)})
+    return sorted({*ends, *(end + 1 for end in ends), *range(0, len(data), 613)} - {len(data)})
 
 
 def test_a_table_whose_making_is_cut_at_any_length_is_made_anew(url: str) -> None:

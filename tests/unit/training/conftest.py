@@ -11,6 +11,7 @@ from ml.robot import learn, novelty
 def small_models() -> Iterator[None]:
     """The wearers made up here differ by far more than the robot's do."""
     with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(learn, "EPOCHS", 6)
         patch.setattr(learn, "FOLDS", 2)
         patch.setattr(novelty, "PROTOTYPES", 16)
         patch.setattr(novelty, "COMPONENTS", 8)

@@ -149,9 +149,14 @@ def test_no_wearer_is_on_both_sides_and_nobody_knows_whose_is_no_judge(
     assert found.card.held_out == ("s0", "s1", "s2")
     assert found.held_out.people == {"p1": 660}
     assert "beside others with one: 1;" in found.remarks[0]
-    assert "whose" not in train(registry_of(mine), ACTIVITY).card.held_out
     with pytest.raises(UnusableData, match=r"nobody is called 'whose'.*1 sessions that do not say whose"):
         train(registry_of(mine), Wish("activity", held_out=("whose",)))
+
+
+def test_nobody_knows_whose_is_no_judge_where_nobody_was_named(people: list[Made], tmp_path: Path) -> None:
+    named = [replace(each, wearer=f"P{number}") for number, each in enumerate(people)]
+    mine = stored(tmp_path, [*named, replace(people[0], session="whose")])
+    assert "whose" not in train(registry_of(mine), ACTIVITY).card.held_out
 
 
 def test_a_serving_model_with_other_sensors_judges_the_same_decisions(
