@@ -208,7 +208,7 @@ def test_an_edit_that_nobody_heard_the_end_of_cuts_the_walk_short(events: list[E
     both = Journalled(JournalEntries([*told.journal.entries, asked]))
     evidence = followed([*events, both])[WORSE.write].evidence
     assert evidence.cycles_after < worse.evidence.cycles_after // 2 + 2
-    assert "another edit" in evidence.notes[0]
+    assert "leaves fewer cycles after this one" in evidence.notes[0]
 
 
 def test_a_long_trial_is_judged_by_what_was_before_it() -> None:

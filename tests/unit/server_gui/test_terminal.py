@@ -354,7 +354,7 @@ def test_write_whose_answer_was_lost_is_not_known() -> None:
         ),
         (
             lambda stopped: stopped.set_result(Stopped({"left_knee": "unreachable"}, True)),
-            "STOP NOT CONFIRMED: left_knee unreachable",
+            "STOP NOT CONFIRMED: left knee unreachable",
         ),
         (lambda stopped: stopped.set_result(Stopped({}, True)), "STOP NOT CONFIRMED: no drive answered"),
         (
