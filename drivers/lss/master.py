@@ -11,6 +11,7 @@ from typing import Protocol, Self
 
 from drivers.bus.frames import FrameHandler
 from drivers.errors import DeviceTimeout, LssRefusal, Mismatch, SettingsError
+from drivers.inbox import Inbox
 
 REQUEST, ANSWER = 0x7E5, 0x7E4
 UNCONFIGURED = 255
@@ -100,7 +101,7 @@ class LssMaster:
         self._bus = bus
         self._timeout_s = timeout_s
         self.scan_s = scan_s
-        self._heard: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+        self._heard: Inbox[bytes] = Inbox()
 
     def __enter__(self) -> Self:
         self._bus.subscribe(ANSWER, self._hear)

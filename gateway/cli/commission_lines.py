@@ -22,6 +22,7 @@ from typing import Any, Self
 import msgspec
 
 from drivers.errors import DriverError
+from drivers.inbox import Inbox
 from gateway.cli.text import say_json
 from gateway.commission.dialogue import Ask, Live
 from gateway.commission.progress import Step
@@ -48,7 +49,7 @@ class Lines:
     def __init__(self, source: int) -> None:
         self.stop_asked = False
         self._source = source
-        self._read: queue.SimpleQueue[Answer | None] = queue.SimpleQueue()
+        self._read: Inbox[Answer | None] = Inbox()
         self._woken, self._wake = os.pipe()
         self._main = threading.main_thread().ident or 0
         self._thread = threading.Thread(target=self._run, name="answers", daemon=True)

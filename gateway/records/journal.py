@@ -20,6 +20,7 @@ from typing import Any, BinaryIO, Final, TypeVar
 
 import msgspec
 
+from drivers.inbox import Inbox
 from gateway.process.futures import failed
 from gateway.records import durable, journal_files
 from gateway.records.chain import Broken, Head, line
@@ -67,7 +68,7 @@ class Journal:
         self._head = Head()
         self._room: Entry = {}  # goes with the next entry
         self._file: BinaryIO | None = None
-        self._queue: queue.SimpleQueue[_Waiting | None] = queue.SimpleQueue()
+        self._queue: Inbox[_Waiting | None] = Inbox()
         self._limits = Limits()
         self._limiting = threading.Lock()  # never taken for the gateway's own entries: a stop tells some
         self._ended = False

@@ -29,6 +29,7 @@ import can
 import canopen
 
 import eds
+from drivers.inbox import Inbox
 from tests.bench._blocked_bus import blocked_bus
 from tests.bench._bus import Drive
 from tests.bench._crowd import crowd
@@ -130,7 +131,7 @@ class Bus:
 
     def __init__(self, process: "subprocess.Popen[str]") -> None:
         self._process = process
-        self._told: queue.SimpleQueue[tuple[str, int, int, int]] = queue.SimpleQueue()
+        self._told: Inbox[tuple[str, int, int, int]] = Inbox()
         self.port = int(self._line())
         self._reader = threading.Thread(target=self._read, name="what the bus tells")
         self._reader.start()

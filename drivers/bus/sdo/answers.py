@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from drivers.bus.sdo.doubles import Doubles
 from drivers.bus.sdo.outstanding import Outstanding
 from drivers.bus.sdo.round_trips import RoundTrips
+from drivers.inbox import Inbox
 
 # Responses that wait. Of a flood the first are kept, in their order: what answers a request comes before what
 # is sent behind it without being asked. What comes beyond is lost, which is as if it never came: its request
@@ -35,7 +36,7 @@ class Answers:
         self._outstanding = outstanding
         self._counters = counters
         self._round_trips = round_trips
-        self._inbox: queue.SimpleQueue[tuple[int, bytes] | None] = queue.SimpleQueue()
+        self._inbox: Inbox[tuple[int, bytes] | None] = Inbox()
         self._doubles = Doubles()
 
     @property

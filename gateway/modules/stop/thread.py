@@ -9,6 +9,7 @@ import threading
 import time
 from collections.abc import Callable
 
+from drivers.inbox import Inbox
 from drivers.urgency import make_urgent
 from gateway.process.memory import MemoryLock
 
@@ -29,7 +30,7 @@ class StopThread:
         self._watches = watches
         self._period_s = period_s
         self._due: float | None = None  # when to look next; `None` while there is nothing to watch
-        self._work: queue.SimpleQueue[Work | None] = queue.SimpleQueue()
+        self._work: Inbox[Work | None] = Inbox()
         self._closed = False
         self._closing = threading.Lock()
         self._thread = threading.Thread(target=self._run, name="stop", daemon=True)

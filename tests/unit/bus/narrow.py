@@ -5,6 +5,7 @@ import threading
 from collections.abc import Sequence
 
 from drivers.bus.frames import Frame
+from drivers.inbox import Inbox
 
 
 class NarrowTransport:
@@ -21,7 +22,7 @@ class NarrowTransport:
         self.asked = 0  # times it had no room
         self.closed = False
         self.fails: Exception | None = None  # raised by whoever sends
-        self.incoming: queue.SimpleQueue[Frame | Exception] = queue.SimpleQueue()
+        self.incoming: Inbox[Frame | Exception] = Inbox()
         self.room = room
         self.awaited = False  # somebody waits, or has waited, for room
         self._changed = threading.Condition()
