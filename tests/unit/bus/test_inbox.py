@@ -37,10 +37,12 @@ def test_what_has_come_is_taken_however_late_one_looks() -> None:
 
 def test_all_that_several_put_is_taken_each_ones_in_order() -> None:
     shared: Inbox[tuple[int, int]] = Inbox()
-    threads = [
-        threading.Thread(target=lambda who=who: [shared.put((who, n)) for n in range(MOST)])
-        for who in range(4)
-    ]
+
+    def put_all(who: int) -> None:
+        for n in range(MOST):
+            shared.put((who, n))
+
+    threads = [threading.Thread(target=put_all, args=(who,)) for who in range(4)]
     for thread in threads:
         thread.start()
     taken = [shared.get(timeout=WAIT_S) for _ in range(4 * MOST)]
