@@ -85,8 +85,8 @@ class Client:
     watches `link.state`.
 
     Ordering: requests are sent in the order of the calls; answers may come in another. Loss: a call is sent
-    at once and once, or raises; one that fails with `LinkLost` or `CallTimeout` may have been carried out.
-    Cancellation: forgets the answer, undoes nothing.
+    at once (a stop within a second) and once, or raises; one that fails with `LinkLost` or `CallTimeout` may
+    have been carried out. Cancellation: forgets the answer, undoes nothing.
     """
 
     def __init__(
@@ -292,6 +292,8 @@ class Client:
 
     async def stop(self, reason: str) -> Stopped:
         """Quick stop on every drive. Not a safety-rated stop; look at what each drive confirmed.
+
+        Where there is no link, one is tried for at once and again, for a second at most.
 
         Raises:
             ClientError: the robot did not answer; consider it NOT stopped.

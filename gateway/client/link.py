@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
+from typing import Final
 
 import msgspec
 
@@ -51,15 +52,17 @@ class LinkSettings:
 
 
 OnState = Callable[[ConnectionState], None]
+AGAIN_S: Final = 0.05  # the least between two attempts, however often somebody dials
+DIAL_S: Final = 1.0  # that a stop waits for a connection at most
 
 
 class Link:
     """Keeps one connection to a robot alive from `start` to `close`.
 
     Nothing is queued while there is no connection: a call is sent at once or raises `NotConnected`, so that
-    no write and no stop can come out later than it was meant. Streams are started again on each new
-    connection. The robot is asked for its clock three times in `silence_s`, which finds a peer that
-    vanished without closing.
+    no write can come out later than it was meant. A stop alone may wait for a connection, for `DIAL_S`.
+    Streams are started again on each new connection. The robot is asked for its clock three times in
+    `silence_s`, which finds a peer that vanished without closing.
     """
 
     def __init__(self, address: Address, settings: LinkSettings, on_state: OnState | None = None) -> None:
@@ -75,6 +78,7 @@ class Link:
         self._connection: Connection | None = None
         self._supervisor: asyncio.Task[None] | None = None
         self._changed = asyncio.Event()
+        self._dialled = asyncio.Event()  # since the last attempt began
         self._subscriptions: list[Subscription] = []
         self._streams: dict[int, Subscription] = {}
         self._decode_data = msgspec.json.Decoder(StreamData).decode
@@ -130,14 +134,26 @@ class Link:
     async def call(self, method: Method[P, R], params: P, timeout_s: float | None = None) -> R:
         """One request and its result; see `Connection.call`.
 
+        For what is urgent, which is a stop, a connection is made where there is none, within `DIAL_S`.
+
         Raises:
             NotConnected: there is no connection now, and nothing was sent.
 
         """
+        if method.urgent:
+            await self._dial()
         if self._connection is None:
             why = f" ({self.problem})" if self.problem is not None else ""
             raise NotConnected(f"there is no link to {self.address} now, and nothing was sent{why}")
         return await self._ask(self._connection, method, params, timeout_s)
+
+    def dial(self) -> None:
+        """Connect now, if there is no connection, instead of after the wait for the next attempt.
+
+        Where an attempt goes on, and fails, another one follows: the robot may have come meanwhile.
+        """
+        if self._connection is None:
+            self._dialled.set()
 
     async def subscribe(self, request: StreamStartParams, depth: int) -> Subscription:
         """Start a stream now, or as soon as there is a connection.
@@ -171,11 +187,21 @@ class Link:
 
     # --- supervision
 
+    async def _dial(self) -> None:
+        """Wait for a connection while it is tried for again and again, for `DIAL_S` at most."""
+        trying = (ConnectionState.WAITING, ConnectionState.CONNECTING)
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(DIAL_S):
+                while self._connection is None and self.state in trying:
+                    self.dial()
+                    await self._next_change()
+
     async def _supervise(self) -> None:
         backoff = Backoff()
         reason: ClientError | None = None
         try:
             while True:
+                self._dialled.clear()
                 self._set(ConnectionState.CONNECTING)
                 try:
                     await self._session(backoff)
@@ -185,10 +211,17 @@ class Link:
                     reason = self.problem
                     return
                 self._set(ConnectionState.WAITING)
-                await asyncio.sleep(backoff.next_s())
+                await self._pause(backoff.next_s())
         finally:
             self._set(ConnectionState.CLOSED)
             self._end_streams(reason)
+
+    async def _pause(self, for_s: float) -> None:
+        """Until the next attempt: so long, or until somebody dials."""
+        await asyncio.sleep(min(AGAIN_S, for_s))
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(for_s - AGAIN_S):
+                await self._dialled.wait()
 
     async def _session(self, backoff: Backoff) -> None:
         """One connection from beginning to end; returns only by raising why it ended."""

@@ -42,6 +42,7 @@ class FakeCommands:
     def __init__(self) -> None:
         self.asked: list[tuple[str, tuple[Any, ...]]] = []
         self.futures: list[Future[Any]] = []
+        self.dials = 0
 
     def _ask(self, name: str, *arguments: Any) -> "Future[Any]":
         self.asked.append((name, arguments))
@@ -92,6 +93,9 @@ class FakeCommands:
 
     def read_objects(self, component: str, objects: Sequence[str]) -> "Future[Any]":
         return self._ask("read_objects", component, tuple(objects))
+
+    def dial(self) -> None:
+        self.dials += 1
 
     def show_processes(self, wanted: bool) -> None:
         self.asked.append(("show_processes", (wanted,)))

@@ -224,7 +224,9 @@ class Station:
                     self._described(event.description, before)
                 case Costs():
                     self.cost = event.cost
-                case LinkChanged():
+                case LinkChanged(state=state):
+                    if state is ConnectionState.CONNECTED:
+                        self._commands.dial()  # its own link may still wait: nobody is to
                     self.cost = None  # it was of the link that there was
                     self.predictions.clear()
                     self.flash.forget()

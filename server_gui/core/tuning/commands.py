@@ -65,6 +65,10 @@ class Commands(Protocol):
         """What a device holds of these now."""
         ...
 
+    def dial(self) -> None:
+        """Connect now where there is no link: the robot has been seen."""
+        ...
+
     def show_processes(self, wanted: bool) -> None:
         """Ask for the process table from now on, or no more."""
         ...

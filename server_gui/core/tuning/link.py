@@ -97,6 +97,9 @@ class Link:
     def read_objects(self, component: str, objects: Sequence[str]) -> "Future[ObjectValues]":
         return self._network.run(self._client.read_objects(component, *objects))
 
+    def dial(self) -> None:
+        self._network.run(self._dial())
+
     def show_processes(self, wanted: bool) -> None:
         self._network.run(self._show_processes(wanted))
 
@@ -142,6 +145,9 @@ class Link:
             if not self._resets and self._ours_until_ns <= time.monotonic_ns():
                 with contextlib.suppress(ClientError):  # it has gone with its time, or the link
                     await self._client.release()
+
+    async def _dial(self) -> None:
+        self._client.link.dial()
 
     async def _show_processes(self, wanted: bool) -> None:
         if wanted:

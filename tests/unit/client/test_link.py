@@ -17,6 +17,7 @@ from gateway.client import (
     RemoteError,
     Subscription,
     Unreachable,
+    link,
 )
 from gateway.wire.stream import StreamStartParams
 from tests.fake_robot import FakeRobot, Refusal
@@ -89,17 +90,21 @@ async def test_link_is_made_when_the_robot_comes_up_later(robot: FakeRobot) -> N
 
 
 @in_loop
-async def test_call_without_a_link_is_not_sent_and_not_kept(robot: FakeRobot) -> None:
+async def test_call_without_a_link_is_not_sent_and_not_kept(
+    robot: FakeRobot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(link, "DIAL_S", 0.1)
     async with Client(robot.address, PATIENT) as client:
         await asyncio.to_thread(robot.refuse)
         await until_in_loop(lambda: client.link.state is not ConnectionState.CONNECTED)
-        with pytest.raises(NotConnected, match="nothing was sent"):
-            await client.stop("test")
+        for call in (client.stop("test"), client.write({"gait.step_length": 0.4}), client.describe()):
+            with pytest.raises(NotConnected, match="nothing was sent"):
+                await call
         await asyncio.to_thread(robot.listen)
         async with asyncio.timeout(30):
             await client.link.connected()
         await client.describe()
-    assert robot.called("robot.stop") == []
+    assert robot.called("robot.stop") == robot.called("parameter.write") == []
 
 
 @in_loop

@@ -1,6 +1,7 @@
 """Control over the link of a window: what took it for one command alone gives it back."""
 
 import asyncio
+import time
 from typing import Any, cast
 
 import pytest
@@ -8,8 +9,10 @@ import pytest
 from gateway.client import Address, ClientError, ConnectionState, NotConnected
 from gateway.wire.control import Lease
 from gateway.wire.stop import Reset
+from server_gui.core.follow.events import LinkChanged
 from server_gui.core.follow.network import Network
 from server_gui.core.tuning.link import LEASE_S, Link
+from tests.support.desk import Bench
 
 
 class FakeClient:
@@ -46,6 +49,14 @@ def link(client: FakeClient) -> Link:
     made = Link(cast("Network", None), Address.parse("127.0.0.1:1"), lambda _event: None, lambda: None)
     made._client = cast("Any", client)
     return made
+
+
+def test_a_robot_that_is_seen_again_can_be_commanded_again(bench: Bench) -> None:
+    commands = bench.first
+    dials = commands.dials
+    for state in (ConnectionState.WAITING, ConnectionState.CONNECTING, ConnectionState.CONNECTED):
+        bench.station.take([LinkChanged(state, None, time.monotonic_ns())])
+    assert commands.dials == dials + 1
 
 
 def test_a_reset_gives_control_back_at_once(link: Link, client: FakeClient) -> None:
