@@ -15,7 +15,7 @@ from server_gui.views.marks import old_text
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card
 from server_gui.views.widgets.plot import Curve, Mouse, PlacedFlag, Plot, css
-from server_gui.views.widgets.time_axis import time_text
+from server_gui.views.widgets.time_axis import NOW, SHOWN, time_text
 from server_gui.views.widgets.wrapped import Wrapped
 
 SECONDS: Final = 10.0
@@ -82,7 +82,8 @@ class KeyPlot(Card):
         live = station.is_live
         self.plot.show_flags(flags)
         self.plot.show_limits([limit * unit.scale for limit in self._limits(station)])
-        self.plot.draw(rings.source, times, columns, live=live, scale=unit.scale)
+        end = SHOWN if station.robot.is_recording else NOW
+        self.plot.draw(rings.source, times, columns, live=live, scale=unit.scale, end=end)
         if slow or self._hover is not None:
             self._say(station, unit, flags, live=live)
 

@@ -210,16 +210,17 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
         *,
         live: bool,
         scale: float = 1.0,
-        paused: bool = False,
+        end: str = NOW,
     ) -> None:
         """Draw a column a curve, times `scale`, over the times; grey where not `live`.
 
-        Times (s) rise, the last is now, but where it is `paused`. Rows of one `source` are only ever added.
+        Times (s) rise; the last is `LAST` where not `live`, else what `end` says. Rows of one `source` are only
+        ever added.
         """
         (left, right), _ = self.getViewBox().viewRange()
         if len(times) and right < 0.0:
-            end = int(np.searchsorted(times, times[-1] + right, "right"))
-            times, columns = times[:end], [values[:end] for values in columns]
+            until = int(np.searchsorted(times, times[-1] + right, "right"))
+            times, columns = times[:until], [values[:until] for values in columns]
         if self.follows and len(times):
             self._follow_new(source, times, columns, scale)
         self._be_blank(not any(np.isfinite(values).any() for values in columns))
@@ -229,7 +230,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
         view = raster.View(right - left, low / scale, high / scale, width, height)
         drawn = self._lines.strip.draw(source, view, times, columns, self._inks)
         self._lines.show_strip(drawn, live=live)
-        self.getPlotItem().getAxis("bottom").set_end(PAUSED if paused else NOW if live else LAST)
+        self.getPlotItem().getAxis("bottom").set_end(end if live else LAST)
         self._mark()
 
     def draw_anew(self) -> None:

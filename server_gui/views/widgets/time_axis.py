@@ -12,10 +12,11 @@ STEPS_S: Final = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 30
 NOW: Final = "now"
 LAST: Final = "last"
 PAUSED: Final = "paused"
+SHOWN: Final = "shown"
 
 
 class TimeAxis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph has no types
-    """Its last place is now, the last that came where nothing comes any more, or when it was paused."""
+    """Its last place is now; or the last that came, when it was paused, what is shown of a recording."""
 
     def __init__(self) -> None:
         self._label_px = 50
@@ -30,7 +31,7 @@ class TimeAxis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph has no types
         self.update()
 
     def set_end(self, word: str) -> None:
-        """Set what its last place is called: `NOW`, `LAST` or `PAUSED`."""
+        """Set what its last place is called: `NOW`, `LAST`, `PAUSED` or `SHOWN`."""
         if word != self._end:
             self._end = word
             self.picture = None

@@ -11,7 +11,7 @@ from server_gui.core.workspace.scene import Scene
 from server_gui.core.workspace.series import Floats
 from server_gui.core.workspace.trigger import WINDOWS, On, State
 from server_gui.views.widgets.plot import PlacedFlag
-from server_gui.views.widgets.time_axis import time_text
+from server_gui.views.widgets.time_axis import NOW, PAUSED, SHOWN, time_text
 from server_gui.views.workspace.unit_plot import EmptyPlot, UnitPlot
 from server_gui.views.workspace.xy_plot import XYPlot
 
@@ -40,8 +40,8 @@ def _draw_plot(scene: Scene, card: UnitPlot, station: Station, times: Floats, *,
     if scene.frozen is None and _comes_late(scene, card):
         card.plot.draw_anew()
     source = station.rings.source if scene.frozen is None else scene.frozen
-    paused = scene.frozen is not None
-    card.plot.draw(source, times, columns, live=live, scale=card.unit.scale, paused=paused)
+    end = PAUSED if scene.frozen is not None else SHOWN if station.robot.is_recording else NOW
+    card.plot.draw(source, times, columns, live=live, scale=card.unit.scale, end=end)
 
 
 def _comes_late(scene: Scene, card: UnitPlot) -> bool:
