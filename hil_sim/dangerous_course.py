@@ -56,7 +56,7 @@ class Course:
         end_s = self._robot.clock.now_s + seconds
         while True:
             entry = next(self._ways)
-            self._robot.controller.go(entry.activity, entry.pace)
+            self._robot.controller.go(entry.activity, self._robot.own_pace(entry.pace))
             until_s = self._robot.clock.now_s + entry.seconds
             while self._robot.clock.now_s < until_s:
                 yield True
@@ -64,7 +64,7 @@ class Course:
                 return
 
     def _wait(self, seconds: float, doing: Activity, *, steady: bool = False) -> Iterator[bool]:
-        pace = self._source.uniform(0.30, 0.55), self._source.uniform(1.4, 2.4)
+        pace = self._robot.own_pace((self._source.uniform(0.30, 0.55), self._source.uniform(1.4, 2.4)))
         self._robot.controller.go(Activity.WALK if steady else doing, pace)
         until_s = self._robot.clock.now_s + seconds + self._source.uniform(0.0, 2.0)
         while self._robot.clock.now_s < until_s or self._robot.controller.generator.in_transition:

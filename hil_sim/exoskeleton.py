@@ -138,12 +138,12 @@ class Exoskeleton:
         entry = next(self._entries, None)
         if entry is None:
             return
-        self.controller.go(entry.activity, self._own(entry.pace))
+        self.controller.go(entry.activity, self.own_pace(entry.pace))
         self.controller.dictionary[controller.ACTIVITY].default = int(entry.activity)
         if math.isfinite(entry.seconds):
             self._next_entry = self.clock.after(round(entry.seconds * SECOND_NS), self._go_on)
 
-    def _own(self, pace: Pace | None) -> Pace | None:
+    def own_pace(self, pace: Pace | None) -> Pace | None:
         """What this wearer makes of a pace that ordinary ones are told to walk at."""
         return pace if pace is None or self.walk == ORDINARY else WALKS[self.walk].pace(*pace)
 
@@ -151,7 +151,7 @@ class Exoskeleton:
         """Walk as fast as this walk usually is, until an operator or the timetable says otherwise."""
         keys = (controller.STEP_LENGTH, controller.CYCLE_TIME)
         entries = [self.controller.dictionary[key] for key in keys]
-        pace = self._own((entries[0].number() / 1e3, entries[1].number() / 1e3))
+        pace = self.own_pace((entries[0].number() / 1e3, entries[1].number() / 1e3))
         for entry, value in zip(entries, pace or (), strict=True):
             entry.take(round(value * 1e3))
             entry.default = entry.value

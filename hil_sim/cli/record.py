@@ -211,8 +211,8 @@ def main(argv: list[str]) -> int:
     parser = _parser()
     try:
         arguments = parser.parse_args(argv)
-        if arguments.scenario == DANGEROUS and (arguments.walks, arguments.assists) != (ORDINARY, None):
-            parser.error("--scenario dangers is of ordinary walks on both legs: no --walks, no --assists")
+        if arguments.scenario == DANGEROUS and arguments.assists is not None:
+            parser.error("--scenario dangers is of robots on both legs: no --assists")
     except SystemExit as leave:
         return 2 if leave.code else 0
     with _opened(arguments.out) as file:

@@ -23,6 +23,7 @@ from server_gui.core.tuning.stop import StopState
 from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.recordings.timeline import clock_text
 from server_gui.views.theme import Look, Theme
+from server_gui.views.widgets.time_axis import SHOWN
 from tests.gui.archives import RATE_HZ, SECONDS, Shown, cell, play, record
 from tests.gui.fakes import Bench
 from tests.support.desk import walking
@@ -101,6 +102,8 @@ def test_playback_is_marked_never_mixed_with_what_is_live_and_shows_what_was_pre
     whole.until(lambda: player.banner.text().endswith(" · predicted then: Walk 94 %"), "showed it")
     lines, activity = player.overview.status_lines, player.overview.now.activity
     whole.until(lambda: activity.main.text().startswith("Walk 94 %"), "said it large")
+    axis = player.overview._plots[0].plot.getPlotItem().getAxis("bottom")
+    whole.until(lambda: axis.tickStrings([0.0], 1.0, 1.0) == [SHOWN], "an instant long past was called now")
     assert activity.detail.text().startswith("said then by model 3fa2 of activity")
     archive.playback.seek(tape.last_ns)
     whole.until(lambda: "predicted" not in player.banner.text(), "jumped")
