@@ -13,10 +13,10 @@ from server_gui.views.widgets.plain import PlainLabel
 
 WIDTH = 560  # at text of 100 %: longer lines are not read
 ADD = (
-    "Type where its gateway listens, HOST:PORT, as gwrms gateway prints it. With one that has keys, pair: "
-    "sudo gwrms keys pair shows a code there. Robots to be followed at every start go into "
-    "~/.config/gwrms/server.toml."
+    "Where its gateway listens, as gwrms gateway prints it. One that has keys shows a code to pair with: "
+    "sudo gwrms keys pair."
 )
+ALWAYS = "Robots that are to be followed at every start go into ~/.config/gwrms/server.toml."
 SIMULATE = "A whole exoskeleton without hardware walks on this computer. It can be stopped, tuned and broken."
 COMMISSION = "Drives that nobody knows yet become a robot's file: it asks, and you move the joints by hand."
 OPEN = "Everything that was recorded, played in the same views; no robot is needed."
@@ -45,6 +45,7 @@ class EmptyView(QWidget):
         self.address.setAccessibleName("Address of the first robot")
         self.address.returnPressed.connect(self._add)
         self.add.setAccessibleName("Add this robot")
+        self.add.setToolTip(ALWAYS)
         self.add.clicked.connect(self._add)
         self.pair = QPushButton("Pair with a code…")
         self.pair.clicked.connect(lambda: self.pairing.emit(self.address.text().strip()))
@@ -87,7 +88,7 @@ class EmptyView(QWidget):
         button = QPushButton("Commission a robot")
         button.setObjectName("commission")
         button.clicked.connect(go)
-        self._column.insertWidget(2, _offer("New robot", COMMISSION, button))
+        self._column.insertWidget(3, _offer("New robot", COMMISSION, button))
 
     # --- inside
 

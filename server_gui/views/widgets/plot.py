@@ -214,8 +214,8 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
     ) -> None:
         """Draw a column a curve, times `scale`, over the times; grey where not `live`.
 
-        Times (s) rise; the last is `LAST` where not `live`, else what `end` says. Rows of one `source` are only
-        ever added.
+        Times (s) rise; the last is `LAST` where not `live`, else what `end` says. Rows of one `source` are
+        only ever added.
         """
         (left, right), _ = self.getViewBox().viewRange()
         if len(times) and right < 0.0:

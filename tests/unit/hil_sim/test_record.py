@@ -92,7 +92,7 @@ def test_the_command_writes_every_wearer(tmp_path: Path, capsys: pytest.CaptureF
         ["--minutes", "x"],
         ["--walks", "moonwalk"],
         ["--assists", "both"],
-        ["--walks", "crouch", "--scenario", "dangers"],
+        ["--assists", "left", "--scenario", "dangers"],
     ],
 )
 def test_wrong_usage_is_refused(wrong: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
