@@ -259,7 +259,7 @@ class App:
                 followed.link.result()  # it ends only by a mistake of ours, which must not stay unseen
         for robot, told in [self._judged.popleft() for _ in range(len(self._judged))]:
             if robot in self._stations:
-                self._stations[robot].take_evidence(told)
+                self._stations[robot].judged.take(told)
         for news in [self._predicted.popleft() for _ in range(len(self._predicted))]:
             if news.robot in self._stations:
                 self._stations[news.robot].take_prediction(news)

@@ -41,7 +41,7 @@ def test_the_newest_edit_is_shown_with_its_word_and_its_strides(bench: Bench, wi
     window.tabs.look_at(window.tabs.edits)
     window.refresh()
     assert "No edit is known yet" in window.tabs.edits.words.text()
-    bench.station.take_evidence(worse())
+    bench.station.judged.take(worse())
     window.tabs.edits.refresh()
     assert window.tabs.edits.list.count() == 1
     assert "worse (" in window.tabs.edits.verdict.text()
@@ -55,7 +55,7 @@ def test_the_newest_edit_is_shown_with_its_word_and_its_strides(bench: Bench, wi
 def test_values_and_metrics_are_in_the_units_that_were_chosen(bench: Bench, parts: Parts) -> None:
     bench.station.take([looked()])
     one = worse()
-    bench.station.take_evidence(
+    bench.station.judged.take(
         replace(one, edit=replace(one.edit, changes=(Change("gait.step_length", 0.4, 0.43),)))
     )
     parts.edits.refresh()
@@ -73,7 +73,7 @@ def test_strides_stand_below_each_other_rather_than_beyond_the_edge(bench: Bench
     scrolled = Scrolled(page)
     one = worse()
     curves = tuple(replace(one.curves[0], channel=f"left_knee.{name}") for name in DRAWN)
-    bench.station.take_evidence(replace(one, curves=curves))
+    bench.station.judged.take(replace(one, curves=curves))
     page.refresh()
     scrolled.show()
     rows = {}
@@ -102,11 +102,11 @@ def test_no_figure_lies_over_a_curve(theme: Theme, scale: float) -> None:
 
 def test_who_looks_at_an_older_edit_keeps_looking_at_it(bench: Bench, parts: Parts) -> None:
     for write in (1, 2):
-        bench.station.take_evidence(worse(write))
+        bench.station.judged.take(worse(write))
     parts.edits.refresh()
     assert parts.edits.list.currentRow() == 0
     parts.edits.list.setCurrentRow(1)
-    bench.station.take_evidence(told(3))
+    bench.station.judged.take(told(3))
     parts.edits.refresh()
     assert parts.edits.list.currentRow() == 2
     assert parts.edits.list.count() == 3
@@ -128,7 +128,7 @@ def test_a_trial_that_counts_down_says_what_it_does_so_far(
         known = worse(is_final=False)
         cycles = 3 if word is Word.FEW else known.evidence.cycles_after
         found = replace(known.evidence, word=word, cycles_after=cycles)
-        bench.station.take_evidence(replace(known, evidence=found))
+        bench.station.judged.take(replace(known, evidence=found))
     parts.trial.refresh()
     assert said[word] in parts.trial.words.text()
 
@@ -153,7 +153,7 @@ def test_enough_strides_that_cannot_be_judged_say_why(
     )
     known = worse(is_final=False)
     found = replace(known.evidence, word=Word.FEW, left_out=left_out, notes=notes)
-    bench.station.take_evidence(replace(known, evidence=found))
+    bench.station.judged.take(replace(known, evidence=found))
     parts.trial.refresh()
     assert f"cannot be judged so far: {said}" in parts.trial.words.text()
 
@@ -166,7 +166,7 @@ def test_an_edit_stands_at_the_time_of_this_place(
     time.tzset()
     try:
         known = worse()
-        bench.station.take_evidence(replace(known, edit=replace(known.edit, utc_ns=1_700_000_000 * 10**9)))
+        bench.station.judged.take(replace(known, edit=replace(known.edit, utc_ns=1_700_000_000 * 10**9)))
         parts.edits.refresh()
     finally:
         monkeypatch.undo()
@@ -176,10 +176,10 @@ def test_an_edit_stands_at_the_time_of_this_place(
 
 def test_evidence_that_grows_lays_no_other_edit_out_again(bench: Bench, parts: Parts) -> None:
     for write in (1, 2):
-        bench.station.take_evidence(worse(write, is_final=False))
+        bench.station.judged.take(worse(write, is_final=False))
     parts.edits.refresh()
     items = [parts.edits.list.item(row) for row in (0, 1)]
-    bench.station.take_evidence(worse(2))
+    bench.station.judged.take(worse(2))
     parts.edits.refresh()
     assert [parts.edits.list.item(row) for row in (0, 1)] == items
     assert ["so far" in item.text() for item in items] == [False, True]
@@ -195,23 +195,23 @@ def running(write: int, state: State = State.ON_TRIAL) -> Told:
 def test_a_trial_that_begins_is_looked_at_until_somebody_chooses_another(bench: Bench, parts: Parts) -> None:
     chosen = parts.edits.list
     for write in (1, 2):
-        bench.station.take_evidence(worse(write))
+        bench.station.judged.take(worse(write))
     parts.edits.refresh()
     chosen.setCurrentRow(1)
-    bench.station.take_evidence(running(3))
+    bench.station.judged.take(running(3))
     parts.edits.refresh()
     assert chosen.currentRow() == 0
     assert "on trial · worse so far" in chosen.item(0).text()
     chosen.setCurrentRow(2)
-    bench.station.take_evidence(replace(running(3), curves=()))
+    bench.station.judged.take(replace(running(3), curves=()))
     parts.edits.refresh()
     assert chosen.currentRow() == 2, "who chose it after the trial had begun keeps looking at it"
 
 
 def test_a_trial_of_another_day_that_nobody_saw_end_is_not_looked_at(bench: Bench, parts: Parts) -> None:
     old = replace(running(1), is_final=True)
-    bench.station.take_evidence(old)
-    bench.station.take_evidence(worse(2))
+    bench.station.judged.take(old)
+    bench.station.judged.take(worse(2))
     parts.edits.refresh()
     assert parts.edits.list.currentRow() == 0, "the newest one"
 
@@ -219,7 +219,7 @@ def test_a_trial_of_another_day_that_nobody_saw_end_is_not_looked_at(bench: Benc
 def test_what_has_ended_is_told_as_over_and_its_later_strides_as_such(bench: Bench, parts: Parts) -> None:
     known = running(1, State.REVERTED)
     counts = replace(known.evidence, cycles_before=49, cycles_after=41, cycles_back=9)
-    bench.station.take_evidence(replace(known, evidence=counts))
+    bench.station.judged.take(replace(known, evidence=counts))
     parts.edits.refresh()
     assert parts.edits.list.item(0).text().endswith("reverted · was worse")
     said = parts.edits.verdict.text()
@@ -228,7 +228,7 @@ def test_what_has_ended_is_told_as_over_and_its_later_strides_as_such(bench: Ben
 
 
 def test_strides_are_read_where_the_pointer_is(bench: Bench, parts: Parts) -> None:
-    bench.station.take_evidence(worse())
+    bench.station.judged.take(worse())
     parts.edits.refresh()
     QApplication.processEvents()  # what has come to a layout is shown then
     parts.edits.grab()  # only what is drawn has a place for each value

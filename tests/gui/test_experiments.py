@@ -95,7 +95,7 @@ def test_stop_and_take_back_is_in_sight_until_it_was_read_back(
     panel.refresh()
     assert "a write of yours ends it" in panel.banner.text()
     part = told(5)
-    bench.station.take_evidence(replace(part, edit=replace(part.edit, boot_id=run.boot_id)))
+    bench.station.judged.take(replace(part, edit=replace(part.edit, boot_id=run.boot_id)))
     parts.edits.refresh()
     assert parts.edits.list.count() == 0
     parts.experiment.end.click()
@@ -141,7 +141,7 @@ def test_the_form_begins_with_the_edit_that_is_looked_at(bench: Bench, parts: Pa
     bench.station.take([looked()])
     (change,) = told().edit.changes
     edit = replace(told().edit, changes=(replace(change, name=NAME, old=0.4, new=0.42),))
-    bench.station.take_evidence(replace(told(), edit=edit))
+    bench.station.judged.take(replace(told(), edit=edit))
     parts.edits.refresh()
     parts.edits.ab.click()
     form = parts.edits.form
@@ -199,8 +199,8 @@ def test_a_sweep_is_told_with_its_response_and_without_its_parts(
     one = replace(one, experiment=replace(one.experiment, is_back=is_back))
     for write in (7, 8, 9):
         part = told(write)
-        bench.station.take_evidence(replace(part, edit=replace(part.edit, boot_id=one.edit.boot_id)))
-    bench.station.take_evidence(replace(one, edit=replace(one.edit, id="ffff")))
+        bench.station.judged.take(replace(part, edit=replace(part.edit, boot_id=one.edit.boot_id)))
+    bench.station.judged.take(replace(one, edit=replace(one.edit, id="ffff")))
     parts.edits.refresh()
     assert parts.edits.list.count() == 1
     assert "sweep 2800 … 3200" in parts.edits.verdict.text()

@@ -29,6 +29,7 @@ from server_gui.core.desk.flags import Flag, FlagKind, Flags, StateWatch, of_jou
 from server_gui.core.desk.resetting import after_reset, without_answer
 from server_gui.core.desk.rings import Rings
 from server_gui.core.evidence.file import Told
+from server_gui.core.evidence.judged import JudgedEdits
 from server_gui.core.experiments.plan import Plan
 from server_gui.core.experiments.run import Run, begun
 from server_gui.core.follow.events import (
@@ -62,7 +63,6 @@ from server_gui.core.tuning.taken_back import OVERDUE_S, TakenBack
 from server_gui.core.tuning.writing import WriteProgress, WriteState, written_line
 
 WATCH_NS: Final = 200_000_000  # between looks for news
-JUDGED: Final = 500  # edits that are shown
 
 
 class Station:
@@ -92,7 +92,7 @@ class Station:
         self.cost: GatewayCost | None = None  # what monitoring costs the robot, as long as it is looked at
         self.predictions = StationPredictions()
         self.experiment: Run | None = None  # an A/B trial or a sweep, the newest
-        self.judged: dict[str, Told] = {}  # edits and what they did, by their ids
+        self.judged = JudgedEdits()
         self.stopping = StopProgress()
         self.control = LeaseState()
         self.edits = Edits()
@@ -289,19 +289,11 @@ class Station:
                 self.tell(NewsKind.WARNING, happened)
                 self.flags.add(Flag(news.verdict.stamp_ns, happened, FlagKind.DANGER))
 
-    def take_evidence(self, told: Told) -> None:
-        """Apply what is known now of an edit."""
-        self.judged.pop(told.edit.id, None)
-        self.judged[told.edit.id] = told
-        while len(self.judged) > JUDGED:
-            del self.judged[next(iter(self.judged))]
-
     @property
     def trial_evidence(self) -> Told | None:
         """What is known of what is on trial."""
         trial = self.writing.trial
-        mine = (told for told in reversed(self.judged.values()) if trial and told.edit.write == trial.write)
-        return next((told for told in mine if not told.is_final), None)
+        return None if trial is None else self.judged.on_trial(trial.write)
 
     def begin(self, plan: Plan) -> Run:
         """Begin an experiment; raises `BadPlan` where one goes on, or something is on trial."""

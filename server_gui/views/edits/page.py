@@ -103,7 +103,7 @@ class Edits(QWidget):
         self.sweep.setEnabled(station is not None)
         run = None if station is None else station.experiment
         writes = () if run is None else run.writes
-        judged = [] if station is None else whole(tuple(station.judged.values()), writes)
+        judged = [] if station is None else whole(tuple(station.judged), writes)
         known = sorted(judged, key=lambda one: -one.edit.utc_ns)
         made_of = (known, self._desk.shown.revision, 0 if station is None else len(station.known))
         if made_of == self._known:
@@ -175,7 +175,7 @@ class Edits(QWidget):
     def _chosen_edit(self, station: Station) -> Tried | None:
         """What is looked at, unless something was staged or tried since."""
         told = self._chosen
-        known = next((one for one in station.judged.values() if told and one.edit.id == told.edit.id), None)
+        known = next((one for one in station.judged if told and one.edit.id == told.edit.id), None)
         if known is None or len(known.edit.changes) != 1 or station.writing.trial or station.edits.staged:
             return None
         (change,) = known.edit.changes

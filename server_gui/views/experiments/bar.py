@@ -76,7 +76,7 @@ class ExperimentBar(QFrame):
         told = result(run, station.who or "this desk", "" if info is None else info.unit)
         if told is not None:
             told = replace(told, edit=replace(told.edit, robot=station.name))
-            station.take_evidence(told)
+            station.judged.take(told)
             self._desk.keep_evidence(station.name, told)
 
     def _whose(self) -> Station | None:
