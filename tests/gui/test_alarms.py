@@ -431,6 +431,31 @@ def test_a_robot_is_chosen_by_keyboard_and_removed_after_a_question(window: Main
     assert [card.station for card in window.robots.cards] == [bench.station]
 
 
+def test_a_card_says_what_its_robot_does_also_beside_an_alarm_and_nothing_of_the_past(
+    around: Around, bench: Bench
+) -> None:
+    other = bench.add("exo-02", 7421)
+    other.take([described(), walking(300), looked()])
+    fault(bench)
+    settle(around, bench)
+    first, second = around.robots.cards
+    assert first.texts[3].endswith("0 of 6 enabled")
+    assert second.texts[3].endswith("6 of 6 enabled")
+    other.take([LinkChanged(ConnectionState.WAITING, "gone", time.monotonic_ns())])
+    settle(around, bench)
+    assert second.texts[3] == "what it does is not known"
+
+
+def test_a_card_has_the_same_word_as_the_header_where_it_is_narrow(window: MainWindow, bench: Bench) -> None:
+    bench.station.stop("test")
+    bench.first.fail(NotConnected("there is no link"))
+    settle(window, bench)
+    assert window.width() >= 1300
+    card = window.robots.cards[0]
+    assert "STOP NOT CONFIRMED" in card._state.shown
+    assert card._state.is_whole
+
+
 def test_alarms_of_two_robots_are_named(around: Around, bench: Bench) -> None:
     fault(bench)
     other = bench.add("exo-02", 7421)
