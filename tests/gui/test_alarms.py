@@ -163,6 +163,30 @@ def test_what_to_check_is_on_the_strip_and_what_may_be_done_whole_in_the_list_wi
         assert button.visibleRegion().boundingRect() == button.rect(), button.text()
 
 
+def test_rows_that_are_opened_under_the_pointer_are_whole_also_where_a_headline_grows(
+    theme: Theme, window: MainWindow, bench: Bench
+) -> None:
+    theme.set(scale=1.5)
+    window.resize(1024, 700)
+    fault(bench)
+    settle(window, bench)
+    window.panels_button.click()
+    settle(window, bench)
+    window.alarms.list.setAttribute(Qt.WidgetAttribute.WA_UnderMouse)
+    window.alarms.list.turn()
+    for words in ("", "; 42 % of its PDOs are missing", "; and this goes on for a line or two" * 8):
+        bench.look_again([looked(state="fault", problem=f"the drive is in fault: {CAUSE}{words}")])
+        settle(window, bench)
+        shown = [row for row in window.alarms.list.rows if row.isVisible()]
+        for label in (label for row in shown for label in (row.headline, row.details)):
+            assert is_whole(label) or label.isHidden(), (words, label.text())
+        for row in shown:
+            for button in (row.clear, row.show_signal, row.acknowledge):
+                assert button.isHidden() or button.height() >= button.sizeHint().height(), words
+    tip = window.alarms.list.rows[0].toolTip().replace("\n", " ")
+    assert "and this goes on for a line or two; and" in tip, "what has no room stands nowhere"
+
+
 @pytest.mark.parametrize(("width", "height"), [(1024, 700), (1366, 768), (1920, 1080)])
 def test_the_joint_table_is_whole_beside_an_alarm(
     window: MainWindow, bench: Bench, width: int, height: int
