@@ -23,7 +23,7 @@ from server_gui.core.follow.events import LinkChanged, Looked
 from server_gui.core.follow.news import NewsKind
 from server_gui.core.tuning.stop import StopProgress
 from server_gui.views.alarms.full_list import AlarmRow
-from server_gui.views.ask import Question
+from server_gui.views.confirmation import Question
 from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.overview.joint_table import JointTable
 from server_gui.views.theme import Theme
