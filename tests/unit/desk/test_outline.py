@@ -64,7 +64,7 @@ def test_the_whole_recording_is_in_it_piece_by_piece_and_a_gap_is_no_value() -> 
 
 def test_what_cannot_be_read_is_left_out() -> None:
     class Away(KneeTape):
-        def read(self, begin_ns: int, end_ns: int, channels: list[str]) -> Rows:  # noqa: ARG002
+        def read(self, begin_ns: int, end_ns: int, channels: list[str]) -> Rows:
             raise OSError("the store is away")
 
     assert np.isnan(opened(Away()).least["left_knee.position"]).all()
