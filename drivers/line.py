@@ -5,7 +5,7 @@ from typing import Generic, Protocol, TypeVar
 
 from drivers.parsing import Parser
 from drivers.port import SerialPort
-from drivers.standstill import Standstill
+from drivers.reader_stalls import ReaderStalls
 
 F = TypeVar("F")
 Listening = TypeVar("Listening", contravariant=True)
@@ -45,11 +45,11 @@ class Line(Generic[F]):
         format_name: str,
         make_parser: Callable[[], Parser[F]],
         recognise: Recognise = unrecognised,
-        standstill: Standstill | None = None,
+        standstill: ReaderStalls | None = None,
     ) -> None:
         """`standstill` is that of a bus which the same computer reads: a port's thread only waits."""
         self.path = path
-        self.standstill = standstill or Standstill()
+        self.standstill = standstill or ReaderStalls()
         self.format_name = format_name
         self.parser = make_parser()
         self.reconnects = 0

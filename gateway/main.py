@@ -107,9 +107,9 @@ def find(name: str) -> Callable[[list[str]], int]:
 def explain(error: Exception, command: str) -> str:
     """An exception of a command as the sentences a user can act on."""
     if isinstance(error, ModuleNotFoundError) and error.name is not None:
-        from gateway import missing
+        from gateway import missing_extras
 
-        return missing.explained(error.name, command)
+        return missing_extras.explained(error.name, command)
     ours = type(error).__module__.partition(".")[0] in OUR_PACKAGES
     if isinstance(error, OSError) and not ours and error.strerror:
         return f"{error.filename}: {error.strerror}" if error.filename else error.strerror
@@ -122,9 +122,9 @@ def _help_without(error: Exception, arguments: Sequence[str]) -> str | None:
     """The help that was asked for, of a command of which a package is missing."""
     if not isinstance(error, ModuleNotFoundError):
         return None
-    from gateway import missing
+    from gateway import missing_extras
 
-    return missing.help_of(arguments)
+    return missing_extras.help_of(arguments)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -17,7 +17,7 @@ from enum import StrEnum
 from typing import Protocol
 
 from gateway.config.robot import RobotConfig
-from gateway.connections.inlet import StopNow
+from gateway.connections.incoming_bytes import StopNow
 from gateway.handlers import Handlers
 from gateway.process.futures import done, failed
 from gateway.process.loop import Loop, Timer

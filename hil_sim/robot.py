@@ -14,7 +14,6 @@ from hil_sim.errors import SimulatorError
 from hil_sim.exoskeleton import Exoskeleton, Scenario
 from hil_sim.faults.injector import Faults
 from hil_sim.gait.walks import ORDINARY
-from hil_sim.housing import Housing
 from hil_sim.loop import Loop
 from hil_sim.mistakes import computer, registry
 from hil_sim.mistakes.mistake import written
@@ -24,10 +23,11 @@ from hil_sim.operator import Operator
 from hil_sim.sensors.serial_port import SerialPort
 from hil_sim.sensors.suite import SensorChoice
 from hil_sim.sensors.tables import companions
+from hil_sim.simulation_host import SimulationHost
 from hil_sim.truth import TruthFile
 
 
-class SimulatedRobot(Housing):
+class SimulatedRobot(SimulationHost):
     """A robot in a folder, to be run by its caller's thread (`run`) or, in a `with` block, by one of its own.
 
         with SimulatedRobot(tmp_path, virtual_channel="bench") as robot:
@@ -40,7 +40,7 @@ class SimulatedRobot(Housing):
     is that table of robot.toml. `mistakes` are made by their names; with them, or an empty list, the files of
     the robot's computer are written to `computer` in the folder. `say` is told when the interface goes and
     comes back, and when the bus is overloaded. `faults` and `operator` belong to the thread that runs it;
-    others use the control socket in the folder. For the rest see `Housing`.
+    others use the control socket in the folder. For the rest see `SimulationHost`.
     """
 
     def __init__(

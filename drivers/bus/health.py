@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Callable
 
 from drivers.bus.interfaces.controller_state import BusState, bus_state
-from drivers.noted import Noted, found
+from drivers.findings import FindingState, active_findings
 from drivers.samples import Finding
 
 LOOK_S = 1.0
@@ -38,7 +38,12 @@ class BusHealth:
         self.load_percent: float | None = None  # of the last second; None: bitrate or time not known
         self.frames_per_s: float | None = None
         self._bitrate = bitrate
-        self._state, self._load, self._errors, self._lost = Noted(), Noted(), Noted(), Noted()
+        self._state, self._load, self._errors, self._lost = (
+            FindingState(),
+            FindingState(),
+            FindingState(),
+            FindingState(),
+        )
         self._before: tuple[int, int, int, int] | None = None
         self._errors_before = 0
         self._recent_errors: deque[int] = deque(maxlen=ERROR_LOOKS)
@@ -51,7 +56,7 @@ class BusHealth:
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        return found((self._state, self._load, self._errors, self._lost))
+        return active_findings((self._state, self._load, self._errors, self._lost))
 
     def opened(self) -> None:
         """The controller begins anew, as does what is measured."""

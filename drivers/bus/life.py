@@ -6,7 +6,7 @@ from typing import Protocol
 
 from drivers.bus.emcy import Emcy, parse_emcy
 from drivers.bus.nmt import NmtState, parse_heartbeat
-from drivers.standstill import Standstill
+from drivers.reader_stalls import ReaderStalls
 
 EMCY_HISTORY = 64
 HEARTBEATS_MISSED = 2.5  # periods without a heartbeat, where no time is configured
@@ -26,7 +26,7 @@ class LifeListener(Protocol):
 class NodeLife:
     """Fed by the bus's thread, read by any. Stamps are ns of the monotonic clock."""
 
-    def __init__(self, configured_timeout_s: float | None, standstill: Standstill | None = None) -> None:
+    def __init__(self, configured_timeout_s: float | None, standstill: ReaderStalls | None = None) -> None:
         """`standstill` is that of the bus on which it is heard."""
         self.emcy_history: deque[Emcy] = deque(maxlen=EMCY_HISTORY)
         self.boots = 0
@@ -39,7 +39,7 @@ class NodeLife:
         self.timeout_s = configured_timeout_s
         self._configured_timeout_s = configured_timeout_s
         self._period_s: float | None = None
-        self._standstill = standstill or Standstill()
+        self._standstill = standstill or ReaderStalls()
         self._beats: deque[float] = deque(maxlen=BEATS)
         self._listeners: tuple[LifeListener, ...] = ()
 

@@ -11,10 +11,11 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from typing import Protocol, TypeVar, cast
 
-from drivers.bus.arrivals import Arrivals
 from drivers.bus.asking import Asking
+from drivers.bus.boot_diagnosis import why_silent
 from drivers.bus.booting import Booting
 from drivers.bus.bus import BusUser, CanBus
+from drivers.bus.frame_losses import FrameLosses
 from drivers.bus.life import NodeLife
 from drivers.bus.nmt import HEARTBEAT, NmtState
 from drivers.bus.objects import identity_problem, read, read_optional, read_rest
@@ -23,9 +24,8 @@ from drivers.bus.sdo.channel import SdoChannel
 from drivers.bus.sdo.protocol import confirmed_write
 from drivers.bus.sdo.worker import SdoWorker
 from drivers.bus.settings import NodeTimes, Role
-from drivers.bus.stuck import why_silent
 from drivers.errors import DeviceTimeout, DriverError, SettingsError
-from drivers.noted import found
+from drivers.findings import active_findings
 from drivers.samples import Finding
 from eds import Description
 
@@ -57,7 +57,7 @@ class Node(BusUser):
         self.node_id = node_id
         self.description = description
         self.life = NodeLife(times.heartbeat_timeout_s, bus.standstill)
-        self.arrivals: tuple[Arrivals, ...] = ()  # of the PDOs that its users follow
+        self.arrivals: tuple[FrameLosses, ...] = ()  # of the PDOs that its users follow
         self._findings: tuple[str, ...] = ()
         self._stranger: str | None = _NOT_ASKED  # why it may not be the device that it should be
         self._times = times
@@ -127,7 +127,7 @@ class Node(BusUser):
         """What is wrong with its answers and its PDOs, each since when, and what to check."""
         if not self.ready:
             return ()
-        return (*self.channel.round_trips.findings, *found(self.arrivals))
+        return (*self.channel.round_trips.findings, *active_findings(self.arrivals))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -144,7 +144,7 @@ class Node(BusUser):
         """That a node without a heartbeat, which is probed, answers no more, in words."""
         return self._asking.silence(now_ns) if self.ready else None
 
-    def follow(self, arrivals: Arrivals) -> Callable[[], None]:
+    def follow(self, arrivals: FrameLosses) -> Callable[[], None]:
         """Watch whether frames are missing; returns how to end it."""
         arrivals.restart()
         self.arrivals = (*self.arrivals, arrivals)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from drivers.bus.frames import Transport
 from drivers.errors import Unavailable
-from drivers.urgency import make_urgent
+from drivers.realtime_priority import make_realtime
 
 SEND_TIMEOUT_S = 0.1  # how long a frame waits for a bus that takes none
 URGENT_S = 1.0  # how long an urgent one does, which nobody waits for
@@ -181,7 +181,7 @@ class Sender:
 
     def _run(self, transport: Transport) -> None:
         """The thread: does what nobody else can."""
-        make_urgent()
+        make_realtime()
         while self._transport is transport:
             self._order.wait()
             self._order.clear()

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import msgspec
 
+from drivers.build_context import BuildContext
 from drivers.bus.bus import CanBus
 from drivers.bus.settings import CanSettings
 from drivers.cli.named import named
@@ -33,7 +34,6 @@ from drivers.insole.layout import Layout
 from drivers.insole.settings import InsoleSettings
 from drivers.line import Line
 from drivers.samples import State
-from drivers.site import Site
 
 STANDARD_GRAVITY = 9.80665
 AVERAGE_S = 2.0
@@ -238,7 +238,7 @@ def _imu_in_file(where: str) -> TrunkImu | None:
         bus = found.table.get("bus")
         tables = {} if bus is None else {bus: found.tables["can"][bus]}
         buses = {name: CanBus(name, CanSettings.from_table(table)) for name, table in tables.items()}
-    return build_imu(found.name, settings, Site(found.file, buses, recognise=format_of))
+    return build_imu(found.name, settings, BuildContext(found.file, buses, recognise=format_of))
 
 
 def _average(line: Line[InsoleFrame], foot: Foot | None, cells: int) -> list[float]:

@@ -16,7 +16,7 @@ from drivers.errors import NotPermitted, SettingsError
 from drivers.lss.change import Device, give_bitrate, give_node_id, inquire
 from drivers.lss.fastscan import unconfigured
 from drivers.lss.master import BITRATES, SCAN_S, UNCONFIGURED, Identity, LssMaster
-from drivers.lss.surroundings import Surroundings, identity_of, is_taken, listen
+from drivers.lss.preconditions import BusSurvey, identity_of, is_taken, listen
 
 MORE = """\
 examples:
@@ -134,7 +134,7 @@ class _Task:
         bus: CanBus,
         settings: CanSettings,
         master: LssMaster,
-        heard: Surroundings,
+        heard: BusSurvey,
         options: argparse.Namespace,
         wait: Callable[[float], object],
     ) -> None:

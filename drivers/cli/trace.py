@@ -16,7 +16,7 @@ from drivers.bus.settings import CanSettings
 from drivers.cli.buses import named
 from drivers.cli.trace_known import Known
 from drivers.cli.trace_load import Meters, show_load
-from drivers.trace.decoding import Decoder, Kind, Line
+from drivers.trace.decoding import DecodedFrame, Decoder, Kind
 from drivers.trace.devices import Devices
 from drivers.trace.files import SUFFIXES, Captured, Put, is_file, writing
 from drivers.trace.merged import merged
@@ -191,7 +191,7 @@ class Shown:
             return None
         return _json(line) if self._as_json else self._text(line)
 
-    def _text(self, line: Line) -> str:
+    def _text(self, line: DecodedFrame) -> str:
         captured = line.captured
         moment = datetime.datetime.fromtimestamp(captured.stamp_ns // 10**9).astimezone()
         clock = f"{moment:%H:%M:%S}.{captured.stamp_ns % 10**9 // 1000:06d}"
@@ -228,7 +228,7 @@ def _wanted(options: argparse.Namespace, known: Known) -> list[Wanted]:
     return found
 
 
-def _json(line: Line) -> str:
+def _json(line: DecodedFrame) -> str:
     captured = line.captured
     told: dict[str, Any] = {
         "t": captured.stamp_ns / 1e9,

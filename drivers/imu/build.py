@@ -2,12 +2,12 @@
 
 import msgspec
 
+from drivers.build_context import BuildContext
 from drivers.imu.settings import MountedSettings, wiring_of
 from drivers.imu.trunk import TrunkImu
-from drivers.site import Site
 
 
-def build_imu(name: str, settings: MountedSettings, site: Site) -> TrunkImu:
+def build_imu(name: str, settings: MountedSettings, site: BuildContext) -> TrunkImu:
     """The IMU that `settings` describe.
 
     Raises:

@@ -13,6 +13,7 @@ from drivers.bus.node import shared_node
 from drivers.bus.pdo import Tpdo
 from drivers.bus.sdo.channel import SdoChannel
 from drivers.errors import SettingsError
+from drivers.frame_shares import beside
 from drivers.imu import slopes
 from drivers.imu.canopen.cia410 import InclinometerSettings
 from drivers.imu.conventions import Conventions
@@ -20,7 +21,6 @@ from drivers.imu.motion import TILT
 from drivers.imu.slopes import MappedSlope, SlopePlan
 from drivers.imu.trunk import TrunkImu
 from drivers.samples import Quality, State
-from drivers.shares import beside
 from eds import Description
 
 

@@ -3,8 +3,8 @@
 import math
 from collections import deque
 
+from drivers.findings import FindingState
 from drivers.imu.rotation import Vector
-from drivers.noted import Noted
 
 STANDARD_GRAVITY = 9.80665
 SETTLED_S = 10.0
@@ -17,7 +17,7 @@ FROZEN_S = 5.0
 PERIOD_NS = 39_000_000  # for slow means, faster frames are left out
 
 
-class ImuCheck(Noted):
+class ImuCheck(FindingState):
     """Watches one IMU in trunk axes."""
 
     def __init__(self, name: str) -> None:

@@ -5,6 +5,8 @@ from pathlib import Path
 
 from drivers.calibration_file import mark
 from drivers.component import Kind
+from drivers.findings import active_findings
+from drivers.frame_shares import beside
 from drivers.freshness import Freshness, silence_text
 from drivers.imu import zero
 from drivers.imu.conventions import Conventions
@@ -14,9 +16,7 @@ from drivers.imu.plausibility import ImuCheck
 from drivers.imu.rotation import IDENTITY, Quaternion, Vector
 from drivers.imu.settings import Attitude, MountedSettings
 from drivers.latest import Latest
-from drivers.noted import found
 from drivers.samples import Quality, State
-from drivers.shares import beside
 
 
 class TrunkImu:
@@ -100,5 +100,5 @@ class TrunkImu:
         counters = {**counters, "stale": self._freshness.stale}
         if state is not State.OK:
             return Quality(state, age_ms, silence or silence_text(age_ms), counters)
-        findings = found([self.check])
+        findings = active_findings([self.check])
         return beside(Quality(State.FAULT if findings else state, age_ms, None, counters), findings, now_ns)

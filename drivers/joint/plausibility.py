@@ -8,8 +8,8 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from drivers.joint.mirror import MirrorCheck
-from drivers.noted import Noted, found
+from drivers.findings import FindingState, active_findings
+from drivers.joint.mirror_check import MirrorCheck
 from drivers.samples import Finding
 
 FROZEN_S = 0.5
@@ -49,7 +49,7 @@ class Motion:
     enabled: bool
 
 
-class FrozenCheck(Noted):
+class FrozenCheck(FindingState):
     """The position stays the same to the count although the joint is moved, or is to move."""
 
     def __init__(self) -> None:
@@ -112,7 +112,7 @@ class FrozenCheck(Noted):
             )
 
 
-class JumpCheck(Noted):
+class JumpCheck(FindingState):
     """The position changes from one sample to the next by more than the joint's speed explains.
 
     Across a gap in sampling, ours or the drive's, nobody knows its speed: what it can have gone at its
@@ -172,7 +172,7 @@ def _explained(before: Motion, now: Motion, way: float, step_s: float) -> float:
     return MARGIN * along * (step_s + LATE_S) + back * step_s / 2
 
 
-class LoadedCheck(Noted):
+class LoadedCheck(FindingState):
     """High torque for a long time without motion: the joint is blocked, or its encoder does not tell."""
 
     def __init__(self) -> None:
@@ -254,4 +254,4 @@ class JointCheck:
     @property
     def findings(self) -> tuple[Finding, ...]:
         """What is wrong, with what to check."""
-        return found(self._own if self.mirror is None else (*self._own, self.mirror))
+        return active_findings(self._own if self.mirror is None else (*self._own, self.mirror))

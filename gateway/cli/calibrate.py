@@ -15,7 +15,7 @@ from gateway.commission.bench import CanBench
 from gateway.commission.dialogue import run
 from gateway.commission.draft import Found, alone
 from gateway.commission.edit import NotEdited, comment_of, with_value
-from gateway.commission.keeping import journal, put
+from gateway.commission.robot_file import journal, write
 from gateway.commission.zero import PLAUSIBLE, NotRepeated, Zero, posture, repeated
 from gateway.config.reading import load
 from gateway.config.robot import JointTable, RobotConfig
@@ -126,7 +126,7 @@ def _write(
     made = with_value(text, table, KEY, Found(zero.offset, zero.how))
     if _text(config.path) != text:
         raise NotEdited(f"{config.path} was changed meanwhile: begin again")
-    found = put(config.path, made)
+    found = write(config.path, made)
     if found.config is None:
         say(f"{config.path} is written and cannot be used: {'; '.join(one.words for one in found.findings)}")
         return 1

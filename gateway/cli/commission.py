@@ -18,9 +18,9 @@ from gateway.cli.text import warn
 from gateway.commission.bench import CanBench
 from gateway.commission.dialogue import At, Talk, agree, run
 from gateway.commission.draft import Draft, alone
-from gateway.commission.keeping import journal, put
 from gateway.commission.powered_run import NotStopped
 from gateway.commission.progress import Progress
+from gateway.commission.robot_file import journal, write
 from gateway.commission.serial_bench import SerialPorts
 from gateway.commission.steps import commission
 from gateway.commission.writing import Written, text, unfinished
@@ -193,7 +193,7 @@ def _all(
 
 
 def _write(draft: Draft, made: str, who: str) -> Written:
-    found = put(draft.file, made)
+    found = write(draft.file, made)
     told = tuple((str(one.severity), one.words) for one in found.findings)
     if found.config is None:
         return Written(str(draft.file), made, told, usable=False)

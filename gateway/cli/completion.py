@@ -4,7 +4,7 @@ import argparse
 from typing import Final
 
 from gateway.cli.text import say
-from gateway.missing import FOLDER
+from gateway.missing_extras import FOLDER
 
 SHELLS: Final = ("bash", "zsh", "fish")
 EPILOG: Final = """once, for your account

@@ -20,10 +20,10 @@ from gateway.commission.draft import Draft, alone
 from gateway.commission.powered_run import NotStopped, Outcome
 from gateway.config.reading import load
 from gateway.config.robot import RobotConfig
-from gateway.joint_test import left
+from gateway.joint_test import undo_file
+from gateway.joint_test.dialogue import Test, tested
 from gateway.joint_test.limits import LATE_S, Asked, NotAllowed
 from gateway.joint_test.motion import Kind, Wish
-from gateway.joint_test.talk import Test, tested
 from gateway.records.folder import RecordsFolder
 from gateway.records.records import Records
 from gateway.user_name import user_name
@@ -316,7 +316,7 @@ def _cut_off(config: RobotConfig) -> str | None:
     except OSError:
         return None  # it is under way, or nobody can tell
     try:
-        found = left.read(folder.joint_test)
+        found = undo_file.read(folder.joint_test)
     except NotAllowed as error:
         return str(error)
     finally:

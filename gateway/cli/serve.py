@@ -122,7 +122,7 @@ def _robot(options: argparse.Namespace, *, tell: bool) -> config.RobotConfig:
 
 def _beside(robot: config.RobotConfig) -> list[Finding]:
     """What `gwrms check` says of EDS files, layouts and calibrations: each costs a component only."""
-    from gateway.surroundings import beside  # all that drivers need: not for a gateway that wakes for a stop
+    from gateway.prerequisites import beside  # all that drivers need: not for a gateway that wakes for a stop
 
     found = list(beside(robot))
     gc.collect()  # buses and components that were built to be looked at

@@ -10,7 +10,7 @@ from gateway.cli.text import warn
 from gateway.cli.writing import add_trial, write
 from gateway.client import ClientError, Robot
 from gateway.coding import Number
-from gateway.several import all_joints, mirrored, spread
+from gateway.several_joints import all_joints, mirrored, spread
 from gateway.units import unit_named
 from gateway.wire.robot import Description
 

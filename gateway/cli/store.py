@@ -8,7 +8,7 @@ from gateway.cli.connect import connect, parser
 from gateway.cli.storage import add_component, say_stored
 from gateway.cli.text import say, say_json, table
 from gateway.client import CallTimeout, LinkLost, NotConnected, RemoteError, Robot
-from gateway.several import Outcome, refused_or_unknown, storing
+from gateway.several_joints import Outcome, refused_or_unknown, storing
 
 EPILOG = """Refused while one of its drives is enabled or in a state that is not known, while something
 is on trial, and where the device does not say that it can (1010h). All of its parameters are stored, whoever

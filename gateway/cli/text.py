@@ -8,7 +8,7 @@ import msgspec
 
 from gateway.amounts import NONE, percent
 from gateway.coding import text as digits
-from gateway.plain import json_plain, plain
+from gateway.plain_text import json_plain, plain
 from gateway.wire.component import ChannelInfo
 from gateway.wire.cost import BudgetInfo
 

@@ -20,7 +20,7 @@ from gateway.cli.connect import (
 from gateway.cli.shown import Channels, add_degrees, utc
 from gateway.cli.text import measured, say, say_json, warn
 from gateway.client import Batch, ClientError, Robot
-from gateway.plain import plain
+from gateway.plain_text import plain
 from gateway.wire.robot import Clock
 from gateway.wire.stream import ModuleName
 

@@ -22,7 +22,7 @@ from gateway.client.errors import (
     Unreachable,
 )
 from gateway.client.keys import check_pin, context_for, pin_of
-from gateway.plain import plain
+from gateway.plain_text import plain
 from gateway.wire import framing
 
 OnNotification = Callable[[str, msgspec.Raw], None]

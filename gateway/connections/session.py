@@ -16,7 +16,7 @@ from typing import Concatenate, ParamSpec, Protocol
 import msgspec
 from msgspec import UNSET, UnsetType
 
-from gateway.connections.inlet import FOREIGN, Heard, Inlet
+from gateway.connections.incoming_bytes import FOREIGN, Heard, IncomingBytes
 from gateway.connections.sharing import Sharing
 from gateway.connections.stop_lines import STOP
 from gateway.process.futures import outcome
@@ -77,7 +77,7 @@ class Session:
     def __init__(
         self,
         loop: Loop,
-        inlet: Inlet,
+        inlet: IncomingBytes,
         handle: "Callable[[Session, framing.Request], Answer]",
         stuck_s: float,
         sharing: Sharing,

@@ -7,7 +7,7 @@ import stat
 import threading
 from typing import Final
 
-from drivers.urgency import lent_urgency
+from drivers.realtime_priority import lent_realtime
 from gateway.access.folder import AccessFolder
 from gateway.access.known import Known
 from gateway.certificates import KeyProblem
@@ -123,7 +123,7 @@ class TlsStream:
 
     def _lock_to_read(self) -> None:
         if not self._lock.acquire(blocking=False):
-            with lent_urgency(self._writer):
+            with lent_realtime(self._writer):
                 self._lock.acquire()
 
 

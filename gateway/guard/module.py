@@ -12,7 +12,7 @@ from drivers.bus.arming import Arming
 from gateway.config.guard import GuardSettings, ends, limit, quantities
 from gateway.config.guard_rules import Action
 from gateway.guard.alarms import ALARM, WHO, Alarms, GuardSource
-from gateway.guard.armings import Armings
+from gateway.guard.armed_drives import ArmedDrives
 from gateway.guard.watcher import Change, State, Watcher
 from gateway.guard.wiring import Wiring
 from gateway.handlers import Handlers
@@ -46,7 +46,7 @@ class GuardModule:
         """Begin to watch, and arm the drives as they come up."""
         self._alarms = Alarms(self._loop, self._control.journal.append)
         drives = cast("Mapping[str, JointDrive]", self._control.drives)
-        self._armings = Armings(drives, self._settings.heartbeat_ms, self._arming_changed)
+        self._armings = ArmedDrives(drives, self._settings.heartbeat_ms, self._arming_changed)
         now_ns = time.monotonic_ns()
         self._wirings = {
             name: Wiring(

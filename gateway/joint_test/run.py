@@ -23,8 +23,8 @@ from drivers.joint.drive import JointDrive
 from drivers.joint.homing import MODE
 from drivers.joint.quantities import AXIS_OFFSET
 from drivers.joint.scaling import scalings
+from drivers.realtime_priority import make_realtime
 from drivers.samples import Sample
-from drivers.urgency import make_urgent
 from gateway.commission.power import Power
 from gateway.commission.powered_run import Ended, PoweredRun
 from gateway.joint_test import parameters
@@ -153,7 +153,7 @@ class TestRun(PoweredRun):
         self._check_place(int.from_bytes(data, "little", signed=True) * linear.scale + linear.offset)
 
     def _act(self) -> None:
-        make_urgent()
+        make_realtime()
         began = time.monotonic()
         self._start = self._hold()
         self._check_place(self._start)

@@ -11,8 +11,8 @@ from typing import Annotated, Any, Final, Literal, TypeVar, Union
 import msgspec
 from msgspec import Meta, Struct, ValidationError
 
+from gateway.decode_errors import key_of, said
 from gateway.tables.finding import Finding, meant, unknown
-from gateway.wording import key_of, said
 
 S = TypeVar("S", bound=Struct)
 Table = Mapping[str, Any]

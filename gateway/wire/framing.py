@@ -12,8 +12,8 @@ from typing import Any, Final, Literal, TypeVar
 import msgspec
 from msgspec import UNSET, Raw, Struct, UnsetType
 
+from gateway.decode_errors import plainly
 from gateway.wire.limits import LINE_LIMIT, NAME_LENGTH
-from gateway.wording import plainly
 
 PROTOCOL: Final = 1
 ANSWER_LIMIT: Final = 16 * 1024 * 1024  # what a client accepts as one line

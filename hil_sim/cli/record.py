@@ -10,7 +10,6 @@ from itertools import compress
 from pathlib import Path
 from typing import BinaryIO, Final
 
-from hil_sim.bare import BareExoskeleton
 from hil_sim.channels import JOINT_UNITS, UNITS, joints_reported, reported
 from hil_sim.cli.arguments import add_wearer, number
 from hil_sim.clock import SECOND_NS
@@ -20,9 +19,10 @@ from hil_sim.dangers import DANGERS
 from hil_sim.errors import SimulatorError
 from hil_sim.exoskeleton import Exoskeleton, Scenario
 from hil_sim.gait.walks import ORDINARY
-from hil_sim.practice import practice
 from hil_sim.sensors.suite import PERIOD_NS
+from hil_sim.training_walks import practice
 from hil_sim.truth import phases
+from hil_sim.without_bus import BareExoskeleton
 
 _DESCRIPTION = """\
 Writes what a gateway would report of the simulated robot (its names of channels, SI units, with the noise and

@@ -33,7 +33,7 @@ NEEDS_LEASE = frozenset({"set"})
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class ScriptStep:
     """One `[[at]]`: what happens at a time (simulated s); `where` is how errors call it."""
 
     where: str
@@ -59,7 +59,7 @@ class Script:
     sensors: SensorChoice = field(default_factory=SensorChoice)
     drives: Mapping[str, Path] = field(default_factory=dict)
     guard: Mapping[str, Any] | None = None  # as robot.toml has it
-    lines: tuple[Line, ...] = ()
+    lines: tuple[ScriptStep, ...] = ()
     expectations: tuple[Expectation, ...] = ()
 
 
@@ -179,9 +179,9 @@ class _Reading:
             robot.complain("drive", str(error).removeprefix("drive "))
             return {}
 
-    def _line(self, table: Table) -> Line:
+    def _line(self, table: Table) -> ScriptStep:
         request = {key: value for key, value in table.values.items() if key != "time_s"}
-        line = Line(f"{self._file} {table.where}", table.seconds("time_s"), request)
+        line = ScriptStep(f"{self._file} {table.where}", table.seconds("time_s"), request)
         if line.for_gateway is not None:
             table.only(("time_s", line.for_gateway))
             _check_gateway_line(table, line.for_gateway)
@@ -211,7 +211,7 @@ def _check_gateway_line(table: Table, key: str) -> None:
                 table.complain(key, text)
 
 
-def _check_answers(lines: tuple[Line, ...], entries: object, mistakes: list[Mistake]) -> None:
+def _check_answers(lines: tuple[ScriptStep, ...], entries: object, mistakes: list[Mistake]) -> None:
     """Only what this file asks for is answered."""
     asked = {line.for_gateway for line in lines if line.for_gateway is not None}
     for number, entry in enumerate(entries if isinstance(entries, list) else (), 1):

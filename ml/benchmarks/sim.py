@@ -18,7 +18,7 @@ from ml.features.recipe import Recipe
 from ml.robot.groups import GROUPS, present, unit
 from ml.robot.task import Task
 from ml.training import simulated
-from ml.training.simulated import Examples, Session
+from ml.training.simulated import Examples, SimulatedSession
 
 FOLDS: Final = 3
 MOST: Final = 24_000  # decisions that are learned from and judged: more say no more
@@ -54,7 +54,7 @@ HIPS: Final = Variant("only_hips_", ("hips",))
 HIPS_TRUNK: Final = Variant("only_hips_trunk_", ("hips", "trunk"))
 
 
-def people(path: Path) -> list[Session]:
+def people(path: Path) -> list[SimulatedSession]:
     """The sessions of a file; raises `UnusableData` where they are those of fewer than three people."""
     sessions = simulated.read(path)
     count = len({session.subject for session in sessions})
@@ -65,7 +65,7 @@ def people(path: Path) -> list[Session]:
     return sessions
 
 
-def robot(sessions: Sequence[Session], variants: Sequence[Variant]) -> tuple[Variant, list[Variant]]:
+def robot(sessions: Sequence[SimulatedSession], variants: Sequence[Variant]) -> tuple[Variant, list[Variant]]:
     """The robot with every sensor that all sessions have, and those of `variants` that lack some of them."""
     channels = set(sessions[0].channels).intersection(*(session.channels for session in sessions))
     whole = replace(WHOLE, groups=present(channels))
@@ -86,18 +86,18 @@ def recipe_of(task: Task, variant: Variant) -> Recipe:
     return recipe
 
 
-def step_of(recipe: Recipe, sessions: Sequence[Session], least: int) -> int:
+def step_of(recipe: Recipe, sessions: Sequence[SimulatedSession], least: int) -> int:
     """Grid samples between decisions, at least `least`, so that there are at most `MOST`."""
     seconds = sum(np.ptp(session.stamps_ns) / 1e9 for session in sessions)
     return max(least, math.ceil(seconds * recipe.rate_hz / MOST))
 
 
-def disturbed(sessions: Sequence[Session]) -> list[Session]:
+def disturbed(sessions: Sequence[SimulatedSession]) -> list[SimulatedSession]:
     """The same people, with sensors that have offsets, noise and delays of their own."""
     return [_disturbed(session, number) for number, session in enumerate(sessions)]
 
 
-def _disturbed(session: Session, number: int) -> Session:
+def _disturbed(session: SimulatedSession, number: int) -> SimulatedSession:
     random = np.random.default_rng(number)
     values = session.values.copy()
     for column, channel in enumerate(session.channels):
@@ -113,7 +113,7 @@ def _disturbed(session: Session, number: int) -> Session:
 _USED: Final = frozenset(channel for group in GROUPS.values() for channel in group)
 
 
-def examples_of(task: Task, variant: Variant, sessions: list[Session], least: int) -> Examples:
+def examples_of(task: Task, variant: Variant, sessions: list[SimulatedSession], least: int) -> Examples:
     """Decisions of all people, as this robot's sensors have them."""
     recipe = recipe_of(task, variant)
     seen = disturbed(sessions) if variant.noisy else sessions

@@ -26,7 +26,7 @@ from ml.benchmarks.sim import (
     recipe_of,
     robot,
 )
-from ml.registry.judged import calibrated
+from ml.registry.classifier_scores import calibrated
 from ml.robot.learn import learn
 from ml.robot.learned import ABNORMAL_FROM, NONE
 from ml.robot.task import ACTIVITY

@@ -16,7 +16,7 @@ FORMAT: Final = 1
 _NOT_CONTENT: Final = ("id", "made")  # two that learned the same have the same model, whenever that was
 
 
-class Source(Enum):
+class DataSource(Enum):
     """Where its examples come from."""
 
     RECORDED = "recorded"
@@ -74,7 +74,7 @@ class Card(Struct, frozen=True, kw_only=True):
     units: dict[str, str]  # of each channel
     ranges: dict[str, tuple[float, float]] = {}  # of each channel, from its 0.1 % to its 99.9 % quantile
     features_hash: str  # of the code that makes its features
-    source: Source
+    source: DataSource
     seed: int
     made: datetime
     versions: dict[str, str]  # of what learned it: python, scikit-learn, numpy, skops

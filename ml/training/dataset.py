@@ -22,7 +22,7 @@ from ml.robot.learned import ABNORMAL_FROM, NONE, Learned
 from ml.robot.task import TASKS, recipe_named
 from ml.serving.grid import on_grid
 from ml.store import NoSuchTable, Store
-from ml.store.labels import REGRESSION, Label, Source, holding, person, wearer
+from ml.store.labels import REGRESSION, Label, LabelSource, holding, person, wearer
 from ml.store.sessions import newest
 from ml.store.tables import LABELS, SESSIONS, TELEMETRY, Table
 from ml.store.translation import translated
@@ -236,7 +236,7 @@ def _teach(ask: Ask, store: Store, known: tuple[npt.NDArray[Any], Names], stamps
     _, mine, its = np.intersect1d(stamps_ns, its_stamps_ns[sure], return_indices=True)
     free = source[mine] == NOBODY
     truth[mine[free]] = np.array(teacher.classes)[verdicts.label[sure][its[free]]]
-    source[mine[free]] = Source.PSEUDO.value
+    source[mine[free]] = LabelSource.PSEUDO.value
 
 
 # --- tables

@@ -15,10 +15,10 @@ import numpy.typing as npt
 from msgspec.structs import replace
 
 from ml.registry.card import Metrics
-from ml.registry.judged import calibrated, judged
+from ml.registry.classifier_scores import calibrated, judged
 from ml.robot.learned import ABNORMAL_FROM, NONE, Learned, Verdicts
 from ml.robot.task import Task
-from ml.store.labels import Source
+from ml.store.labels import LabelSource
 from ml.training.dataset import Part
 
 FEW: Final = 20  # decisions; a class or person with fewer is no reason
@@ -134,7 +134,7 @@ def _figure(metrics: Metrics, name: str) -> float:
 
 def _by_people(part: Part) -> Part:
     """What people, the simulator or sensors say: nobody is judged by what a model said."""
-    return part.of(part.source != Source.PSEUDO.value)
+    return part.of(part.source != LabelSource.PSEUDO.value)
 
 
 def _common(parts: Sequence[Part], its: Sequence[Part]) -> tuple[list[Part], list[Part]]:

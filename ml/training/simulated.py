@@ -24,7 +24,7 @@ ORDINARY: Final = "ordinary"  # the walks of recordings that do not say whose th
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Session:
+class SimulatedSession:
     """One wearer's recording: a row for each cycle of the sensors; NaN where a channel has no value."""
 
     name: str
@@ -68,7 +68,7 @@ _ROW: Final = msgspec.json.Decoder(list[Any])
 _HEAD: Final = msgspec.json.Decoder(_Head)
 
 
-def read(path: Path) -> list[Session]:
+def read(path: Path) -> list[SimulatedSession]:
     """Every session of a file.
 
     Raises:
@@ -91,7 +91,7 @@ def read(path: Path) -> list[Session]:
     return sessions
 
 
-def examples(task: Task, recipe: Recipe, sessions: list[Session], step: int) -> Examples:
+def examples(task: Task, recipe: Recipe, sessions: list[SimulatedSession], step: int) -> Examples:
     """A decision every `step` samples of the recipe's grid, each on a full window.
 
     Raises:
@@ -129,14 +129,14 @@ def _blocks(file: BinaryIO) -> Iterator[tuple[bytes, list[list[Any]]]]:
         yield head, rows
 
 
-def _session(line: bytes, rows: list[list[Any]]) -> Session:
+def _session(line: bytes, rows: list[list[Any]]) -> SimulatedSession:
     head = _HEAD.decode(line)
     if tuple(head.columns[: len(TRUTH)]) != TRUTH:
         raise ValueError(f"the columns of session {head.session} do not begin with {', '.join(TRUTH)}")
     if {len(row) for row in rows} - {len(head.columns)}:
         raise ValueError(f"a line of session {head.session} has not the {len(head.columns)} columns")
     numbers = np.array([[*row[2:]] for row in rows], dtype=np.float64).reshape(len(rows), -1)
-    return Session(
+    return SimulatedSession(
         head.session,
         str(head.subject),
         tuple(head.columns[len(TRUTH) :]),
@@ -148,7 +148,7 @@ def _session(line: bytes, rows: list[list[Any]]) -> Session:
     )
 
 
-def _decisions(task: Task, recipe: Recipe, session: Session, step: int) -> Iterator[tuple[Any, ...]]:
+def _decisions(task: Task, recipe: Recipe, session: SimulatedSession, step: int) -> Iterator[tuple[Any, ...]]:
     missing = set(recipe.channels) - set(session.channels)
     if missing:
         raise UnusableData(f"session {session.name} has no {', '.join(sorted(missing))}")

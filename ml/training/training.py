@@ -16,8 +16,7 @@ from threadpoolctl import threadpool_limits
 from ml.errors import UnusableData, UnusableModel
 from ml.features.recipe import Recipe
 from ml.progress import Tell, untold
-from ml.registry.card import Card, Metrics
-from ml.registry.card import Source as Origin
+from ml.registry.card import Card, DataSource, Metrics
 from ml.registry.code import features_hash
 from ml.registry.code import versions as library_versions
 from ml.registry.registry import Registry
@@ -25,7 +24,7 @@ from ml.robot.groups import unit
 from ml.robot.learn import LEAST_ROWS, learn
 from ml.robot.learned import Learned
 from ml.robot.task import Task
-from ml.store.labels import Source
+from ml.store.labels import LabelSource
 from ml.training.adapting import adapted, divided
 from ml.training.choosing import held_out, judging, recipe_for, split
 from ml.training.dataset import LeftOut, Part
@@ -81,7 +80,9 @@ def _general(registry: Registry, found: Material, wish: Wish) -> Trained:
     parts, left_out = found.parts(recipe, *_teacher(wish, serving))
     if not parts:
         raise UnusableData("no session can be learned from; " + "; ".join(map(told, left_out)))
-    labelled = [each for each in parts if not each.regression and (each.source != Source.PSEUDO.value).any()]
+    labelled = [
+        each for each in parts if not each.regression and (each.source != LabelSource.PSEUDO.value).any()
+    ]
     able = judging(labelled)
     held = held_out((each.group for each in able), wish.held_out, len(labelled) - len(able))
     lessons, judges, regression = split(parts, held)
@@ -247,15 +248,15 @@ def _sessions(parts: Sequence[Part]) -> tuple[str, ...]:
     return tuple(sorted({each.ask.session for each in parts}))
 
 
-def _origin(rows: Mapping[str, int]) -> Origin:
-    simulated = rows.get(Source.SIMULATOR.value, 0)
+def _origin(rows: Mapping[str, int]) -> DataSource:
+    simulated = rows.get(LabelSource.SIMULATOR.value, 0)
     if not simulated:
-        return Origin.RECORDED
-    return Origin.SIMULATED if simulated == sum(rows.values()) else Origin.MIXED
+        return DataSource.RECORDED
+    return DataSource.SIMULATED if simulated == sum(rows.values()) else DataSource.MIXED
 
 
-def _both(one: Origin, other: Origin) -> Origin:
-    return one if one is other else Origin.MIXED
+def _both(one: DataSource, other: DataSource) -> DataSource:
+    return one if one is other else DataSource.MIXED
 
 
 def _of_its_classes(metrics: Metrics, classes: Sequence[str]) -> Metrics:

@@ -14,7 +14,7 @@ from ml.store.sessions import Session
 from ml.store.store import Store
 from ml.store.url import checked_url
 from server_gui.cli.cloud_options import add_url, parser, progress, reach, url
-from server_gui.core.cloud import exports, moved_store, partial_copy, spool_upload, transfer
+from server_gui.core.cloud import exports, partial_copy, relocated_store, spool_upload, transfer
 from server_gui.core.fleet.control_socket import NobodyCollects, ask, why_not_uploaded
 from server_gui.core.recording.errors import SpoolUnusable
 from server_gui.core.recording.receipts import RECEIPTS
@@ -82,7 +82,7 @@ def _note(arguments: argparse.Namespace) -> None:
         return
     try:
         with Spool(folder) as spool:
-            moved_store.note(spool, Store.existing(url(arguments)))
+            relocated_store.note(spool, Store.existing(url(arguments)))
     except SpoolUnusable as error:
         warn("cloud", f"that batches of this computer are in the copy is not noted in its spool: {error}")
 

@@ -14,9 +14,9 @@ import msgspec
 
 from gateway.amounts import NONE, age, size
 from gateway.cli.text import say, table, warn
-from gateway.plain import json_plain, plain
+from gateway.plain_text import json_plain, plain
 from ml.store.private import private_files
-from server_gui.cli.worn import add_worn, worn
+from server_gui.cli.wearer_notes import add_worn, worn
 from server_gui.core.fleet.collector import Collector, CollectorReport
 from server_gui.core.fleet.control_socket import ask, why_not_uploaded
 from server_gui.core.fleet.link_statistics import LinkReport
@@ -24,7 +24,7 @@ from server_gui.core.prediction.state import WITHIN_DAYS, Figures, PredictingSta
 from server_gui.core.recording.records import Worn
 from server_gui.core.settings.server_file import ServerSettings, SettingsError, add_robots, default_file, load
 from server_gui.core.threads.supervision import BEAT_S
-from server_gui.processes.ending import Ended, Ending
+from server_gui.processes.shutdown_signals import ShutdownRequested, ShutdownSignals
 
 log = logging.getLogger(__name__)
 
@@ -113,7 +113,7 @@ def _collect(settings: ServerSettings, operator: str, notes: str, worn: Worn) ->
     _log_to_stderr()
     gc.freeze()  # what was loaded so far lives as long as the process, and there is much of it
     collecting = Collector(settings, operator, notes, worn=worn)
-    with Ending() as ending, contextlib.suppress(Ended), collecting as collector:
+    with ShutdownSignals() as ending, contextlib.suppress(ShutdownRequested), collecting as collector:
         names = ", ".join(settings.robots)
         log.info("recording %s into %s, for the store %s", names, settings.recorder.spool, settings.store.url)
         while True:

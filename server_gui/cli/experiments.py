@@ -45,7 +45,7 @@ from server_gui.core.fleet.collector import CollectorReport
 from server_gui.core.fleet.control_socket import NobodyCollects, ask
 from server_gui.core.follow.feed import FollowSettings
 from server_gui.core.settings.server_file import load
-from server_gui.processes.ending import Ended, Ending
+from server_gui.processes.shutdown_signals import ShutdownRequested, ShutdownSignals
 from server_gui.terminal.followed_robot import FollowedRobot
 
 BEAT_S: Final = 0.1
@@ -198,7 +198,7 @@ def _run(command: str, arguments: argparse.Namespace, planned: Planner) -> int:
     following = FollowSettings(
         f"gwrms {command}", ("*",), (plan.name,), rate_hz=RATE_HZ, journal_s=1.0, buses_s=2.0
     )
-    with Ending() as ending_, FollowedRobot(arguments.robot, following) as followed:
+    with ShutdownSignals() as ending_, FollowedRobot(arguments.robot, following) as followed:
         try:
             run = _begin(plan, followed, ending_)
         except BadPlan as error:
@@ -245,7 +245,7 @@ def _held(robot: Robot, name: str) -> float:
         time.sleep(BEAT_S)
 
 
-def _begin(plan: Plan, followed: FollowedRobot, ending_: Ending) -> Run:
+def _begin(plan: Plan, followed: FollowedRobot, ending_: ShutdownSignals) -> Run:
     until_s = time.monotonic() + REACH_S
     while True:
         followed.update()
@@ -258,14 +258,16 @@ def _begin(plan: Plan, followed: FollowedRobot, ending_: Ending) -> Run:
         time.sleep(BEAT_S)
 
 
-def _follow(run: Run, followed: FollowedRobot, ending_: Ending, arguments: argparse.Namespace) -> None:
+def _follow(
+    run: Run, followed: FollowedRobot, ending_: ShutdownSignals, arguments: argparse.Namespace
+) -> None:
     """Until it is over; whoever asks to end it waits for what is read back."""
     said = ""
     while not run.is_over:
         followed.update()
         try:
             ending_.check()
-        except Ended as ended:
+        except ShutdownRequested as ended:
             run.halt(str(ended))
         if _is_watched(run):
             run.beat()

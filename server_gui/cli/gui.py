@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from ml.store.private import private_files
-from server_gui.cli.worn import add_worn, worn
+from server_gui.cli.wearer_notes import add_worn, worn
 from server_gui.core.settings.server_file import add_robots, default_file, load, name_of
 from server_gui.qt_needs import check, prefer_x
 

@@ -28,7 +28,7 @@ from server_gui.core.prediction.rehearsals import BENCHMARKS
 from server_gui.core.prediction.replay import Replayed, replay
 from server_gui.core.settings.prediction import DANGER
 from server_gui.core.settings.server_file import ServerSettings, SettingsError, add_robots, load, name_of
-from server_gui.processes.ending import Ended, Ending
+from server_gui.processes.shutdown_signals import ShutdownRequested, ShutdownSignals
 from server_gui.terminal.predictions import link, replay_told, told
 
 LOOK_S: Final = 0.25  # a look at what has come waits at most so long
@@ -117,8 +117,8 @@ def _live(settings: ServerSettings, robots: Mapping[str, Address], arguments: ar
     until_s = math.inf if arguments.seconds is None else time.monotonic() + arguments.seconds
     predicted = False
     with (
-        Ending() as ending,
-        contextlib.suppress(Ended),
+        ShutdownSignals() as ending,
+        contextlib.suppress(ShutdownRequested),
         Live(settings, robots) as live,
         _shown(arguments) as show,
     ):

@@ -12,7 +12,7 @@ import pyarrow.csv
 
 from gateway.amounts import NONE
 from gateway.cli.text import say, table, warn
-from gateway.plain import json_plain
+from gateway.plain_text import json_plain
 from ml.store.private import private_files
 from ml.store.query import Result, query
 from server_gui.cli.cloud_options import add_url, parser, reach

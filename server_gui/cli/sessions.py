@@ -31,7 +31,7 @@ from server_gui.cli.sessions_changed import changed
 from server_gui.cli.sessions_gait import gait
 from server_gui.cli.sessions_resources import compare, resources
 from server_gui.core.cloud import exports
-from server_gui.core.cloud.changed import DIGITS
+from server_gui.core.cloud.configuration_changes import DIGITS
 from server_gui.core.cloud.mcap import write_mcap
 from server_gui.core.cloud.recordings import Recorded, Recordings
 from server_gui.core.cloud.selection import Choice, choose

@@ -9,8 +9,8 @@ from gateway.cli.text import say, say_json, table
 from ml.store.sessions import Session
 from server_gui.cli.cloud_options import add_url, parser, progress, recordings
 from server_gui.cli.edits import COLUMNS, metric_row
-from server_gui.core.cloud.changed import Changes, Difference, Told, changes, not_known
-from server_gui.core.cloud.moved import moved, walk
+from server_gui.core.cloud.configuration_changes import Changes, Difference, Told, changes, not_known
+from server_gui.core.cloud.metric_changes import moved, walk
 from server_gui.core.evidence.comparison import Evidence, Word
 
 EPILOG = """First what was otherwise when the session AFTER began: wearer, parameters, calibration, firmware,

@@ -12,13 +12,13 @@ from rich.table import Table
 from rich.text import Text
 
 from gateway.client import ConnectionState
-from gateway.plain import plain
+from gateway.plain_text import plain
 from gateway.units import Unit, Units
 from gateway.wire.parameter import ParameterInfo, ParameterValue
 from ml.danger.levels import Level
 from server_gui.core.alarms.alarm import Active
-from server_gui.core.alarms.found import undriven
 from server_gui.core.alarms.marks import GLYPHS
+from server_gui.core.alarms.robot_alarms import undriven
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.news import NewsKind
 from server_gui.core.follow.robot import Robot

@@ -22,8 +22,8 @@ from server_gui.core.settings.server_file import RecordingSettings, ServerSettin
 from server_gui.views.cloud.panel import Cloud
 from server_gui.views.frame.main_window import USUAL, MainWindow
 from server_gui.views.models.panel import ModelsPage
-from server_gui.views.pace import SLOW
 from server_gui.views.recordings.panel import Recordings
+from server_gui.views.refresh_rate import SLOW
 from server_gui.views.theme import Theme
 from tests.gui.fakes import Bench, destroy, draw_frames, leave_unpainted
 from tests.gui.foreseen import predicted

@@ -24,14 +24,14 @@ from server_gui.core.follow.news import NewsKind
 from server_gui.core.tuning.stop import StopProgress
 from server_gui.views.alarms.full_list import AlarmRow
 from server_gui.views.alarms.words import fewer
-from server_gui.views.ask import Question
+from server_gui.views.confirmation import Question
 from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.overview.joint_table import JointTable
 from server_gui.views.theme import Theme
 from tests.gui import rules
 from tests.gui.fakes import Around, Bench, stop_is_whole
 from tests.gui.foreseen import predicted
-from tests.support.desk import JOINTS, described, looked, telemetry, walking
+from tests.support.desk import JOINTS, looked, telemetry, walking
 
 CAUSE = "0x2310 continuous overcurrent at the output (register: generic, current)"
 WHY = "there is no link to 127.0.0.1:7420 now (127.0.0.1:7420 did not answer hello within 5 s)"
@@ -427,18 +427,6 @@ def test_a_held_stop_is_reset_after_a_question_about_that_robot_once_it_is_answe
     assert any("to go on: enable the drives" in text for text in window.alarms.texts)
 
 
-def test_each_stop_names_its_robot_and_all_says_all(around: Around, bench: Bench) -> None:
-    other = bench.add("a-robot-with-quite-a-long-name-of-its-own", 7421)
-    other.is_named = True
-    other.take([described()])
-    settle(around, bench)
-    first, second = around.robots.cards
-    assert first.stop.text() == "STOP  exo-01"
-    assert second.stop.text().startswith("STOP  a-robot")
-    assert second.stop.accessibleName() == "STOP a-robot-with-quite-a-long-name-of-its-own"
-    assert around.robots.all_stop.text() == "STOP  ALL"
-
-
 def test_a_robot_is_chosen_by_keyboard_and_removed_after_a_question(window: MainWindow, bench: Bench) -> None:
     other = bench.add("exo-02", 7421)
     bench.draw(window)
@@ -453,31 +441,6 @@ def test_a_robot_is_chosen_by_keyboard_and_removed_after_a_question(window: Main
     bench.desk.remove(other)
     bench.draw(window)
     assert [card.station for card in window.robots.cards] == [bench.station]
-
-
-def test_a_card_says_what_its_robot_does_also_beside_an_alarm_and_nothing_of_the_past(
-    around: Around, bench: Bench
-) -> None:
-    other = bench.add("exo-02", 7421)
-    other.take([described(), walking(300), looked()])
-    fault(bench)
-    settle(around, bench)
-    first, second = around.robots.cards
-    assert first.texts[3].endswith("0 of 6 enabled")
-    assert second.texts[3].endswith("6 of 6 enabled")
-    other.take([LinkChanged(ConnectionState.WAITING, "gone", time.monotonic_ns())])
-    settle(around, bench)
-    assert second.texts[3] == "what it does is not known"
-
-
-def test_a_card_has_the_same_word_as_the_header_where_it_is_narrow(window: MainWindow, bench: Bench) -> None:
-    bench.station.stop("test")
-    bench.first.fail(NotConnected("there is no link"))
-    settle(window, bench)
-    assert window.width() >= 1300
-    card = window.robots.cards[0]
-    assert "STOP NOT CONFIRMED" in card._state.shown
-    assert card._state.is_whole
 
 
 def test_alarms_of_two_robots_are_named(around: Around, bench: Bench) -> None:

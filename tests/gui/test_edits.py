@@ -18,8 +18,8 @@ from server_gui.core.tuning.writing import Trial
 from server_gui.views.edits.page import Edits
 from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.theme import Theme
-from server_gui.views.widgets.framed import draw_frame
-from server_gui.views.widgets.scrolled import Scrolled
+from server_gui.views.widgets.plot_frame import draw_frame
+from server_gui.views.widgets.scroll_area import ScrollArea
 from server_gui.views.widgets.stride_curves import CYCLE
 from tests.gui.fakes import Bench, Parts, destroy
 from tests.gui.rules import settle
@@ -70,7 +70,7 @@ def test_values_and_metrics_are_in_the_units_that_were_chosen(bench: Bench, part
 
 def test_strides_stand_below_each_other_rather_than_beyond_the_edge(bench: Bench, theme: Theme) -> None:
     page = Edits(bench.desk, theme)
-    scrolled = Scrolled(page)
+    scrolled = ScrollArea(page)
     one = worse()
     curves = tuple(replace(one.curves[0], channel=f"left_knee.{name}") for name in DRAWN)
     bench.station.judged.take(replace(one, curves=curves))

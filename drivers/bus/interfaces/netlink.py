@@ -23,7 +23,7 @@ CAN_STATES = ("error active", "error warning", "error passive", "bus off", "stop
 
 
 @dataclass(frozen=True, slots=True)
-class Link:
+class NetworkInterface:
     """A network interface; the CAN fields are `None` where it has none (vcan has no bitrate)."""
 
     up: bool
@@ -33,7 +33,7 @@ class Link:
     state: str | None
 
 
-def read_link(name: str) -> Link | None:
+def read_link(name: str) -> NetworkInterface | None:
     """The link called `name`; `None` where there is none. Raises `OSError` from a kernel that is silent."""
     try:
         index = socket.if_nametoindex(name)
@@ -51,7 +51,7 @@ def link_request(index: int) -> bytes:
     return _HEADER.pack(_HEADER.size + len(body), _GET_LINK, _REQUEST, 1, 0) + body
 
 
-def parse_link(message: bytes) -> Link | None:
+def parse_link(message: bytes) -> NetworkInterface | None:
     """A link out of the kernel's answer; `None` for any other message."""
     if len(message) < _HEADER.size + _INTERFACE.size:
         return None
@@ -63,7 +63,7 @@ def parse_link(message: bytes) -> Link | None:
     info = dict(_attributes(attributes.get(_LINK_INFO, b"")))
     can = dict(_attributes(info.get(_INFO_DATA, b"")))
     state = _number(can.get(_CAN_STATE))
-    return Link(
+    return NetworkInterface(
         up=bool(flags & _IFF_UP),
         kind=info[_INFO_KIND].rstrip(b"\0").decode("ascii", "replace") if _INFO_KIND in info else None,
         bitrate=_number(can.get(_CAN_BIT_TIMING)) or None,

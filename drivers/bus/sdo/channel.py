@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable
 from typing import Any, Protocol, TypeVar
 
+from drivers.bus.confirmed_writes import ConfirmedWrites
 from drivers.bus.sdo import protocol
 from drivers.bus.sdo.aborts import abort_text
 from drivers.bus.sdo.answers import Answers, SdoCounters
@@ -19,7 +20,6 @@ from drivers.bus.sdo.outstanding import Outstanding, Request
 from drivers.bus.sdo.round_trips import RoundTrips
 from drivers.bus.sdo.transfer import Transfer, nothing, read, write
 from drivers.bus.sender import StillLeaving
-from drivers.bus.written import Written
 from drivers.errors import DeviceAbort, DeviceTimeout, NotPermitted, Unavailable
 
 T = TypeVar("T")
@@ -80,7 +80,7 @@ class SdoChannel:
         self.round_trips = RoundTrips(timeout_s)
         self._answers = Answers(self._outstanding, self.counters, self.round_trips)
         self._unassigned = 0  # failed attempts to bring it in sync, in a row
-        self._written = Written()
+        self._written = ConfirmedWrites()
         self._urgent = False
         self._current: Callable[[], bool] = _always
         self._pause: Callable[[], None] = _end

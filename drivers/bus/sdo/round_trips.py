@@ -3,7 +3,7 @@
 import threading
 from collections import deque
 
-from drivers.noted import Noted, found
+from drivers.findings import FindingState, active_findings
 from drivers.samples import Finding
 
 KEPT, RECENT_S = 64, 60.0  # answers that figures are made of
@@ -18,7 +18,7 @@ class RoundTrips:
         self.late = 0  # answers that came when nobody waited for them any more
         self._timeout_s = timeout_s
         self._recent: deque[tuple[int, int]] = deque(maxlen=KEPT)  # when it was answered, and after how long
-        self._silence, self._lateness = Noted(), Noted()
+        self._silence, self._lateness = FindingState(), FindingState()
         self._unanswered, self._first_unanswered_ns = 0, 0
         self._prompt = 0
         self._lock = threading.Lock()
@@ -73,4 +73,4 @@ class RoundTrips:
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        return found((self._silence, self._lateness))
+        return active_findings((self._silence, self._lateness))

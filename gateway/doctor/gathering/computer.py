@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from drivers.bus.settings import CanSettings
-from drivers.urgency import PRIORITY
+from drivers.realtime_priority import PRIORITY
 from gateway.config.robot import RobotConfig
 from gateway.doctor.observations import Computer
 from gateway.modules.resource.extras import kernel

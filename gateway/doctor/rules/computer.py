@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from drivers.urgency import PRIORITY
+from drivers.realtime_priority import PRIORITY
 from gateway.config.robot import header
 from gateway.doctor.gathering.computer import links, usb_name
 from gateway.doctor.observations import Observations

@@ -15,11 +15,11 @@ from eds.datatypes import DATA_TYPES, DOMAIN
 from eds.naming import remark
 from eds.report import pdo_rows
 from gateway.config.robot import RobotConfig
-from gateway.connections.turns import Client
+from gateway.connections.fair_queue import Client
 from gateway.modules.component.module import ComponentModule
-from gateway.modules.control.locked import Table, locked
 from gateway.modules.control.parameters import READABLE, WRITABLE, Parameter
 from gateway.modules.control.unanswered import Unanswered
+from gateway.modules.control.write_refusals import Table, locked
 from gateway.process.futures import back, done, gather, then
 from gateway.process.loop import Loop
 from gateway.wire.dictionary import (

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, cast
 
 from gateway.access.folder import AccessFolder
 from gateway.handlers import Handlers, on
-from gateway.modules.control.admitted import AdmissionsJournal
+from gateway.modules.control.access_journal import AccessJournal
 from gateway.modules.control.lease import RENEWED, TAKEN, Leases
 from gateway.modules.control.storage import RESTORING, STORING
 from gateway.modules.control.tuning import Tuning
@@ -138,7 +138,7 @@ class ControlModule:
                 config, self._component, loop, self._records, self._stop.authority, self._trials_changed
             )
             opened.callback(self._tuning.close)
-            self._admissions = AdmissionsJournal(self._records, AccessFolder(config.access))
+            self._admissions = AccessJournal(self._records, AccessFolder(config.access))
             self._admissions.look()
             self._stop.claim = self._tuning.claim
             left = self._tuning.load()

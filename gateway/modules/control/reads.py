@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Final, Generic, Protocol, TypeVar
 
-from gateway.connections.turns import Client, Turns
+from gateway.connections.fair_queue import Client, FairQueue
 from gateway.process.futures import done, outcome, then
 from gateway.process.loop import Loop
 
@@ -80,7 +80,7 @@ class Reads(Generic[P, V]):
         self._loop = loop
         self._device_of = device_of
         self._read_all = read_all
-        self._turns = Turns[_Reading[P, V]]()
+        self._turns = FairQueue[_Reading[P, V]]()
         self._busy: dict[str, float] = {}  # devices, and since when
         self._slow: set[str] = set()
 

@@ -17,7 +17,7 @@ from msgspec import UNSET
 
 from drivers.errors import DeviceTimeout, DriverError
 from gateway.config.robot import RobotConfig
-from gateway.connections.turns import Client
+from gateway.connections.fair_queue import Client
 from gateway.modules.component.module import ComponentModule
 from gateway.modules.control.catalogue import resolve
 from gateway.modules.control.dictionary import Objects, Wanted

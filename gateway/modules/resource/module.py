@@ -14,7 +14,7 @@ import msgspec
 
 from drivers.latest import Latest, Listener
 from drivers.samples import Channel
-from gateway.connections.turns import Turns
+from gateway.connections.fair_queue import FairQueue
 from gateway.handlers import Handlers, on
 from gateway.process.futures import back, done, pass_on, then
 from gateway.streaming.sources import Selection, whole
@@ -127,7 +127,7 @@ class ResourceModule:
         loop = context.config.control_loop
         self._control = () if loop is None else loop.processes
         self._meters: dict[tuple[Session, str], Meter] = {}
-        self._turns = Turns[_Wish]()
+        self._turns = FairQueue[_Wish]()
         self._measuring = False  # for a client
         self.handlers = Handlers(on(RESOURCE_SNAPSHOT, self._snapshot))
 

@@ -15,9 +15,9 @@ from gateway.client import Batch, ConnectionState
 from gateway.wire.component import ChannelInfo, ComponentInfo
 from gateway.wire.robot import Clock, Description, GuardInfo
 from gateway.wire.stop import StopInfo
-from server_gui.core.archive.happened import Happened
 from server_gui.core.archive.outline import Outline
 from server_gui.core.archive.recorded_predictions import Said
+from server_gui.core.archive.timeline_events import TimelineEvents
 from server_gui.core.cloud.tape import Rows, Tape
 from server_gui.core.desk.desk import Desk, Shown
 from server_gui.core.desk.flags import Flag, FlagKind
@@ -152,7 +152,7 @@ class Playback:
         self._robot = PlayedRobot()
         self._words: Mapping[str, dict[str, str]] = {}
         self._recall: Recall = nothing_said
-        self.happened = Happened(read, deliver)
+        self.happened = TimelineEvents(read, deliver)
         self.outline = Outline(read, deliver)
         self._said: dict[str, Said] = {}  # the newest of each task
         self._pieces: dict[int, Piece] = {}

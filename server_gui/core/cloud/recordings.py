@@ -22,7 +22,7 @@ import pyarrow.dataset
 from ml.store import NoSuchTable, StoreError, StoreRefused, StoreUnreachable, Table, sessions
 from ml.store.labels import holding
 from ml.store.precedence import recorded_order
-from ml.store.sessions import Channel, Piece, Session, Source
+from ml.store.sessions import Channel, Piece, Session, TelemetrySource
 from ml.store.snapshot import Snapshot
 from ml.store.tables import EVENTS, LABELS, SESSIONS, TELEMETRY, Known, columns
 from ml.store.translation import translated
@@ -224,7 +224,7 @@ class Recorded:
     session: Session
     channels: Sequence[Channel]
     waiting: int
-    _sources: Sequence[Source]
+    _sources: Sequence[TelemetrySource]
     _url: str
 
     def telemetry(
@@ -256,9 +256,9 @@ class _Waiting:
         self._pieces = {batch: piece for batch in batches if (piece := self._looked_into(batch))}
         self.rows = sum(piece.rows for piece in self._pieces.values())
 
-    def source(self) -> Source:
+    def source(self) -> TelemetrySource:
         """Return all of it, for `merged`."""
-        return Source([*self._pieces.values()], self._between)
+        return TelemetrySource([*self._pieces.values()], self._between)
 
     def _between(self, begin_ns: int, end_ns: int) -> pyarrow.dataset.Dataset:
         """The batches that have something with such stamps."""

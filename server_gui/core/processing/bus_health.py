@@ -8,7 +8,7 @@ from typing import Final
 
 from gateway.client import ConnectionState
 from gateway.wire.bus import CLOSED, BusInfo, NodeInfo
-from server_gui.core.follow.moment import now_ns
+from server_gui.core.follow.frame_time import now_ns
 from server_gui.core.follow.robot import Robot
 
 ACTIVE: Final = "error active"

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from gateway.client import ClockOffset
-from gateway.several import devices
+from gateway.several_joints import devices
 from gateway.wire.component import QualityInfo
 from gateway.wire.method import Number
 from gateway.wire.robot import Description

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from gateway.client import NotConnected, RemoteError
-from gateway.several import Outcome, refused_or_unknown, storing
+from gateway.several_joints import Outcome, refused_or_unknown, storing
 from gateway.wire.parameter import Stored
 from gateway.wire.robot import Description
 from server_gui.core.follow.news import NewsKind

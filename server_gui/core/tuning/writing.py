@@ -10,7 +10,7 @@ from typing import Final
 from gateway.client import NotConnected, RemoteError
 from gateway.wire.method import Number
 from gateway.wire.parameter import Written
-from server_gui.core.follow import moment
+from server_gui.core.follow import frame_time
 from server_gui.core.tuning.edits import Change
 
 UNDO: Final = 100  # writes that can be taken back one after another
@@ -44,7 +44,7 @@ class Trial:
 
     def left_s(self, now_ns: int | None = None) -> float:
         """Seconds until it reverts, never below 0."""
-        return max(0, self.until_ns - (moment.now_ns() if now_ns is None else now_ns)) / 1e9
+        return max(0, self.until_ns - (frame_time.now_ns() if now_ns is None else now_ns)) / 1e9
 
 
 @dataclass(slots=True)

@@ -9,7 +9,7 @@ import msgspec
 import tomlkit
 from msgspec import Struct
 
-from gateway.plain import plain
+from gateway.plain_text import plain
 from server_gui.core.atomic_files import draft
 from server_gui.core.workspace.grammar import LONGEST, ExpressionError, parse
 from server_gui.core.workspace.trigger import Condition, Mode, On

@@ -12,8 +12,15 @@ from server_gui.core.desk.flags import Flag, FlagKind
 from server_gui.core.desk.measuring import nearest
 from server_gui.core.desk.station import Station
 from server_gui.core.workspace.alignment import Align, offset_text, shift_ns
+from server_gui.core.workspace.curve_binding import (
+    BESIDE,
+    Channels,
+    CurveBinding,
+    channels_of,
+    meaning,
+    with_beside,
+)
 from server_gui.core.workspace.layouts import Layout, PlotLayout, TriggerLayout
-from server_gui.core.workspace.meaning import BESIDE, Channels, Meaning, channels_of, meaning, with_beside
 from server_gui.core.workspace.series import ALL_S, HELD_S, Beside, Floats, Series
 from server_gui.core.workspace.trigger import Condition, On, State, Trigger
 from server_gui.core.workspace.workspace import Workspace
@@ -56,7 +63,7 @@ class Scene:
         self._station: Station | None = None
         self._series: Series | None = None
         self._theirs: Channels = {}
-        self._meanings: dict[str, Meaning] = {}
+        self._meanings: dict[str, CurveBinding] = {}
         self._known: tuple[object, ...] = ()
         self._source: object = None
 
@@ -89,13 +96,13 @@ class Scene:
 
     # --- what is drawn
 
-    def meaning(self, text: str) -> Meaning:
+    def meaning(self, text: str) -> CurveBinding:
         """What this text means on the robot."""
         if text not in self._meanings:
             self._meanings[text] = meaning(text, self.channels, self._shown.units)
         return self._meanings[text]
 
-    def meaning_beside(self, text: str) -> Meaning:
+    def meaning_beside(self, text: str) -> CurveBinding:
         """What it means on what is beside it."""
         key = f"{BESIDE_KEY}{text}"
         if key not in self._meanings:

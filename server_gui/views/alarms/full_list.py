@@ -11,9 +11,9 @@ from server_gui.views.marks import Mark
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text, set_tone
 from server_gui.views.widgets.mark import MarkIcon
+from server_gui.views.widgets.overlay import Overlay
 from server_gui.views.widgets.plain import set_tip
-from server_gui.views.widgets.sheet import Sheet
-from server_gui.views.widgets.whole import WholeLabel
+from server_gui.views.widgets.wrapping_label import WrappingLabel
 
 WIDEST: Final = 900  # at text of 100 %
 AROUND_BUTTONS: Final = 24  # pixels, of a row
@@ -65,7 +65,7 @@ class AlarmRow(QFrame):
         self.setObjectName("alarm")
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Maximum)
         self._icon = MarkIcon(theme, 13)
-        self.headline, self.details = WholeLabel(), WholeLabel("dim")
+        self.headline, self.details = WrappingLabel(), WrappingLabel("dim")
         words = QVBoxLayout()
         words.setSpacing(1)
         words.addWidget(self.headline)
@@ -146,7 +146,7 @@ class AlarmRow(QFrame):
         self.setStyleSheet(style(self._theme))
 
 
-def _high(label: WholeLabel, text: str) -> int:
+def _high(label: WrappingLabel, text: str) -> int:
     """How high a label is with this text."""
     box = QRect(0, 0, max(label.width(), 1), MOST_PX)
     return label.fontMetrics().boundingRect(box, WRAPPED, text).height()
@@ -187,7 +187,7 @@ class AlarmButtons(QWidget):
         self.acknowledge.setVisible(all_of_them and unread)
 
 
-class AlarmList(Sheet):
+class AlarmList(Overlay):
     """Every alarm in full. While it is open no row moves: new ones come last, and what is over stays.
 
     Texts grow and buttons go; as long as the pointer is over the list, no row changes its height by that.
@@ -202,7 +202,7 @@ class AlarmList(Sheet):
         self._column = QVBoxLayout(words)
         self._column.setContentsMargins(0, 0, 0, 0)
         self._column.setSpacing(4)
-        self._none = WholeLabel("dim")
+        self._none = WrappingLabel("dim")
         self._none.setText("No alarms.")
         self._column.addWidget(self._none)
         self._column.addStretch(1)

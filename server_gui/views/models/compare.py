@@ -15,7 +15,7 @@ from PySide6.QtWidgets import (
 )
 
 from gateway.amounts import NONE
-from gateway.plain import plain
+from gateway.plain_text import plain
 from server_gui.core.models.catalogue import Catalogue, Entry
 from server_gui.core.models.comparison import Row, last_week, notes, percent, rows, signed, usual_other
 from server_gui.views.models.calibration import CalibrationPlot, Curve

@@ -18,7 +18,7 @@ from server_gui.views.models.train_form import TrainForm, offer_robots
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_text
 from server_gui.views.widgets.plain import PlainLabel
-from server_gui.views.widgets.scrolled import bring_into_sight
+from server_gui.views.widgets.scroll_area import bring_into_sight
 
 SLOW: Final = 6  # frames between two looks
 NARROW: Final = 480  # at text of 100 %: no room for all buttons in a row

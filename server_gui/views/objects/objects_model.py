@@ -7,9 +7,9 @@ from typing import Any, Final
 
 from PySide6.QtCore import QAbstractTableModel, QModelIndex, QPersistentModelIndex, Qt
 
-from gateway.plain import plain
+from gateway.plain_text import plain
 from gateway.wire.dictionary import ObjectInfo
-from server_gui.core.follow.moment import now_ns
+from server_gui.core.follow.frame_time import now_ns
 from server_gui.core.objects.reading import Held
 from server_gui.core.objects.rows import Compared, limits, pin_of
 from server_gui.views.theme import Theme

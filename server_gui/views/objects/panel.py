@@ -33,8 +33,8 @@ from server_gui.views.objects.objects_table import ObjectsTable
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.files import ask_save, save_whole
-from server_gui.views.widgets.fitted import FittedLabel
 from server_gui.views.widgets.plain import PlainLabel
+from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 
 READ: Final = 6  # frames between two looks
 LOST: Final = "The robot is not linked: what is shown is as old as it says."
@@ -57,7 +57,7 @@ class ObjectsPage(QWidget):
         self._finder = Finder()
         self.setObjectName("page")
         self.bar = ChoiceBar(theme)
-        self.count = FittedLabel("dim")
+        self.count = ShrinkingLabel("dim")
         self.said = PlainLabel()
         self.said.setObjectName("banner")
         self.said.setWordWrap(True)

@@ -16,7 +16,7 @@ from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card
 from server_gui.views.widgets.plot import Curve, Mouse, PlacedFlag, Plot, css
 from server_gui.views.widgets.time_axis import NOW, SHOWN, time_text
-from server_gui.views.widgets.wrapped import Wrapped
+from server_gui.views.widgets.wrapping_legend import WrappingLegend
 
 SECONDS: Final = 10.0
 WIDE_NUMBER: Final = re.compile(r"^−?\d+")
@@ -52,7 +52,7 @@ class KeyPlot(Card):
         self._theme = theme
         self._kind = kind
         self._curves = kind.curves  # of what the robot that is looked at has
-        self.legend = Wrapped(f"Values of {kind.title}")
+        self.legend = WrappingLegend(f"Values of {kind.title}")
         self.plot = Plot(theme, SECONDS, self._unit.scale * kind.least, Mouse.TIME)
         self.plot.set_curves([Curve(channel, colour) for channel, colour, _ in self._curves])
         self.plot.setAccessibleName(kind.title)

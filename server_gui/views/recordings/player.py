@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from gateway.plain import plain
+from gateway.plain_text import plain
 from server_gui.core.archive.archive import Archive
 from server_gui.core.archive.playback import SPEEDS
 from server_gui.core.archive.recorded_notes import RecordedNotes
@@ -32,7 +32,7 @@ from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.files import ask_save
 from server_gui.views.widgets.plain import PlainLabel, set_tip
-from server_gui.views.widgets.scrolled import Scrolled
+from server_gui.views.widgets.scroll_area import ScrollArea
 from server_gui.views.workspace.page import Signals
 
 ROOMY: Final = 440  # high, at text of 100 %: what is lower shows plots alone beside labels
@@ -58,7 +58,7 @@ class Player(QWidget):
         self._views = (self.overview, self.signals)
         self._stack = QStackedWidget()
         for view in self._views:
-            self._stack.addWidget(Scrolled(view))
+            self._stack.addWidget(ScrollArea(view))
         self.banner = PlainLabel()
         self.banner.setObjectName("banner")
         self.banner.setWordWrap(True)

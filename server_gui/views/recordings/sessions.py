@@ -18,7 +18,7 @@ from PySide6.QtWidgets import (
 )
 
 from gateway.amounts import size
-from gateway.plain import plain
+from gateway.plain_text import plain
 from ml.store.labels import utc_ns
 from ml.store.sessions import Session
 from server_gui.core.archive.archive import Archive

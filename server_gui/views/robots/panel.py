@@ -19,17 +19,17 @@ from gateway.wire.pairing import is_link
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.settings.server_file import name_of
-from server_gui.views.ask import ask
+from server_gui.views.confirmation import ask
 from server_gui.views.marks import age_text
 from server_gui.views.predictions import doing
 from server_gui.views.robots.pairing import PairingDialog, show_pairing
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
-from server_gui.views.widgets.choosable import Choosable
+from server_gui.views.widgets.clickable_frame import ClickableFrame
 from server_gui.views.widgets.elided import ElidedLabel
-from server_gui.views.widgets.fitted import FittedLabel
 from server_gui.views.widgets.mark import MarkIcon
 from server_gui.views.widgets.plain import PlainLabel, set_tip
+from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 from server_gui.views.widgets.stop_button import StopButton
 
 # Where a card has no room for a state's own words.
@@ -42,7 +42,7 @@ SHORTER: Final = {
 PAIRING_ENDS_S: Final = 1.0  # how long the window waits for that when it closes
 
 
-class RobotCard(Choosable):
+class RobotCard(ClickableFrame):
     """One robot; `chosen` when it is clicked, or Return or Space is pressed on it; `removed` likewise."""
 
     removed = Signal()
@@ -52,9 +52,13 @@ class RobotCard(Choosable):
         self.station = station
         self.setAccessibleName(f"Robot {station.name}")
         self._icon = MarkIcon(theme, 12)
-        self._name, self._state, self._link = ElidedLabel("title"), FittedLabel("dim"), FittedLabel("dim")
-        self._doing = FittedLabel("dim")
-        self._where = FittedLabel("dim")  # only where another robot is called so, too
+        self._name, self._state, self._link = (
+            ElidedLabel("title"),
+            ShrinkingLabel("dim"),
+            ShrinkingLabel("dim"),
+        )
+        self._doing = ShrinkingLabel("dim")
+        self._where = ShrinkingLabel("dim")  # only where another robot is called so, too
         self._state.setMinimumWidth(1)
         self.stop = StopButton("robot_stop")
         self.remove = QToolButton()

@@ -13,7 +13,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from gateway.plain import plain
+from gateway.plain_text import plain
 
 HINT = (
     "Quick stop on every drive (F12 or Ctrl+Space). It is software over a network, NOT a safety-rated "

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from gateway.units import Unit
 from server_gui.core.evidence.curves import Curves, Side
 from server_gui.views.theme import Theme
-from server_gui.views.widgets.framed import GAP, draw_frame
+from server_gui.views.widgets.plot_frame import GAP, draw_frame
 
 Floats = npt.NDArray[np.float64]
 

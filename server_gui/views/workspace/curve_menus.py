@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from PySide6.QtWidgets import QMenu
 
-from gateway.plain import plain
+from gateway.plain_text import plain
 from server_gui.core.workspace.scene import Scene
 from server_gui.core.workspace.workspace import said
 

@@ -22,7 +22,7 @@ from server_gui.core.desk import station as station_module
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.events import BusesSeen, Described, Event, Journalled, LinkChanged, Looked
-from server_gui.core.follow.moment import one_moment
+from server_gui.core.follow.frame_time import one_moment
 from server_gui.core.follow.news import News, NewsKind
 from tests.support.desk import JOINTS, Bench, described, looked, telemetry, walking
 
