@@ -1,5 +1,6 @@
 """What models say of a robot, in marks and words for header and overview; also that they do not know."""
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Final
@@ -21,6 +22,7 @@ ACTIVITY, FALLING, GAIT_PHASE = "activity", "falling", "gait_phase"
 STEADY: Final = "steady"
 FEW: Final = 3  # classes of which one is true: more are no news
 LEAST: Final = 0.01  # what is less probable is not worth a word
+PROBABLE: Final = re.compile(r" \d+ %$")
 TITLES: Final = {FALLING: "Balance", GAIT_PHASE: "Stride"}
 LEARNED: Final = {state: ("ring", "dim", state.value) for state in State} | {
     State.OFFERED: ("diamond", "accent", "offered"),
@@ -140,7 +142,8 @@ def doing(station: Station) -> tuple[str, ...]:
     line, gait = activity(station), station.processing.derived().gait
     walks = gait.walking and gait.cadence_spm is not None and line.mark.word != STOPPED
     cadence = f"{line.text} {gait.cadence_spm:.0f} steps/min" if walks else line.short_text
-    return tuple(dict.fromkeys((f"{cadence} · {count}", f"{line.short_text} · {count}", count)))
+    least = f"{PROBABLE.sub('', line.short_text)} · {count.replace(' of ', '/')}"
+    return tuple(dict.fromkeys((f"{cadence} · {count}", f"{line.short_text} · {count}", least, count)))
 
 
 def lines(station: Station) -> Iterator[PredictionRow]:

@@ -32,6 +32,11 @@ def test_a_card_says_what_its_robot_does_also_beside_an_alarm_and_nothing_of_the
     first, second = around.robots.cards
     assert first.texts[3].endswith("0 of 6 enabled")
     assert second.texts[3].endswith("6 of 6 enabled")
+    assert second._doing.is_whole
+    first.resize(200, first.height())
+    assert "·" in first._doing.shown, (
+        "what the wearer does is left out where there is room for it in few words"
+    )
     other.take([LinkChanged(ConnectionState.WAITING, "gone", time.monotonic_ns())])
     settle(around, bench)
     assert second.texts[3] == "what it does is not known"
