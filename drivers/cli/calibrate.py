@@ -58,7 +58,7 @@ def main(arguments: Sequence[str]) -> int:
     kind, *rest = arguments
     parser = argparse.ArgumentParser(prog=f"gwrms calibrate {kind}")
     parser.add_argument("port", metavar="PORT")
-    parser.add_argument("--write", type=Path, required=True, metavar="FILE", help="where the result goes")
+    parser.add_argument("--write", type=Path, required=True, metavar="FILE", help="file for the result")
     return run_parsed(parser, kinds[kind](parser), rest)
 
 
@@ -75,9 +75,9 @@ def _insole_options(parser: argparse.ArgumentParser) -> Callable[[argparse.Names
     parser.add_argument(
         "--layout", help=f"a shipped layout or a .toml file; default: the device's own, else {USUAL_LAYOUT}"
     )
-    parser.add_argument("--foot", choices=("left", "right"), help="where both feet are on the port")
-    parser.add_argument("--falling", type=float, metavar="FULL_SCALE", help="fewer counts are more load")
-    parser.add_argument("--saturation", type=float, help="counts from which a cell says no more")
+    parser.add_argument("--foot", choices=("left", "right"), help="needed if both feet are on the port")
+    parser.add_argument("--falling", type=float, metavar="FULL_SCALE", help="fewer counts mean more load")
+    parser.add_argument("--saturation", type=float, help="counts at which a cell saturates")
     parser.add_argument("--power", action="store_true", help="fit a power law (two different loads or more)")
     return _insole
 

@@ -25,12 +25,14 @@ AXES = "# which of its axes point forward, left and up; here as its maker means 
 
 
 def options(parser: argparse.ArgumentParser) -> Callable[[argparse.Namespace], int]:
-    parser.add_argument("port", metavar="PORT", help="best a stable path: /dev/serial/by-id/…")
+    parser.add_argument("port", metavar="PORT", help="preferably a stable path: /dev/serial/by-id/…")
     parser.add_argument("--baud", type=int, help="try this baud rate only")
     parser.add_argument(
-        "--seconds", type=float, help="show it live for so long (0: not at all; default: Ctrl-C)"
+        "--seconds", type=float, help="show live values for so long (0: not at all; default: until Ctrl-C)"
     )
-    parser.add_argument("--json", action="store_true", help="one JSON line: what was found, with the table")
+    parser.add_argument(
+        "--json", action="store_true", help="print the result as one JSON line, with the table"
+    )
     return run
 
 

@@ -45,8 +45,10 @@ class Figure(Struct, frozen=True):
 
 def main(argv: list[str]) -> int:
     """Run `gwrms bench`."""
-    made = parser("bench", "Measure a robot's gateway: latency, CPU and memory of what it does.", EPILOG)
-    made.add_argument("--requests", type=_count, default=REQUESTS, help="of each kind (default: %(default)d)")
+    made = parser("bench", "Measure a robot's gateway: latency, CPU and memory.", EPILOG)
+    made.add_argument(
+        "--requests", type=_count, default=REQUESTS, help="requests of each kind (default: %(default)d)"
+    )
     arguments = made.parse_args(argv)
     figures = []
     with connect(arguments, "bench") as robot:

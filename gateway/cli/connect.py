@@ -43,7 +43,7 @@ def parser(command: str, what: str, epilog: str = "") -> argparse.ArgumentParser
         allow_abbrev=False,
     )
     add_robot(made)
-    made.add_argument("--json", action="store_true", help="one JSON object a line, for machines")
+    made.add_argument("--json", action="store_true", help="print one JSON object per line, for programs")
     return made
 
 

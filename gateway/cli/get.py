@@ -16,12 +16,12 @@ EPILOG = """examples:
 
 def main(argv: list[str]) -> int:
     """Run `gwrms get`."""
-    made = parser("get", "Read parameters from the devices, now.", EPILOG)
+    made = parser("get", "Read parameters from the devices.", EPILOG)
     made.add_argument(
         "names",
         metavar="GLOB",
         nargs="*",
-        help="names, addresses, globs, or a component (default: all that can be changed)",
+        help="names, addresses, globs, or a component (default: all writable ones)",
     )
     add_degrees(made)
     arguments = made.parse_args(argv)

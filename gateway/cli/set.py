@@ -66,17 +66,17 @@ def main(argv: list[str]) -> int:
         metavar="NAME[=VALUE[UNIT]]",
         nargs="+",
         type=change_of,
-        help="in the parameter's own unit, or in another: 3deg, 420mm, 30rpm",
+        help="value, in the parameter's own unit or another: 3deg, 420mm, 30rpm",
     )
     whom = made.add_mutually_exclusive_group()
-    whom.add_argument("--mirror", action="store_true", help="the same joint of the other side takes it, too")
-    whom.add_argument("--all-joints", action="store_true", help="every joint takes it")
+    whom.add_argument("--mirror", action="store_true", help="also set the same joint of the other side")
+    whom.add_argument("--all-joints", action="store_true", help="set every joint")
     made.add_argument(
         "--leave-out",
         action="append",
         default=[],
         metavar="JOINT",
-        help="with these: a joint that stays as it is (again: more)",
+        help="with these: skip this joint (repeatable)",
     )
     add_trial(made)
     arguments = made.parse_args(argv)

@@ -17,7 +17,7 @@ def add_wearer(parser: argparse.ArgumentParser) -> None:
         help=f"how they walk: {', '.join(NAMES)} (default: %(default)s)",
     )
     parser.add_argument(
-        "--assists", choices=SIDES, metavar="SIDE", help="the only leg that the robot is on, left or right"
+        "--assists", choices=SIDES, metavar="SIDE", help="the only leg with a robot, left or right"
     )
 
 

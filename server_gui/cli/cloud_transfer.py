@@ -42,7 +42,7 @@ examples
 
 def upload(argv: list[str]) -> int:
     """Run `gwrms cloud upload`."""
-    made = parser("cloud upload", "What waits in the spool, now; or a whole store.", UPLOAD_EPILOG)
+    made = parser("cloud upload", "Upload pending data of the spool, or copy a whole store.", UPLOAD_EPILOG)
     add_url(made, "url")
     made.add_argument("--from", dest="source", metavar="URL", help="the store to copy")
     arguments = made.parse_args(argv)
@@ -110,11 +110,15 @@ def _empty(folder: Path, arguments: argparse.Namespace) -> int:
 
 def download(argv: list[str]) -> int:
     """Run `gwrms cloud download`."""
-    made = parser("cloud download", "A store, or some of it, into a folder: a store too.", DOWNLOAD_EPILOG)
+    made = parser(
+        "cloud download",
+        "Download a store, or a part of it, to a folder, which is a store too.",
+        DOWNLOAD_EPILOG,
+    )
     add_url(made, "url")
     made.add_argument("--out", type=Path, required=True, metavar="FOLDER", help="where to")
-    made.add_argument("--robot", action="append", metavar="GLOB", help="these alone; repeat for more")
-    made.add_argument("--session", action="append", metavar="NAME", help="these alone; repeat for more")
+    made.add_argument("--robot", action="append", metavar="GLOB", help="only these; repeatable")
+    made.add_argument("--session", action="append", metavar="NAME", help="only these; repeatable")
     arguments = made.parse_args(argv)
     target = arguments.out.absolute().as_uri()
     if arguments.robot is None and arguments.session is None:

@@ -251,7 +251,7 @@ def _instant(utc_s: float) -> str:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="gwrms collect",
-        description="Record every robot, whole, into the store; and ask how that goes.",
+        description="Record all robots into the store; show the status of the running collector.",
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
@@ -263,19 +263,21 @@ def _parser() -> argparse.ArgumentParser:
         action="append",
         default=[],
         metavar="NAME=HOST:PORT",
-        help="a robot beside those of the file; again for another one",
+        help="a robot in addition to those of the file; repeatable",
     )
-    parser.add_argument("--operator", default="", metavar="WHO", help="who records; kept with the sessions")
+    parser.add_argument(
+        "--operator", default="", metavar="WHO", help="operator's name; kept with the sessions"
+    )
     parser.add_argument("--notes", default="", metavar="TEXT", help="kept with the sessions")
     add_worn(parser)
     asking = parser.add_mutually_exclusive_group()
-    asking.add_argument("--status", action="store_true", help="ask the collector that runs how it goes")
-    asking.add_argument("--upload", action="store_true", help="tell it to upload what waits, now")
-    asking.add_argument(
-        "--mark", metavar="TEXT", help="tell it to mark this instant in every robot's recording"
-    )
+    asking.add_argument("--status", action="store_true", help="show the status of the running collector")
+    asking.add_argument("--upload", action="store_true", help="make it upload pending data now")
+    asking.add_argument("--mark", metavar="TEXT", help="mark this instant in every robot's recording")
     asking.add_argument("--unit", action="store_true", help="print a systemd unit for this installation")
-    parser.add_argument("--json", action="store_true", help="with --status: one JSON object, for machines")
+    parser.add_argument(
+        "--json", action="store_true", help="with --status: print one JSON object, for programs"
+    )
     return parser
 
 

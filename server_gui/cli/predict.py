@@ -256,33 +256,35 @@ def _say_replayed(session: Session, found: Sequence[Replayed]) -> None:
 
 
 def _parser() -> argparse.ArgumentParser:
-    made = parser("predict", "What robot and wearer are doing, and how far to believe that.", EPILOG)
+    made = parser(
+        "predict", "Predict the activity of robot and wearer, with the trust in the models.", EPILOG
+    )
     made.add_argument(
         "--robot",
         action="append",
         default=[],
         metavar="NAME|[NAME=]HOST:PORT",
-        help="live: a robot of the server's file, or where one is; repeat for more",
+        help="live: a robot of the server's file, or its address; repeatable",
     )
-    made.add_argument("--seconds", type=seconds, metavar="N", help="live: end after so long")
+    made.add_argument("--seconds", type=seconds, metavar="N", help="live: duration")
     made.add_argument(
         "--session",
         action="append",
         default=[],
         metavar="SESSION",
-        help="over a recording: its name, or how that alone begins; repeat for more",
+        help="over a recording: its name, which may be abbreviated; repeatable",
     )
     made.add_argument(
         "--model",
         action="append",
         default=[],
         metavar="ID",
-        help="over a recording: this instead of the serving one; repeat for more",
+        help="over a recording: use this model instead of the serving one; repeatable",
     )
     made.add_argument(
         "--rules",
         action="store_true",
-        help="over recordings: what the rules of the server's file would have done",
+        help="over recordings: rehearse the rules of the server's file",
     )
     made.add_argument(
         "--benchmark", choices=BENCHMARKS, metavar="NAME", help=f"with --rules: {', '.join(BENCHMARKS)}"
