@@ -80,7 +80,7 @@ OUR_PACKAGES = frozenset({"gateway", "drivers", "eds", "server_gui", "ml", "hil_
 
 
 def usage() -> str:
-    """The manual's first page."""
+    """Return the manual's first page."""
     width = max(map(len, COMMANDS))
     lines = [
         "usage: gwrms COMMAND [ARGUMENTS]",
@@ -105,7 +105,7 @@ def find(name: str) -> Callable[[list[str]], int]:
 
 
 def explain(error: Exception, command: str) -> str:
-    """An exception of a command as the sentences a user can act on."""
+    """Return an exception of a command as the sentences a user can act on."""
     if isinstance(error, ModuleNotFoundError) and error.name is not None:
         from gateway import missing_extras
 
@@ -119,7 +119,7 @@ def explain(error: Exception, command: str) -> str:
 
 
 def _help_without(error: Exception, arguments: Sequence[str]) -> str | None:
-    """The help that was asked for, of a command of which a package is missing."""
+    """Return the help that was asked for, of a command of which a package is missing."""
     if not isinstance(error, ModuleNotFoundError):
         return None
     from gateway import missing_extras
@@ -148,7 +148,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _replace_closed_streams() -> None:
-    """What whoever started us has closed goes nowhere; nothing that is opened later takes its number."""
+    """Open closed standard streams to nowhere, so that no later file takes their numbers."""
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
             setattr(sys, name, open(os.devnull, mode))  # noqa: PTH123, SIM115 - for as long as we run

@@ -188,7 +188,7 @@ def _insole_on_port(options: argparse.Namespace) -> _Sole:
 
 
 def _insole_in_file(where: str) -> _Sole | None:
-    """The insole at `ROBOT.toml:NAME`; `None` for a port.
+    """Return the insole at `ROBOT.toml:NAME`; `None` for a port.
 
     Raises:
         SettingsError: the file, its table or the layout cannot be used.
@@ -225,7 +225,7 @@ def _imu_on_port(options: argparse.Namespace) -> Imu:
 
 
 def _imu_in_file(where: str) -> TrunkImu | None:
-    """The IMU at `ROBOT.toml:NAME`, with no zero yet; `None` for a port.
+    """Return the IMU at `ROBOT.toml:NAME`, with no zero yet; `None` for a port.
 
     Raises:
         SettingsError: the file or its table cannot be used.
@@ -256,7 +256,7 @@ def _average(line: Line[InsoleFrame], foot: Foot | None, cells: int) -> list[flo
 
 
 def _mass() -> float | None:
-    """The next known load in kg; `None` when there are no more."""
+    """Return the next known load in kg; `None` when there are no more."""
     while True:
         _say("Put a known load on the whole insole, type its mass in kg and press Enter (empty: done).")
         text = _read()

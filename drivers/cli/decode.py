@@ -99,7 +99,7 @@ def _line(values: dict[str, object]) -> str:
 
 
 def _with_load(layout: Layout) -> Flatten:
-    """Adds pressure, force and centre of pressure where the layout says enough."""
+    """Add pressure, force and centre of pressure where the layout suffices."""
     count = len(layout.cells)
     cells = Cells(layout.calibration, count) if layout.calibration is not None and count else None
 

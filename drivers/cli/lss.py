@@ -157,7 +157,7 @@ class _Task:
             sys.stdout.write(msgspec.json.encode(found).decode() + "\n")
 
     def device(self) -> Device:
-        """The device that is meant, as it is now."""
+        """Return the device that is meant, as it is now."""
         text = self.options.device
         if text == "new":
             found = unconfigured(self.master)
@@ -232,7 +232,7 @@ def _set(task: _Task) -> int:
 
 
 def _plan(device: Device, node_id: int | None, bitrate: int | None, *, stored: bool) -> Iterator[str]:
-    """What will happen, line by line."""
+    """Yield what will happen, line by line."""
     if node_id is not None:
         keeps = "stores that" if stored else "forgets that when it is switched off"
         yield f"  it becomes node {node_id}, and {keeps}"

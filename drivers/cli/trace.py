@@ -138,7 +138,7 @@ def _live(buses: Mapping[str, CanSettings]) -> Batches:
 
 
 def _robot(sources: Sequence[str]) -> Path | None:
-    """A robot's file among what is traced."""
+    """Return a robot's file among what is traced."""
     return next((Path(name) for name in sources if name.endswith(".toml")), None)
 
 
@@ -188,7 +188,7 @@ class Shown:
         self._with_interface = with_interface
 
     def line(self, captured: Captured) -> str | None:
-        """What is shown of a frame; `None` where it is not wanted."""
+        """Return what is shown of a frame; `None` where it is not wanted."""
         interface = captured.interface
         if interface not in self._decoders:
             self._decoders[interface] = Decoder(Devices(self._known.on(interface)))

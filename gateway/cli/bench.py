@@ -92,7 +92,7 @@ def _took_ms(ask: Callable[[], object]) -> float:
 
 
 def _with_psutil(requests: int) -> Figure:
-    """The same table as `every process`, by a plain loop of psutil in this process."""
+    """Return the same table as `every process`, by a plain loop of psutil in this process."""
 
     def ask() -> None:
         for one in psutil.process_iter(["pid", "name", "cpu_percent", "memory_info"]):
@@ -134,7 +134,7 @@ def _ages_ms(batch: Batch, offset: ClockOffset | None) -> list[float]:
 
 
 def _quantiles(values: list[float]) -> tuple[float | None, float | None]:
-    """The median, and what 99 % stay below."""
+    """Return the median, and what 99 % stay below."""
     if not values:
         return None, None
     values = sorted(values)

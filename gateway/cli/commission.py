@@ -98,7 +98,7 @@ def _lead(
 
 
 def _known_to(file: Path) -> Draft:
-    """What was found; where that cannot be read nothing is known, and a stop asks all."""
+    """Return what was found; where that cannot be read nothing is known, and a stop asks all."""
     try:
         return Draft(file)
     except SettingsError as error:
@@ -107,7 +107,7 @@ def _known_to(file: Path) -> Draft:
 
 
 def _not_stopped(draft: Draft, bench: CanBench, why: str, lines: Lines | None) -> int:
-    """A drive that was under power has not confirmed that it is off: it is asked once more."""
+    """Return a drive that was under power has not confirmed that it is off: it is asked once more."""
     warn("commission", f"NOT STOPPED: {why}")
     return stop_drives(draft, bench, as_json=lines is not None) or 1
 

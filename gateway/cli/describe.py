@@ -91,7 +91,7 @@ def _profiles(components: list[ComponentInfo]) -> Iterator[str]:
 
 
 def _channels(channels: list[ChannelInfo]) -> str:
-    """The channels by component, numbered ones as one, and once for each state what it can be."""
+    """Return the channels by component, numbered ones as one, and once for each state what it can be."""
     by_component: dict[str, dict[str, str]] = {}
     for channel in channels:
         quantity, unit = (

@@ -51,5 +51,5 @@ def _row(info: ParameterInfo, value: ParameterValue, unit: Unit) -> tuple[str, .
 
 
 def _text(value: float | None, unit: Unit) -> str:
-    """A value with every digit that it has; in another unit, with those that are worth reading."""
+    """Return a value with every digit that it has; in another unit, with those that are worth reading."""
     return exact(value) if value is None or unit.symbol == unit.si else f"{value * unit.scale:.6g}"

@@ -114,7 +114,7 @@ def _write(service: Service, into: Path) -> None:
 
 
 def _say_how(service: Service, into: Path, stale: Sequence[str]) -> None:
-    """The commands that follow; `stale` are units of before, for a file that has changed since."""
+    """Print the next commands; `stale` are old units, for a file that has changed since."""
     sudo, systemctl = ("", "systemctl --user") if service.of_user else ("sudo ", "sudo systemctl")
     say("\nNow:\n")
     if stale:

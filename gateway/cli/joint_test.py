@@ -210,7 +210,10 @@ def _load(file: Path, joint: str) -> RobotConfig:
 
 @contextmanager
 def _records(config: RobotConfig) -> Iterator[Records]:
-    """The robot's records, for this command alone: no gateway runs meanwhile, and none has left something."""
+    """Return the robot's records, for this command alone.
+
+    No gateway runs meanwhile, and none has left something.
+    """
     records = Records(config.records)
     try:
         if records.unusable is not None:
@@ -309,7 +312,7 @@ def _stop(file: Path, joint: str, *, as_json: bool) -> int:
 
 
 def _cut_off(config: RobotConfig) -> str | None:
-    """What a test has left that nobody leads any more, in words."""
+    """Return what a test has left that nobody leads any more, in words."""
     folder = RecordsFolder(config.records)
     try:
         folder.open()

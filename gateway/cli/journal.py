@@ -149,7 +149,10 @@ def _witnesses(arguments: argparse.Namespace) -> tuple[list[SignedHead], list[st
 
 
 def _key(arguments: argparse.Namespace) -> tuple[str | None, list[str]]:
-    """The fingerprint of the robot's key: as given, the robot's own, or that of the only paired robot."""
+    """Return the fingerprint of the robot's key.
+
+    As given, the robot's own, or that of the only paired robot.
+    """
     if arguments.key is not None or not arguments.witness:
         return arguments.key, []
     if arguments.path.suffix == ".toml":

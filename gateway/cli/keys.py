@@ -108,7 +108,7 @@ def _show(listener: socket.socket, code: str, own: str) -> None:
 
 
 def _drawn(text: str) -> list[str]:
-    """The same for a camera, where this is a terminal that can show it."""
+    """Return the same for a camera, where this is a terminal that can show it."""
     try:
         "█▀▄".encode(sys.stdout.encoding or "ascii")
         return [*qr_code.lines(text), ""] if sys.stdout.isatty() else []
@@ -125,7 +125,7 @@ def _address() -> str:
 
 
 def _confirmed(candidate: Candidate, arguments: argparse.Namespace, folder: AccessFolder) -> tuple[str, Role]:
-    """What the person here says; raises `PairingEnded` where they refuse."""
+    """Return what the person here says; raises `PairingEnded` where they refuse."""
     if arguments.yes:
         return arguments.name, arguments.role
     wished = arguments.name or (candidate.name if NAME.fullmatch(candidate.name) else "")
@@ -156,7 +156,7 @@ def _role() -> Role:
 
 
 def _asked(question: str) -> str:
-    """Raises `PairingEnded` where the terminal has closed."""
+    """Ask a question; raises `PairingEnded` if the terminal has closed."""
     say(question)
     line = sys.stdin.buffer.readline()
     if not line:
@@ -220,7 +220,7 @@ def _parser(command: str, what: str) -> argparse.ArgumentParser:
 
 
 def _robot(arguments: argparse.Namespace) -> tuple[config.RobotConfig, AccessFolder]:
-    """The robot of the file, and its folder on the disk, whoever runs this."""
+    """Return the robot of the file, and its folder on the disk, whoever runs this."""
     robot = config.load(arguments.config)
     return robot, AccessFolder(robot.access, {})
 

@@ -114,7 +114,7 @@ def _read(file: Path) -> bytes:
 
 
 def _added(host: str, name: str, pem: bytes, arguments: argparse.Namespace) -> dict[str, Any]:
-    """What the robot answers; raises `KeyProblem` with what it says where it refuses."""
+    """Return what the robot answers; raises `KeyProblem` with what it says where it refuses."""
     ssh = shutil.which("ssh")
     if ssh is None:
         raise KeyProblem("the program ssh is not here: apt install openssh-client")
@@ -130,7 +130,7 @@ def _added(host: str, name: str, pem: bytes, arguments: argparse.Namespace) -> d
 
 
 def _answer(output: bytes) -> dict[str, Any]:
-    """The last line, because a login may print others before."""
+    """Return the last line, because a login may print others before."""
     lines = output.strip().splitlines()
     try:
         found = json.loads(lines[-1]) if lines else None

@@ -110,7 +110,7 @@ def _show_directly(arguments: argparse.Namespace) -> int:
 
 
 def _component(device: str, description: Description) -> str:
-    """The component's name; of a node with several the first, whose EDS is that of all."""
+    """Return the component's name; of a node with several the first, whose EDS is that of all."""
     if not device.isdecimal():
         return device
     nodes = {node.node_id: node.components for bus in description.buses for node in bus.nodes}
@@ -167,7 +167,7 @@ def _set(robot: Robot, found: ObjectList, description: Description, arguments: a
 
 
 def _value(text: str) -> Change:
-    """A value and its unit, for a parameter that is not known yet."""
+    """Return a value and its unit, for a parameter that is not known yet."""
     try:
         return change_of(f"object={text}")
     except argparse.ArgumentTypeError as error:

@@ -97,7 +97,7 @@ def _typed(arguments: argparse.Namespace) -> tuple[Address, str]:
 
 
 def _asked(question: str, arguments: argparse.Namespace) -> str:
-    """A line of the standard input; where a person types it, they are asked.
+    """Return a line of the standard input; where a person types it, they are asked.
 
     Raises:
         NobodyToAsk: the input has ended.

@@ -22,7 +22,7 @@ def add_wearer(parser: argparse.ArgumentParser) -> None:
 
 
 def speed(text: str) -> float | None:
-    """Simulated over real time; `None` for `max`, as fast as it goes."""
+    """Parse the speed, simulated over real time; `None` for `max`, as fast as possible."""
     if text == "max":
         return None
     value = number(text)

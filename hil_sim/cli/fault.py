@@ -81,7 +81,7 @@ def main(argv: list[str]) -> int:
 
 
 def _request(parser: argparse.ArgumentParser, arguments: argparse.Namespace) -> dict[str, Any]:
-    """What is meant, as the socket takes it; leaves with the usage where nothing is."""
+    """Return what is meant, as the socket takes it; leaves with the usage where nothing is."""
     if arguments.dir is None:
         parser.error("--dir DIR says which simulator")
     given: dict[str, Any] = {
@@ -122,7 +122,7 @@ def _params(parser: argparse.ArgumentParser, words: list[str]) -> dict[str, str]
 
 
 def _told(answer: dict[str, Any]) -> str:
-    """An answer in words."""
+    """Return an answer in words."""
     if "begun" in answer:
         return f"begun: {_active(answer['begun'])}\n"
     for key in ("cleared", "active"):

@@ -228,7 +228,10 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _parse(argv: list[str]) -> tuple[argparse.Namespace, Script]:
-    """What is asked for; where a script is named, its `[robot]` stands for the options that are not given."""
+    """Return what is asked for.
+
+    Where a script is named, its `[robot]` stands for the options that are not given.
+    """
     parser = _parser()
     arguments = parser.parse_args(argv)
     if arguments.script is None:
@@ -246,7 +249,7 @@ def _parse(argv: list[str]) -> tuple[argparse.Namespace, Script]:
 
 
 def _drives(words: list[str]) -> dict[str, Path]:
-    """The files of `--drive`, looked for in the working folder and among those that ship."""
+    """Return the files of `--drive`, looked for in the working folder and among those that ship."""
     return personality.choose(words, JOINTS, Path.cwd() / "here")
 
 

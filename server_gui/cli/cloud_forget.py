@@ -107,7 +107,7 @@ def _question(store: Store, known: Plan) -> str:
 
 
 def _say(arguments: argparse.Namespace, known: Plan) -> None:
-    """What there is of them."""
+    """Print their data."""
     if arguments.json:
         return
     if not known.sessions:
@@ -126,7 +126,7 @@ def _say(arguments: argparse.Namespace, known: Plan) -> None:
 
 
 def _not_reached(known: Plan) -> Iterator[str]:
-    """What nobody here can look into."""
+    """Yield what nobody here can look into."""
     if known.others:
         yield (
             f"not looked into: the spools of other computers that write to this store "
@@ -165,5 +165,5 @@ def _tell(arguments: argparse.Namespace, known: Plan, left: Sequence[str]) -> in
 
 
 def _moved(known: Plan) -> list[str]:
-    """What was exported and is there no more: removed, or somewhere else with all its rows."""
+    """Return what was exported and is there no more: removed, or somewhere else with all its rows."""
     return [each.place for each in known.exported if each.state is State.GONE]

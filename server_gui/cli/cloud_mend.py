@@ -89,7 +89,7 @@ def _question(plan: mending.Plan) -> str:
 
 
 def _store(arguments: argparse.Namespace, folder: Path) -> Again:
-    """The store to mend; made anew where batches went to one that is no more."""
+    """Return the store to mend; made anew where batches went to one that is no more."""
     wanted, settings = url(arguments), load(arguments.config).store
     try:
         store = Again.existing(wanted)
@@ -108,7 +108,7 @@ def _store(arguments: argparse.Namespace, folder: Path) -> Again:
 
 
 def _check_shards(wanted: str, shards: int) -> None:
-    """That what says how many there are is made anew as it was."""
+    """Check that the number of shards is known before `store.json` is written again."""
     there = {name.split("/")[1] for name in Objects(wanted).names(TELEMETRY.name)}
     if len(there) > shards:
         raise StoreError(

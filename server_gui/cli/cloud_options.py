@@ -34,7 +34,7 @@ def parser(command: str, what: str, epilog: str = "") -> argparse.ArgumentParser
 
 
 def add_url(made: argparse.ArgumentParser, name: str = "--url") -> None:
-    """The argument that names another store than the server's file does."""
+    """Add the argument for a store other than that of the server's file."""
     made.add_argument(
         name,
         nargs="?",
@@ -104,7 +104,7 @@ def when(time: datetime | None) -> str:
 
 @contextlib.contextmanager
 def progress(what: str, total: int, *, bytes_: bool = False) -> Iterator[Advance]:
-    """A bar on stderr that goes on with each call, where that is a terminal."""
+    """Return a bar on stderr that goes on with each call, where that is a terminal."""
     if not sys.stderr.isatty():
         yield lambda _: None
         return

@@ -76,7 +76,7 @@ def upload(argv: list[str]) -> int:
 
 
 def _note(arguments: argparse.Namespace) -> None:
-    """The spool's receipts say from now on that its batches are in the copy too, so that this is missed."""
+    """Note in the spool's receipts that its batches are in the copy too, so that a loss is noticed."""
     folder = load(arguments.config).recorder.spool
     if not (folder / RECEIPTS).exists():
         return
@@ -127,7 +127,7 @@ def download(argv: list[str]) -> int:
 
 
 def _copy(source: str, target: str, arguments: argparse.Namespace) -> int:
-    """A whole store."""
+    """Return a whole store."""
     store = Store.existing(source)
     from_, to = store.objects, transfer.open_target(store, target)
     exports.note_copy(target)
@@ -158,7 +158,7 @@ def _copy_parts(source: Store, target: Store, arguments: argparse.Namespace) -> 
 
 
 def _chosen(source: Store, arguments: argparse.Namespace) -> tuple[Sequence[Session], set[str]]:
-    """The sessions that are wanted, and the robots of which everything is."""
+    """Return the sessions that are wanted, and the robots of which everything is."""
     globs = arguments.robot or ("*",)
     known = [
         session

@@ -131,7 +131,7 @@ def _collect(settings: ServerSettings, operator: str, notes: str, worn: Worn) ->
 
 
 def _log_to_stderr() -> None:
-    """A line each; in systemd's journal without the time, which it has itself."""
+    """Log lines; in systemd's journal without the time, which it adds itself."""
     time = "" if "JOURNAL_STREAM" in os.environ else "%(asctime)s "
     logging.basicConfig(level=logging.WARNING)
     for handler in logging.getLogger().handlers:
@@ -188,7 +188,7 @@ def _batches(count: int) -> str:
 
 
 def _predicted(state: PredictingState | None) -> list[str]:
-    """What models say of the robots, and what is wrong with models."""
+    """Return what models say of the robots, and what is wrong with models."""
     if state is None:
         return ["prediction is off\n"]
     rows = [

@@ -240,7 +240,7 @@ def _plan(command: str, arguments: argparse.Namespace, planned: Planner) -> tupl
 
 
 def _held(robot: Robot, name: str) -> float:
-    """What the device holds; one that has been asked nothing for a while may not have answered yet."""
+    """Return what the device holds; one that has been asked nothing for a while may not have answered yet."""
     until_s = time.monotonic() + REACH_S
     while True:
         held = robot.read(name).values[name]
@@ -348,7 +348,10 @@ def _keep(told: Told, arguments: argparse.Namespace, command: str) -> None:
 
 
 def _recording(spool: Path, calls_itself: str) -> tuple[str, str]:
-    """What the robot is called where it is recorded, and the recording; as it calls itself, and none."""
+    """Return what the robot is called where it is recorded, and the recording.
+
+    As it calls itself, and none.
+    """
     try:
         report = msgspec.json.decode(ask(spool, "status"), type=CollectorReport)
     except (NobodyCollects, ClientError, msgspec.DecodeError):

@@ -249,7 +249,7 @@ def _registry(arguments: argparse.Namespace) -> Registry:
 
 
 def _named(registry: Registry, text: str) -> str:
-    """The one model whose name this is, or begins so.
+    """Return the one model whose name this is, or begins so.
 
     Raises:
         UnusableModel: there is none, or there are several.

@@ -73,7 +73,7 @@ def main(argv: list[str]) -> int:
 
 
 def _settings(arguments: argparse.Namespace) -> ServerSettings:
-    """The server's file, with another store where one is named; here prediction is always on."""
+    """Return the server's file, with another store where one is named; here prediction is always on."""
     settings = load(arguments.config)
     replace = msgspec.structs.replace
     store = replace(settings.store, url=arguments.url) if arguments.url else settings.store
@@ -174,7 +174,7 @@ def _show_json(_live: Live, news: Sequence[PredictionNews]) -> None:
 
 
 def _show_new(news: Sequence[PredictionNews], said: dict[tuple[str, str], str]) -> None:
-    """A line for each change."""
+    """Print a line for each change."""
     for one in news:
         match one:
             case Predicted(prediction=prediction):
@@ -241,7 +241,7 @@ def _sessions(settings: ServerSettings, arguments: argparse.Namespace) -> int:
 
 
 def _say_replayed(session: Session, found: Sequence[Replayed]) -> None:
-    """A line a decision, then one a task."""
+    """Print a line per decision, then one per task."""
     whose = {"robot": session.robot, "session": session.session}
     for one in found:
         for prediction, utc_ns in zip(one.predictions, one.utc_ns, strict=True):

@@ -188,7 +188,7 @@ def _told(
 
 
 def _value(value: object) -> str:
-    """A parameter's, as what changed between sessions is told; whole numbers keep all their digits."""
+    """Return a parameter's, as what changed between sessions is told; whole numbers keep all their digits."""
     rounds = isinstance(value, float) and not value.is_integer()
     return f"{value:.{DIGITS}g}" if rounds else str(value)
 

@@ -70,7 +70,7 @@ def main(argv: list[str]) -> int:
 
 
 def _settings() -> "ServerSettings | None":
-    """What the server's file says; one that cannot be read hinders nobody."""
+    """Return what the server's file says; one that cannot be read hinders nobody."""
     from server_gui.core.settings.server_file import SettingsError, load
 
     try:

@@ -72,7 +72,7 @@ def main(argv: list[str]) -> int:
 
 
 def _trained(registry: Registry, wish: Wish, arguments: argparse.Namespace) -> "Trained":
-    """What came of it; says what it does first, for even loading what learns takes its seconds."""
+    """Return what came of it; says what it does first, for even loading what learns takes its seconds."""
     tell = _teller(arguments)
     if not arguments.json:
         warn("train", f"{wish.task}, from the sessions and labels of {registry.url}")
@@ -82,7 +82,7 @@ def _trained(registry: Registry, wish: Wish, arguments: argparse.Namespace) -> "
 
 
 def _teller(arguments: argparse.Namespace) -> Tell:
-    """What tells how far it is: for machines in lines of JSON before the answer."""
+    """Return what tells how far it is: for machines in lines of JSON before the answer."""
     if arguments.json:
         if not arguments.progress:
             return untold
@@ -153,7 +153,7 @@ def _figures(judged: Judged) -> Iterator[tuple[str, str, str]]:
 
 
 def _flat(metrics: Metrics) -> Mapping[str, float]:
-    """The figures that people ask for, then classes and people."""
+    """Return the figures that people ask for, then classes and people."""
     found: dict[str, float] = {name: metrics.figures[name] for name in FIGURES if name in metrics.figures}
     if metrics.calibration_error is not None:
         found["calibration_error"] = metrics.calibration_error
