@@ -70,8 +70,9 @@ def decide(task: Task, held_out: Judged, regression: Judged | None) -> Decision:
         return _without_serving(task, held_out, figure)
     old = held_out.serving.figures[figure]
     gain = new - old if task.fold else old - new
+    ours, its = _percents(task, new, old)
     reasons = [
-        f"{figure} on {held_out.name}: {new:.4g}, the serving model's {old:.4g}"
+        f"{figure} on {held_out.name}: {ours}, the serving model's {its}"
         + ("" if gain > 0 else ": not better")
     ]
     losses = [loss for each in (held_out, regression) if each is not None for loss in _losses(task, each)]
@@ -82,8 +83,9 @@ def _without_serving(task: Task, held_out: Judged, figure: str) -> Decision:
     """Nothing serves: so it must be better than saying always the same."""
     new, idle = held_out.new.figures[figure], held_out.new.figures["idle"]
     better = new > idle if task.fold else new < idle
+    ours, its = _percents(task, new, idle)
     told = (
-        f"{figure} on {held_out.name}: {new:.4g}; saying always the same has {idle:.4g}; "
+        f"{figure} on {held_out.name}: {ours}; saying always the same has {its}; "
         "no model that was promoted serves yet"
     )
     return Decision(better, (told,))
@@ -97,15 +99,30 @@ def _losses(task: Task, found: Judged) -> Iterator[str]:
     for name, score in old.per_class.items():
         lost = score.f1 - new.per_class[name].f1
         if score.support >= FEW and lost > MOST_LOST:
-            yield f"much worse in the {found.name}: F1 of {name} falls by {lost:.3f}"
+            yield f"much worse in the {found.name}: F1 of {name} falls by {100 * lost:.1f} points"
     for who, before in old.per_subject.items():
         lost = before - new.per_subject[who] if task.fold else new.per_subject[who] - before
         if found.people[who] >= FEW and lost > (MOST_LOST if task.fold else MOST_LOST_PERCENT):
-            yield f"much worse in the {found.name}: {who} loses {lost:.3g}{'' if task.fold else ' %'}"
+            yield f"much worse in the {found.name}: {who} loses {_points(task, lost)}"
     for name, most in (("calibration_error", MOST_LOST), ("abstained", MOST_ABSTAINED)):
         lost = _figure(new, name) - _figure(old, name)
         if lost > most:
-            yield f"much worse in the {found.name}: {name} rises by {lost:.3f}"
+            yield f"much worse in the {found.name}: {name} rises by {100 * lost:.1f} points"
+
+
+def _percents(task: Task, *figures: float) -> list[str]:
+    """As tables show them, `95.2 %`; with more digits where else they would look alike."""
+    scale = 100.0 if task.fold else 1.0  # an error of the stride is in percent already
+    for digits in range(1, 4):
+        told = [f"{scale * figure:.{digits}f} %" for figure in figures]
+        if len(set(told)) == len(set(figures)):
+            break
+    return told
+
+
+def _points(task: Task, lost: float) -> str:
+    """How much is lost, on the same scale."""
+    return f"{100 * lost if task.fold else lost:.1f} points"
 
 
 def _figure(metrics: Metrics, name: str) -> float:

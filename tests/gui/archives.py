@@ -174,11 +174,16 @@ def cell(shown: Shown, column: int) -> str:
 
 
 def play(shown: Shown, archive: Archive) -> None:
-    """Open the newest recording and play it."""
+    """Open the newest recording, which plays at once, and stand still at its beginning."""
     shown.open("Recordings")
     page = shown.window.tabs.recordings.list
     shown.until(lambda: page.sessions.rowCount(), "listed it")
     page.table.selectRow(0)
     shown.until(lambda: archive.tape, "looked into it")
     page.play.click()
+    assert archive.playback.playing
+    tape = archive.playback.tape
+    assert tape is not None
+    archive.playback.play(on=False)
+    archive.playback.seek(tape.first_ns)
     shown.until(lambda: not archive.playback.is_loading, "showed it")

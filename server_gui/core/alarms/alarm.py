@@ -45,7 +45,8 @@ class Alarm:
         """How it is shown, wherever that is: in its own word, as bad as the worst that it explains."""
         own, worst = TEXTS[self.kind].mark, min((self, *self.under), key=lambda one: _RANK[one.kind])
         shown = TEXTS[worst.kind].mark
-        return own if worst is self else Mark(shown.shape, shown.colour, own.word)
+        # As bad by itself: then in its own shape, so that one word has one mark.
+        return own if shown.colour == own.colour else Mark(shown.shape, shown.colour, own.word)
 
     @property
     def rank(self) -> int:

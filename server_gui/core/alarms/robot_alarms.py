@@ -246,7 +246,7 @@ def _of_part(robot: Robot, part: Part, stopping: StopProgress) -> Iterator[Alarm
         yield Alarm(Kind.UNKNOWN, part.name, what, where, check=check_of(Kind.UNKNOWN), is_now=is_now)
         return
     did = _did(robot, stopping) if part.kind == "joint" else ""
-    what, *advice = _ADVICE.split(problem, maxsplit=1)
+    what, advice = _advised(problem)
     since_s = None if part.age_ms is None or not is_now else time.time() - part.age_ms / 1000
     yield Alarm(
         kind,
@@ -254,12 +254,25 @@ def _of_part(robot: Robot, part: Part, stopping: StopProgress) -> Iterator[Alarm
         what or "it does not say why",
         where,
         did,
-        advice[0] if advice else check_of(kind, part.kind),  # who says what is wrong knows best
+        advice or check_of(kind, part.kind),  # who says what is wrong knows best
         since_s if kind is not Kind.IMPLAUSIBLE else None,
         channel,
         is_now=is_now,
         node=_bus(robot, part.name),
     )
+
+
+def _advised(problem: str) -> tuple[str, str]:
+    """What is wrong and what to check; a robot says both: `this: check that; it goes on; more: …`."""
+    things, advice = list[str](), list[str]()
+    for clause in problem.split("; "):
+        thing, *check = _ADVICE.split(clause, maxsplit=1)
+        if not check and advice:
+            advice[-1] += f"; {clause}"
+        else:
+            things.append(thing)
+            advice += check
+    return "; ".join(things), "; ".join(dict.fromkeys(advice))
 
 
 def _of_those_that_come_up(robot: Robot) -> Iterator[Alarm]:

@@ -15,6 +15,7 @@ from gateway.client import Batch, ConnectionState
 from gateway.wire.component import ChannelInfo, ComponentInfo
 from gateway.wire.robot import Clock, Description, GuardInfo
 from gateway.wire.stop import StopInfo
+from server_gui.core.archive.outline import Outline
 from server_gui.core.archive.recorded_predictions import Said
 from server_gui.core.archive.timeline_events import TimelineEvents
 from server_gui.core.cloud.tape import Rows, Tape
@@ -152,6 +153,7 @@ class Playback:
         self._words: Mapping[str, dict[str, str]] = {}
         self._recall: Recall = nothing_said
         self.happened = TimelineEvents(read, deliver)
+        self.outline = Outline(read, deliver)
         self._said: dict[str, Said] = {}  # the newest of each task
         self._pieces: dict[int, Piece] = {}
         self._reading: int | None = None
@@ -176,6 +178,7 @@ class Playback:
         self.desk.stations = [station]
         self.desk.select(station)
         self.happened.open(tape, _words(tape, words))
+        self.outline.open(tape)
         self.seek(tape.first_ns)
 
     def close(self) -> None:

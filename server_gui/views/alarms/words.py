@@ -64,7 +64,16 @@ def details(one: Active, now_s: float, *, each: bool = False) -> list[str]:
 def fewer(said: list[str]) -> tuple[str, ...]:
     """Return the details as texts of decreasing length: what to check stays longest, then the time."""
     since, check = said[0].partition(" · ")[0], [one for one in said[1:] if one.startswith(REMEDY)]
-    shorter: tuple[list[str], ...] = said, [since, *said[1:]], said[1:], [since, *check], check, [since], []
+    first = [f"{begins} …" for one in check if (begins := one.partition("; ")[0]) != one]
+    with_check = (
+        said,
+        [since, *said[1:]],
+        said[1:],
+        [since, *check],
+        check,
+        [since, *first] if first else [],
+    )
+    shorter: tuple[list[str], ...] = (*with_check, first, [since], [])
     return tuple(dict.fromkeys(map(" · ".join, shorter)))
 
 

@@ -141,6 +141,8 @@ class ModelsPage(QWidget):
             if self._models.found.find(model) is not None:
                 self._known.add(model)
                 self.table.choose(model)
+                self.new.setChecked(False)  # what came of it is looked at next
+                bring_into_sight(self._list)
 
     def _train(self, wish: TrainingWish) -> None:
         self._models.train(wish, training)

@@ -60,3 +60,4 @@ class Recordings(QStackedWidget):
         if self._archive.play():
             self.setCurrentIndex(PLAYER)
             self.player.show_tape()
+            self._archive.playback.play(on=True)  # as the button says; at its very beginning there is little

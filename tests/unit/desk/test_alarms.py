@@ -15,6 +15,7 @@ from gateway.wire.component import QualityInfo, Snapshot
 from gateway.wire.control import JournalEntries
 from gateway.wire.robot import GuardInfo, GuardRuleInfo
 from gateway.wire.stop import Reset, Stopped
+from server_gui.core.alarms.alarm import Alarm
 from server_gui.core.alarms.marks import STATES
 from server_gui.core.alarms.texts import TEXTS, Kind
 from server_gui.core.desk import station as station_module
@@ -83,6 +84,21 @@ def test_what_the_robot_advises_is_said_once_in_place_of_what_is_usual(bench: Be
     alarm = bench.station.alarms.active[0].alarm
     assert alarm.line.endswith("no heartbeat for 3 s")
     assert alarm.check == "check the cable"
+
+
+def test_what_is_wrong_twice_is_said_as_such_and_so_is_what_to_check(bench: Bench) -> None:
+    twice = "its heartbeat is missing: check its power; it goes on; its position jumped: check its encoder"
+    bench.station.take([looked(state="lost", problem=twice)])
+    alarm = bench.station.alarms.active[0].alarm
+    assert alarm.what == "its heartbeat is missing; its position jumped"
+    assert alarm.check == "check its power; it goes on; check its encoder"
+
+
+def test_a_word_has_one_mark_whatever_it_explains_that_is_as_bad() -> None:
+    """Lost is a cross, also where what follows from it is a square of the same colour."""
+    own = TEXTS[Kind.LOST].mark
+    for as_bad in (kind for kind in Kind if TEXTS[kind].mark.colour == own.colour):
+        assert Alarm(Kind.LOST, "left_knee", "silent", under=(Alarm(as_bad, "gait", "jumped"),)).mark == own
 
 
 def test_a_drive_that_tells_its_code_alone_is_put_into_words(bench: Bench) -> None:
