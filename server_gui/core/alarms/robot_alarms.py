@@ -263,7 +263,7 @@ def _of_part(robot: Robot, part: Part, stopping: StopProgress) -> Iterator[Alarm
 
 
 def _advised(problem: str) -> tuple[str, str]:
-    """What is wrong and what to check; a robot says both: `this: check that; it goes on; more: …`."""
+    """Split a problem into what is wrong and what to check: `this: check that; it goes on; more: …`."""
     things, advice = list[str](), list[str]()
     for clause in problem.split("; "):
         thing, *check = _ADVICE.split(clause, maxsplit=1)
