@@ -634,7 +634,7 @@ complete -c gwrms -n '_shtab_gwrms_using models promote' -s h -l help -d 'show t
 complete -c gwrms -n '_shtab_gwrms_using models promote' -l config -xka "(__fish_complete_path (commandline -ct))" -d 'the server'"'"'s file, which names the store'
 complete -c gwrms -n '_shtab_gwrms_using models promote' -l json -d 'for programs'
 complete -c gwrms -n '_shtab_gwrms_using models promote' -l url -x -d 'file:///folder or s3://bucket/prefix (default: of the server'"'"'s file)'
-complete -c gwrms -n '_shtab_gwrms_using models promote' -l instead-of -x -d 'promote only while this one serves; nothing: promote only while none does'
+complete -c gwrms -n '_shtab_gwrms_using models promote' -l instead-of -x -d 'promote only while this one serves; nothing: while none does'
 complete -c gwrms -n '_shtab_gwrms_using models promote' -l robot -x -d 'this robot alone (default: that for every robot)'
 complete -c gwrms -n '_shtab_gwrms_using models promote' -l who -x -d 'author (default: your account)'
 complete -c gwrms -n '_shtab_gwrms_using models promote' -l why -x -d 'reason, kept in the history'

@@ -906,7 +906,7 @@ _shtab_gwrms_models_promote_options=(
   "--config[the server\'s file, which names the store]:FILE:_files"
   "--json[for programs]"
   "--url[file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file)]:URL:"
-  "--instead-of[promote only while this one serves\; nothing\: promote only while none does]:MODEL:"
+  "--instead-of[promote only while this one serves\; nothing\: while none does]:MODEL:"
   "--robot[this robot alone (default\: that for every robot)]:NAME:"
   "--who[author (default\: your account)]:WHO:"
   "--why[reason, kept in the history]:TEXT:"

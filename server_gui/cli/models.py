@@ -121,7 +121,7 @@ def promote(argv: list[str]) -> int:
     made.add_argument(
         "--instead-of",
         metavar="MODEL",
-        help=f"promote only while this one serves; {NOTHING}: promote only while none does",
+        help=f"promote only while this one serves; {NOTHING}: while none does",
     )
     _add_who(made, "this robot alone")
     arguments = made.parse_args(argv)
