@@ -12,16 +12,16 @@ class FindingState:
         self.finding: Finding | None = None
 
     def note(self, now_ns: int, words: str, check: str) -> None:
-        """It is wrong, or still wrong; the words may change meanwhile. Another check is another finding."""
+        """Report the problem, new or persisting; the words may change. Another check is another finding."""
         before = self.finding
         since_ns = before.since_ns if before is not None and before.check == check else now_ns
         self.finding = Finding(since_ns, words, check)
 
     def clear(self) -> None:
-        """It is not wrong any more."""
+        """Note that the problem is over."""
         self.finding = None
 
 
 def active_findings(noted: Iterable[FindingState]) -> tuple[Finding, ...]:
-    """What is wrong now."""
+    """Return what is wrong now."""
     return tuple(finding for one in noted if (finding := one.finding) is not None)

@@ -16,14 +16,14 @@ class FrameRate(FindingState):
         self.restart()
 
     def restart(self) -> None:
-        """The line is another one."""
+        """Restart for another line."""
         self.clear()
         self._best_hz = 0.0
         self._before: tuple[int, int] | None = None
         self._windows = 0
 
     def skip(self, now_ns: int, frames: int) -> None:
-        """What came until now says nothing of the sensor."""
+        """Discard the frames until now: they say nothing of the sensor."""
         self._before = now_ns, frames
 
     def update(self, now_ns: int, frames: int) -> None:

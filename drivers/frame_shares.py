@@ -19,12 +19,12 @@ class FrameShare(FindingState):
         self.restart()
 
     def restart(self) -> None:
-        """The counters begin anew."""
+        """Restart the counters."""
         self.clear()
         self._before: tuple[int, int, int] | None = None
 
     def skip(self, now_ns: int, part: int, whole: int) -> None:
-        """What came until now says nothing of the sensor."""
+        """Discard the frames until now: they say nothing of the sensor."""
         self._before = now_ns, part, whole
 
     def update(self, now_ns: int, part: int, whole: int) -> None:
@@ -61,7 +61,7 @@ def saturated_frames() -> FrameShare:
 
 
 def beside(quality: Quality, findings: Sequence[Finding], now_ns: int) -> Quality:
-    """The quality, and what was found beside it."""
+    """Return the quality, and what was found beside it."""
     texts = (quality.problem, *(finding.text(now_ns) for finding in findings))
     problem = "; ".join(text for text in texts if text) or None
     return replace(quality, problem=problem, findings=(*quality.findings, *findings))

@@ -24,7 +24,7 @@ class User(Protocol[Listening]):
     """A component that takes frames; called in the port's thread."""
 
     def received(self, frames: Sequence[Listening], stamp_ns: int) -> None:
-        """The frames, one or more, that one read has completed."""
+        """Take the frames, one or more, completed by one read."""
         ...
 
     def disconnected(self) -> None: ...
@@ -76,7 +76,7 @@ class Line(Generic[F]):
             self._port.stop()
 
     def problem(self, now_ns: int) -> str | None:
-        """What is wrong with the line, in words with what to check; `None` while frames come."""
+        """Return what is wrong with the line, in words with what to check; `None` while frames come."""
         if self._port.problem is not None:
             return self._port.problem
         opened_ns = self._port.opened_ns

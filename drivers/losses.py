@@ -18,7 +18,7 @@ class Losses:
         self._stood = standstill.times
 
     def restart(self) -> None:
-        """The line is another one."""
+        """Restart for another line."""
         self._missing.restart()
         self._pace.restart()
 

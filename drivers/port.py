@@ -28,7 +28,7 @@ Received = Callable[[bytes, int], None]
 
 
 def _nothing() -> None:
-    """What happens at opening and closing when nobody wants to know."""
+    """Do nothing at opening and closing."""
 
 
 class SerialPort:

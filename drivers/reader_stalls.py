@@ -36,7 +36,7 @@ class ReaderStalls(FindingState):
         self.clear()
 
     def passed(self, now_ns: int) -> None:
-        """The thread has looked at the bus, and handed out what came."""
+        """Note that the thread has read the bus and handed out its frames."""
         passed_ns = self._passed_ns
         if passed_ns is None:
             self._listening_since_ns = now_ns
@@ -73,7 +73,7 @@ class ReaderStalls(FindingState):
         return self.gap is None or now_ns - self.gap[1] > EVEN_NS
 
     def explains(self) -> None:
-        """The last gap explains what looked wrong elsewhere: so it is told, however short it was."""
+        """Report the last gap, however short: it explains a problem elsewhere."""
         if self.gap is not None and self.finding is None:
             began_ns, self._before_ns = self.gap
             self.note(

@@ -41,7 +41,7 @@ def plainly(error: Exception) -> str:
 
 
 def said(error: Exception) -> str:
-    """The same without its key."""
+    """Return the same without its key."""
     what, _key = _parts(error)
     return _known(what) or what[:1].lower() + what[1:]
 

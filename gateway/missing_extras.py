@@ -57,12 +57,12 @@ class Page(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 def extra_of(package: str, command: str = "") -> str:
-    """The extra of GWRMS that installs what is imported as `package`, as far as `command` needs it."""
+    """Return the extra of GWRMS that installs what is imported as `package`, as far as `command` needs it."""
     return _ENOUGH.get(command) or _BRINGS.get(package.partition(".")[0], "collect")
 
 
 def explained(package: str, command: str = "") -> str:
-    """What to do where `command` misses this package."""
+    """Return what to do where `command` misses this package."""
     if package in sys.stdlib_module_names:
         return f"this does not run on {sys.platform}, where Python has no {package!r}: use Linux"
     extra = extra_of(package, command)
@@ -74,7 +74,7 @@ def explained(package: str, command: str = "") -> str:
 
 
 def help_of(words: Sequence[str]) -> str | None:
-    """The help of a command as it was written down; None where it is not asked for, or not known."""
+    """Return the help of a command as it was written down; None where it is not asked for, or not known."""
     asked = next((place for place, word in enumerate(words) if word in ("-h", "--help")), None)
     if asked is None:
         return None

@@ -31,7 +31,7 @@ def plain(text: str, keep: str = "") -> str:
 
 
 def json_plain(text: str) -> str:
-    """A line of JSON in which nothing commands a terminal; it says the same to machines."""
+    """Return a line of JSON in which nothing commands a terminal; it says the same to machines."""
     if text.isprintable():
         return text
     return "".join(one if one.isprintable() else _json_escaped(one) for one in text)

@@ -188,7 +188,7 @@ class _Spreading:
     def _angle(
         self, source: ParameterInfo, value: Number, joint: str, place: Object
     ) -> tuple[ParameterInfo, Number]:
-        """A limit of position, as the same angle of the joint."""
+        """Return a limit of position, as the same angle of the joint."""
         here, there = self._angle_of(source.component), self._angle_of(joint)
         if here is None or there is None:
             raise _Refused(_UNKNOWN_WAY)

@@ -144,7 +144,7 @@ class Exoskeleton:
             self._next_entry = self.clock.after(round(entry.seconds * SECOND_NS), self._go_on)
 
     def own_pace(self, pace: Pace | None) -> Pace | None:
-        """What this wearer makes of a pace that ordinary ones are told to walk at."""
+        """Return what this wearer makes of a pace that ordinary ones are told to walk at."""
         return pace if pace is None or self.walk == ORDINARY else WALKS[self.walk].pace(*pace)
 
     def _take_own_pace(self) -> None:
@@ -212,7 +212,7 @@ def _known(what: str, name: str, names: Collection[str]) -> str:
 
 
 def _refuse_to_lead_others(without: Collection[str]) -> None:
-    """A controller that enables drives may only do so to simulated ones."""
+    """Refuse a controller that would enable real drives."""
     joints = [name for name in JOINTS if name in without]
     if joints and CONTROLLER not in without:
         raise SimulatorError(

@@ -100,7 +100,7 @@ def verb_of(request: Request) -> str:
 
 
 def further(verb: str) -> tuple[str, ...]:
-    """What else a request of this kind may hold."""
+    """Return what else a request of this kind may hold."""
     return _CHECKS[verb][0]
 
 

@@ -89,7 +89,7 @@ class SimulatedRobot(SimulationHost):
         return companions(self.exoskeleton.sensors.choice)
 
     def _check_guard(self) -> None:
-        """What was there before stays, so it must be what is wanted; raises `SimulatorError`."""
+        """Check that an existing file is the requested one; raises `SimulatorError`."""
         if self._guard is None or self.config_is_ours:
             return
         if tomllib.loads(self.config.read_text(encoding="utf-8")).get("guard") != self._guard:
@@ -99,7 +99,7 @@ class SimulatedRobot(SimulationHost):
             )
 
     def _check_mistakes(self) -> None:
-        """A file that was there before may be right; raises `SimulatorError`."""
+        """Refuse mistakes that need lines in an existing file; raises `SimulatorError`."""
         if not self.config_is_ours and any(mistake.lines for mistake in self._mistakes or ()):
             raise SimulatorError(f"{self.config} is there already: delete it, or choose another folder")
 

@@ -53,11 +53,11 @@ class SimulationHost:
     # -- what a robot adds -----------------------------------------------------------------------------
 
     def _config_text(self, bus: str) -> str:
-        """What robot.toml says where there is none yet; `bus` is the table of its bus."""
+        """Return what robot.toml says where there is none yet; `bus` is the table of its bus."""
         raise NotImplementedError
 
     def _companions(self) -> Mapping[str, str]:
-        """The files that robot.toml names, by name."""
+        """Return the files that robot.toml names, by name."""
         return {}
 
     def _furnish(self, loop: Loop, closing: ExitStack) -> None:
@@ -80,7 +80,7 @@ class SimulationHost:
             self._loop = loop
 
     def _open_bus(self, loop: Loop, closing: ExitStack) -> str:
-        """Returns the bus's table in robot.toml."""
+        """Open the bus; return its table in robot.toml."""
         if self._virtual_channel is not None:
             from hil_sim.bus.virtual import VirtualBridge  # python-can is heavy, and the hub does without
 

@@ -31,7 +31,7 @@ _TUNED_SHARE = 0.4  # of the parts: somebody has changed toe height and trunk an
 
 
 def practice(robot: Exoskeleton, seed: int) -> Iterator[Entry]:
-    """Rounds without end, each in another order and with other settings of `robot`'s controller."""
+    """Yield rounds without end, each in another order and with other settings of `robot`'s controller."""
     source = random.Random(f"{seed} practice")
     usual = {
         key: robot.controller.dictionary.number(key) for key in (objects.TOE_HEIGHT, objects.TRUNK_ANGLE)

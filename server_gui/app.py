@@ -276,7 +276,7 @@ class App:
             self.tick()
 
     def _show(self, robot: str, event: Event) -> None:
-        """What has come; in the network's thread."""
+        """Take events; in the network's thread."""
         mailbox = self._mailboxes.get(robot)  # of one that was left a last event may come
         if mailbox is not None:
             mailbox.put(event)

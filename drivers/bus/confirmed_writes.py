@@ -16,7 +16,10 @@ class ConfirmedWrites:
         self._before: tuple[Object, bytes | None, bool] | None = None  # of the write under way
 
     def known(self, key: Object, otherwise: bytes | None = None) -> bytes | None:
-        """What was confirmed last, `otherwise` where nothing was written; `None` where nobody knows."""
+        """Return what was confirmed last, `otherwise` where nothing was written.
+
+        `None` where nobody knows.
+        """
         if key in self._unsure:
             return None
         value = self._confirmed.get(key, otherwise)
@@ -27,20 +30,20 @@ class ConfirmedWrites:
         return key in self._unsure
 
     def doubt(self, key: Object) -> None:
-        """A write is about to be sent, of which nothing will be told."""
+        """Note a write about to be sent, whose outcome will not be reported."""
         self._unsure.add(key)
         self._confirmed.pop(key, None)
         if self._before is not None and self._before[0] == key:
             self._before = key, None, True  # also where the one under way is not sent after all
 
     def begin(self, key: Object) -> None:
-        """A write is about to be sent, and one of the next three will be told."""
+        """Note a write about to be sent, whose outcome one of the next three methods will report."""
         before = (key, self._confirmed.get(key), key in self._unsure)
         self.doubt(key)
         self._before = before
 
     def confirm(self, key: Object, data: bytes) -> None:
-        """The device has taken it."""
+        """Note that the device has accepted the write."""
         if self._before is None:
             return  # it has booted meanwhile: before it took it or after, nobody knows
         self._before = None
@@ -48,7 +51,7 @@ class ConfirmedWrites:
         self._unsure.discard(key)
 
     def withdraw(self) -> None:
-        """The device has refused it, or it could not be sent: what was known is known still."""
+        """Note that the write was refused or could not be sent: the known value stays."""
         if self._before is None:
             return
         (key, value, unsure), self._before = self._before, None
@@ -62,7 +65,7 @@ class ConfirmedWrites:
         self._before = None
 
     def forget(self) -> None:
-        """The device has booted, or may have: it holds its own values, but for a write under way."""
+        """Forget all values after a boot, or a possible one, except a write under way."""
         before, self._before = self._before, None
         self._confirmed.clear()
         self._unsure.intersection_update(() if before is None else before[:1])

@@ -24,13 +24,13 @@ class FrameLosses(FindingState):
         self._looks = 0  # in a row that say otherwise than what is told
 
     def restart(self) -> None:
-        """What came before is of another life."""
+        """Forget the time before a restart."""
         self.clear()
         self.stamps.clear()
         self.missing, self._looks = None, 0
 
     def skip(self) -> None:
-        """What came last has waited: begin to count anew; what was found stays."""
+        """Restart the count after frames have waited; findings stay."""
         self.stamps.clear()
 
     def excuse(self, began_ns: int, ended_ns: int) -> None:
@@ -79,7 +79,10 @@ class FrameLosses(FindingState):
 
 
 def missing_share(stamps: deque[int]) -> float | None:
-    """The share of frames that are missing between the first and the last stamp; `None` without a pace."""
+    """Return the share of frames that are missing between the first and the last stamp.
+
+    `None` without a pace.
+    """
     known = list(stamps)
     gaps = [later - earlier for earlier, later in pairwise(known)]
     if len(gaps) < FEWEST:
@@ -93,6 +96,6 @@ def missing_share(stamps: deque[int]) -> float | None:
 
 
 def _mean(gaps: list[int], usual: int) -> float:
-    """The pace: the mean of the gaps between two frames that are neighbours."""
+    """Return the pace: the mean of the gaps between two frames that are neighbours."""
     near = [gap for gap in gaps if usual / 2 < gap < usual * 1.5]
     return sum(near) / len(near)

@@ -24,7 +24,7 @@ STATE_WORDS = {
 
 
 def bits_per_s(frames_per_s: float, bytes_per_s: float) -> float:
-    """What frames with so many bytes of data take of a bus's time, in bits."""
+    """Return what frames with so many bytes of data take of a bus's time, in bits."""
     return FRAME_BITS * frames_per_s + BYTE_BITS * bytes_per_s
 
 
@@ -59,7 +59,7 @@ class BusHealth:
         return active_findings((self._state, self._load, self._errors, self._lost))
 
     def opened(self) -> None:
-        """The controller begins anew, as does what is measured."""
+        """Restart all measurements with the controller."""
         self.state = BusState.ACTIVE
         self.load_percent = self.frames_per_s = self._before = None
         self._errors_before = self.error_frames
@@ -68,7 +68,7 @@ class BusHealth:
             noted.clear()
 
     def take_error(self, stamp_ns: int, can_id: int, data: bytes) -> None:
-        """An error frame: of the wire, or of our controller's state."""
+        """Take an error frame: of the wire, or of our controller's state."""
         state = bus_state(can_id, data)
         if state is None:
             self.error_frames += 1

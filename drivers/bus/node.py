@@ -46,7 +46,7 @@ class NodeUser(Protocol):
         """Read from the device what is needed, in the worker's thread. A `DriverError` is tried again."""
 
     def forget(self) -> None:
-        """What was read and received is no longer true: the node rebooted or its bus is gone."""
+        """Forget all values: the node rebooted or its bus is gone."""
 
 
 class Node(BusUser):
@@ -141,7 +141,7 @@ class Node(BusUser):
         self._asking.probes = True
 
     def silence(self, now_ns: int) -> str | None:
-        """That a node without a heartbeat, which is probed, answers no more, in words."""
+        """Return in words that a probed node without a heartbeat stopped answering."""
         return self._asking.silence(now_ns) if self.ready else None
 
     def follow(self, arrivals: FrameLosses) -> Callable[[], None]:
@@ -228,13 +228,13 @@ class Node(BusUser):
         self.worker.wake()
 
     def problem(self, now_ns: int) -> str | None:
-        """What is wrong with the node now, in words with what to check; `None` when nothing is."""
+        """Return what is wrong with the node now, in words with what to check; `None` when nothing is."""
         if not self.ready:
             return self.bus.trouble or (_REMAPPED if now_ns < self._settled_ns else self._booting.step)
         return self.life.problem(now_ns) or self._asking.guard_problem or self.bus.trouble
 
     def counters(self) -> dict[str, int]:
-        """What happened since the node's object was made."""
+        """Return what happened since the node's object was made."""
         sdo = self.channel.counters
         return {
             "boots": self.life.boots,
@@ -370,7 +370,7 @@ class Node(BusUser):
 
 
 def shared_node(bus: CanBus, node_id: int, description: Description, times: NodeTimes) -> Node:
-    """The one node object of this id: two axes of a drive, or a joint and its parameters, share it.
+    """Return the one node object of this id: two axes of a drive, or a joint and its parameters, share it.
 
     Raises `SettingsError` where two tables describe the same node with different files.
     """

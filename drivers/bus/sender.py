@@ -33,7 +33,7 @@ class StillLeaving(BusFull):
 
 
 def always() -> bool:
-    """A frame that nothing overtakes; one that was sent."""
+    """Return a frame that nothing overtakes; one that was sent."""
     return True
 
 
@@ -180,7 +180,7 @@ class Sender:
             self._empty_and_leave(transport, only_urgent=only_urgent, until=until)
 
     def _run(self, transport: Transport) -> None:
-        """The thread: does what nobody else can."""
+        """Run the thread that does the blocking sends."""
         make_realtime()
         while self._transport is transport:
             self._order.wait()
@@ -270,7 +270,7 @@ class Sender:
         return self._transport
 
     def _queue(self, frame: _Frame) -> _Frame:
-        """The frame to wait for: where the same one waits already, urgently, it does not leave twice."""
+        """Return the frame to wait for: one that is queued urgently already is not sent twice."""
         same = (frame.can_id, frame.data)
         for one in (self._urgent.get(frame.key), self._in_hand):
             if one is not None and one.is_urgent and (one.can_id, one.data) == same:

@@ -8,7 +8,7 @@ from drivers.imu.trunk import TrunkImu
 
 
 def build_imu(name: str, settings: MountedSettings, site: BuildContext) -> TrunkImu:
-    """The IMU that `settings` describe.
+    """Return the IMU that `settings` describe.
 
     Raises:
         SettingsError: they contradict themselves or the device's file.

@@ -66,7 +66,7 @@ class Imu(TrunkImu):
         self._take(frame, stamp_ns)
 
     def disconnected(self) -> None:
-        """The port went away."""
+        """Note that the port went away."""
         self._forget()
         self._losses.restart()
         self._clock = self._clock_spec.make() if self._clock_spec else None

@@ -76,11 +76,11 @@ class TrunkImu:
         return measured
 
     def ups_as_mounted(self) -> list[Vector]:
-        """The world's up in the axes of the trunk without a zero, of the last second or so."""
+        """Return the world's up in the axes of the trunk without a zero, of the last second or so."""
         return self._motion.ups_as_mounted()
 
     def _take(self, frame: ImuFrame, stamp_ns: int) -> None:
-        """A frame that was taken at `stamp_ns`."""
+        """Take a frame of `stamp_ns`."""
         felt = self._motion.felt(frame, stamp_ns)
         if felt.indices:
             self.check.update(stamp_ns, felt.acceleration, felt.angular_velocity, felt.up)

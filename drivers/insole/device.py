@@ -109,7 +109,7 @@ class Insole:
         return Quality(state, age_ms, silence or silence_text(age_ms), self._counters())
 
     def _implausible(self) -> tuple[Finding, ...]:
-        """The first thing that cannot be, for what else is told follows from it."""
+        """Return the first thing that cannot be, for what else is told follows from it."""
         return (*self.check.findings, *active_findings((self._feet_check, self._swap_check)))[:1]
 
     def received(self, frames: Sequence[InsoleFrame], stamp_ns: int) -> None:
@@ -138,7 +138,7 @@ class Insole:
         self._update(stamp_ns, self._pressures(frame))
 
     def disconnected(self) -> None:
-        """The port went away: nothing that it said before is true any more."""
+        """Forget all values: the port went away."""
         self.latest.clear()
         self._freshness.disconnected()
         self._fault, self._foreign = None, 0
@@ -219,7 +219,7 @@ class Insole:
 
 
 def layout_of(format_name: str, layout_name: str | None, beside: Path | None = None) -> Layout:
-    """The layout of that name; without one, the device's own, or the usual one.
+    """Return the layout of that name; without one, the device's own, or the usual one.
 
     Raises:
         SettingsError: there is none, or it is wrong; the message names file and key.
@@ -237,7 +237,7 @@ def line_for(
     recognise: Recognise = unrecognised,
     standstill: ReaderStalls | None = None,
 ) -> Line[InsoleFrame]:
-    """The line that `settings` describe.
+    """Return the line that `settings` describe.
 
     Raises:
         SettingsError: the format needs a description that the layout does not have.

@@ -205,7 +205,7 @@ class JointDrive(PowerDrive):
                 self._undo.append(self.node.worker.repeat(1 / hz, partial(self._poll, deque(polled))))
 
     def _handler(self, decoder: Decoder) -> FrameHandler:
-        """What is done with each frame of a TPDO: the hot path."""
+        """Return what is done with each frame of a TPDO: the hot path."""
         indices, values = decoder.channels, decoder.values
         update, lock = self.latest.update, self._lock
         position = self._index[POSITION] in indices
@@ -243,7 +243,7 @@ class JointDrive(PowerDrive):
         return 0 if variable is None else variable.data_type or 0
 
     def _take(self, one: QuantitySource, counts: Number, stamp_ns: int) -> None:
-        """What it answered, as old as the question: nobody knows how long the answer has waited."""
+        """Take the answer, as old as the question: nobody knows how long it has waited."""
         indices: tuple[int, ...] = (one.channel,)
         values: tuple[float | None, ...] = (counts * one.linear.scale + one.linear.offset,)
         if one.quantity.name == STATUSWORD:
@@ -259,7 +259,7 @@ class JointDrive(PowerDrive):
     # What is wrong, in words.
 
     def _notes(self, now_ns: int, findings: tuple[Finding, ...]) -> Iterator[str | None]:
-        """What explains something comes before what it explains."""
+        """Yield what explains something comes before what it explains."""
         plan = self._plan
         yield self._watch.held_off.words
         yield from () if plan is None else plan.contradictions
@@ -286,7 +286,7 @@ class JointDrive(PowerDrive):
         return "the drive is in fault and does not say why (no EMCY was seen, 603Fh is empty)"
 
     def _emcy_text(self, state: State, now_ns: int) -> str | None:
-        """What a drive reports that goes on all the same."""
+        """Return what a drive reports that goes on all the same."""
         emcy = self.node.life.active_emcy
         if emcy is None or state is State.LOST or self._drive_state(now_ns) in _IN_FAULT:
             return None

@@ -68,7 +68,10 @@ def make_plan(settings: JointSettings, found: tuple[Quantity, ...], reading: Dri
 
 
 def _fields(tpdo: Tpdo, wanted: Mapping[tuple[int, int], QuantitySource]) -> list[Field]:
-    """What this TPDO carries of what is wanted, as wide as its type: a part of it would be another number."""
+    """Return what this TPDO carries of what is wanted, as wide as its type.
+
+    A part of it would be another number.
+    """
     return [
         Field(one.channel, mapped.at, mapped.bits, one.quantity.kind, one.linear)
         for mapped in tpdo.objects
@@ -92,7 +95,7 @@ def _width_notes(reading: DriveReading, wanted: Mapping[tuple[int, int], Quantit
 
 
 def _bringer(channel: int, mapped: Sequence[tuple[Tpdo, list[Field]]]) -> Tpdo | None:
-    """The TPDO that brings a channel; one that comes cyclically rather than one that does not."""
+    """Return the TPDO that brings a channel; one that comes cyclically rather than one that does not."""
     bringers = [tpdo for tpdo, fields in mapped if any(field.channel == channel for field in fields)]
     return next((tpdo for tpdo in bringers if tpdo.cyclic), bringers[0] if bringers else None)
 

@@ -223,14 +223,14 @@ class JointCheck:
         self.mirror = MirrorCheck(self._name, other)
 
     def restart(self) -> None:
-        """What was seen before is of another life of the drive."""
+        """Forget everything seen before the drive's restart."""
         for check in self._own:
             check.restart()
         if self.mirror is not None:
             self.mirror.restart()
 
     def skip(self) -> None:
-        """What came last may have waited, or nobody has looked: how it moved until now is not known."""
+        """Forget the motion until now: samples may have waited, or nobody has looked."""
         self._jump.skip()
 
     @property
@@ -239,7 +239,7 @@ class JointCheck:
         return self._jump.was_gap
 
     def update(self, now: Motion, other: Callable[[], float | None]) -> None:
-        """What is known now; a position that is as old as the last time says nothing new."""
+        """Take the present values; a position as old as the last one is ignored."""
         if now.stamp_ns == self._last_ns:
             self._jump.was_gap = False
             return

@@ -25,7 +25,7 @@ class PowerInhibit:
         self._candidate: tuple[int, int] | None = None  # and those that may be it, since when
 
     def restart(self) -> None:
-        """What was seen before is of another life of the drive."""
+        """Forget everything seen before the drive's restart."""
         self.words, self._enabled, self._candidate = None, None, None
 
     def update(self, now_ns: int, state: DriveState | None, inputs: int | None) -> None:

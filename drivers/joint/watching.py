@@ -33,7 +33,7 @@ class JointWatch(BusUser):
         self._other = lambda now_ns: other.read(position, now_ns)[0]
 
     def restart(self) -> None:
-        """What was seen before is of another life of the drive."""
+        """Forget everything seen before the drive's restart."""
         self.check.restart()
         self.held_off.restart()
 
@@ -76,7 +76,10 @@ class JointWatch(BusUser):
 
 
 def beside(latest: Latest, index: int | None, stamp_ns: int, now_ns: int) -> float | None:
-    """A value of about the time of another one; one that is only polled now and then says nothing of it."""
+    """Return a value of about the time of another one.
+
+    One that is only polled now and then says nothing of it.
+    """
     value, at_ns = (None, None) if index is None else latest.read(index, now_ns)
     return None if at_ns is None or abs(stamp_ns - at_ns) > BESIDE_S * 1e9 else value
 

@@ -172,7 +172,7 @@ def _plain(captured: Captured, kind: Kind, words: str) -> DecodedFrame:
 
 
 def _part(raw: int, mapped: Mapped) -> bytes:
-    """The bytes of one object of a PDO."""
+    """Return the bytes of one object of a PDO."""
     return (raw >> mapped.at & (1 << mapped.bits) - 1).to_bytes((mapped.bits + 7) // 8, "little")
 
 

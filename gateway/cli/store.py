@@ -33,9 +33,9 @@ class Result(Struct, frozen=True):
 
 def main(argv: list[str]) -> int:
     """Run `gwrms store`."""
-    made = parser("store", "Make a device keep its parameters as they are now (1010h).", EPILOG)
+    made = parser("store", "Store a device's present parameters in its memory (1010h).", EPILOG)
     add_component(made, "?")
-    made.add_argument("--all", action="store_true", help="every device that can, one after another")
+    made.add_argument("--all", action="store_true", help="every device that can store, one after another")
     arguments = made.parse_args(argv)
     if arguments.all == (arguments.component is not None):
         made.error("name one COMPONENT, or say --all")

@@ -231,7 +231,7 @@ def _not_let_in(address: Address) -> str:
 
 
 def _said(refusal: Refusal) -> str:
-    """The robot's own words, as far as they are told."""
+    """Return the robot's own words, as far as they are told."""
     return plain(refusal.message[:LONGEST_REFUSAL])
 
 

@@ -88,4 +88,4 @@ class _Swing:
             self._least = total if self._least is None else min(self._least, total)
 
     def disconnected(self) -> None:
-        """The port went away: what it has shown stays."""
+        """Note that the port went away; its values stay."""

@@ -12,7 +12,7 @@ _TABLES = ("can", "joint", "device", "insole", "imu", "parameter", "channel")
 
 
 def remains(config: RobotConfig, mistakes: Iterable[Finding]) -> RobotConfig:
-    """The same robot without the tables that mistakes were found in, and without what needs those."""
+    """Return the same robot without the tables that mistakes were found in, and without what needs those."""
     wrong = {one.where.lstrip("[").partition("]")[0] for one in mistakes}
     kept: dict[str, Any] = {table: _right(config, table, wrong) for table in _TABLES}
     for table in ("joint", "device", "imu"):

@@ -126,7 +126,7 @@ class Authentication:
             self._admit(connection, f"uid {peer.uid}:{connection.fileno()}", identity)
 
     def _refuse(self, connection: socket.socket, whom: str) -> None:
-        """A stranger on the robot is told so: this door is not open to others than its own people."""
+        """Refuse an unlisted user of the robot, with a message."""
         why = f"{whom} {STRANGER}: [users] or [groups] of {self._folder.table} may name it"
         line = framing.encode_error(None, framing.refuse(framing.Kind.NOT_ALLOWED, why))
         with connection:

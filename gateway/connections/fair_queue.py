@@ -41,7 +41,7 @@ class FairQueue(Generic[T]):
         clients[client].append(item)
 
     def next(self, way: Callable[[T], R | None]) -> tuple[Client, T, R] | None:
-        """The first thing of the client that has waited longest, of those in whose first `way` finds one.
+        """Return the first item of the longest waiting client, of those in which `way` finds one.
 
         It stays that client's first until it is `done`.
         """
@@ -55,7 +55,7 @@ class FairQueue(Generic[T]):
         return None
 
     def done(self, client: Client, item: T) -> None:
-        """It waits no longer; idempotent."""
+        """Remove it from the queue; idempotent."""
         items = self._waiting.get(client.address, {}).get(client)
         if items and items[0] is item:
             items.popleft()

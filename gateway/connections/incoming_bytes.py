@@ -130,7 +130,7 @@ class IncomingBytes:
         self._loop.post(self._forget_receiver)
 
     def _forget_receiver(self) -> None:
-        """It has heard all; so neither keeps the other in memory."""
+        """Release both, so that neither keeps the other in memory."""
         self.receiver = bool
 
     def _read_last(self) -> None:
@@ -247,7 +247,7 @@ class IncomingBytes:
         self._rests = False
 
     def _end(self, lost: str | None, heard: Heard) -> None:
-        """The end of what the client says, or of the client: `lost` says why."""
+        """End the client's input, or the client: `lost` says why."""
         self._ended = heard.ended = True
         self._wake()
         heard.lost = lost

@@ -104,7 +104,7 @@ class TlsStream:
             self._come.write_eof()
 
     def send(self, data: bytes | memoryview) -> int:
-        """A record at most, so that whoever reads waits no longer than for that.
+        """Return a record at most, so that whoever reads waits no longer than for that.
 
         Raises `BlockingIOError` until all of it has gone: the same is to be sent again until then.
         """
@@ -128,7 +128,7 @@ class TlsStream:
 
 
 def context_of(folder: AccessFolder, known: Known) -> ssl.SSLContext:
-    """A robot's side: its own key, and nobody but those who are known.
+    """Return a robot's side: its own key, and nobody but those who are known.
 
     Raises:
         KeyProblem: the robot's key cannot be read; it says which file, and nothing of what is in it.

@@ -95,7 +95,7 @@ def _by_node(drives: "Mapping[str, JointDrive]") -> "Iterable[list[JointDrive]]"
 
 
 def _still_on(name: str, drive: "JointDrive") -> str | None:
-    """A drive that is enabled, or that is there and does not say whether it is."""
+    """Return a drive that is enabled, or that is there and does not say whether it is."""
     now_ns = time.monotonic_ns()
     if not drive.node.ready or drive.node.life.lost(now_ns):
         return None

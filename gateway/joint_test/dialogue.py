@@ -202,7 +202,7 @@ def _has_mode(bench: Bench, test: Test) -> None:
 
 
 def _period(bench: Bench, axis: Axis) -> float:
-    """What the drive expects between two SYNCs (60C2h); within what this computer can keep."""
+    """Return what the drive expects between two SYNCs (60C2h); within what this computer can keep."""
     value = number(bench, axis, *PERIOD)
     exponent = bench.read(axis.node, axis.index(EXPONENT[0]), EXPONENT[1])
     if not value or exponent is None:
@@ -232,7 +232,7 @@ def _agreed(test: Test, known: Known) -> Talk[bool]:
 
 
 def explained(test: Test, known: Known) -> Iterator[str]:
-    """What will happen, line by line."""
+    """Yield what will happen, line by line."""
     limits, wish = known.limits, test.wish
     low, high, _, time_s = planned(wish, known.period_s)
     yield f"What will happen, to the {words(test.joint)} ({test.axis}) alone: a {wish.kind} test"
@@ -281,7 +281,7 @@ def _moved(bench: Bench, test: Test, known: Known) -> Talk[Outcome | None]:
 
 
 def _taken(bench: Bench, test: Test, joint: JointTable) -> Iterator[int]:
-    """The identifiers of the process data that a drive takes as it is configured now, wherever they are."""
+    """Yield the identifiers of the process data that a drive receives, as configured now."""
     description = eds.load(eds.locate(joint.eds, test.config.path), joint.node_id)
     for index in range(RPDO_PARAMETER, RPDO_PARAMETER + MAX_RPDOS):
         if index in description.object_dictionary:
@@ -292,7 +292,7 @@ def _taken(bench: Bench, test: Test, joint: JointTable) -> Iterator[int]:
 
 @contextmanager
 def _reader(test: Test, power: Power, known: Known) -> Iterator[JointDrive]:
-    """The joint as a gateway follows it; its PDOs are as they are."""
+    """Return the joint as a gateway follows it; its PDOs are as they are."""
     settings = msgspec.structs.replace(test.settings, configure_pdos=False)
     reader = JointDrive(test.joint, settings, power.bus, known.description)
     reader.start()
@@ -347,7 +347,7 @@ def _led(
 
 
 def _keep(test: Test, before: parameters.Parameters) -> None:
-    """What it is about to change, so that it is put back also where nothing of this program is left."""
+    """Record the coming changes, so that they can be restored even after this program's death."""
     changes = undo_file.changes(before, test.mode, test.settings.axis * AXIS_OFFSET)
     if changes:
         place = (test.joint, test.settings.bus, test.settings.node_id)

@@ -140,7 +140,7 @@ class TestRun(PoweredRun):
         return self._late_s
 
     def take(self) -> list[Row]:
-        """The samples since the last time."""
+        """Return the samples since the last time."""
         return [self._rows.popleft() for _ in range(len(self._rows))]
 
     # In the thread.
@@ -207,7 +207,7 @@ class TestRun(PoweredRun):
         return seen
 
     def _aim(self, target: float) -> None:
-        """The target of the next SYNC, in the drive's own units; the drive confirms that it has it."""
+        """Send the target of the next SYNC, in the drive's own units, confirmed by the drive."""
         linear = self._linear("torque" if self._by_torque else "position")
         value = target if self._by_torque else self._start + target
         (index, size), counts = (

@@ -137,7 +137,7 @@ class Recording:
         self._write(list(compress(row, self._kept)))
 
     def _danger(self) -> list[float]:
-        """What is written of dangers, in the order of `DANGER_COLUMNS`."""
+        """Return what is written of dangers, in the order of `DANGER_COLUMNS`."""
         if self._course is None:
             return []
         units = zip(joints_reported(self._robot), JOINT_UNITS.values(), strict=True)
@@ -186,12 +186,18 @@ def _parser() -> argparse.ArgumentParser:
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--out", required=True, type=Path, metavar="FILE", help="what is written; replaced")
     parser.add_argument(
-        "--minutes", type=_minutes, default=6.0, metavar="M", help="of each wearer (default: %(default)g)"
+        "--out", required=True, type=Path, metavar="FILE", help="output file; replaced if it exists"
     )
     parser.add_argument(
-        "--subjects", type=_subjects, default=[0], metavar="N[-N]", help="who wears the robot (default: 0)"
+        "--minutes",
+        type=_minutes,
+        default=6.0,
+        metavar="M",
+        help="duration for each wearer (default: %(default)g)",
+    )
+    parser.add_argument(
+        "--subjects", type=_subjects, default=[0], metavar="N[-N]", help="number of the wearer (default: 0)"
     )
     parser.add_argument(
         "--scenario",

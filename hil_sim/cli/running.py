@@ -11,7 +11,7 @@ from hil_sim.simulation_host import SimulationHost
 
 
 def say(sentence: str) -> None:
-    """A word to whoever started it."""
+    """Print a line for the parent process."""
     sys.stderr.write(f"gwrms sim: {sentence}\n")
 
 

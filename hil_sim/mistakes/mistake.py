@@ -31,7 +31,7 @@ class Mistake:
 
 
 def written(text: str, lines: Sequence[FileKey], folder: str) -> str:
-    """The file with these lines; raises `SimulatorError` where a table is missing."""
+    """Return the file with these lines; raises `SimulatorError` where a table is missing."""
     for line in lines:
         text = _with_line(text, line, line.value.replace("{folder}", folder))
     return text

@@ -98,7 +98,7 @@ class ReplayedRobot(SimulationHost):
             yield stamp_ns, partial(self._ports[name].write, data)
 
     def _play(self, frame: Frame) -> None:
-        """It was arbitrated when it was recorded: here it arrives at its time."""
+        """Deliver the frame at its time: it was arbitrated when recorded."""
         node = None if frame.extended else self.nodes.get(_SDO.get(frame.cob_id, 0))
         if node is None:
             self._bus.deliver(frame, self)

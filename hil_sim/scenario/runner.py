@@ -131,7 +131,7 @@ def _watch(robot: SimulatedRobot, gateway: GatewayProcess) -> Lateness:
 def _judge(
     expectation: Expectation, lines: tuple[ScriptStep, ...], observed: Observed, lateness: Lateness
 ) -> Verdict:
-    """A failure is in doubt where time was lost since the last thing that happened before its window."""
+    """Return the verdict, in doubt if time was lost since the last event before its window."""
     verdict = expectation.judge(observed)
     if verdict.ok:
         return verdict

@@ -79,13 +79,13 @@ def load(file: Path) -> Script:
 
 
 def examined(file: Path, values: Mapping[str, Any]) -> tuple[Script, list[Mistake]]:
-    """What stands in a file, and everything that is wrong with it, or likely is."""
+    """Return what stands in a file, and everything that is wrong with it, or likely is."""
     mistakes: list[Mistake] = []
     return _Reading(file, mistakes).script(values), mistakes
 
 
 def robot_text(file: Path, values: Mapping[str, Any]) -> str:
-    """The robot's file as a run of this scenario would write it, but for the port of its bus."""
+    """Return the robot's file as a run of this scenario would write it, but for the port of its bus."""
     script, _ = examined(file, values)
     robot = Exoskeleton(sensors=script.sensors, drives=script.drives)
     return robot_file.text(file.parent.resolve(), robot_file.hub_bus(0), robot, script.guard)
@@ -97,7 +97,7 @@ def findings(
     *,
     machine: bool,  # noqa: ARG001 - of robots
 ) -> Iterator[tuple[str, str, str, str]]:
-    """What `gwrms check` says of it: severity, where, key and text."""
+    """Return what `gwrms check` says of it: severity, where, key and text."""
     return ((one.severity, one.where, one.key, one.text) for one in examined(file, tables)[1])
 
 
@@ -109,7 +109,7 @@ class _Reading:
         self._mistakes = mistakes
 
     def script(self, values: Mapping[str, Any]) -> Script:
-        """What can be made of it."""
+        """Return what can be made of it."""
         top = Table("", values, self._mistakes)
         self._check_tables(values)
         robot = self._table("robot", values)
@@ -143,7 +143,7 @@ class _Reading:
         )
 
     def _table(self, key: str, values: Mapping[str, Any]) -> Table:
-        """The table of that name; where it is none, one without anything."""
+        """Return the table of that name; where it is none, one without anything."""
         try:
             return Table(f"[{key}]", values.get(key, {}), self._mistakes)
         except Unusable:
@@ -156,7 +156,7 @@ class _Reading:
                 self._mistakes.append(Mistake(f"[{key}]", "", said))
 
     def _each(self, values: Mapping[str, Any], key: str, read: Callable[[Table], T]) -> Iterator[T]:
-        """What is made of each entry of a list; one that cannot be used does not hide the next."""
+        """Yield what is made of each entry of a list; one that cannot be used does not hide the next."""
         found = values.get(key, [])
         if not isinstance(found, list):
             self._mistakes.append(Mistake(f"[{key}]", "", f"is a list of tables: write [[{key}]]"))

@@ -55,7 +55,10 @@ HIPS_TRUNK: Final = Variant("only_hips_trunk_", ("hips", "trunk"))
 
 
 def people(path: Path) -> list[SimulatedSession]:
-    """The sessions of a file; raises `UnusableData` where they are those of fewer than three people."""
+    """Return the sessions of a file.
+
+    Raises `UnusableData` where they are those of fewer than three people.
+    """
     sessions = simulated.read(path)
     count = len({session.subject for session in sessions})
     if count < FOLDS:
@@ -66,20 +69,20 @@ def people(path: Path) -> list[SimulatedSession]:
 
 
 def robot(sessions: Sequence[SimulatedSession], variants: Sequence[Variant]) -> tuple[Variant, list[Variant]]:
-    """The robot with every sensor that all sessions have, and those of `variants` that lack some of them."""
+    """Return the robot with all common sensors, and those of `variants` that lack some."""
     channels = set(sessions[0].channels).intersection(*(session.channels for session in sessions))
     whole = replace(WHOLE, groups=present(channels))
     return whole, [one for one in variants if set(one.groups) < set(whole.groups)]
 
 
 def by_walks(seen: Examples, figures: Callable[[Flags], dict[str, float]]) -> dict[str, dict[str, float]]:
-    """The figures of the rows of each walk; none where all walk alike."""
+    """Return the figures of the rows of each walk; none where all walk alike."""
     names = np.unique(seen.walks)
     return {str(one): figures(seen.walks == one) for one in names} if len(names) > 1 else {}
 
 
 def recipe_of(task: Task, variant: Variant) -> Recipe:
-    """The recipe of a robot with these sensors."""
+    """Return the recipe of a robot with these sensors."""
     recipe = task.recipe({channel for group in variant.groups for channel in GROUPS[group]})
     if recipe is None:
         raise UnusableData(f"{task.name} cannot be told from {', '.join(variant.groups)}")
@@ -93,7 +96,7 @@ def step_of(recipe: Recipe, sessions: Sequence[SimulatedSession], least: int) ->
 
 
 def disturbed(sessions: Sequence[SimulatedSession]) -> list[SimulatedSession]:
-    """The same people, with sensors that have offsets, noise and delays of their own."""
+    """Return the same people, with sensors that have offsets, noise and delays of their own."""
     return [_disturbed(session, number) for number, session in enumerate(sessions)]
 
 

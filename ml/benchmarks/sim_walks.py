@@ -83,7 +83,7 @@ def evaluate(path: Path, search: Search) -> Outcome:  # noqa: ARG001 - there is 
 
 
 def _shipped(registry: Registry, task: Task, sessions: Sequence[SimulatedSession]) -> Learned:
-    """The model of a robot with every sensor.
+    """Return the model of a robot with every sensor.
 
     Raises:
         UnusableData: a session lacks a sensor, or its wearer is one whom the model has learned from.

@@ -91,7 +91,7 @@ class Card(Struct, frozen=True, kw_only=True):
 
 
 def content_id(card: Card) -> str:
-    """The name of a model with these files and this card, but for when it was made."""
+    """Return the name of a model with these files and this card, but for when it was made."""
     return f"{card.task}-{digest(card)[:12]}"
 
 
@@ -108,7 +108,7 @@ def encoded(card: Card) -> bytes:
 
 
 def decoded(data: bytes) -> Card:
-    """The card in a `model.json`.
+    """Return the card in a `model.json`.
 
     Raises:
         UnusableModel: it is none, or not the one that was published.
@@ -154,7 +154,7 @@ def age_days(card: Card, now: datetime | None = None) -> float:
 
 
 def checked_name(name: str, what: str) -> str:
-    """A name that may stand in a path; raises `UnusableModel` where it may not."""
+    """Return a name that may stand in a path; raises `UnusableModel` where it may not."""
     if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_.-]*", name):
         raise UnusableModel(f"{name!r} is no name of a {what}")
     return name

@@ -52,7 +52,7 @@ def confusion(classes: int, truth: Indices, label: Indices) -> Indices:
 
 
 def calibrated(probabilities: Floats, truth: Indices) -> tuple[Bin, ...]:
-    """What was said of the likeliest class, and how often it was right, in bins that are not empty."""
+    """Return what was said of the likeliest class, and how often it was right, in bins that are not empty."""
     said, right = probabilities.max(axis=1), probabilities.argmax(axis=1) == truth
     place = np.minimum((said * BINS).astype(np.int_), BINS - 1)
     return tuple(
@@ -72,6 +72,6 @@ def _score(counts: Indices, at: int) -> ClassScore:
 
 
 def _macro_f1(counts: Indices) -> float:
-    """The mean over the classes that were there or were said."""
+    """Return the mean over the classes that were there or were said."""
     scores = [_score(counts, at) for at in range(len(counts)) if counts[at].any() or counts[:, at].any()]
     return sum(score.f1 for score in scores) / len(scores) if scores else 0.0

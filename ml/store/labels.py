@@ -52,7 +52,7 @@ class Label(Struct, frozen=True, order=True):
     source: LabelSource = LabelSource.PERSON
 
     def __post_init__(self) -> None:
-        """Times as the store keeps them."""
+        """Round times to the store's resolution."""
         for name in ("began_utc_ns", "ended_utc_ns"):
             force_setattr(self, name, getattr(self, name) // US_NS * US_NS)
 

@@ -89,7 +89,7 @@ def _kind(error: Exception) -> type[StoreError]:
 
 
 def _reason(error: Exception) -> str:
-    """The error in few words; what a server answered is reduced to its code."""
+    """Return the error in few words; what a server answered is reduced to its code."""
     text = str(error)
     if gone := _GONE.search(text):
         return f"{gone[1] or gone[2]} is not there"

@@ -68,7 +68,7 @@ class Part:
     named: bool = True  # whether somebody has said who the wearer was
 
     def of(self, rows: npt.NDArray[Any]) -> "Part":
-        """Some of its decisions."""
+        """Return some of its decisions."""
         return Part(
             self.ask,
             self.group,
@@ -91,7 +91,7 @@ class LeftOut:
 
 
 def part(ask: Ask) -> Part | LeftOut:
-    """The session's decisions.
+    """Return the session's decisions.
 
     Raises:
         StoreError: the store cannot be read.
@@ -259,7 +259,7 @@ def _rows(store: Store, table: Table, ask: Ask) -> list[dict[str, Any]]:
 
 
 def versions(store: Store, robots: Sequence[str]) -> dict[str, int]:
-    """The versions of now, of all tables that are needed for these robots' sessions, by location."""
+    """Return the versions of now, of all tables that are needed for these robots' sessions, by location."""
     shards = store.about.shards
     wanted = {*(TELEMETRY.location(robot, shards) for robot in robots), SESSIONS.name, LABELS.name}
     found: dict[str, int] = {}

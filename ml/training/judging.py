@@ -133,12 +133,12 @@ def _figure(metrics: Metrics, name: str) -> float:
 
 
 def _by_people(part: Part) -> Part:
-    """What people, the simulator or sensors say: nobody is judged by what a model said."""
+    """Return what people, the simulator or sensors say: nobody is judged by what a model said."""
     return part.of(part.source != LabelSource.PSEUDO.value)
 
 
 def _common(parts: Sequence[Part], its: Sequence[Part]) -> tuple[list[Part], list[Part]]:
-    """The decisions, session by session, that both have features for."""
+    """Return the decisions, session by session, that both have features for."""
     others = {(each.ask.robot, each.ask.session): _by_people(each) for each in its}
     mine, theirs = [], []
     for each in parts:
@@ -158,7 +158,7 @@ def _people(parts: Sequence[Part]) -> dict[str, int]:
 
 
 def _classes(new: Learned, parts: Sequence[Part], serving: Learned | None) -> tuple[str, ...]:
-    """The new model's, and then those that it does not know, but the other one or somebody does."""
+    """Return the new model's, and then those that it does not know, but the other one or somebody does."""
     others = {str(name) for each in parts if new.task.fold for name in np.unique(each.truth)}
     others |= set(() if serving is None else serving.classes)
     return (*new.classes, *sorted(others - set(new.classes)))
@@ -190,7 +190,10 @@ def _in_sets(
 
 
 def _coverage(learned: Learned, covered: npt.NDArray[np.bool_], people: npt.NDArray[Any]) -> dict[str, float]:
-    """The share of decisions, and of the worst person's, whose truth is within; beside what is promised."""
+    """Return the share of decisions, and of the worst person's, whose truth is within.
+
+    Beside what is promised.
+    """
     found = {
         "covered": float(covered.mean()),
         "worst_subject_covered": min(float(covered[people == one].mean()) for one in np.unique(people)),
@@ -202,7 +205,7 @@ def _coverage(learned: Learned, covered: npt.NDArray[np.bool_], people: npt.NDAr
 
 
 def _label(verdicts: Sequence[Verdicts]) -> npt.NDArray[np.int_]:
-    """What is said: nothing of what it does not know."""
+    """Return what is said: nothing of what it does not know."""
     return np.concatenate([np.where(one.novelty < ABNORMAL_FROM, one.label, NONE) for one in verdicts])
 
 
@@ -213,7 +216,7 @@ def _of_classes(
     verdicts: Sequence[Verdicts],
     people: npt.NDArray[Any],
 ) -> Metrics:
-    """A class that the model does not know is one that it never says."""
+    """Return a class that the model does not know is one that it never says."""
     place = np.array([*(every.index(name) for name in known), NONE])
     probabilities = np.zeros((len(truth), len(every)))
     probabilities[:, place[:-1]] = np.concatenate([one.probabilities for one in verdicts])

@@ -37,7 +37,7 @@ class SimulatedSession:
     walks: str = ORDINARY  # how the wearer walks, as `gwrms sim-record --walks`
 
     def of(self, channels: tuple[str, ...]) -> Floats:
-        """The values of these channels, in this order."""
+        """Return the values of these channels, in this order."""
         return self.values[:, [self.channels.index(name) for name in channels]]
 
 
@@ -92,7 +92,7 @@ def read(path: Path) -> list[SimulatedSession]:
 
 
 def examples(task: Task, recipe: Recipe, sessions: list[SimulatedSession], step: int) -> Examples:
-    """A decision every `step` samples of the recipe's grid, each on a full window.
+    """Return a decision every `step` samples of the recipe's grid, each on a full window.
 
     Raises:
         UnusableData: a session lacks a channel, or all are shorter than the recipe's look-back.
@@ -106,7 +106,7 @@ def examples(task: Task, recipe: Recipe, sessions: list[SimulatedSession], step:
 
 
 def stepping(label: npt.NDArray[np.str_], phase: Floats) -> tuple[Floats, npt.NDArray[np.bool_]]:
-    """What gait_phase learns: phases (n, 2), NaN where nobody steps; and the rows of which it is known.
+    """Return the targets of gait_phase: phases (n, 2), NaN without steps; and the known rows.
 
     Between standing and walking, falling and getting up nobody can say.
     """

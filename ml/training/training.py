@@ -156,7 +156,7 @@ def _loaded(registry: Registry, name: str) -> _Model:
 
 
 def _serving(registry: Registry, task: Task, robot: str, recipe: Recipe) -> _Model | None:
-    """The model that serves robots with these sensors."""
+    """Return the model that serves robots with these sensors."""
     name = registry.serving(task.name, robot, set(recipe.channels))
     return None if name is None else _loaded(registry, name)
 
@@ -172,7 +172,7 @@ def _teacher(wish: Wish, serving: _Model | None) -> tuple[str, float]:
 def _its_parts(
     found: Material, serving: _Model | None, recipe: Recipe, judges: Sequence[Part]
 ) -> Sequence[Part]:
-    """The same sessions with the features of the serving model."""
+    """Return the same sessions with the features of the serving model."""
     if serving is None or serving.learned.recipe.name == recipe.name:
         return judges
     return found.of(judges).parts(serving.learned.recipe)[0]
@@ -193,7 +193,7 @@ def _enough(task: Task, lessons: Sequence[Part]) -> tuple[list[Part], list[str]]
 
 
 def _unnamed(sessions: int) -> list[str]:
-    """What is to be known of sessions whose wearer may be any of those who judge."""
+    """Return what is to be known of sessions whose wearer may be any of those who judge."""
     if not sessions:
         return []
     remark = (

@@ -29,11 +29,13 @@ HEADER = ("WHAT CHANGED", "", "BEFORE", "AFTER")
 def changed(argv: list[str]) -> int:
     """Run `gwrms sessions changed`."""
     made = parser(
-        "sessions changed", "What changed from one session to another, and what moved with it.", EPILOG
+        "sessions changed", "Show what changed between two sessions, and what moved with it.", EPILOG
     )
-    made.add_argument("before", metavar="BEFORE", help="the session in which it worked; how its name begins")
+    made.add_argument(
+        "before", metavar="BEFORE", help="the session in which it worked; its name, which may be abbreviated"
+    )
     made.add_argument("after", metavar="AFTER", help="the other one")
-    made.add_argument("--facts", action="store_true", help="only what changed: no telemetry is read")
+    made.add_argument("--facts", action="store_true", help="show only what changed; reads no telemetry")
     add_url(made)
     arguments = made.parse_args(argv)
     known = recordings("sessions", arguments)

@@ -70,7 +70,7 @@ def main(argv: list[str]) -> int:
 
 
 def _settings() -> "ServerSettings | None":
-    """What the server's file says; one that cannot be read hinders nobody."""
+    """Return what the server's file says; one that cannot be read hinders nobody."""
     from server_gui.core.settings.server_file import SettingsError, load
 
     try:
@@ -97,7 +97,7 @@ def _tell(stopping: StopProgress) -> int:
 def _parser() -> argparse.ArgumentParser:
     made = argparse.ArgumentParser(
         prog="gwrms top",
-        description="One robot in the terminal, live: its joints, feet, trunk, parameters and computer.",
+        description="Show one robot live in the terminal: joints, feet, trunk, parameters and computer.",
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,

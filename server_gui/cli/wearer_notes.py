@@ -11,13 +11,13 @@ def add_worn(parser: argparse.ArgumentParser) -> None:
         "--wearer",
         default="",
         metavar="ID",
-        help="who wears the robots, as a pseudonym of the study; gwrms cloud forget finds them by it",
+        help="the wearer's pseudonym in the study, by which gwrms cloud forget finds the data",
     )
     parser.add_argument(
         "--consent",
         default="",
         metavar="TEXT",
-        help="what the wearer has agreed to, and when or where that is",
+        help="the wearer's consent, with its date or reference",
     )
 
 

@@ -64,7 +64,7 @@ class DemoRobot:
             self._thread.join()
 
     def check(self) -> None:
-        """Raises `ChildFailed` once simulator or gateway has ended, or never became ready."""
+        """Check the processes; raises `ChildFailed` if one has ended, or never became ready."""
         if self.problem:
             raise ChildFailed(self.problem)
 

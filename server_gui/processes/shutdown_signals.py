@@ -35,7 +35,7 @@ class ShutdownSignals:
             signal.signal(number, before)
 
     def check(self) -> None:
-        """Raises `ShutdownRequested` once a signal has come."""
+        """Check for a signal; raises `ShutdownRequested`."""
         if self._asked is not None:
             raise ShutdownRequested(self._asked)
 

@@ -107,7 +107,7 @@ class FollowedRobot:
                     summary.see(part.name, part.state)
 
     def _give_back_control(self) -> None:
-        """The lease is held only while something is written."""
+        """Release the lease when nothing is being written."""
         control, writing = self.station.control, self.station.writing
         wanted = control.until_ns is not None and writing.state is not WriteState.WRITING
         if wanted and writing.revision != self._given_back:

@@ -189,7 +189,10 @@ def _learning(adapting: Adapting) -> PredictionRow:
 
 
 def _danger(predictions: StationPredictions) -> Iterator[PredictionRow]:
-    """What is foreseen: its level and number, then why; nothing old, unknown or unsaid is called fine."""
+    """Yield what is foreseen: its level and number, then why.
+
+    Nothing old, unknown or unsaid is called fine.
+    """
     shown = predictions.danger
     if shown is None:
         if predictions.foresees:
@@ -242,7 +245,7 @@ def label_text(label: str) -> str:
 
 
 def _stride(station: Station, line: PredictionRow) -> PredictionRow:
-    """The ring has the numbers; here stands whether both that know one agree."""
+    """Return the line with the agreement of steps and model; the ring has the numbers."""
     derived, modelled = station.processing.derived(), model_phases(station)
     steps = {leg: leg_phase(derived, leg, derived.stamp_ns) for leg in Leg}
     pairs = [(steps[leg], modelled[leg]) for leg in Leg]
@@ -269,7 +272,7 @@ def _as_predicted(line: PredictionRow) -> PredictionRow:
 
 
 def _runner_up(shown: Told) -> str:
-    """What it may be as well, where it may."""
+    """Return what it may be as well, where it may."""
     prediction = shown.prediction
     others = sorted(prediction.probabilities.items(), key=lambda item: -item[1])
     if 1 < len(prediction.either) <= FEW:

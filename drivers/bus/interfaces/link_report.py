@@ -9,7 +9,7 @@ USUAL_BITRATE = 1_000_000
 
 
 def missing_link(name: str) -> str:
-    """The words for an interface that is not there."""
+    """Return the words for an interface that is not there."""
     here = [known for _, known in socket.if_nameindex() if "can" in known]
     present = f"CAN interfaces here: {', '.join(here)}" if here else "there is no CAN interface here"
     return f"there is no interface {name}; {present}: plug the adapter in, or load its driver"
@@ -23,7 +23,7 @@ def blocking_problem(name: str, link: NetworkInterface, bitrate: int | None) -> 
 
 
 def warning(name: str, link: NetworkInterface, bitrate: int | None) -> str | None:
-    """What differs from the robot's file, or will hurt later; `None` when all is well."""
+    """Return what differs from the robot's file, or will hurt later; `None` when all is well."""
     if link.bitrate is not None and bitrate is not None and link.bitrate != bitrate:
         return (
             f"{name} runs at {link.bitrate} bit/s, the robot's file says {bitrate}; "

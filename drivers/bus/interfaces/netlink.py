@@ -34,7 +34,10 @@ class NetworkInterface:
 
 
 def read_link(name: str) -> NetworkInterface | None:
-    """The link called `name`; `None` where there is none. Raises `OSError` from a kernel that is silent."""
+    """Return the link called `name`; `None` where there is none.
+
+    Raises `OSError` from a kernel that is silent.
+    """
     try:
         index = socket.if_nametoindex(name)
     except OSError:
@@ -46,13 +49,13 @@ def read_link(name: str) -> NetworkInterface | None:
 
 
 def link_request(index: int) -> bytes:
-    """The message that asks for one link."""
+    """Return the message that asks for one link."""
     body = _INTERFACE.pack(socket.AF_UNSPEC, 0, index, 0, 0)
     return _HEADER.pack(_HEADER.size + len(body), _GET_LINK, _REQUEST, 1, 0) + body
 
 
 def parse_link(message: bytes) -> NetworkInterface | None:
-    """A link out of the kernel's answer; `None` for any other message."""
+    """Return a link out of the kernel's answer; `None` for any other message."""
     if len(message) < _HEADER.size + _INTERFACE.size:
         return None
     length, kind, *_ = _HEADER.unpack_from(message)

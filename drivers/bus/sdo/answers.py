@@ -54,7 +54,7 @@ class Answers:
         self._doubles = DuplicateAnswers()
 
     def put(self, stamp_ns: int, response: bytes) -> None:
-        """A response has come."""
+        """Take a response."""
         if self._inbox.qsize() >= INBOX:
             self._counters.dropped += 1
         else:

@@ -96,7 +96,7 @@ class SdoChannel:
         return self._unassigned >= OUT_OF_SYNC
 
     def known(self, index: int, subindex: int, otherwise: bytes | None = None) -> bytes | None:
-        """What the device has confirmed to hold since it came up, `otherwise` where nothing was written.
+        """Return the value confirmed since the device came up, `otherwise` if none was written.
 
         `None` where nobody knows: a write of it is under way, or stayed unanswered.
         """
@@ -109,7 +109,7 @@ class SdoChannel:
     # What comes, and who is first.
 
     def on_response(self, stamp_ns: int, data: bytes) -> None:
-        """A frame with the identifier of this channel's responses; called in the bus's thread."""
+        """Take a frame with the identifier of this channel's responses; called in the bus's thread."""
         if len(data) == 8:
             self._answers.put(stamp_ns, data)
 
@@ -151,11 +151,11 @@ class SdoChannel:
         self._interrupted.clear()
 
     def forget_written(self) -> None:
-        """The device may hold other values than it was given."""
+        """Note that the device may hold other values than written."""
         self._written.forget()
 
     def rebooted(self) -> None:
-        """The node has booted: it has forgotten what it was asked and given."""
+        """Forget requests and writes after a boot of the node."""
         self._outstanding.forget()
         self._written.forget()
         self._answers.forget_doubles()

@@ -29,7 +29,7 @@ class DuplicateAnswers:
         return not self.found and bool(self._recent) and self._recent[-1].twice
 
     def answered(self, answer: bytes) -> None:
-        """A request was answered by this."""
+        """Take the answer to a request."""
         if not protocol.names_object(answer):
             return
         self._recent.append(_Answered(answer))
@@ -56,5 +56,5 @@ class DuplicateAnswers:
 
 
 def _key(answer: bytes) -> tuple[int, bytes]:
-    """Specifier and object: two devices may hold different values."""
+    """Return specifier and object: two devices may hold different values."""
     return answer[0] & protocol.SPECIFIER, answer[1:4]

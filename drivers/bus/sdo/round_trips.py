@@ -24,7 +24,7 @@ class RoundTrips:
         self._lock = threading.Lock()
 
     def answered(self, sent_ns: int, stamp_ns: int, *, given_up: bool) -> None:
-        """An answer came at `stamp_ns`; `given_up`: nobody waited for it any more."""
+        """Take an answer of `stamp_ns`; `given_up`: nobody waited for it any more."""
         trip_ns = max(0, stamp_ns - sent_ns)
         with self._lock:
             self._recent.append((stamp_ns, trip_ns))
@@ -45,7 +45,7 @@ class RoundTrips:
                     self._lateness.clear()
 
     def unanswered(self, now_ns: int) -> None:
-        """A request was given up."""
+        """Note that a request was given up."""
         with self._lock:
             if self._unanswered == 0:
                 self._first_unanswered_ns = now_ns
@@ -58,7 +58,7 @@ class RoundTrips:
                 )
 
     def restart(self) -> None:
-        """The node began anew; what was counted stays."""
+        """Restart with the node; counts stay."""
         with self._lock:
             self._recent.clear()
             self._unanswered = self._prompt = 0

@@ -26,7 +26,7 @@ class InclinometerSettings(NodeImuSettings, frozen=True, forbid_unknown_fields=T
 
 
 def build(name: str, settings: InclinometerSettings, site: "BuildContext") -> "Inclinometer":
-    """Raises `SettingsError` and `EdsError` where the settings or the device's file cannot be used."""
+    """Build it; raises `SettingsError` and `EdsError` for unusable settings or device files."""
     from drivers.imu.inclinometer import Inclinometer  # needs what only a started bus needs
 
     description = eds.load(eds.locate(settings.eds, site.file), settings.node_id)

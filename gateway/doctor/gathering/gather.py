@@ -78,7 +78,7 @@ def gather(config: RobotConfig, how: How) -> Observations:
 
 @contextlib.contextmanager
 def _gateway(how: How) -> Iterator[Robot | None]:
-    """The robot's gateway, where one runs."""
+    """Return the robot's gateway, where one runs."""
     if how.gateway is None:
         yield None
         return
@@ -169,7 +169,7 @@ def _waiting() -> Wait:
 def _proposals(
     seen: Observations, objects: Mapping[str, Mapping[Object, Value]], folders: tuple[Path, ...]
 ) -> Iterator[tuple[str, str]]:
-    """The EDS file for what each device says it is, where its own is another's."""
+    """Yield the EDS file for what each device says it is, where its own is another's."""
     library: Library | None = None
     for place in seen.nodes():
         vendor, product = (objects.get(place.name, {}).get((0x1018, sub)) for sub in (1, 2))
@@ -187,5 +187,5 @@ def _proposals(
 
 
 def _told(vendor: int, product: int) -> Told:
-    """A device of which only that is known."""
+    """Return a device of which only that is known."""
     return Told(0, None, None, None, None, vendor, product, None, None, None, (), ())

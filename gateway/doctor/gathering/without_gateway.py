@@ -33,7 +33,7 @@ Wait = Callable[[float], object]
 
 
 def harmless(config: RobotConfig) -> RobotConfig:
-    """The same robot for drivers that change nothing on it."""
+    """Return the same robot for drivers that change nothing on it."""
     joints = {name: replace(joint, configure_pdos=False) for name, joint in config.joint.items()}
     gateway = replace(config.gateway, role=Role.OBSERVER)
     return replace(config, gateway=gateway, joint=joints, guard=None)
@@ -90,7 +90,7 @@ def objects(
     asked_by_others: Mapping[str, frozenset[int]],
     wait: Wait,
 ) -> dict[str, dict[Object, Value]]:
-    """What each device holds that nobody else asks; one that does not answer is left out."""
+    """Return what each device holds that nobody else asks; one that does not answer is left out."""
     found: dict[str, dict[Object, Value]] = {}
     with ExitStack() as ending:
         buses = {name: CanBus(name, settings) for name, settings in config.can.items()}

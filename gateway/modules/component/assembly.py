@@ -92,7 +92,7 @@ def _add(robot: Robot, kind: Kind, name: str, build: Callable[[], Component]) ->
 def _on_can(
     make: Callable[..., Component], join: Callable[[Mapping[str, Component]], None] | None = None
 ) -> Builder:
-    """The builder of what a vendor's EDS describes."""
+    """Return the builder of what a vendor's EDS describes."""
 
     def build(name: str, settings: JointSettings | DeviceSettings, site: BuildContext) -> Component:
         description = eds.load(eds.locate(settings.eds, site.file), settings.node_id)
@@ -114,7 +114,7 @@ BUILDERS: Mapping[Kind, Builder] = {
 
 
 def facts(config: RobotConfig, name: str, description: eds.Description) -> Mapping[str, str | int]:
-    """What `robot.describe` tells of a device: what its EDS says, and where it is."""
+    """Return what `robot.describe` tells of a device: what its EDS says, and where it is."""
     tables: dict[str, Any] = {name: one for kind in BUILDERS for name, one in getattr(config, kind).items()}
     bus, bitrate = tables[name].bus, config.can[tables[name].bus].bitrate
     found: dict[str, str | int] = {

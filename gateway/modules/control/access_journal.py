@@ -54,7 +54,7 @@ class AccessJournal:
             log.warning("who is let in cannot be seen, and is not told: %s", error)
 
     def tell(self, known: "Known") -> None:
-        """What has changed since it was told last. In one thread at a time."""
+        """Record the changes since the last time. In one thread at a time."""
         now, before = _people(known), self._kept() if self._told is None else self._told
         self._told = now
         written: Future[None] | None = None

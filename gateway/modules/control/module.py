@@ -158,7 +158,7 @@ class ControlModule:
         self._records.close()
 
     def describe(self) -> "Future[Described]":
-        """Waits for a cold start, so that it says what is there."""
+        """Describe the robot after a cold start is over."""
         ready = self._component.when_ready(self._component.robot.components)
         return then(ready, lambda _none: self._described())
 
@@ -286,5 +286,5 @@ class ControlModule:
         return self._stop.stop(who, reason)
 
     def trip(self, who: str, reason: str) -> None:
-        """The same for the guard, whose stop leaves one that is held already as it is. From any thread."""
+        """Stop for the guard, which leaves an already held stop as it is. From any thread."""
         self._stop.trip(who, reason)

@@ -156,7 +156,7 @@ class Alarms:
 
 
 def _kept(before: Active | None, alarm: Alarm, now_s: float, newest_ns: int | None) -> Active:
-    """The same alarm as before, or a new one; what has become worse is to be read again."""
+    """Return the same alarm as before, or a new one; what has become worse is to be read again."""
     if before is None:
         since_s = now_s if alarm.since_s is None else alarm.since_s
         at_ns = None if newest_ns is None else newest_ns - round(max(0.0, now_s - since_s) * 1e9)

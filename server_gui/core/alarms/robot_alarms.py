@@ -102,19 +102,19 @@ def _of_stop(robot: Robot, stopping: StopProgress) -> Iterator[Alarm]:
 
 
 def remedy(robot: Robot) -> str:
-    """What to do after a STOP that nobody has confirmed."""
+    """Return what to do after a STOP that nobody has confirmed."""
     is_off = _is_live(robot) and None not in _words(robot).values() and not _moving(robot)
     return "STOP again to be sure" if is_off else "use the hardware stop"
 
 
 def _after_stop(robot: Robot, stopping: StopProgress) -> str:
-    """What the drives' states have shown; where not all have shown it, how they are."""
+    """Return what the drives' states have shown; where not all have shown it, how they are."""
     shown = set(stopping.proofs) >= set(robot.names("joint")) and not any_enabled(robot)
     return stopping.proof if shown else "; ".join(filter(None, (stopping.proof, _drives_did(robot))))
 
 
 def _after_unconfirmed(robot: Robot) -> str:
-    """What the robot does after a STOP that nobody has confirmed."""
+    """Return what the robot does after a STOP that nobody has confirmed."""
     if not _is_live(robot):
         return "what it does now is not known"
     moving = _moving(robot)
@@ -161,7 +161,7 @@ def _counted(words: Mapping[str, str | None], state: str, states: int) -> str:
 
 
 def _did(robot: Robot, stopping: StopProgress) -> str:
-    """What the robot did about it, as far as is known."""
+    """Return what the robot did about it, as far as is known."""
     held = f"STOP is held ({stopping.reason})" if stopping.held and stopping.reason else ""
     held = held or ("STOP is held" if stopping.held else "")
     return "; ".join(filter(None, (held, _drives_did(robot))))
@@ -265,7 +265,7 @@ def _of_part(robot: Robot, part: Part, stopping: StopProgress) -> Iterator[Alarm
 
 
 def _advised(problem: str) -> tuple[str, str]:
-    """What is wrong and what to check; a robot says both: `this: check that; it goes on; more: …`."""
+    """Split a problem into what is wrong and what to check: `this: check that; it goes on; more: …`."""
     things, advice = list[str](), list[str]()
     for clause in problem.split("; "):
         thing, *check = _ADVICE.split(clause, maxsplit=1)
@@ -321,7 +321,7 @@ def _of_rule(kind: Kind, rule: GuardRuleInfo, facts: Facts, *, is_now: bool) -> 
 
 
 def _told(journal: Iterable[Mapping[str, Any]], rule: str) -> str:
-    """What the guard last wrote of one of its rules."""
+    """Return what the guard last wrote of one of its rules."""
     found = ""
     for entry in journal:
         if entry.get("who") == "guard" and entry.get("about") == rule and entry.get("what") == "alarm":
@@ -383,7 +383,7 @@ def _where(robot: Robot, name: str) -> str:
 
 
 def _bus(robot: Robot, name: str) -> str:
-    """The bus of a component that is a node."""
+    """Return the bus of a component that is a node."""
     device = _device(robot, name)
     return str(device.get("bus", "its bus")) if "node_id" in device else ""
 
@@ -395,7 +395,7 @@ def _device(robot: Robot, name: str) -> Mapping[str, Any]:
 
 
 def _channel(robot: Robot, name: str, code: int | None, first: tuple[str, ...] = ()) -> str | None:
-    """The channel that shows what is wrong with a component, of those that the robot has."""
+    """Return the channel that shows what is wrong with a component, of those that the robot has."""
     known = () if robot.description is None else robot.description.channels
     names = [channel.name for channel in known if channel.component == name and not channel.enum]
     told = "" if code is None else f"{code:04X}"

@@ -85,7 +85,10 @@ class Archive:
         return self._desk.shown.units
 
     def held_then(self, session: Session) -> list[str]:
-        """The parameters that it began with, in the window's units; in SI where the robot is not there."""
+        """Return the parameters that it began with, in the window's units.
+
+        In SI where the robot is not there.
+        """
         found = (station.robot.description for station in self._desk if station.name == session.robot)
         described = next((one for one in found if one is not None), None)
         si = {} if described is None else {one.name: one.unit for one in described.parameters}
@@ -99,7 +102,7 @@ class Archive:
         return said
 
     def _words(self, robot: str) -> dict[str, dict[str, str]]:
-        """The words of states, which recordings do not have: of the live robot, if it is there."""
+        """Return the words of states, which recordings do not have: of the live robot, if it is there."""
         named = (station.robot.description for station in self._desk if station.name == robot)
         described = next((found for found in named if found is not None), None)
         channels = [] if described is None else described.channels

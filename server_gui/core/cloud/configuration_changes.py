@@ -150,7 +150,7 @@ def _part(setup: Facts, section: str) -> Facts:
 
 
 def _compared(kind: Kind, title: str, before: Facts, after: Facts, are_told: bool) -> Iterator[Difference]:
-    """What a section has on both sides. `are_told`: both sessions tell what they are made of."""
+    """Yield what a section has on both sides. `are_told`: both sessions tell what they are made of."""
     whole = are_told and kind in (Kind.COMPONENT, Kind.GUARD, Kind.LIMITS)
     if not before and not after and not whole:
         if kind is not Kind.OPERATOR:
@@ -179,7 +179,7 @@ def _size(old: object, new: object) -> float:
 
 
 def _gathered(found: Iterable[Difference]) -> Iterator[Difference]:
-    """A line a kind where nothing of it was recorded on a side, instead of one for each joint."""
+    """Yield a line a kind where nothing of it was recorded on a side, instead of one for each joint."""
     by_kind: dict[tuple[Kind, bool, bool], list[Difference]] = {}
     for one in found:
         sides = (one.before == NOT_RECORDED, one.after == NOT_RECORDED)

@@ -127,7 +127,7 @@ class _Between:
 
 
 def _parts(table: pa.Table) -> Iterator[tuple[list[int], dict[str, list[float | None]]]]:
-    """A few rows at a time, in which no channel is missing altogether."""
+    """Yield a few rows at a time, in which no channel is missing altogether."""
     for begin in range(0, table.num_rows, ROWS):
         part = table.slice(begin, ROWS)
         columns = {name: part[name] for name in part.column_names if name not in ("utc", "stamp_ns")}

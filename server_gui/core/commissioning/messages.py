@@ -94,7 +94,7 @@ class Message(msgspec.Struct, frozen=True):
 
 
 def understood(text: str) -> Message:
-    """A line; one that is not understood says what it is."""
+    """Return a line; one that is not understood says what it is."""
     try:
         return msgspec.json.decode(text, type=Message)
     except (msgspec.DecodeError, UnicodeDecodeError):
@@ -102,7 +102,7 @@ def understood(text: str) -> Message:
 
 
 def answer(text: str, number: int) -> str:
-    """The line that answers the question of this number, and no other."""
+    """Return the line that answers the question of this number, and no other."""
     return msgspec.json.encode({"answer": text, "number": number}).decode()
 
 

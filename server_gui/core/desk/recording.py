@@ -128,7 +128,7 @@ class Recording:
         )
 
     def see(self, threads: Sequence[Trouble], by: By = By.WINDOW) -> None:
-        """What is wrong with the threads that follow, record and predict: this window's, or another's."""
+        """Show problems of the threads that follow, record and predict: this window's, or another's."""
         told = {trouble.thread: trouble.text for trouble in self._threads.get(by, ())}
         now = {trouble.thread: trouble.text for trouble in threads}
         for thread, text in now.items():

@@ -72,7 +72,7 @@ class Shutdown:
         self._feeds.hurry()
 
     def finish(self) -> None:
-        """Raises what an end has raised; what does not end although it was hurried is left to itself."""
+        """Raise the error of an ending part, if any; abandon one that does not end in time."""
         if self._done is None:
             self._end()
         elif self._done.done() or not self._hurries.is_set():

@@ -265,7 +265,7 @@ class Station:
             self.tell(NewsKind.WARNING, f"staged edits dropped, the robot no longer has {', '.join(gone)}")
 
     def _processes(self, event: Resources) -> None:
-        """A look at the process table; of CPU and memory the other looks tell, over their own periods."""
+        """Take a look at the process table; CPU and memory come from other looks."""
         self.processes, self.processes_at_ns = event.snapshot, event.at_ns
         table = event.snapshot.processes or []
         known = max(table, key=lambda one: one.cpu_percent or 0.0, default=None)
@@ -335,7 +335,7 @@ class Station:
         self.tell(NewsKind.NOT_STOPPED if not_stopped else NewsKind.STOP, self.stopping.text)
 
     def _show_stop(self, event: Telemetry) -> None:
-        """What the drives' states show of a STOP that goes on."""
+        """Update a running STOP from the drives' states."""
         if self.stopping.at_ns is None or self.stopping.state is StopState.IDLE:
             return
         stamps_ns, columns = event.batch.stamps_ns, event.batch.columns
@@ -380,7 +380,7 @@ class Station:
         self._ask(self._commands.release_control(), lambda _: self._control_gone(), "release")
 
     def lost_control(self) -> None:
-        """The link that held the lease has dropped."""
+        """Note that the link with the lease has dropped."""
         if self.control.until_ns is not None:
             self.tell(NewsKind.CONTROL, "control lost with the link")
         self._control_gone()
@@ -457,7 +457,7 @@ class Station:
         self.tell(NewsKind.PARAMETER, how)
 
     def end_trial_if_over(self, now_ns: int) -> None:
-        """A trial whose time is over has gone back when the robot holds the old values again, not before.
+        """Check whether an expired trial is reverted: the robot must hold the old values again.
 
         Only values that were read after its end count: a link, or this window, may be slow.
         """

@@ -11,7 +11,7 @@ from server_gui.core.follow.validation import Unfit
 
 
 async def signed_head(client: Client, address: Address) -> SignedHead | None:
-    """The newest entry, signed; `None` where the robot has no key, or is from before there were any.
+    """Return the newest entry, signed; `None` where the robot has no key, or is from before there were any.
 
     Raises:
         Unfit: it was signed by another key than was paired, or its signature does not hold.

@@ -222,7 +222,7 @@ class AdaptingService:
             self._put(robot, windows)
 
     def broke(self, robot: str) -> None:
-        """The adapted model cannot judge."""
+        """Note that the adapted model cannot predict."""
         if robot in self.now:
             self._inbox.put(robot, Said(self.now[robot].number, Happening.BROKE))
 
@@ -288,7 +288,7 @@ class AdaptingService:
         self._leaving.wait(GIVE_WAY_S)
 
     def _drop_silent(self) -> None:
-        """A robot that nobody follows any more tells nothing of its end."""
+        """Forget a robot that is not followed any more."""
         now_s = time.monotonic()
         for robot, known in self._attempts.items():
             if known.context != EMPTY and now_s - self._heard_s.get(robot, now_s) > SILENT_S:
@@ -302,7 +302,7 @@ class AdaptingService:
 
 
 def _after(before: Context, events: Iterable[Event]) -> Context:
-    """What the robot's link and boot are after these events."""
+    """Return what the robot's link and boot are after these events."""
     boot_id, links, is_linked = before.boot_id, before.links, before.is_linked
     for event in events:
         match event:

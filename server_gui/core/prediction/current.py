@@ -147,7 +147,7 @@ class StationPredictions:
         return None if self.danger is None else self.danger.known
 
     def clear(self) -> None:
-        """The link has dropped, or the robot has booted: nothing is known of it now."""
+        """Forget everything: the link has dropped, or the robot has booted."""
         self.revision += 1
         self.by_task.clear()
         self.danger = self.adapting = None

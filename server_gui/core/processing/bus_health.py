@@ -181,7 +181,7 @@ def _misses(node: NodeInfo) -> bool:
 
 
 def _gathered(nodes: Sequence[NodeInfo]) -> Iterator[tuple[str, str]]:
-    """What nodes have, those with the same in one: `all 6 nodes: 3–4 % of their PDOs are missing`."""
+    """Yield what nodes have, those with the same in one: `all 6 nodes: 3–4 % of their PDOs are missing`."""
     same: dict[tuple[str, str], list[tuple[NodeInfo, str]]] = {}
     for node in nodes:
         said = [(one.words, one.check) for one in node.findings]

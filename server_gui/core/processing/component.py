@@ -97,7 +97,7 @@ class ComponentProcessing:
     # --- gait
 
     def _found(self, wiring: Wiring, stamp_ns: int, row: int, columns: Columns) -> list[GaitEvent]:
-        """The events of every source; only those of each leg's best source count."""
+        """Return the events of every source; only those of each leg's best source count."""
         found: list[GaitEvent] = []
         for detectors, source, fed in (
             (self._pressure, EventSource.PRESSURE, wiring.forces),

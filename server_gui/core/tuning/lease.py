@@ -31,7 +31,7 @@ class LeaseState:
         self.asking, self.problem = False, None
 
     def renewed(self, ttl_s: float) -> None:
-        """A write took it anew."""
+        """Note that a write took the lease again."""
         self.taken(Lease("", ttl_s))
 
     def refused(self, why: str) -> None:

@@ -24,7 +24,7 @@ class RevertedTrials:
         self._awaited: tuple[Mapping[str, Number], int] | None = None
 
     def began(self, before: Mapping[str, Number]) -> None:
-        """The robot says that these are in force again."""
+        """Take the robot's report that these are in force again."""
         self._awaited = before, time.monotonic_ns()
         self._writing.reverting()
 

@@ -123,7 +123,7 @@ class Storing:
 
 
 def _summed(done: Sequence[tuple[str, Outcome, str]]) -> tuple[WriteState, str]:
-    """The worst of it, and what came of each; of one device its own words."""
+    """Return the worst of it, and what came of each; of one device its own words."""
     outcomes = {outcome for _, outcome, _ in done}
     state = WriteState.DONE if outcomes == {Outcome.STORED} else WriteState.NOT_STORED
     if Outcome.UNKNOWN in outcomes:

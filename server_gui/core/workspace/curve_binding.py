@@ -63,13 +63,13 @@ def meaning(text: str, channels: Channels, units: Units) -> CurveBinding:
 
 
 def _shown(written: Written, si: str, channels: Channels, units: Units) -> Unit:
-    """A single channel keeps the unit of its quantity, whatever name it was given."""
+    """Return the unit; a single channel keeps that of its quantity, whatever its name."""
     only = channels[written.tree.text] if written.tree.kind == "channel" else None
     return units.unit("" if only is None else only.quantity, si)
 
 
 def not_here(names: Iterable[str]) -> str:
-    """That these channels are missing, in words."""
+    """Return in words that these channels are missing."""
     beside = [name.removeprefix(BESIDE) for name in names if name.startswith(BESIDE)]
     here = [name for name in names if not name.startswith(BESIDE)]
     said = [f"this robot has no {', '.join(here)}"] if here else []

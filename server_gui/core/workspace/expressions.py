@@ -132,7 +132,7 @@ class _Compiler:
             raise self._error(f"{node.text} is of {wanted.said}, not of {part.dimension.said}", node)
 
     def _constant(self, node: ExpressionNode, wanted: Dimension, most: float) -> float:
-        """The second argument: a number above 0 and up to `most`, in this unit or none."""
+        """Return the second argument: a number above 0 and up to `most`, in this unit or none."""
         told = node.parts[1]
         if told.kind != "number":
             raise self._error(f"the second argument of {node.text} is a number in {wanted.said}", told)

@@ -35,7 +35,7 @@ class ExpressionError(ValueError):
         self.problem, self.text, self.place, self.length = problem, text, place, max(length, 1)
 
     def __str__(self) -> str:
-        """The text, and below it the place that is meant with what is wrong there."""
+        """Return the text, and below it the place that is meant with what is wrong there."""
         return f"{self.text}\n{' ' * self.place}{'^' * self.length} {self.problem}"
 
     @property

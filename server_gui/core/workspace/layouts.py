@@ -216,7 +216,7 @@ class Layouts:
         return path
 
     def _free(self, name: str) -> Path:
-        """A file for a new one: of its letters, whatever the file system thinks of the others."""
+        """Return a file for a new one: of its letters, whatever the file system thinks of the others."""
         stem = re.sub(r"\W+", "-", name.casefold(), flags=re.ASCII).strip("-") or "layout"
         place, number = self.folder / f"{stem}{SUFFIX}", 2
         while place.exists():

@@ -134,5 +134,5 @@ class Workspace:
 
 
 def said(unit: Unit | None) -> str:
-    """A unit for a sentence."""
+    """Return a unit for a sentence."""
     return "an unknown unit" if unit is None else unit.symbol or "no unit"

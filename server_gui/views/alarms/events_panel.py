@@ -91,7 +91,7 @@ class NewsModel(QAbstractTableModel):
         return stations[0] if len(stations) == 1 else None
 
     def _said(self, line: EventRow) -> str:
-        """What is said, and of whom where that is neither in the column beside it nor the only robot."""
+        """Return the text, with the robot unless its column shows it or there is only one."""
         only = self.only
         return line.text if only is None or line.robot == only.title else f"{line.robot}: {line.text}"
 

@@ -43,7 +43,7 @@ class Deeds(Protocol):
         ...
 
     def acknowledge(self, told: Told) -> None:
-        """It is read."""
+        """Acknowledge the alarm."""
         ...
 
 
@@ -245,7 +245,7 @@ class AlarmList(Overlay):
 
 
 def style(theme: Theme) -> str:
-    """The frame of an alarm, by its tone."""
+    """Return the frame of an alarm, by its tone."""
     colours = theme.colours
     return (
         f"QFrame#alarm {{ background: {colours.card}; border: 1px solid {colours.border}; "

@@ -113,7 +113,7 @@ class AlarmStrip(ClickableFrame):
             self.shown.emit(station, one.alarm.channel, one.at_ns)
 
     def acknowledge(self, told: Told) -> None:
-        """It is read."""
+        """Acknowledge the alarm."""
         station, one = told
         (self._desk.recording if station is None else station).alarms.acknowledge(one.alarm.key)
         if station is not None and one.alarm.kind is Kind.RESET:

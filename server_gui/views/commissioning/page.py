@@ -98,7 +98,7 @@ class CommissionPage(QWidget):
         self.log.refresh()
 
     def _answer(self, text: str) -> None:
-        """The keyboard waits for the next question: what it was on goes."""
+        """Send the answer, and keep the keyboard focus for the next question."""
         if self.commissioning.answer(text):
             self.setFocus()
 

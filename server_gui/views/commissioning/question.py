@@ -126,7 +126,7 @@ class Question(Card):
         return button
 
     def _lead(self) -> None:
-        """The keyboard goes to the answer, where it was with the question before or on nothing."""
+        """Move the focus to the answer, if it was on the last question or nowhere."""
         focused = QApplication.focusWidget()
         ours = focused is None or focused.isAncestorOf(self) or self.isAncestorOf(focused)
         if not self.isVisible() or not ours:

@@ -99,7 +99,7 @@ class Result(Card):
 
 
 def checked(written: Written) -> str:
-    """What `gwrms check` says of it, a line each."""
+    """Return what `gwrms check` says of it, a line each."""
     lines = [f"▲ {severity}: {words}" for severity, words in written.findings]
     if written.unfinished:
         lines.append(f"▲ not in it, because not finished: {', '.join(written.unfinished)}")

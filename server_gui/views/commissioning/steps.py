@@ -81,7 +81,7 @@ class Steps(Card):
 
 
 def _parts(steps: tuple[Step, ...]) -> list[tuple[str, list[Step]]]:
-    """Steps that follow each other in one part."""
+    """Return steps that follow each other in one part."""
     parts: list[tuple[str, list[Step]]] = []
     for step in steps:
         if not parts or parts[-1][1][-1].part != step.part:

@@ -121,7 +121,7 @@ class Edits(QWidget):
         self._choose()
 
     def _follow(self) -> None:
-        """A trial that has begun is looked at, until somebody chooses another edit."""
+        """Show a trial that has begun, until another edit is chosen."""
         running = (
             place
             for place, one in enumerate(self._shown)
@@ -146,7 +146,7 @@ class Edits(QWidget):
         return [in_units(one, units, si) for one in known]
 
     def _left(self) -> QVBoxLayout:
-        """The list, and what else may be tried."""
+        """Return the list, and what else may be tried."""
         self.ab, self.sweep = QPushButton("A/B trial…"), QPushButton("Sweep…")
         self.ab.setToolTip("Two values of a parameter against each other, several times in a drawn order")
         self.sweep.setToolTip("Values of a parameter upwards in small steps, while you watch")
@@ -176,7 +176,7 @@ class Edits(QWidget):
             self.form.show()
 
     def _chosen_edit(self, station: Station) -> Tried | None:
-        """What is looked at, unless something was staged or tried since."""
+        """Return what is looked at, unless something was staged or tried since."""
         told = self._chosen
         known = next((one for one in station.judged if told and one.edit.id == told.edit.id), None)
         if known is None or len(known.edit.changes) != 1 or station.writing.trial or station.edits.staged:
@@ -244,7 +244,7 @@ class Edits(QWidget):
         self._place()
 
     def _place(self) -> None:
-        """A joint a row; where that has no room, two rows or four."""
+        """Arrange one row per joint; without room, two or four."""
         told, px = self._drawn, self._theme.px
         room = self.width() - (0 if self._is_narrow else px(LIST))
         columns = next((one for one in (len(DRAWN), 2) if one * px(LEAST) <= room), 1)
@@ -261,7 +261,7 @@ class Edits(QWidget):
             one.show_hover(at)
 
     def _what(self, told: Told) -> str:
-        """What was changed, in its unit."""
+        """Return what was changed, in its unit."""
         if told.experiment is None:
             return changes(told.edit, self._units.get(told.edit.id, {}))
         return f"{what(told)} {told.experiment.unit}".rstrip()
@@ -289,7 +289,7 @@ class Edits(QWidget):
         return self.width() < self._theme.px(NARROW)
 
     def _scale(self) -> None:
-        """The list is beside the strides, or above them where there is less room."""
+        """Put the list beside the strides, or above them without room."""
         px, direction, is_narrow = self._theme.px, QBoxLayout.Direction, self._is_narrow
         self._row.setDirection(direction.TopToBottom if is_narrow else direction.LeftToRight)
         self.list.setMaximumSize(MOST_PX if is_narrow else px(LIST), px(ABOVE) if is_narrow else MOST_PX)
@@ -343,7 +343,7 @@ def _by_our_clock(note: str) -> str:
 
 
 def _strong(told: Told) -> list[Measured]:
-    """What differs, the strongest first."""
+    """Return what differs, the strongest first."""
     found = (one for one in told.evidence.metrics if one.word in (Word.BETTER, Word.WORSE, Word.CHANGED))
     return sorted(found, key=lambda one: -abs(one.size or 0.0))
 
@@ -355,6 +355,6 @@ def _metric(one: Measured) -> str:
 
 
 def _in_unit(one: Measured) -> str:
-    """The difference in the metric's unit."""
+    """Return the difference in the metric's unit."""
     ends = f"{number(one.low)} to {number(one.high)} {one.unit}".rstrip()
     return f"{one.title.replace('_', ' ')}: {number(one.difference)} {one.unit}, 95 % interval {ends}"

@@ -208,7 +208,7 @@ class ExperimentForm(QDialog):
         self._say("\n".join(line.strip() for line in stated(plan)))
 
     def _say(self, text: str) -> None:
-        """What is longer makes the form higher: Qt would press the fields together for it."""
+        """Grow the form with its contents: Qt would press the fields together."""
         set_text(self.words, text)
         needed = self.heightForWidth(self.width())
         if self.isVisible() and needed > self.height():

@@ -237,7 +237,7 @@ class MainWindow(QMainWindow):
         self.closed.emit()
 
     def _ask_to_end(self, commissioning: Commissioning) -> None:
-        """It closes once that has ended: nothing here waits for it."""
+        """Close the window when the shutdown has ended, without waiting."""
 
         def end() -> None:
             self._is_closing = True

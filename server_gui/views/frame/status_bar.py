@@ -93,7 +93,7 @@ class StatusBar(QStatusBar):
 
 
 def _bus(station: Station) -> tuple[Level, tuple[str, ...]]:
-    """The worst bus; where nothing new comes from the robot, none is known to be good."""
+    """Return the worst bus; where nothing new comes from the robot, none is known to be good."""
     level, words = worst(station.robot)
     is_known = level is not Level.GOOD or station.is_live
     return (level, words) if is_known else (Level.UNKNOWN, (UNKNOWN, "CAN –"))

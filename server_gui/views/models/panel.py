@@ -136,7 +136,7 @@ class ModelsPage(QWidget):
             bring_into_sight(self.form)
 
     def _choose_trained(self) -> None:
-        """What was trained here is looked at next, once."""
+        """Show a model trained here next, once."""
         for model in self._models.trained.keys() - self._known:
             if self._models.found.find(model) is not None:
                 self._known.add(model)
@@ -173,7 +173,7 @@ class ModelsPage(QWidget):
             self.said.style().polish(self.said)
 
     def _show_learned(self) -> None:
-        """What is no model of the store, and serves or may: copies that have learned from who walks now."""
+        """Show adapted models, which are not in the store."""
         known = [(one.title, one.predictions.adapting) for one in self._desk or ()]
         lines = [f"◆ {title}: {one.standing}" for title, one in known if one is not None and one.standing]
         set_text(self.learned, "\n".join(lines))

@@ -252,7 +252,10 @@ class ObjectsPage(QWidget):
     def _wanted(
         self, station: Station, dictionary: Dictionary, compared: Compared
     ) -> tuple[list[Object], list[Object]]:
-        """What is chosen or in sight, here and on the device beside it; and what of it never changes."""
+        """Return what is chosen or in sight, here and on the device beside it.
+
+        And what of it never changes.
+        """
         current = self.table.current
         shown = [*([] if current is None else [current]), *self.table.in_sight]
         still = [(compared.component, address) for address in dictionary.still]
@@ -268,7 +271,7 @@ class ObjectsPage(QWidget):
 
 
 def _trouble(station: Station, device: Device | None, dictionary: Dictionary) -> str:
-    """What is wrong as a whole; of single objects their rows tell."""
+    """Return what is wrong as a whole; of single objects their rows tell."""
     if not station.is_linked:
         return LOST
     if station.robot.description is None:

@@ -128,7 +128,7 @@ class KeyPlot(Card):
         )
 
     def _values(self, station: Station) -> list[float | None]:
-        """The newest, or those at the pointer."""
+        """Return the newest, or those at the pointer."""
         if self._hover is None:
             return [station.robot.values.get(name) for name in self.channels]
         times = station.rings.times(SECONDS)
@@ -157,7 +157,7 @@ class KeyPlot(Card):
         return [end for both in ends for end in both if end is not None]
 
     def _held(self, station: Station, wanted: str) -> list[float]:
-        """What drives hold in an object, where the robot's file gives it the plot's unit."""
+        """Return what drives hold in an object, where the robot's file gives it the plot's unit."""
         parts = {channel.partition(".")[0] for channel in self.channels}
         known = (
             () if not wanted or station.robot.description is None else station.robot.description.parameters

@@ -146,7 +146,7 @@ class NowLine(QFrame):
         set_tip(self.ab, why_not or TO_AB)
 
     def _fit(self, *, on_trial: bool) -> None:
-        """What is on trial stands beside the other facts where all its words have room, else below them.
+        """Put the trial beside the other facts if it fits, else below them.
 
         How it is judged changes with each stride, and nothing may move with that: it has what room there is.
         """

@@ -119,7 +119,7 @@ class Overview(QWidget):
         return QSize(self._theme.px(A_COLUMN), super().minimumSizeHint().height())
 
     def _arrange(self, columns: int) -> None:
-        """The cards beside each other, as many as have room, and the joints below all of them."""
+        """Arrange as many cards as fit in a row, and the joints below."""
         self._columns, grid = columns, self._grid
         grid.addWidget(self.now, 0, 0, 1, columns)
         cards = [] if self._is_plots else [self._status, self._posture, self._pressure]
@@ -221,7 +221,7 @@ class Overview(QWidget):
             self.learned.refresh(station)
 
     def _words(self, station: Station) -> tuple[str, str]:
-        """What the wearer does, and how fast."""
+        """Return what the wearer does, and how fast."""
         line, gait = activity(station), station.processing.derived().gait
         if line.mark.word == STOPPED:
             return line.short_text, "not judged"
@@ -308,7 +308,7 @@ def _load_texts(side: str, load: Load, force: Unit) -> tuple[str, ...]:
 
 
 def _meaning(sources: Collection[str], *, model: bool) -> tuple[str, ...]:
-    """What the rings mean, the fullest wording first."""
+    """Return what the rings mean, the fullest wording first."""
     rings, short = "outer ring left, inner right", "outer left, inner right"
     told = [f"line: steps by {', '.join(sorted(sources))}"] if sources else []
     told += ["dot: model"] if model else []

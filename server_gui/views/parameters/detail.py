@@ -186,7 +186,7 @@ def reach(info: ParameterInfo, current: Number | None) -> tuple[float, float] | 
 
 
 def _round(value: float, span: float, scale: float, unit: Unit) -> float:
-    """A slider gives numbers that people would type, in `unit`, no finer than a count of the device."""
+    """Return a slider's value rounded for people, in `unit`, no finer than a count of the device."""
     digits = max(0, 2 - math.floor(math.log10(span * unit.scale)))
     if scale > 0:
         digits = min(digits, max(0, -math.floor(math.log10(scale * unit.scale) + 1e-9)))

@@ -239,7 +239,7 @@ class ParametersPanel(QWidget):
         return grid
 
     def _more_button(self) -> QPushButton:
-        """What its menu has is done by the buttons that it stands for."""
+        """Return what its menu has is done by the buttons that it stands for."""
         self._seldom = (self._compare, self._save, self.store_button)
         self.more = QPushButton("More")
         menu = QMenu(self.more)
@@ -352,7 +352,7 @@ class ParametersPanel(QWidget):
             self.pages.setCurrentIndex(EDIT)
 
     def _refused(self, station: Station | None) -> str:
-        """What of the staged the robot would refuse, as it stands now."""
+        """Return what of the staged the robot would refuse, as it stands now."""
         changes = () if station is None else station.difference(self._desk.shown.units)
         said = [f"{change.name}: {change.problem}" for change in changes if change.problem]
         return "\n".join(said)
@@ -377,7 +377,7 @@ def _close_file(station: Station) -> None:
 
 
 def _banner(station: Station | None, staged: int, problem: str) -> tuple[str, str]:
-    """What matters most now, and how it is meant."""
+    """Return what matters most now, and how it is meant."""
     if station is None:
         return "No robot chosen: there is nothing to change.", "plain"
     if problem:

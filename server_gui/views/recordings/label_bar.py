@@ -141,7 +141,7 @@ class LabelBar(QWidget):
 
 
 def _span_texts(tape: Tape, span: tuple[int, int] | None) -> tuple[str, ...]:
-    """The span, in fewer words where there is less room."""
+    """Return the span, in fewer words where there is less room."""
     if span is None:
         return "No span chosen", "No span"
     begin, end = ((at - tape.first_ns) / SECOND_NS for at in span)

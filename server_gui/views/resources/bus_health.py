@@ -187,7 +187,7 @@ class BusCard(Card):
         self._fit()
 
     def _fit(self) -> None:
-        """What has no room is left out whole: no number is cut."""
+        """Leave out parts without room as a whole: no number is cut."""
         titles = title_widths(self.table)
         widths = [max(self.table.sizeHintForColumn(column), title) for column, title in enumerate(titles)]
         shown = set(range(len(TITLES)))
@@ -283,7 +283,7 @@ def _kinds(bus: BusInfo) -> list[tuple[str, float]]:
 
 
 def _order(node_id: int | None, talk: Talking | None) -> tuple[float, bool, int]:
-    """The largest share first; of one and the same, as it is shown, the lowest node."""
+    """Return the largest share first; of one and the same, as it is shown, the lowest node."""
     return 0.0 if talk is None else -round(100 * talk.share), node_id is None, node_id or 0
 
 

@@ -63,7 +63,7 @@ class ProcessTable(RowsTable):
         self._make_room()
 
     def _make_room(self) -> None:
-        """The command tells processes apart, where not all has room."""
+        """Show the command if there is not room for all columns: it tells processes apart."""
         for column, least in ROOM.items():
             self.setColumnHidden(column, self.width() < self._theme.px(least))
 

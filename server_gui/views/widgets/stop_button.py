@@ -140,7 +140,7 @@ class StopButton(QPushButton):
 
 
 def _in_two(name: str) -> list[str]:
-    """A name, and where that is said, its address below; else halves."""
+    """Return a name, and where that is said, its address below; else halves."""
     first, at, address = name.partition(" at ")
     half = -(-len(name) // 2)
     return [first, address] if at else [name[:half], name[half:]]

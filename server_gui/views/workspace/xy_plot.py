@@ -104,7 +104,7 @@ class XYPlot(TakesCurves):
 
 
 def _faded(ink: QColor, band: int) -> QColor:
-    """The colour of the oldest band is the faintest."""
+    """Return a band's colour; the oldest is the faintest."""
     faded = QColor(ink)
     faded.setAlphaF(FAINTEST + (1.0 - FAINTEST) * (band + 1) / BANDS)
     return faded

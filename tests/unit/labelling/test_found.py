@@ -174,7 +174,7 @@ def test_the_command_labels_lists_and_takes_back(config: str, capsys: pytest.Cap
 @pytest.mark.parametrize(
     ("arguments", "status", "words"),
     [
-        (["--from", "1"], 2, "say LABEL and --from, or one of"),
+        (["--from", "1"], 2, "give LABEL and --from, or one of"),
         (["walk", "--from", "soon"], 2, "'soon' is no time"),
         (["walk", "--from", "1", "--to", "100"], 1, "lies outside the session"),
         (["walk", "--from", "100"], 1, "lies outside the session"),
