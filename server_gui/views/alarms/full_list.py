@@ -128,7 +128,7 @@ class AlarmRow(QFrame):
         return self.height() - around - below
 
     def _fitting_headline(self, wordings: list[str]) -> str:
-        """The fullest one that has room."""
+        """Return the fullest one that has room."""
         fits = (text for text in wordings if _high(self.headline, text) <= self._room)
         return next(fits, wordings[-1])
 

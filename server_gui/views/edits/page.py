@@ -334,7 +334,7 @@ def _said(told: Told) -> list[str]:
 
 
 def _by_our_clock(note: str) -> str:
-    """An edit that a note is about is found in the list by its time, not by its id for the command."""
+    """Name an edit in a note by its time, by which the list has it, instead of by the command's id."""
 
     def time_of(found: re.Match[str]) -> str:
         return _when(int(datetime.datetime.fromisoformat(f"{found[1]}+00:00").timestamp()) * 10**9)
