@@ -1,5 +1,6 @@
 """What models say of a robot, in marks and words for header and overview; also that they do not know."""
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Final
@@ -15,12 +16,13 @@ from server_gui.core.models.names import model_name, told_name
 from server_gui.core.prediction.adaptation import LEARNED_S, TRIED_S, Adapting, State
 from server_gui.core.prediction.current import STALE_S, Recalled, StationPredictions, Told
 from server_gui.core.processing.gait_events import Leg
-from server_gui.views.marks import Mark
+from server_gui.views.marks import Mark, enabled_text
 
 ACTIVITY, FALLING, GAIT_PHASE = "activity", "falling", "gait_phase"
 STEADY: Final = "steady"
 FEW: Final = 3  # classes of which one is true: more are no news
 LEAST: Final = 0.01  # what is less probable is not worth a word
+PROBABLE: Final = re.compile(r" \d+ %$")
 TITLES: Final = {FALLING: "Balance", GAIT_PHASE: "Stride"}
 LEARNED: Final = {state: ("ring", "dim", state.value) for state in State} | {
     State.OFFERED: ("diamond", "accent", "offered"),
@@ -43,6 +45,7 @@ class PredictionRow:
     detail: str = ""
     short: str = ""
     tip: str = ""
+    brief: str = ""  # all of it where there is the least room
 
     @property
     def short_text(self) -> str:
@@ -53,7 +56,8 @@ class PredictionRow:
     def wordings(self) -> tuple[str, ...]:
         """As one line, the fullest first."""
         details = (self.detail, self.short, "")
-        return tuple(dict.fromkeys(" · ".join(filter(None, (self.text, one))) for one in details))
+        said = [" · ".join(filter(None, (self.text, one))) for one in details]
+        return tuple(dict.fromkeys((*said, self.brief or self.text)))
 
 
 def said(shown: Told, *, stopped: str = "", unseen: str = "") -> PredictionRow:
@@ -130,6 +134,18 @@ def activity(station: Station) -> PredictionRow:
     )
 
 
+def doing(station: Station) -> tuple[str, ...]:
+    """Return what a robot does, the fullest wording first: `Walking 74 steps/min · 6 of 6 enabled`."""
+    count = enabled_text(station.robot, live=station.is_live)
+    if not station.is_live:
+        return ("what it does is not known", "not known")
+    line, gait = activity(station), station.processing.derived().gait
+    walks = gait.walking and gait.cadence_spm is not None and line.mark.word != STOPPED
+    cadence = f"{line.text} {gait.cadence_spm:.0f} steps/min" if walks else line.short_text
+    least = f"{PROBABLE.sub('', line.short_text)} · {count.replace(' of ', '/')}"
+    return tuple(dict.fromkeys((f"{cadence} · {count}", f"{line.short_text} · {count}", least, count)))
+
+
 def lines(station: Station) -> Iterator[PredictionRow]:
     """Yield the overview's lines: balance and stride, rules that hold, devices in trouble."""
     predictions, stopped = station.predictions, not_judged(station)
@@ -141,7 +157,7 @@ def lines(station: Station) -> Iterator[PredictionRow]:
                 line = _stride(station, line)
             if not station.is_live and line.mark.colour != "bad":
                 line = PredictionRow(Mark("ring", "old", "not known"), "not known", "no live data")
-            yield replace(line, text=f"{title}: {line.text}")
+            yield replace(line, text=f"{title}: {line.text}", brief=line.brief and f"{title}: {line.brief}")
     if predictions.problem:
         yield PredictionRow(
             Mark("ring", "old", "no model"), "Not predicted", predictions.problem, "", predictions.problem
@@ -237,7 +253,7 @@ def _stride(station: Station, line: PredictionRow) -> PredictionRow:
     if not differences:
         return replace(line, text="by the model alone")
     if max(differences) <= AGREES:
-        return replace(line, text="steps and model agree")
+        return replace(line, text="steps and model agree", brief="both agree")
     mark = Mark("triangle", "warn", "differs")
     return replace(line, mark=mark, text=f"{max(differences):.0f} % apart")
 

@@ -31,7 +31,7 @@ from server_gui.views.theme import Theme
 from tests.gui import rules
 from tests.gui.fakes import Around, Bench, stop_is_whole
 from tests.gui.foreseen import predicted
-from tests.support.desk import JOINTS, described, looked, telemetry, walking
+from tests.support.desk import JOINTS, looked, telemetry, walking
 
 CAUSE = "0x2310 continuous overcurrent at the output (register: generic, current)"
 WHY = "there is no link to 127.0.0.1:7420 now (127.0.0.1:7420 did not answer hello within 5 s)"
@@ -161,6 +161,30 @@ def test_what_to_check_is_on_the_strip_and_what_may_be_done_whole_in_the_list_wi
     for button in (row.clear, row.show_signal, row.acknowledge):
         assert button.isVisible()
         assert button.visibleRegion().boundingRect() == button.rect(), button.text()
+
+
+def test_rows_that_are_opened_under_the_pointer_are_whole_also_where_a_headline_grows(
+    theme: Theme, window: MainWindow, bench: Bench
+) -> None:
+    theme.set(scale=1.5)
+    window.resize(1024, 700)
+    fault(bench)
+    settle(window, bench)
+    window.panels_button.click()
+    settle(window, bench)
+    window.alarms.list.setAttribute(Qt.WidgetAttribute.WA_UnderMouse)
+    window.alarms.list.turn()
+    for words in ("", "; 42 % of its PDOs are missing", "; and this goes on for a line or two" * 8):
+        bench.look_again([looked(state="fault", problem=f"the drive is in fault: {CAUSE}{words}")])
+        settle(window, bench)
+        shown = [row for row in window.alarms.list.rows if row.isVisible()]
+        for label in (label for row in shown for label in (row.headline, row.details)):
+            assert is_whole(label) or label.isHidden(), (words, label.text())
+        for row in shown:
+            for button in (row.clear, row.show_signal, row.acknowledge):
+                assert button.isHidden() or button.height() >= button.sizeHint().height(), words
+    tip = window.alarms.list.rows[0].toolTip().replace("\n", " ")
+    assert "and this goes on for a line or two; and" in tip, "what has no room stands nowhere"
 
 
 @pytest.mark.parametrize(("width", "height"), [(1024, 700), (1366, 768), (1920, 1080)])
@@ -401,18 +425,6 @@ def test_a_held_stop_is_reset_after_a_question_about_that_robot_once_it_is_answe
     bench.station.take([telemetry([now_ns + 1], off, now_ns)])
     window.alarms.refresh()
     assert any("to go on: enable the drives" in text for text in window.alarms.texts)
-
-
-def test_each_stop_names_its_robot_and_all_says_all(around: Around, bench: Bench) -> None:
-    other = bench.add("a-robot-with-quite-a-long-name-of-its-own", 7421)
-    other.is_named = True
-    other.take([described()])
-    settle(around, bench)
-    first, second = around.robots.cards
-    assert first.stop.text() == "STOP  exo-01"
-    assert second.stop.text().startswith("STOP  a-robot")
-    assert second.stop.accessibleName() == "STOP a-robot-with-quite-a-long-name-of-its-own"
-    assert around.robots.all_stop.text() == "STOP  ALL"
 
 
 def test_a_robot_is_chosen_by_keyboard_and_removed_after_a_question(window: MainWindow, bench: Bench) -> None:

@@ -166,12 +166,17 @@ def test_an_edit_stands_at_the_time_of_this_place(
     time.tzset()
     try:
         known = worse()
-        bench.station.judged.take(replace(known, edit=replace(known.edit, utc_ns=1_700_000_000 * 10**9)))
+        edit = replace(known.edit, utc_ns=1_700_000_000 * 10**9)
+        note = f"the edit of gait.step_length at {edit.utc} (9f1b194352) leaves fewer cycles before this one"
+        noted = replace(known.evidence, notes=(note,))
+        bench.station.judged.take(replace(known, edit=edit, evidence=noted))
         parts.edits.refresh()
+        words = parts.edits.words.text()
     finally:
         monkeypatch.undo()
         time.tzset()
     assert parts.edits.list.item(0).text().startswith("2023-11-15 03:43  ")
+    assert "The edit of gait.step_length at 2023-11-15 03:43 leaves fewer cycles" in words
 
 
 def test_evidence_that_grows_lays_no_other_edit_out_again(bench: Bench, parts: Parts) -> None:

@@ -26,7 +26,7 @@ _IN_FAULT: Final = ("fault", "fault reaction active")
 _CODE: Final = re.compile(r"0x([0-9A-Fa-f]{4})\b")
 _PREFIX: Final = re.compile(r"^(the drive is in fault: |it reports )")
 _LASTING: Final = re.compile(r" \(for \d+ s\)")  # an alarm says by itself since when
-_ADVICE: Final = re.compile(r": (?=(?:check|plug) )")  # with which what the robot says of a part may end
+_ADVICE: Final = re.compile(r": (?=(?:check|plug|see) )")  # with which what the robot says of a part may end
 # What shows it best, by the code's beginning; else the position.
 _SHOWN_BY: Final = (
     ("2", ("current", "torque")),
@@ -197,14 +197,16 @@ def _of_drive(robot: Robot, name: str, stopping: StopProgress) -> Iterator[Alarm
     word, part = robot.word(f"{name}.state"), robot.parts[name]
     if word not in _IN_FAULT and not (part.state == "fault" and "in fault" in (part.problem or "")):
         return
-    what, code = _cause(robot, part)
+    said, code = _cause(robot, part)
+    what, more = _advised(said)
+    check = check_of(Kind.FAULT) if code is None else error_check(code)
     yield Alarm(
         Kind.FAULT,
         name,
         what,
         where=_where(robot, name),
         did=_did(robot, stopping),
-        check=check_of(Kind.FAULT) if code is None else error_check(code),
+        check="; ".join(filter(None, (check, more))),
         channel=_channel(robot, name, code),
         clears=not robot.is_recording,
         is_now=not robot.is_stale(),

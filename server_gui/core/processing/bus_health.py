@@ -62,7 +62,8 @@ def level(bus: BusInfo) -> Level:
         return Level.ALARM
     if bus.state != ACTIVE or (bus.load_percent or 0.0) >= BUSY_PERCENT or bus.findings or bus.problem:
         return Level.WARNING
-    return max((node_level(node) for node in bus.nodes), key=ORDER.index, default=Level.GOOD)
+    of_nodes = max((node_level(node) for node in bus.nodes), key=ORDER.index, default=Level.GOOD)
+    return Level.UNKNOWN if of_nodes is Level.GOOD and bus.load_percent is None else of_nodes
 
 
 def node_level(node: NodeInfo) -> Level:
@@ -108,7 +109,7 @@ def trouble(bus: BusInfo) -> tuple[str, str] | None:
 
 def findings(bus: BusInfo) -> list[tuple[str, str]]:
     """Return each thing that is wrong with a bus, and what to check; what several nodes have, once."""
-    if level(bus) is Level.GOOD:
+    if level(bus) in (Level.GOOD, Level.UNKNOWN):
         return []
     load, full = bus.load_percent or 0.0, []
     own = [one for one in bus.findings if not one.words.endswith(TAKEN)]  # by the load of a moment ago

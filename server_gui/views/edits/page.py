@@ -24,7 +24,7 @@ from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.evidence.comparison import Measured, Word
 from server_gui.core.evidence.cycles import DRAWN
-from server_gui.core.evidence.edits import Edit, State
+from server_gui.core.evidence.edits import State
 from server_gui.core.evidence.file import Told
 from server_gui.core.evidence.shown import in_units, symbols
 from server_gui.core.evidence.wording import changes, from_to, interval, number, share, strides, word
@@ -51,6 +51,9 @@ NONE: Final = (
     "torque and gait is judged here, stride by stride, before and after."
 )
 COLOURS: Final = "grey before, in colour after; {}the bands are one standard deviation of the strides"
+EDIT: Final = re.compile(
+    r"(\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d)Z \([0-9a-f]+\)"
+)  # when, and its id for the command
 BACK: Final = "strides since it was taken back are grey, too: they have the old value; "
 
 
@@ -267,7 +270,7 @@ class Edits(QWidget):
         ended = told.edit.became if told.experiment is None else told.experiment.kind
         values = self._what(told).replace(" → ", ARROW)  # no line ends within them, nor before a unit
         values = re.sub(r"(?<=\d) (?=[^\W\d]|[°%])", "\N{NO-BREAK SPACE}", values)
-        return f"{_when(told.edit)}  {values}\n{ended} · {word(told)}"
+        return f"{_when(told.edit.utc_ns)}  {values}\n{ended} · {word(told)}"
 
     def _verdict(self, told: Told) -> str:
         evidence, tried = told.evidence, told.experiment
@@ -294,10 +297,10 @@ class Edits(QWidget):
         self._place()
 
 
-def _when(edit: Edit) -> str:
+def _when(utc_ns: int) -> str:
     """In the time of this place; of another day that, too."""
     try:
-        at = datetime.datetime.fromtimestamp(edit.utc_ns / 1e9, datetime.UTC).astimezone()
+        at = datetime.datetime.fromtimestamp(utc_ns / 1e9, datetime.UTC).astimezone()
     except (OverflowError, ValueError, OSError):  # nobody's calendar has it
         return NO_TIME
     is_today = at.date() == datetime.datetime.now().astimezone().date()
@@ -322,9 +325,21 @@ def _said(told: Told) -> list[str]:
     silent = sum(one.word is Word.NO_DATA for one in evidence.metrics)
     if silent:
         lines.append(f"No data for {counted(silent, 'metric')}.")
-    lines += [f"{note[0].upper()}{note[1:]}." for note in evidence.notes]
-    lines += [f"Left out: {counted(count, 'cycle')}, {why}." for why, count in evidence.left_out.items()]
+    lines += [f"{note[0].upper()}{note[1:]}." for note in map(_by_our_clock, evidence.notes)]
+    lines += [
+        f"Left out: {counted(count, 'cycle')}, {why.replace('_', ' ')}."
+        for why, count in evidence.left_out.items()
+    ]
     return lines
+
+
+def _by_our_clock(note: str) -> str:
+    """Name an edit in a note by its time, by which the list has it, instead of by the command's id."""
+
+    def time_of(found: re.Match[str]) -> str:
+        return _when(int(datetime.datetime.fromisoformat(f"{found[1]}+00:00").timestamp()) * 10**9)
+
+    return EDIT.sub(time_of, note)
 
 
 def _strong(told: Told) -> list[Measured]:

@@ -92,6 +92,18 @@ def test_what_is_wrong_twice_is_said_as_such_and_so_is_what_to_check(bench: Benc
     alarm = bench.station.alarms.active[0].alarm
     assert alarm.what == "its heartbeat is missing; its position jumped"
     assert alarm.check == "check its power; it goes on; check its encoder"
+    bench.station.take([looked(state="stale", problem="this computer stood still: see what keeps it busy")])
+    alarm = bench.station.alarms.active[0].alarm
+    assert (alarm.what, alarm.check) == ("this computer stood still", "see what keeps it busy")
+
+
+def test_what_else_is_wrong_with_a_drive_in_fault_is_to_be_checked_as_well(bench: Bench) -> None:
+    more = "7 % of its PDOs are missing: check its cable"
+    problem = f"the drive is in fault: {CAUSE}; {more}"
+    bench.station.take([states(5.0, left_knee=7.0), looked(state="fault", problem=problem)])
+    (alarm,) = (one for one in bench.station.alarms.each if one.kind is Kind.FAULT)
+    assert alarm.what == f"{CAUSE}; 7 % of its PDOs are missing"
+    assert alarm.check == f"{error_check(0x2310)}; check its cable"
 
 
 def test_a_word_has_one_mark_whatever_it_explains_that_is_as_bad() -> None:
