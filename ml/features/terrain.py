@@ -40,13 +40,13 @@ def _compute(windows: Samples) -> Features:
 
 
 def mirrored(windows: Samples) -> Samples:
-    """What the sensors would have measured, had left been right."""
+    """Return what the sensors would have measured, had left been right."""
     swapped: Samples = windows[:, SWAPPED] * SIGNS
     return swapped
 
 
 def led_by_the_left(windows: Samples) -> Samples:
-    """Windows, mirrored where the right leg is in front or about to be: half as many kinds of steps."""
+    """Mirror the windows in which the right leg is in front or about to be: half as many kinds of steps."""
     left, right, left_rate, right_rate = (windows[:, channel, -1] for channel in range(4))
     right_leads = left - right + AHEAD_S * (left_rate - right_rate) < 0.0
     led: Samples = np.where(right_leads[:, None, None], mirrored(windows), windows)
