@@ -1,6 +1,7 @@
 """`gwrms keys pair` and `gwrms pair`: what is typed where, and what a terminal shows."""
 
 import io
+import signal
 import threading
 from argparse import Namespace
 from collections.abc import Iterator
@@ -199,6 +200,24 @@ def test_a_name_that_is_taken_is_said_before_a_code_is_shown(
 
 
 # From beginning to end
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+def test_a_pairing_that_is_shown_and_ended_leaves_the_robot_without_keys(
+    number: signal.Signals, tmp_path: Path
+) -> None:
+    """It locked whoever could stop the robot before out of it, without letting a desk in."""
+    file = tmp_path / "robot.toml"
+    file.write_text('[robot]\nname = "exo-01"\n', encoding="utf-8")
+    options = ("--port", "0", "--name", "anna", "--role", "operator", "--yes")
+    with processes.process(*processes.GATEWAY[:-1], "keys", "pair", str(file), *options) as robot:
+        assert robot.stdout is not None
+        assert robot.stderr is not None
+        assert "only a desk on this computer" in robot.stderr.readline(), "before a code is shown"
+        next(line for line in robot.stdout if line.startswith("  gwrms pair"))
+        robot.send_signal(number)
+        robot.wait()
+    assert not AccessFolder(tmp_path, {}).has_keys
 
 
 def test_two_commands_let_a_desk_in_and_a_third_sends_it_away(
