@@ -109,5 +109,5 @@ def _asked(question: str, arguments: argparse.Namespace) -> str:
         asking.flush()
     line = sys.stdin.buffer.readline(_MOST)
     if not line:
-        raise NobodyToAsk(f"nothing was typed: {question.rstrip(': ')}")
+        raise NobodyToAsk(f"nothing was typed; it was asked for: {question.rstrip(': ')}")
     return line.decode("utf-8", "replace").strip()

@@ -35,7 +35,7 @@ NOT_TYPED: Final[Mapping[str, tuple[str, ...]]] = {
         "a dialogue with hands at a simulated one",
     ),
     "how-to/containers.md": ("Docker", "Docker", "Docker"),
-    "how-to/first-robot.md": ("two computers, and root",),
+    "how-to/first-robot.md": ("root", "root", "two computers, and root"),
     "how-to/judge-an-edit.md": ("a walk of minutes, before and after an edit",),
     "how-to/what-changed.md": ("two recorded walks of minutes, some days apart",),
     "how-to/try-two-values.md": (
