@@ -21,6 +21,7 @@ from gateway.cli.keys import _show as show
 from gateway.client import Address, NotPaired
 from gateway.client.keys import pin_of
 from gateway.client.pairing import pair, typed
+from gateway.connections.listeners import listen
 from gateway.main import main
 from gateway.wire.pairing import Reply, link, normal
 from gateway.wire.role import Role
@@ -83,11 +84,23 @@ def test_a_person_who_mistypes_the_code_is_asked_again(
 
 @pytest.mark.parametrize("is_terminal", [False, True])
 def test_who_types_nothing_is_not_waited_for(
-    is_terminal: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    is_terminal: bool, shown: Shown, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     types(monkeypatch, "0123\n" if is_terminal else "", is_terminal=is_terminal)
-    assert main(["pair", "192.0.2.7"]) == 1
+    assert main(["pair", str(shown.where)]) == 1
     assert "nothing was typed" in capsys.readouterr().err
+
+
+def test_nobody_is_asked_for_a_code_where_no_robot_pairs(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with listen("127.0.0.1", 0) as listener:
+        where = Address("127.0.0.1", listener.getsockname()[1])
+    types(monkeypatch, f"{CODE}\n", is_terminal=True)
+    assert main(["pair", str(where)]) != 0
+    captured = capsys.readouterr()
+    assert f"no robot pairs at {where}" in captured.err
+    assert "code" not in captured.out
 
 
 @pytest.mark.parametrize("lines", ["0123\n", "\n", "\N{BLACK HEART SUIT}" * 16 + "\n"])
