@@ -53,7 +53,7 @@ def test_a_question_that_waits_is_left_in_order(
         for said in process.stdout:
             if "ask" in (line := _read(said)):
                 break
-        assert line["ask"].startswith("How is the robot called")
+        assert line["ask"].startswith("What is the robot called")
         end(process)
         rest = process.stdout.read()
     assert process.returncode == status, rest
