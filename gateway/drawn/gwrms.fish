@@ -505,7 +505,7 @@ complete -c gwrms -n '_shtab_gwrms_using sweep' -l seconds -x -d 'hold each valu
 complete -c gwrms -n '_shtab_gwrms_using sweep' -l most-error -x -d 'end at this tracking error'
 complete -c gwrms -n '_shtab_gwrms_using sweep' -l most-current -x -d 'end at this current'
 complete -c gwrms -n '_shtab_gwrms_using sweep' -l config -xka "(__fish_complete_path (commandline -ct))" -d 'the server'"'"'s file, for the place of the result'
-complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a label -d 'Label label the activities in a recorded session.'
+complete -c gwrms -n '_shtab_gwrms_using; and test $_shtab_gwrms_npos -eq 0' -a label -d 'Label the activities in a recorded session.'
 complete -c gwrms -n '_shtab_gwrms_using label' -s h -l help -d 'show this help message and exit'
 complete -c gwrms -n '_shtab_gwrms_using label' -l config -xka "(__fish_complete_path (commandline -ct))" -d 'the server'"'"'s file, which names the store'
 complete -c gwrms -n '_shtab_gwrms_using label' -l json -d 'for programs'

@@ -35,7 +35,7 @@ _shtab_gwrms_commands() {
     joint-test:'test a joint on a bench: step, chirp, friction, relay'
     journal:'show and verify the robot'"'"'s journal'
     keys:'on the robot: admit and revoke clients'
-    label:'Label label the activities in a recorded session.'
+    label:'Label the activities in a recorded session.'
     lss:'Find CANopen devices without a node id; set node ids and bit rates (CiA 305).'
     models:'inspect, promote, roll back and export models'
     od:'Search a device'"'"'s object dictionary: names, types, limits, values.'

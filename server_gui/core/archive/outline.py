@@ -25,13 +25,11 @@ class Outline:
         self.revision = 0  # rises with each change
         self.least: dict[str, Floats] = {}  # by channel, a value a stretch
         self.most: dict[str, Floats] = {}
-        self._tape: Tape | None = None
         self._read = read
         self._deliver = deliver
 
     def open(self, tape: Tape) -> None:
-        """Find out of another recording."""
-        self._tape = tape
+        """Find out of another recording, or of the same one anew."""
         names = shown([*tape.units])
         self.least = {name: np.full(STRETCHES, np.nan) for name in names}
         self.most = {name: np.full(STRETCHES, np.nan) for name in names}
@@ -39,18 +37,17 @@ class Outline:
         self._look(tape, tape.first_ns)
 
     def _look(self, tape: Tape, begin_ns: int) -> None:
-        if not self.least or begin_ns > tape.last_ns:
+        least = self.least
+        if not least or begin_ns > tape.last_ns:
             return
         when_done(
-            self._read(lambda: tape.read(begin_ns, begin_ns + PIECE_NS, [*self.least])),
+            self._read(lambda: tape.read(begin_ns, begin_ns + PIECE_NS, [*least])),
             self._deliver,
-            lambda rows: self._looked(tape, begin_ns, rows),
+            lambda rows: self._looked(tape, begin_ns, rows) if least is self.least else None,
             lambda _error: None,
         )
 
     def _looked(self, tape: Tape, begin_ns: int, rows: Rows) -> None:
-        if tape is not self._tape:
-            return
         places = (rows.utc_ns - tape.first_ns) * STRETCHES // (tape.last_ns - tape.first_ns + 1)
         places = np.clip(places, 0, STRETCHES - 1)  # a row that came meanwhile belongs to the end
         for name, column in rows.columns.items():

@@ -80,6 +80,17 @@ def test_rows_of_a_recording_that_is_no_longer_shown_are_not_drawn_into_another(
     assert outline.least == {}
 
 
+def test_the_same_recording_opened_twice_is_read_once_from_its_second_piece_on() -> None:
+    late: list[Callable[[], None]] = []
+    outline, tape = Outline(at_once, late.append), KneeTape()
+    outline.open(cast("Tape", tape))
+    outline.open(cast("Tape", tape))
+    while late:
+        late.pop(0)()
+    assert tape.asked == 2 + LENGTH_S * SECOND_NS // PIECE_NS
+    assert outline.most["left_knee.position"][-1] == LENGTH_S
+
+
 @pytest.mark.parametrize(
     ("names", "wanted"),
     [
