@@ -122,9 +122,7 @@ def _rates(path: Path) -> npt.NDArray[np.int16]:
         if missing := [name for name in COLUMNS if name not in names]:
             raise WrongFile(f"{path} lacks the columns {', '.join(missing)}")
         try:
-            rates = np.loadtxt(
-                file, delimiter=",", ndmin=2, usecols=[names.index(name) for name in COLUMNS]
-            )
+            rates = np.loadtxt(file, delimiter=",", ndmin=2, usecols=[names.index(name) for name in COLUMNS])
         except ValueError as error:
             raise WrongFile(f"{path}: {error}") from error
     whole = np.rint(rates / UNIT_DEG_S)

@@ -57,7 +57,9 @@ def read(path: Path) -> list[Walk]:
     if any(groups[walk.subject] != walk.group for walk in walks):
         raise file.problem("has somebody in two groups")
     if sum(name == HEALTHY for name in groups.values()) < 2 or len(set(groups.values())) < 2:
-        raise file.problem(f"has fewer than two {HEALTHY} people, or nobody else: there is nothing to compare")
+        raise file.problem(
+            f"has fewer than two {HEALTHY} people, or nobody else: there is nothing to compare"
+        )
     return walks
 
 

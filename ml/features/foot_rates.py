@@ -49,9 +49,7 @@ def _told(foot: Samples) -> Samples:
     return np.stack([foot[:, 1], length(foot)], axis=1)
 
 
-def _of(
-    compute: Callable[[Samples, Samples], Features], name: str, look_back: int
-) -> tuple[Recipe, Recipe]:
+def _of(compute: Callable[[Samples, Samples], Features], name: str, look_back: int) -> tuple[Recipe, Recipe]:
     """The recipe for the left foot and that for the right one."""
 
     def left(windows: Samples) -> Features:

@@ -11,6 +11,9 @@ import numpy.typing as npt
 from ml.benchmarks.impaired import HEALTHY
 from ml.robot import conformal
 
+MODELS: Final = ("healthy", "mixed")  # what learned from healthy people alone, and from every group
+WHEN: Final = ("later", "adapted")  # after the first minute: without what it taught, and with it
+FEWEST: Final = 3  # people, for a row of their own
 DRAWS: Final = 2000  # of people, for an interval
 LEVEL: Final = 0.95
 Floats = npt.NDArray[np.float64]
@@ -34,7 +37,7 @@ def rows_of(people: Sequence[Person]) -> dict[str, dict[str, float]]:
     for name in order:
         for sensor in sorted({one.sensor for one in groups[name]}):
             own = [one for one in groups[name] if one.sensor == sensor]
-            if len(own) < len(groups[name]):
+            if FEWEST <= len(own) < len(groups[name]):
                 rows[f"{name}, {sensor}"] = _row(own)
     return rows
 
@@ -43,7 +46,7 @@ def figures_of(people: Sequence[Person], rows: Mapping[str, Mapping[str, float]]
     """The worst group's figures, what patients lose to healthy people, and what a minute gives the worst."""
     names = {one.group for one in people}
     found: dict[str, float] = {}
-    for model in ("healthy", "mixed"):
+    for model in MODELS:
         rmse = [rows[name][f"{model}_rmse_percent"] for name in names]
         found |= {
             f"worst_group_{model}_rmse_percent": max(rmse),
@@ -54,7 +57,7 @@ def figures_of(people: Sequence[Person], rows: Mapping[str, Mapping[str, float]]
     patients = [one for one in people if one.group != HEALTHY]
     low, high = interval([_gain(one) for one in patients])
     found |= {"mixed_gain_points": _gains(patients), "mixed_gain_low": low, "mixed_gain_high": high}
-    for model in ("healthy", "mixed"):
+    for model in MODELS:
         found |= _adaptation(people, model)
     return found
 
@@ -71,8 +74,8 @@ def interval(values: Sequence[float]) -> tuple[float, float]:
 
 
 def _row(people: Sequence[Person]) -> dict[str, float]:
-    row: dict[str, float] = {"people": float(len(people))}
-    for model in ("healthy", "mixed"):
+    row = {"people": float(len(people)), "hindsight_rmse_percent": _mean(people, "hindsight_rmse_percent")}
+    for model in MODELS:
         values = [one.figures[f"{model}_rmse_percent"] for one in people]
         low, high = interval(values)
         worst = sorted(values, reverse=True)[: math.ceil(len(values) / 3)]
@@ -88,8 +91,8 @@ def _row(people: Sequence[Person]) -> dict[str, float]:
         }
     later = [one for one in people if not math.isnan(one.figures["healthy_later_rmse_percent"])]
     row["later_people"] = float(len(later))
-    for model in ("healthy", "mixed"):
-        for when in ("later", "adapted"):
+    for model in MODELS:
+        for when in WHEN:
             row[f"{model}_{when}"] = _mean(later, f"{model}_{when}_rmse_percent")
     return row
 
@@ -101,30 +104,22 @@ def _adaptation(people: Sequence[Person], model: str) -> dict[str, float]:
         return {}
     judged.sort(key=lambda one: -one.figures[f"{model}_early_rmse_percent"])
     found: dict[str, float] = {}
-    for name, own in (("", judged), ("worst_third_", judged[: math.ceil(len(judged) / 3)])):
-        low, high = _cut_interval(own, model)
+    for name, own in ((model, judged), (f"{model}_worst_third", judged[: math.ceil(len(judged) / 3)])):
+        pairs = np.array([[one.figures[f"{model}_{when}_rmse_percent"] for when in WHEN] for one in own])
+        low, high = _cut_interval(pairs)
+        before, after = pairs.mean(axis=0).tolist()
         found |= {
-            f"{name}{model}_later_rmse_percent": _mean(own, f"{model}_later_rmse_percent"),
-            f"{name}{model}_adapted_rmse_percent": _mean(own, f"{model}_adapted_rmse_percent"),
-            f"{name}{model}_adaptation_cut": _cut(*_pairs(own, model).mean(axis=0)),
-            f"{name}{model}_adaptation_cut_low": low,
-            f"{name}{model}_adaptation_cut_high": high,
+            f"{name}_later_rmse_percent": before,
+            f"{name}_adapted_rmse_percent": after,
+            f"{name}_adaptation_cut": 1.0 - after / before,
+            f"{name}_adaptation_cut_low": low,
+            f"{name}_adaptation_cut_high": high,
         }
     return found
 
 
-def _pairs(people: Sequence[Person], model: str) -> Floats:
-    """(n, 2): each one's later error without and with the minute."""
-    names = [f"{model}_{when}_rmse_percent" for when in ("later", "adapted")]
-    return np.array([[one.figures[name] for name in names] for one in people])
-
-
-def _cut(before: float, after: float) -> float:
-    return float(1.0 - after / before)
-
-
-def _cut_interval(people: Sequence[Person], model: str) -> tuple[float, float]:
-    pairs = _pairs(people, model)
+def _cut_interval(pairs: Floats) -> tuple[float, float]:
+    """Of (n, 2) errors before and after, of people drawn anew."""
     drawn = np.random.default_rng(0).integers(0, len(pairs), (DRAWS, len(pairs)))
     before, after = pairs[drawn].mean(axis=1).T
     low, high = np.quantile(1.0 - after / before, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
@@ -140,4 +135,6 @@ def _gains(people: Sequence[Person]) -> float:
 
 
 def _mean(people: Sequence[Person], figure: str) -> float:
-    return float(np.mean([one.figures[figure] for one in people])) if people else math.nan
+    """Over those of whom it is known; NaN of nobody."""
+    known = [value for one in people if not math.isnan(value := one.figures[figure])]
+    return float(np.mean(known)) if known else math.nan
