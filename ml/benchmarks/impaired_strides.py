@@ -45,7 +45,9 @@ def lessons(walks: Sequence[impaired.Walk], later: Mapping[str, int], data: Deci
     made = [data.of(np.isin(data.subject, list(people)))]
     for factor in PACES:
         slower = {sensor: round(samples * factor) for sensor, samples in later.items()}
-        made.append(decisions((_stretched(walk, factor) for walk in walks), slower, PACES_STEP))
+        others = (_stretched(walk, factor) for walk in walks)
+        whole = (walk for walk in others if len(walk.rates))  # of a single sample, faster, none is left
+        made.append(decisions(whole, slower, PACES_STEP))
     columns = {field.name: [getattr(one, field.name) for one in made] for field in fields(Decisions)}
     stride = apart(columns.pop("stride"))
     return Decisions(**{name: np.concatenate(column) for name, column in columns.items()}, stride=stride)
