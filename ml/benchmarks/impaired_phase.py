@@ -64,13 +64,17 @@ def evaluate(path: Path, search: Search) -> Outcome:  # noqa: ARG001 - there is 
         )
     data = decisions(walks, later)
     groups = {walk.subject: walk.group for walk in walks if (data.subject == walk.subject).any()}
+    makes_of = {
+        one: "+".join(sorted({walk.sensor for walk in walks if walk.subject == one})) for one in groups
+    }
     late = late_of(data, minutes(walks, later))
     split = list(folds_of(groups))
     teachers = {one for fold in split for model in fold.teachers for one in model}
     taught = lessons([walk for walk in walks if walk.subject in teachers], later, data)
+    del walks  # they fill a fifth of a gigabyte
     work = folds.over(lambda fold: _fold(taught, data, late, fold), split)
     judged = {subject: one for found in work for subject, one in found.items()}
-    people = [_person(walks, data, groups, judged, subject) for subject in sorted(groups)]
+    people = [_person(data, groups, makes_of[subject], judged, subject) for subject in sorted(groups)]
     rows = rows_of(people)
     makes = ", ".join(f"{name} {samples / RATE_HZ * 1000:.0f} ms" for name, samples in sorted(later.items()))
     settings = f"fixed, those of ipol-phase; labels moved earlier: {makes}"
@@ -108,9 +112,12 @@ def mixed(groups: Mapping[int, str], count: int) -> list[int]:
 
 
 def _fold(taught: Decisions, data: Decisions, late: Flags, fold: Fold) -> dict[int, Judged]:
-    models = [_fitted(taught, people) for people in fold.teachers]
+    own = {one: data.subject == one for one in fold.held_out}
+    # One model after the other: each keeps what it has learned from.
+    healthy, both = (_of_model(_fitted(taught, people), data, late, own) for people in fold.teachers)
     return {
-        one: _judged(models, data.of(data.subject == one), late[data.subject == one]) for one in fold.held_out
+        one: Judged((healthy[one][0], both[one][0]), (healthy[one][1], both[one][1]), late[rows])
+        for one, rows in own.items()
     }
 
 
@@ -119,17 +126,18 @@ def _fitted(taught: Decisions, people: Sequence[int]) -> PhaseModel:
     return PhaseModel(SETTINGS).fit(own.features, own.phase, own.stride)
 
 
-def _judged(models: Sequence[PhaseModel], own: Decisions, late: Flags) -> Judged:
-    early, later = own.of(~late), own.of(late)
-    error, adapted = [], []
-    for model in models:
-        error.append(_errors(model, own))
-        if late.sum() >= LEAST_LATER and len(early.phase):
-            personal = model.personal(early.features, early.phase, early.stride)
-            adapted.append(_errors(personal, later))
-        else:
-            adapted.append(np.zeros(0))
-    return Judged((error[0], error[1]), (adapted[0], adapted[1]), late)
+def _of_model(
+    model: PhaseModel, data: Decisions, late: Flags, people: Mapping[int, Flags]
+) -> dict[int, tuple[Floats, Floats]]:
+    """Each person's errors, and those after the minute once it has been learned from."""
+    found = {}
+    for subject, rows in people.items():
+        early, later = data.of(rows & ~late), data.of(rows & late)
+        adapted = np.zeros(0)
+        if len(later.phase) >= LEAST_LATER and len(early.phase):
+            adapted = _errors(model.personal(early.features, early.phase, early.stride), later)
+        found[subject] = (_errors(model, data.of(rows)), adapted)
+    return found
 
 
 def _errors(model: PhaseModel, data: Decisions) -> Floats:
@@ -137,11 +145,7 @@ def _errors(model: PhaseModel, data: Decisions) -> Floats:
 
 
 def _person(
-    walks: Sequence[impaired.Walk],
-    data: Decisions,
-    groups: Mapping[int, str],
-    judged: Mapping[int, Judged],
-    subject: int,
+    data: Decisions, groups: Mapping[int, str], makes: str, judged: Mapping[int, Judged], subject: int
 ) -> Person:
     """One person's figures. What is promised comes from others whom the same kind of model had not seen."""
     own, rows = judged[subject], data.subject == subject
@@ -161,8 +165,7 @@ def _person(
             f"{model}_later_rmse_percent": _percent(before) if len(after) else np.nan,
             f"{model}_adapted_rmse_percent": _percent(after),
         }
-    sensors = sorted({walk.sensor for walk in walks if walk.subject == subject})
-    return Person(subject, groups[subject], "+".join(sensors), figures)
+    return Person(subject, groups[subject], makes, figures)
 
 
 def _percent(errors: Floats) -> float:
