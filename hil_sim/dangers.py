@@ -166,7 +166,10 @@ LONGEST_S: Final = 25.0  # without harm a danger is ended, and counts as none
 
 
 def healthy(source: random.Random) -> Iterator[Entry]:
-    """A wearer's own day on foot, without end: walking, turning, ramps, stairs, standing and sitting."""
+    """Yield a wearer's own day on foot, without end.
+
+    Walking, turning, ramps, stairs, standing and sitting.
+    """
     while True:
         visits = [*_VISITS]
         source.shuffle(visits)

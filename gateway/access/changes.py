@@ -34,7 +34,7 @@ def ensure_keys(folder: AccessFolder, robot: str) -> bool:
 
 
 def own_fingerprint(folder: AccessFolder) -> str:
-    """The robot's; raises `KeyProblem`."""
+    """Return the robot's; raises `KeyProblem`."""
     try:
         return fingerprint(der_of(folder.certificate.read_bytes()))
     except OSError as error:

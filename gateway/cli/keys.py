@@ -51,14 +51,14 @@ def pair(argv: list[str]) -> int:
     made = _parser("pair", _PAIR)
     made.add_argument("--host", help="address to listen on for the desk (default: [gateway] host)")
     made.add_argument("--port", type=int, default=PAIRING_PORT, help="its port (default %(default)s)")
-    made.add_argument("--name", type=keys_push.name_of, help="of the desk, instead of asking")
-    made.add_argument("--role", type=Role, choices=list(Role), help="what it may, instead of asking")
+    made.add_argument("--name", type=keys_push.name_of, help="name of the desk, instead of asking")
+    made.add_argument("--role", type=Role, choices=list(Role), help="its role, instead of asking")
     made.add_argument(
-        "--yes", action="store_true", help="with --name and --role: ask nothing, take who comes"
+        "--yes", action="store_true", help="with --name and --role: ask nothing, accept the first desk"
     )
     arguments = made.parse_args(argv)
     if arguments.yes and not (arguments.name and arguments.role):
-        made.error("--yes needs --name and --role: who comes is taken as that")
+        made.error("--yes needs --name and --role for the desk")
     if not arguments.yes and not sys.stdin.isatty():
         raise NobodyToAsk("there is no terminal to ask on; give --name, --role and --yes")
     forbid_core_dumps()
@@ -108,7 +108,7 @@ def _show(listener: socket.socket, code: str, own: str) -> None:
 
 
 def _drawn(text: str) -> list[str]:
-    """The same for a camera, where this is a terminal that can show it."""
+    """Return the same for a camera, where this is a terminal that can show it."""
     try:
         "█▀▄".encode(sys.stdout.encoding or "ascii")
         return [*qr_code.lines(text), ""] if sys.stdout.isatty() else []
@@ -125,7 +125,7 @@ def _address() -> str:
 
 
 def _confirmed(candidate: Candidate, arguments: argparse.Namespace, folder: AccessFolder) -> tuple[str, Role]:
-    """What the person here says; raises `PairingEnded` where they refuse."""
+    """Return what the person here says; raises `PairingEnded` where they refuse."""
     if arguments.yes:
         return arguments.name, arguments.role
     wished = arguments.name or (candidate.name if NAME.fullmatch(candidate.name) else "")
@@ -156,7 +156,7 @@ def _role() -> Role:
 
 
 def _asked(question: str) -> str:
-    """Raises `PairingEnded` where the terminal has closed."""
+    """Ask a question; raises `PairingEnded` if the terminal has closed."""
     say(question)
     line = sys.stdin.buffer.readline()
     if not line:
@@ -166,8 +166,8 @@ def _asked(question: str) -> str:
 
 def list_(argv: list[str]) -> int:
     """Exit code: 0 all is well, 1 something in it is not."""
-    made = _parser("list", "Who is let in on this robot, and as what.")
-    made.add_argument("--json", action="store_true", help="one JSON object a line, for machines")
+    made = _parser("list", "List the clients of this robot, with their roles.")
+    made.add_argument("--json", action="store_true", help="print one JSON object per line, for programs")
     arguments = made.parse_args(argv)
     _, folder = _robot(arguments)
     known = known_in(folder)
@@ -187,7 +187,7 @@ def list_(argv: list[str]) -> int:
 
 def revoke(argv: list[str]) -> int:
     """Exit code: 0 gone, 1 there is nobody of that name, or it could not be removed."""
-    made = _parser("revoke", "Let somebody in no more. A gateway that runs closes their connections at once.")
+    made = _parser("revoke", "Revoke a client. A running gateway closes its connections at once.")
     made.add_argument("name", metavar="NAME")
     arguments = made.parse_args(argv)
     _, folder = _robot(arguments)
@@ -201,7 +201,7 @@ def add(argv: list[str]) -> int:
     made = _parser("add", keys_push.ADD)
     made.add_argument("name", metavar="NAME", type=keys_push.name_of)
     made.add_argument("--role", type=Role, choices=list(Role), required=True, help="what it may")
-    made.add_argument("--json", action="store_true", help="one JSON object, for machines")
+    made.add_argument("--json", action="store_true", help="print one JSON object, for programs")
     arguments = made.parse_args(argv)
     return keys_push.add(arguments, *_robot(arguments))
 
@@ -220,7 +220,7 @@ def _parser(command: str, what: str) -> argparse.ArgumentParser:
 
 
 def _robot(arguments: argparse.Namespace) -> tuple[config.RobotConfig, AccessFolder]:
-    """The robot of the file, and its folder on the disk, whoever runs this."""
+    """Return the robot of the file, and its folder on the disk, whoever runs this."""
     robot = config.load(arguments.config)
     return robot, AccessFolder(robot.access, {})
 

@@ -111,7 +111,10 @@ def main(arguments: Sequence[str]) -> int:
 
 
 def _robot(options: argparse.Namespace, *, tell: bool) -> config.RobotConfig:
-    """The robot of the file; what is likely wrong with it, or files that it names, is logged on `tell`."""
+    """Return the robot of the file.
+
+    What is likely wrong with it, or files that it names, is logged on `tell`.
+    """
     robot, warnings = config.load_with_warnings(options.config)
     for one in (*warnings, *_beside(robot)) if tell else ():
         log.warning("%s: %s", options.config, one.words)
@@ -121,8 +124,8 @@ def _robot(options: argparse.Namespace, *, tell: bool) -> config.RobotConfig:
 
 
 def _beside(robot: config.RobotConfig) -> list[Finding]:
-    """What `gwrms check` says of EDS files, layouts and calibrations: each costs a component only."""
-    from gateway.surroundings import beside  # all that drivers need: not for a gateway that wakes for a stop
+    """Return what `gwrms check` says of EDS files, layouts and calibrations: each costs a component only."""
+    from gateway.prerequisites import beside  # all that drivers need: not for a gateway that wakes for a stop
 
     found = list(beside(robot))
     gc.collect()  # buses and components that were built to be looked at
@@ -146,7 +149,7 @@ def _listeners(robot: config.RobotConfig, handed: Listeners | None) -> Listeners
 
 
 def _local(robot: config.RobotConfig) -> socket.socket | None:
-    """The Unix socket that the robot's file names, or one in the folder that we are given for such."""
+    """Return the Unix socket that the robot's file names, or one in the folder that we are given for such."""
     given = robot.gateway.socket
     folder = os.environ.get("RUNTIME_DIRECTORY") or os.environ.get("XDG_RUNTIME_DIR")
     if given == "" or (given is None and not folder):

@@ -51,7 +51,7 @@ class Paired:
 
 
 def typed(where: str, code: str = "") -> tuple[Address, str]:
-    """What a person typed: HOST:PORT and the code, or the link that has both.
+    """Return what a person typed: HOST:PORT and the code, or the link that has both.
 
     Raises:
         ValueError: it is neither; it says which of the two is wrong.
@@ -144,7 +144,7 @@ def _reply(secured: ssl.SSLSocket, where: Address, given_up: Callable[[], bool])
 
 
 def own_certificate() -> bytes:
-    """A desk's own (PEM), made with its key where there is none; raises `KeyProblem`."""
+    """Return a desk's own (PEM), made with its key where there is none; raises `KeyProblem`."""
     folder = keys_folder()
     try:
         with alone_in(folder.parent):
@@ -157,7 +157,7 @@ def own_certificate() -> bytes:
 
 
 def own_name() -> str:
-    """What a robot may call this desk: its user and computer."""
+    """Return what a robot may call this desk: its user and computer."""
     name = f"{user_name()}-{socket.gethostname()}"
     return re.sub(r"[^A-Za-z0-9_.-]", "-", name).lstrip("_.-")[:64] or "desk"
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from drivers.bus.settings import CanSettings, Role
 from gateway.access.folder import AccessFolder
 from gateway.config.robot import RobotConfig, header
-from gateway.plain import LONGEST_NAME, NAME_SIGNS, ROBOT_SIGNS, is_name, is_robot_name
+from gateway.plain_text import LONGEST_NAME, NAME_SIGNS, ROBOT_SIGNS, is_name, is_robot_name
 from gateway.tables.finding import Finding, meant, warning
 
 BITRATES = (10_000, 20_000, 50_000, 83_333, 100_000, 125_000, 250_000, 500_000, 800_000, 1_000_000)

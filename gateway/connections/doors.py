@@ -36,7 +36,7 @@ class Stream(Protocol):
 
 
 def kind_of(listener: socket.socket, *, has_keys: bool) -> Kind:
-    """What comes in there; by the address that it listens on, whoever has opened it.
+    """Return what comes in there; by the address that it listens on, whoever has opened it.
 
     Raises:
         DoorProblem: nobody may come in there.
@@ -52,7 +52,7 @@ def kind_of(listener: socket.socket, *, has_keys: bool) -> Kind:
 
 
 def check_classic(listener: socket.socket) -> None:
-    """The paper's own exchange knows no keys: raises `DoorProblem` beyond this computer."""
+    """Refuse the paper's protocol, which has no keys, beyond this computer; raises `DoorProblem`."""
     if not is_loopback(listener.getsockname()):
         raise DoorProblem(
             f"classic_port would be served at {_said(listener.getsockname())}: it knows no keys, and is for "

@@ -52,7 +52,7 @@ class Listeners:
 
 
 def listen(host: str, port: int, setting: str = "--host or --port") -> socket.socket:
-    """A listening TCP socket; port 0 picks one. `setting` is what an error tells to change.
+    """Return a listening TCP socket; port 0 picks one. `setting` is what an error tells to change.
 
     Raises:
         OSError: the address is not ours, or the port is in use; the message names both.
@@ -69,7 +69,7 @@ def listen(host: str, port: int, setting: str = "--host or --port") -> socket.so
 
 
 def listen_locally(path: Path) -> socket.socket:
-    """A listening Unix socket. What a gateway that has gone has left there is taken away.
+    """Return a listening Unix socket. What a gateway that has gone has left there is taken away.
 
     Raises:
         OSError: another gateway serves there, or the path cannot be used; the message names it.
@@ -106,7 +106,7 @@ def _answers(path: Path) -> bool:
 
 
 def inherited(environ: MutableMapping[str, str]) -> Listeners | None:
-    """The sockets that were handed to this process, `None` where there are none; they are taken only once.
+    """Return the sockets passed to this process, `None` for none; they are taken only once.
 
     Raises:
         HandoverError: what was handed over is no listening TCP socket, or more than one has the same name.

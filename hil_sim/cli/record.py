@@ -10,7 +10,6 @@ from itertools import compress
 from pathlib import Path
 from typing import BinaryIO, Final
 
-from hil_sim.bare import BareExoskeleton
 from hil_sim.channels import JOINT_UNITS, UNITS, joints_reported, reported
 from hil_sim.cli.arguments import add_wearer, number
 from hil_sim.clock import SECOND_NS
@@ -20,9 +19,10 @@ from hil_sim.dangers import DANGERS
 from hil_sim.errors import SimulatorError
 from hil_sim.exoskeleton import Exoskeleton, Scenario
 from hil_sim.gait.walks import ORDINARY
-from hil_sim.practice import practice
 from hil_sim.sensors.suite import PERIOD_NS
+from hil_sim.training_walks import practice
 from hil_sim.truth import phases
+from hil_sim.without_bus import BareExoskeleton
 
 _DESCRIPTION = """\
 Writes what a gateway would report of the simulated robot (its names of channels, SI units, with the noise and
@@ -137,7 +137,7 @@ class Recording:
         self._write(list(compress(row, self._kept)))
 
     def _danger(self) -> list[float]:
-        """What is written of dangers, in the order of `DANGER_COLUMNS`."""
+        """Return what is written of dangers, in the order of `DANGER_COLUMNS`."""
         if self._course is None:
             return []
         units = zip(joints_reported(self._robot), JOINT_UNITS.values(), strict=True)
@@ -186,12 +186,18 @@ def _parser() -> argparse.ArgumentParser:
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--out", required=True, type=Path, metavar="FILE", help="what is written; replaced")
     parser.add_argument(
-        "--minutes", type=_minutes, default=6.0, metavar="M", help="of each wearer (default: %(default)g)"
+        "--out", required=True, type=Path, metavar="FILE", help="output file; replaced if it exists"
     )
     parser.add_argument(
-        "--subjects", type=_subjects, default=[0], metavar="N[-N]", help="who wears the robot (default: 0)"
+        "--minutes",
+        type=_minutes,
+        default=6.0,
+        metavar="M",
+        help="duration for each wearer (default: %(default)g)",
+    )
+    parser.add_argument(
+        "--subjects", type=_subjects, default=[0], metavar="N[-N]", help="number of the wearer (default: 0)"
     )
     parser.add_argument(
         "--scenario",

@@ -53,7 +53,7 @@ def evaluate(path: Path, search: Search) -> Outcome:
 
 
 def _late(data: Decisions, minute: dict[int, int]) -> npt.NDArray[np.bool_]:
-    """The decisions of trials after a subject's first minute."""
+    """Return the decisions of trials after a subject's first minute."""
     last = np.array([minute[person] for person in data.subject.tolist()])
     return np.asarray(data.trial > last)
 

@@ -109,7 +109,7 @@ def _counts(one: Seen) -> Floats:
 
 
 def _foreseeable(one: Seen) -> set[float]:
-    """The numbers of dangers that something shows before."""
+    """Return the numbers of dangers that something shows before."""
     return {1.0 + at for at, name in enumerate(one.names) if name not in SUDDEN}
 
 
@@ -128,7 +128,7 @@ def walking(one: Seen) -> Flags:
 
 
 def _maxima(one: Seen, odds: Floats) -> Floats:
-    """The largest odds of each block of healthy walking."""
+    """Return the largest odds of each block of healthy walking."""
     rows = walking(one)
     block = (one.at_s[rows] // BLOCK_S).astype(np.int_)
     said = np.nan_to_num(odds[rows])
@@ -140,7 +140,7 @@ def _hours(seen: Sequence[Seen]) -> float:
 
 
 def judge(one: Seen, calibration: Calibration) -> Judged:
-    """What was said of a wearer, moment by moment; after harm the levels begin anew."""
+    """Return what was said of a wearer, moment by moment; after harm the levels begin anew."""
     odds = calibration.log_odds(one.above)
     levels, level = Levels(calibration.by_level), np.zeros(len(odds), dtype=np.int_)
     over = False
@@ -178,7 +178,7 @@ def false_alarms(judged: Judged, least: Level, rows: Flags) -> int:
 
 
 def _looked_at(windows: Samples) -> Features:
-    """What a robot's channels are: the detectors make their own of them, row by row."""
+    """Return what a robot's channels are: the detectors make their own of them, row by row."""
     return windows[:, :, -1].astype(np.float32)
 
 
@@ -192,7 +192,7 @@ def evaluate(path: Path, search: bool) -> Outcome:  # noqa: ARG001 - there is no
 
 
 def evaluate_shipped(path: Path, search: bool) -> Outcome:  # noqa: ARG001 - there is nothing to choose
-    """The calibration that ships, on wearers from whom it was not learned."""
+    """Return the calibration that ships, on wearers from whom it was not learned."""
     calibration = load()
     return outcome([judge(one, calibration) for one in read(path)])
 
@@ -236,7 +236,7 @@ def outcome(judged: Sequence[Judged]) -> Outcome:
 
 
 def of_danger(found: Sequence[Event]) -> dict[str, float]:
-    """The share of these events that was foreseen, with its interval."""
+    """Return the share of these events that was foreseen, with its interval."""
     leads = [event.lead_s for event in found if event.lead_s is not None]
     low, high = share_interval(sum(event.foreseen for event in found), len(found))
     return {
@@ -272,7 +272,7 @@ def per_hour(judged: Sequence[Judged], level: Level, name: str, rows: Sequence[F
 
 
 def shares(name: str, flags: Sequence[bool]) -> dict[str, float]:
-    """A share with its interval."""
+    """Return a share with its interval."""
     low, high = share_interval(sum(flags), len(flags)) if flags else (float("nan"), float("nan"))
     return {name: _mean(flags), f"{name}_low": low, f"{name}_high": high}
 

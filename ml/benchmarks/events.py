@@ -85,7 +85,7 @@ def feet_of(trials: Sequence[ipol.Trial]) -> Feet:
 
 
 def candidates(pitch: npt.NDArray[np.float64]) -> tuple[Integers, Integers]:
-    """Samples where a foot may strike (its pitch rate falls through zero), or push off (it is lowest)."""
+    """Return candidate samples: strikes (pitch rate falls through zero) and push-offs (it is lowest)."""
     if len(pitch) < 3:
         return np.array([], dtype=np.int_), np.array([], dtype=np.int_)
     smooth = np.convolve(pitch, np.ones(3) / 3.0, mode="same")
@@ -126,7 +126,7 @@ def _fitted(feet: Sequence[Foot], settings: EventSettings) -> EventModel:
 
 
 def _counted(model: EventModel, foot: Foot, share: float, kind: str) -> Iterator[Key]:
-    """A key for each event: Counter counts them."""
+    """Yield a key for each event: Counter counts them."""
     found = model.events(foot.features, foot.at)
     sizes = (
         ("hits", metrics.matches(foot.true, found, WITHIN)),

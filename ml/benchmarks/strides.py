@@ -44,7 +44,10 @@ class Decisions:
 
 
 def lessons(trials: Sequence[ipol.Trial]) -> Decisions:
-    """What is learned from: every trial as it was, and as slower and faster people would have walked it."""
+    """Return what is learned from.
+
+    Every trial as it was, and as slower and faster people would have walked it.
+    """
     stretched = (ipol.stretched(trial, factor) for factor in PACES for trial in trials)
     other = [one for one in stretched if len(one.samples)]  # of a single sample, faster, none is left
     made = (decisions(trials), decisions(other, PACES_STEP))

@@ -47,7 +47,7 @@ class Agreement:
         )
 
     def _gravity(self, now: Now) -> float:
-        """The tilt that is told against the one that gravity shows, over a second."""
+        """Return the tilt that is told against the one that gravity shows, over a second."""
         apart = math.atan2(-now.trunk[0], now.trunk[2]) - float(now.trunk[6])
         if math.isnan(apart):
             return math.nan

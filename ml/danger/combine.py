@@ -45,7 +45,7 @@ class Calibration(msgspec.Struct, frozen=True):
         return odds
 
     def probability(self, odds: Floats | float) -> Floats:
-        """What share of moments with such odds ended in harm."""
+        """Return what share of moments with such odds ended in harm."""
         share: Floats = np.asarray(np.interp(odds, self.odds, self.share))
         return share
 
@@ -105,7 +105,10 @@ def calibrated(odds: Floats, danger: npt.NDArray[np.bool_]) -> tuple[Sequence[fl
 
 
 def load(path: Path = SHIPPED) -> Calibration:
-    """What ships; raises `UnusableModel` where the file is damaged, or was learned for other detectors."""
+    """Return what ships.
+
+    Raises `UnusableModel` where the file is damaged, or was learned for other detectors.
+    """
     try:
         found = msgspec.json.decode(path.read_bytes(), type=Calibration)
     except (OSError, msgspec.DecodeError) as error:

@@ -121,5 +121,5 @@ def in_order(channels: Sequence[str]) -> Mapping[int, int]:
 
 
 def spoken(name: str) -> str:
-    """A channel's component as people say it."""
+    """Return a channel's component as people say it."""
     return name.replace("_", " ")

@@ -48,7 +48,7 @@ class _Side:
         self.begin()
 
     def begin(self) -> None:
-        """A stride begins."""
+        """Begin a stride."""
         self.samples = 0
         self._low, self._high = np.full(6, np.inf), np.full(6, -np.inf)
         self._sums = np.zeros(24)  # angles, squared torques; then load, samples and place by foot; lean

@@ -63,7 +63,7 @@ class Verdict:
 
 
 def detectors(memory: Memory) -> tuple[Detector, ...]:
-    """New ones, for one robot, in the order of `DETECTORS`."""
+    """Return new ones, for one robot, in the order of `DETECTORS`."""
     first = (Tracking(), Torque(), Strides(), Support(), Balance(), Rhythm(), Agreement(), Drift(), Creep())
     return *first, *kinds(memory)
 
@@ -102,7 +102,7 @@ class Evidence:
         return above
 
     def why(self, above: Floats) -> tuple[str, ...]:
-        """The reasons of the last moment, the worst first."""
+        """Return the reasons of the last moment, the worst first."""
         order = np.argsort(-np.nan_to_num(above))[:TOLD].tolist()
         return tuple(self._words(at) for at in order if above[at] >= TELLING)
 

@@ -25,7 +25,7 @@ USUAL_STRIDE: Final = 115.0  # samples; where no stride has been seen yet
 
 
 def mirrored(windows: Samples) -> Samples:
-    """The same walk seen in a mirror: the right foot's channels where the left one's were."""
+    """Return the same walk seen in a mirror: the right foot's channels where the left one's were."""
     swapped: Samples = windows[:, SWAPPED] * SIGNS
     return swapped
 

@@ -41,7 +41,7 @@ def _compute(windows: Samples) -> Features:
 
 
 def _both_legs(windows: Samples) -> Samples:
-    """What the two hips do together and against each other, and how strongly the back moves."""
+    """Return what the two hips do together and against each other, and how strongly the back moves."""
     left, right, left_rate, right_rate = (windows[:, channel] for channel in range(4))
     signals = (
         left + right,

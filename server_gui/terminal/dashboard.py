@@ -87,7 +87,7 @@ class Dashboard:
 
 
 def save_picture(path: Path, station: Station, controls: Controls, where: str) -> None:
-    """The frame of this moment as an SVG file."""
+    """Save the present frame as an SVG file."""
     width, height = PICTURE_SIZE
     console = Console(record=True, width=width, height=height, file=io.StringIO(), force_terminal=True)
     console.print(draw(station, controls, where, PICTURE_SIZE), height=height)

@@ -12,13 +12,13 @@ from rich.table import Table
 from rich.text import Text
 
 from gateway.client import ConnectionState
-from gateway.plain import plain
+from gateway.plain_text import plain
 from gateway.units import Unit, Units
 from gateway.wire.parameter import ParameterInfo, ParameterValue
 from ml.danger.levels import Level
 from server_gui.core.alarms.alarm import Active
-from server_gui.core.alarms.found import undriven
 from server_gui.core.alarms.marks import GLYPHS
+from server_gui.core.alarms.robot_alarms import undriven
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.news import NewsKind
 from server_gui.core.follow.robot import Robot
@@ -99,7 +99,10 @@ def learned(text: str) -> Text:
 
 
 def _danger(station: Station) -> Text:
-    """The level of danger, or that it is not known; nothing where nobody foresees it, or it is no sign."""
+    """Return the level of danger, or that it is not known.
+
+    Nothing where nobody foresees it, or it is no sign.
+    """
     shown = station.predictions.danger
     if not station.predictions.foresees or undriven(station.robot, station.stopping):
         return words("")
@@ -209,7 +212,7 @@ def feet_and_trunk(robot: Robot, gait: Gait, look: Look) -> RenderableType:
 
 
 def _walk(gait: Gait, look: Look) -> str:
-    """Steps a minute and, where there is room, each foot's share of its stride on the ground."""
+    """Return steps a minute and, where there is room, each foot's share of its stride on the ground."""
     if gait.cadence_spm is None:
         return ""
     cadence = f"{gait.cadence_spm:.0f} steps/min"
@@ -318,7 +321,7 @@ def footer(station: Station, controls: Controls, where: str) -> Group:
 
 
 def _news(station: Station, controls: Controls, where: str) -> Text:
-    """The one thing that matters most now."""
+    """Return the one thing that matters most now."""
     robot, writing = station.robot, station.writing
     if controls.stop_sent:
         return words(station.stopping.text, style=f"bold {STOP_STYLES.get(station.stopping.state, BAD)}")
@@ -346,7 +349,7 @@ def _news(station: Station, controls: Controls, where: str) -> Text:
 
 
 def _alarm(active: Sequence[Active], controls: Controls) -> Text:
-    """The worst: what, then what to check, and how many more there are."""
+    """Return the worst: what, then what to check, and how many more there are."""
     alarm, more = active[0].alarm, len(active) - 1
     others = f"  (+{more} more)" if more else ""
     key = "  r r clears it" if alarm.clears and not controls.no_reset else ""

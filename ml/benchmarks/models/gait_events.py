@@ -58,7 +58,7 @@ class EventModel:
         return self
 
     def events(self, x: Features, at: Integers) -> Integers:
-        """The samples of one foot's events, in time's order, of moments at the samples `at`."""
+        """Return the samples of one foot's events, in time's order, of moments at the samples `at`."""
         if not len(at):
             return at
         probability = np.ones(len(at)) if self.whether_ is None else self.whether_.predict_proba(x)[:, 1]

@@ -14,7 +14,7 @@ from hil_sim.cli.record import COLUMNS, Recording
 from hil_sim.controller import objects
 from hil_sim.exoskeleton import Exoskeleton, Scenario
 from hil_sim.gait.activity import Activity
-from hil_sim.practice import practice
+from hil_sim.training_walks import practice
 
 
 def recorded(
