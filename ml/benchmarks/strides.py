@@ -52,7 +52,7 @@ def lessons(trials: Sequence[ipol.Trial]) -> Decisions:
     other = [one for one in stretched if len(one.samples)]  # of a single sample, faster, none is left
     made = (decisions(trials), decisions(other, PACES_STEP))
     columns = {field.name: [getattr(one, field.name) for one in made] for field in fields(Decisions)}
-    stride = _apart(columns.pop("stride"))
+    stride = apart(columns.pop("stride"))
     return Decisions(**{name: np.concatenate(column) for name, column in columns.items()}, stride=stride)
 
 
@@ -67,11 +67,11 @@ def decisions(trials: Sequence[ipol.Trial], step: int = STEP) -> Decisions:
     if len({part[-2][0] for part in parts}) < 2:
         raise UnusableData("fewer than two subjects have strides of 0.7 to 2.0 s: nothing can be learned")
     columns: list[Any] = [np.concatenate(column) for column in zip(*parts, strict=True)]
-    columns[2] = _apart([part[2] for part in parts])
+    columns[2] = apart([part[2] for part in parts])
     return Decisions(*columns)
 
 
-def _apart(numbers: Sequence[npt.NDArray[np.int_]]) -> npt.NDArray[np.int_]:
+def apart(numbers: Sequence[npt.NDArray[np.int_]]) -> npt.NDArray[np.int_]:
     """Numbers counted on from list to list, so that no two lists share one."""
     sizes = [int(own.max()) + 1 for own in numbers]
     offsets = np.cumsum([0, *sizes[:-1]])
