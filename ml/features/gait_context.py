@@ -1,4 +1,4 @@
-"""The recipe for standing, walking and turning with what came before: `GAIT_STATUS`, and six seconds at 20 Hz.
+"""The recipe for standing, walking and turning in context: `GAIT_STATUS`, and six seconds at 20 Hz.
 
 A pause of two seconds is the end of a walk, or a breath after a turn: the newest two seconds cannot tell.
 """

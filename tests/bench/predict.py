@@ -142,7 +142,9 @@ def _fitted(recipe: Recipe, x: npt.NDArray[np.float32]) -> Predict:
 
     def votes(rows: npt.NDArray[np.float32]) -> Any:
         inputs = scaled_rows(scale, rows)
-        return quick.predict_proba(rows)[0] + np.mean([probabilities(one[-1], inputs) for one in networks], axis=0)
+        return quick.predict_proba(rows)[0] + np.mean(
+            [probabilities(one[-1], inputs) for one in networks], axis=0
+        )
 
     return votes
 

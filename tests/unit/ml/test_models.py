@@ -64,10 +64,10 @@ def test_a_quick_support_vector_machine_says_what_scikit_learns_says() -> None:
 
 def test_status_is_learned_and_repeats_itself() -> None:
     random = np.random.default_rng(0)
-    truth = random.integers(0, 3, 300)
-    x = (random.normal(size=(300, 5)) + truth[:, None] * [2, 0, 0, 0, -1]).astype(np.float32)
-    first, second = (status_model().fit(x[:200], truth[:200]).predict_proba(x[200:]) for _ in range(2))
-    assert (first.argmax(axis=1) == truth[200:]).mean() > 0.8
+    truth = random.integers(0, 3, 1200)
+    x = (random.normal(size=(1200, 5)) + truth[:, None] * [2, 0, 0, 0, -1]).astype(np.float32)
+    first, second = (status_model().fit(x[:800], truth[:800]).predict_proba(x[800:]) for _ in range(2))
+    assert (first.argmax(axis=1) == truth[800:]).mean() > 0.8
     assert np.array_equal(first, second)
 
 
