@@ -67,7 +67,7 @@ class EventModel:
         return heights
 
     def events(self, at: Integers, height: Floats) -> Integers:
-        """The samples of one foot's events of one kind, by `height` (n,) at the samples `at`; in time's order.
+        """The samples of one foot's events of a kind, by `height` (n,) at the samples `at`; in time's order.
 
         A top is known once TOP samples have shown nothing higher.
         """
