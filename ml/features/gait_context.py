@@ -3,9 +3,10 @@
 A pause of two seconds is the end of a walk, or a breath after a turn: the newest two seconds cannot tell.
 """
 
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
+import numpy.typing as npt
 
 from ml.features.blocks import bins, flat
 from ml.features.gait_status import CHANNELS, GAIT_STATUS, RATE_HZ, SOFTEN
@@ -29,7 +30,7 @@ def _compute(windows: Samples) -> Features:
     heading = _heading(yaw, along(left_spin, up(left)) + along(right_spin, up(right)))
     feet = np.stack([length(left_spin), length(right_spin)])
     signals = (length(spin), feet.sum(axis=0), feet.min(axis=0), np.abs(length(trunk) - GRAVITY))
-    columns = [
+    columns: list[npt.NDArray[Any]] = [
         GAIT_STATUS.compute(np.ascontiguousarray(filled[..., -GAIT_STATUS.look_back :])),
         bins(heading, STRETCH, coarse.shape[-1] // STRETCH),
         bins(np.log(SOFTEN + np.stack(signals, axis=1)), STRETCH, coarse.shape[-1] // STRETCH),

@@ -35,9 +35,8 @@ def test_each_moment_knows_how_far_the_nearest_event_of_each_kind_is() -> None:
 
 def test_an_event_is_the_top_of_a_bump_and_no_other_is_as_near_as_a_step() -> None:
     at = np.arange(0, 400, 2)
-    height = sum(
-        np.exp(-0.5 * ((at - top) / 3.0) ** 2) * high for top, high in ((101, 1.0), (125, 0.6), (251, 0.5))
-    )
+    tops, high = np.array([[101], [125], [251]]), np.array([[1.0], [0.6], [0.5]])
+    height = (np.exp(-0.5 * ((at - tops) / 3.0) ** 2) * high).sum(axis=0)
     model = EventModel(EventSettings(threshold=0.4))
     assert model.events(at, height).tolist() == [101, 251]
     assert model.events(at[:0], height[:0]).tolist() == []
