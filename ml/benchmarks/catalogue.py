@@ -25,10 +25,9 @@ from ml.benchmarks.outcome import Goal, Outcome
 from ml.benchmarks.sim import WHOLE, recipe_of
 from ml.features import Recipe
 from ml.features.falling import FALLING
-from ml.features.foot_rates import PHASES
+from ml.features.gait_context import GAIT_CONTEXT
 from ml.features.gait_events import LEFT_EVENTS
 from ml.features.gait_phase import LEFT_PHASE
-from ml.features.gait_status import GAIT_STATUS
 from ml.features.terrain import TERRAIN
 from ml.robot.task import ACTIVITY, FALLING_TASK, GAIT_PHASE
 
@@ -55,7 +54,7 @@ BENCHMARKS: Final = {
         Benchmark(
             "ipol-status",
             "standing, walking or turning, 200 ms ago; leave one subject out",
-            GAIT_STATUS,
+            GAIT_CONTEXT,
             status.evaluate,
             {
                 "macro_f1": Goal(0.955, stretch=0.97),
