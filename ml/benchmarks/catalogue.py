@@ -25,6 +25,7 @@ from ml.benchmarks.outcome import Goal, Outcome
 from ml.benchmarks.sim import WHOLE, recipe_of
 from ml.features import Recipe
 from ml.features.falling import FALLING
+from ml.features.foot_rates import PHASES
 from ml.features.gait_context import GAIT_CONTEXT
 from ml.features.gait_events import LEFT_EVENTS
 from ml.features.gait_phase import LEFT_PHASE

@@ -31,7 +31,7 @@ class Walk:
 
 
 def read(path: Path) -> list[Walk]:
-    """The file's walks, subject by subject, in their order.
+    """Read the file's walks, subject by subject, in their order.
 
     Raises:
         UnusableData: it is not such a file, or has samples that cannot be.
@@ -64,7 +64,7 @@ def read(path: Path) -> list[Walk]:
 
 
 def _names(file: Arrays, name: str, rows: int) -> npt.NDArray[np.str_]:
-    """What each row's number in the array `name` means."""
+    """Return what each row's number in the array `name` means."""
     names, number = file.of(f"{name}_names", 1), file.of(name, 1, rows).astype(np.int_)
     if not np.isin(number, range(len(names))).all():
         raise file.problem(f"has numbers in {name!r} that {name + '_names'!r} does not name")
@@ -72,7 +72,7 @@ def _names(file: Arrays, name: str, rows: int) -> npt.NDArray[np.str_]:
 
 
 def landings(moving: npt.NDArray[np.bool_]) -> npt.NDArray[np.intp]:
-    """The rows at which the foot lies flat again."""
+    """Return the rows at which the foot lies flat again."""
     return np.flatnonzero(moving[:-1] & ~moving[1:]) + 1
 
 

@@ -43,7 +43,7 @@ def rows_of(people: Sequence[Person]) -> dict[str, dict[str, float]]:
 
 
 def figures_of(people: Sequence[Person], rows: Mapping[str, Mapping[str, float]]) -> dict[str, float]:
-    """The worst group's figures, what patients lose to healthy people, and what a minute gives the worst."""
+    """Return the worst group's figures, what patients lose, and what a minute gives the worst."""
     names = {one.group for one in people}
     found: dict[str, float] = {}
     for model in MODELS:
@@ -63,7 +63,7 @@ def figures_of(people: Sequence[Person], rows: Mapping[str, Mapping[str, float]]
 
 
 def interval(values: Sequence[float]) -> tuple[float, float]:
-    """The middle 95 % of the means of people drawn anew; NaN of nobody."""
+    """Return the middle 95 % of the means of people drawn anew; NaN of nobody."""
     known = np.array([value for value in values if not math.isnan(value)])
     if not len(known):
         return math.nan, math.nan
@@ -98,7 +98,7 @@ def _row(people: Sequence[Person]) -> dict[str, float]:
 
 
 def _adaptation(people: Sequence[Person], model: str) -> dict[str, float]:
-    """What a minute cuts of the later error: of all, and of the third that was worst in that minute."""
+    """Return what a minute cuts of the later error: of all, and of the third that was worst in it."""
     judged = [one for one in people if not math.isnan(one.figures[f"{model}_later_rmse_percent"])]
     if not judged:
         return {}

@@ -40,7 +40,7 @@ class Decisions:
 
 
 def lessons(walks: Sequence[impaired.Walk], later: Mapping[str, int], data: Decisions) -> Decisions:
-    """What these people teach: `data`, and their walks as slower and faster people would have walked them."""
+    """Return what these people teach: `data`, and their walks as if they were slower or faster."""
     people = {walk.subject for walk in walks}
     made = [data.of(np.isin(data.subject, list(people)))]
     for factor in PACES:
@@ -91,7 +91,7 @@ def _of_walk(walk: impaired.Walk, later: int, step: int) -> Iterator[tuple[Any, 
 
 
 def strikes_of(moving: Flags, later: int) -> npt.NDArray[np.intp]:
-    """The rows at which the labels have the foot lie flat, `later` samples earlier."""
+    """Return the rows at which the labels have the foot lie flat, `later` samples earlier."""
     flat = impaired.landings(moving) - later
     return flat[flat >= 0]
 
@@ -116,6 +116,6 @@ def minutes(walks: Sequence[impaired.Walk], later: Mapping[str, int]) -> dict[in
 
 
 def late_of(data: Decisions, minute: Mapping[int, int]) -> Flags:
-    """The decisions in walks after each person's first minute."""
+    """Return the decisions in walks after each person's first minute."""
     last = np.array([minute[subject] for subject in data.subject.tolist()])
     return np.asarray(data.walk > last)

@@ -45,12 +45,12 @@ def _events(left: Samples, right: Samples) -> Features:
 
 
 def _told(foot: Samples) -> Samples:
-    """A foot's pitch rate, and how fast it turns at all."""
+    """Return a foot's pitch rate, and how fast it turns at all."""
     return np.stack([foot[:, 1], length(foot)], axis=1)
 
 
 def _of(compute: Callable[[Samples, Samples], Features], name: str, look_back: int) -> tuple[Recipe, Recipe]:
-    """The recipe for the left foot and that for the right one."""
+    """Return the recipe for the left foot and that for the right one."""
 
     def left(windows: Samples) -> Features:
         feet = mended(windows)

@@ -139,6 +139,15 @@ def test_the_right_foot_is_the_left_one_in_a_mirror() -> None:
     assert not np.array_equal(RIGHT_PHASE.compute(window), LEFT_PHASE.compute(window))
 
 
+def test_a_step_of_the_right_leg_on_the_ground_is_the_left_ones_in_a_mirror() -> None:
+    window = walk(TERRAIN, TERRAIN.look_back).T[None]
+    assert np.array_equal(other_side(other_side(window)), window)
+    assert np.array_equal(TERRAIN.compute(window), TERRAIN.compute(other_side(window)))
+    one_leg = window.copy()
+    one_leg[:, [0, 2]] += 0.5  # whichever leads, the other leg's part is not its own
+    assert not np.array_equal(TERRAIN.compute(window), TERRAIN.compute(one_leg))
+
+
 @pytest.mark.parametrize("recipe", [GAIT_STATUS, GAIT_CONTEXT], ids=lambda recipe: recipe.name)
 def test_status_does_not_know_left_from_right_nor_which_way_it_turns(recipe: Recipe) -> None:
     window = walk(recipe, recipe.look_back).T[None]
