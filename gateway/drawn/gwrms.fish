@@ -731,7 +731,7 @@ complete -c gwrms -n '_shtab_gwrms_using sim-record' -s h -l help -d 'show this 
 complete -c gwrms -n '_shtab_gwrms_using sim-record' -l out -xka "(__fish_complete_path (commandline -ct))" -d 'what is written; replaced'
 complete -c gwrms -n '_shtab_gwrms_using sim-record' -l minutes -x -d 'of each wearer (default: 6)'
 complete -c gwrms -n '_shtab_gwrms_using sim-record' -l subjects -x -d 'who wears the robot (default: 0)'
-complete -c gwrms -n '_shtab_gwrms_using sim-record' -l scenario -xka "practice dangers walk stand sit sit_to_stand stairs_up stairs_down ramp_up ramp_down turn_left turn_right stumble fall day" -d 'default: practice'
+complete -c gwrms -n '_shtab_gwrms_using sim-record' -l scenario -xka "practice dangers healthy walk stand sit sit_to_stand stairs_up stairs_down ramp_up ramp_down turn_left turn_right stumble fall day" -d 'default: practice'
 complete -c gwrms -n '_shtab_gwrms_using sim-record' -l walks -xka "ordinary slow hemiparetic crouch steppage crutches_two_point crutches_three_point" -d 'how they walk: ordinary, slow, hemiparetic, crouch, steppage, crutches_two_point, crutches_three_point (default: ordinary)'
 complete -c gwrms -n '_shtab_gwrms_using sim-record' -l assists -xka "left right" -d 'the only leg that the robot is on, left or right'
 complete -c gwrms -n '_shtab_gwrms_using sim-record' -l seed -x -d 'same seed, same recording (default: 0)'

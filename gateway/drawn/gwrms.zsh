@@ -1299,7 +1299,7 @@ _shtab_gwrms_sim_record_options=(
   "--out[what is written\; replaced]:FILE:_files"
   "--minutes[of each wearer (default\: 6)]:M:"
   "--subjects[who wears the robot (default\: 0)]:N[-N]:"
-  "--scenario[default\: practice]:scenario:(practice dangers walk stand sit sit_to_stand stairs_up stairs_down ramp_up ramp_down turn_left turn_right stumble fall day)"
+  "--scenario[default\: practice]:scenario:(practice dangers healthy walk stand sit sit_to_stand stairs_up stairs_down ramp_up ramp_down turn_left turn_right stumble fall day)"
   "--walks[how they walk\: ordinary, slow, hemiparetic, crouch, steppage, crutches_two_point, crutches_three_point (default\: ordinary)]:NAME:(ordinary slow hemiparetic crouch steppage crutches_two_point crutches_three_point)"
   "--assists[the only leg that the robot is on, left or right]:SIDE:(left right)"
   "--seed[same seed, same recording (default\: 0)]:S:"
