@@ -1296,10 +1296,10 @@ _shtab_gwrms_sim_fault_defaults_added=0
 
 _shtab_gwrms_sim_record_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--out[output file\; replaced if it exists]:FILE:_files"
-  "--minutes[duration for each wearer (default\: 6)]:M:"
-  "--subjects[number of the wearer (default\: 0)]:N[-N]:"
-  "--scenario[default\: practice]:scenario:(practice dangers walk stand sit sit_to_stand stairs_up stairs_down ramp_up ramp_down turn_left turn_right stumble fall day)"
+  "--out[what is written\; replaced]:FILE:_files"
+  "--minutes[of each wearer (default\: 6)]:M:"
+  "--subjects[who wears the robot (default\: 0)]:N[-N]:"
+  "--scenario[default\: practice]:scenario:(practice dangers healthy walk stand sit sit_to_stand stairs_up stairs_down ramp_up ramp_down turn_left turn_right stumble fall day)"
   "--walks[how they walk\: ordinary, slow, hemiparetic, crouch, steppage, crutches_two_point, crutches_three_point (default\: ordinary)]:NAME:(ordinary slow hemiparetic crouch steppage crutches_two_point crutches_three_point)"
   "--assists[the only leg with a robot, left or right]:SIDE:(left right)"
   "--seed[same seed, same recording (default\: 0)]:S:"
