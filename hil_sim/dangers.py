@@ -166,7 +166,7 @@ LONGEST_S: Final = 25.0  # without harm a danger is ended, and counts as none
 
 
 def healthy(source: random.Random, among: Sequence[Activity]) -> Iterator[Entry]:
-    """A wearer's own day on foot, without end: visits `among` these, each once a round."""
+    """Yield a wearer's own day on foot, without end: visits `among` these, each once a round."""
     while True:
         visits = [*among]
         source.shuffle(visits)

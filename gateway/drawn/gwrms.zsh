@@ -572,7 +572,7 @@ _shtab_gwrms_enable_defaults_added=0
 
 _shtab_gwrms_evaluate_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--benchmark[a benchmark from the list below]:NAME:(ipol-status ipol-phase ipol-adapt ipol-events sisfall-prefall aust-mode ipol-danger sisfall-danger sim-activity sim-phase sim-walks sim-falling sim-danger sim-danger-shipped)"
+  "--benchmark[a benchmark from the list below]:NAME:(ipol-status ipol-phase ipol-adapt ipol-events impaired-phase sisfall-prefall aust-mode ipol-danger sisfall-danger sim-activity sim-phase sim-walks sim-falling sim-danger sim-danger-shipped)"
   "--data[the recordings]:FILE:_files"
   "--json[print the figures, including groups, as a JSON object in the last line]"
   "--report[also write a page with tables and pictures]:FILE.html:_files"
@@ -1296,9 +1296,9 @@ _shtab_gwrms_sim_fault_defaults_added=0
 
 _shtab_gwrms_sim_record_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--out[what is written\; replaced]:FILE:_files"
-  "--minutes[of each wearer (default\: 6)]:M:"
-  "--subjects[who wears the robot (default\: 0)]:N[-N]:"
+  "--out[output file\; replaced if it exists]:FILE:_files"
+  "--minutes[duration for each wearer (default\: 6)]:M:"
+  "--subjects[number of the wearer (default\: 0)]:N[-N]:"
   "--scenario[default\: practice]:scenario:(practice dangers healthy walk stand sit sit_to_stand stairs_up stairs_down ramp_up ramp_down turn_left turn_right stumble fall day)"
   "--walks[how they walk\: ordinary, slow, hemiparetic, crouch, steppage, crutches_two_point, crutches_three_point (default\: ordinary)]:NAME:(ordinary slow hemiparetic crouch steppage crutches_two_point crutches_three_point)"
   "--assists[the only leg with a robot, left or right]:SIDE:(left right)"

@@ -138,7 +138,7 @@ def walking(one: Seen) -> Flags:
 
 
 def _maxima(one: Seen, odds: Floats) -> Floats:
-    """The highest threshold that each block of healthy walking would have reached."""
+    """Return the highest threshold that each block of healthy walking would have reached."""
     rows = walking(one)
     block = (one.at_s[rows] // BLOCK_S).astype(np.int_)
     said = held(np.nan_to_num(odds))[rows]
@@ -202,7 +202,7 @@ def evaluate(path: Path, search: bool) -> Outcome:  # noqa: ARG001 - there is no
 
 
 def evaluate_shipped(path: Path, search: bool) -> Outcome:  # noqa: ARG001 - there is nothing to choose
-    """The calibration that ships, on wearers from whom it was not learned."""
+    """Judge the calibration that ships, on wearers from whom it was not learned."""
     calibration, seen = load(), read(path)
     found = outcome([judge(one, calibration) for one in seen])
     maxima = np.concatenate([_maxima(one, calibration.log_odds(one.above)) for one in seen])

@@ -40,7 +40,7 @@ URGENT: Final = (Level.EARLY, Level.ADVICE, Level.ALARM, Level.STOP)
 
 
 def held(odds: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """The highest threshold at which a level would begin, (n,): what the last `HOLD` moments all reached."""
+    """Return the highest threshold at which a level would begin (n,): what `HOLD` moments all reached."""
     found = odds.copy()
     for before in range(1, HOLD):
         np.minimum(found[before:], odds[:-before], out=found[before:])

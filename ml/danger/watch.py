@@ -102,7 +102,7 @@ class Evidence:
         return above
 
     def why(self, above: Floats) -> tuple[str, ...]:
-        """The reasons of the last moment, the worst first."""
+        """Return the reasons of the last moment, the worst first."""
         order = np.argsort(-or_zero(above))[:TOLD].tolist()
         return tuple(self._words(at) for at in order if above[at] >= TELLING)
 

@@ -67,7 +67,7 @@ class EventModel:
         return heights
 
     def events(self, at: Integers, height: Floats) -> Integers:
-        """Return the samples of one foot's events of a kind, in time's order: `height` (n,) is of samples `at`.
+        """Return the samples of one foot's events of a kind, in time's order; `height` (n,) is of `at`.
 
         A top is known once TOP samples have shown nothing higher.
         """
