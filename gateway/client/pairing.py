@@ -112,8 +112,8 @@ def _connected(where: Address) -> socket.socket:
 
 def _nobody(where: Address, error: OSError) -> Unreachable:
     return Unreachable(
-        f"no robot pairs at {where} ({error.strerror or error}): does `gwrms keys pair` wait there, and "
-        "is it the address that it shows?"
+        f"no robot pairs at {where} ({error.strerror or error}): does `gwrms keys pair` wait there, and is "
+        "it the address that it shows?"
     )
 
 
