@@ -51,8 +51,9 @@ class Outline:
         places = (rows.utc_ns - tape.first_ns) * STRETCHES // (tape.last_ns - tape.first_ns + 1)
         places = np.clip(places, 0, STRETCHES - 1)  # a row that came meanwhile belongs to the end
         for name, column in rows.columns.items():
-            np.fmin.at(self.least[name], places, column)
-            np.fmax.at(self.most[name], places, column)
+            known = np.where(np.isfinite(column), column, np.nan)  # beside an infinity all else were flat
+            np.fmin.at(self.least[name], places, known)
+            np.fmax.at(self.most[name], places, known)
         self.revision += 1
         self._look(tape, begin_ns + PIECE_NS)
 

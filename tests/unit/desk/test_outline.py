@@ -80,6 +80,19 @@ def test_rows_of_a_recording_that_is_no_longer_shown_are_not_drawn_into_another(
     assert outline.least == {}
 
 
+def test_an_infinity_does_not_make_all_else_flat() -> None:
+    class Odd(KneeTape):
+        def read(self, begin_ns: int, end_ns: int, channels: list[str]) -> Rows:
+            rows = super().read(begin_ns, end_ns, channels)
+            odd = {
+                name: np.where(rows.stamps_ns == 0, np.inf, column) for name, column in rows.columns.items()
+            }
+            return Rows(rows.utc_ns, rows.stamps_ns, odd)
+
+    outline = opened(Odd())
+    assert np.nanmax(outline.most["left_knee.position"]) == LENGTH_S
+
+
 def test_the_same_recording_opened_twice_is_read_once_from_its_second_piece_on() -> None:
     late: list[Callable[[], None]] = []
     outline, tape = Outline(at_once, late.append), KneeTape()
