@@ -60,14 +60,26 @@ def test_the_whole_recording_is_in_it_piece_by_piece_and_a_gap_is_no_value() -> 
     nothing = np.flatnonzero(np.isnan(least)) * a_stretch_s
     assert (nothing[0], nothing[-1] + a_stretch_s) == pytest.approx((240, 300), abs=1.1 * a_stretch_s)
     assert tape.asked == 1 + LENGTH_S * SECOND_NS // PIECE_NS
+    assert outline.read_share == 1.0
 
 
-def test_what_cannot_be_read_is_left_out() -> None:
-    class Away(KneeTape):
+def test_what_cannot_be_read_is_not_known_and_not_taken_for_nothing_recorded() -> None:
+    class GoesAway(KneeTape):
         def read(self, begin_ns: int, end_ns: int, channels: list[str]) -> Rows:
-            raise OSError("the store is away")
+            if self.asked:
+                raise OSError("the store is away")
+            return super().read(begin_ns, end_ns, channels)
 
-    assert np.isnan(opened(Away()).least["left_knee.position"]).all()
+    outline = opened(GoesAway())
+    assert outline.read_share == pytest.approx(PIECE_NS / (LENGTH_S * SECOND_NS))
+    known = np.flatnonzero(~np.isnan(outline.least["left_knee.position"])) / STRETCHES
+    assert known.max() < outline.read_share
+
+
+def test_a_clock_that_jumped_by_decades_makes_no_more_reads_than_there_are_stretches() -> None:
+    tape = KneeTape(first_ns=0)
+    assert opened(tape).read_share == 1.0
+    assert tape.asked <= STRETCHES + 1
 
 
 def test_rows_of_a_recording_that_is_no_longer_shown_are_not_drawn_into_another() -> None:
