@@ -197,7 +197,7 @@ class Timeline(QWidget):
             painter.fillRect(QRectF(left, bar.top(), max(right - left, 2.0), bar.height()), colour)
 
     def _draw_outline(self, painter: QPainter, bar: QRectF) -> None:
-        """Above the labels: how far each knee bent; nothing where nothing was recorded, hatched where not read."""
+        """Above the labels: how far each knee bent; hatched where it was not read."""
         if self._outline is None or not self._outline.least:
             return
         high = bar.height() * (1 - LABELLED) - 4
