@@ -572,7 +572,7 @@ _shtab_gwrms_enable_defaults_added=0
 
 _shtab_gwrms_evaluate_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--benchmark[a benchmark from the list below]:NAME:(ipol-status ipol-phase ipol-adapt ipol-events sisfall-prefall aust-mode ipol-danger sisfall-danger sim-activity sim-phase sim-walks sim-falling sim-danger sim-danger-shipped)"
+  "--benchmark[a benchmark from the list below]:NAME:(ipol-status ipol-phase ipol-adapt ipol-events impaired-phase sisfall-prefall aust-mode ipol-danger sisfall-danger sim-activity sim-phase sim-walks sim-falling sim-danger sim-danger-shipped)"
   "--data[the recordings]:FILE:_files"
   "--json[print the figures, including groups, as a JSON object in the last line]"
   "--report[also write a page with tables and pictures]:FILE.html:_files"
