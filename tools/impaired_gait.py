@@ -65,7 +65,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def made(folder: Path) -> dict[str, npt.NDArray[Any]]:
-    """Every trial of the folder, as the benchmarks read them.
+    """Return every trial of the folder, as the benchmarks read them.
 
     Raises:
         WrongFile: there is none, or one is not as it should be.
@@ -132,7 +132,7 @@ def _rates(path: Path) -> npt.NDArray[np.int16]:
 
 
 def _moving(steps: Sequence[tuple[int, int]], rows: int) -> npt.NDArray[np.int8]:
-    """1 while the foot moves; a row on the ground stays between two steps that the labels let overlap."""
+    """Return 1 while the foot moves; between two steps that overlap in the labels a row on the ground stays."""
     moving = np.zeros(rows, dtype=np.int8)
     for begin, end in steps:
         moving[begin:end] = 1

@@ -31,7 +31,7 @@ class Walk:
 
 
 def read(path: Path) -> list[Walk]:
-    """Read the file's walks, subject by subject, in their order.
+    """Return the file's walks, subject by subject, in their order.
 
     Raises:
         UnusableData: it is not such a file, or has samples that cannot be.
@@ -64,7 +64,7 @@ def read(path: Path) -> list[Walk]:
 
 
 def _names(file: Arrays, name: str, rows: int) -> npt.NDArray[np.str_]:
-    """Return what each row's number in the array `name` means."""
+    """Say what each row's number in the array `name` means."""
     names, number = file.of(f"{name}_names", 1), file.of(name, 1, rows).astype(np.int_)
     if not np.isin(number, range(len(names))).all():
         raise file.problem(f"has numbers in {name!r} that {name + '_names'!r} does not name")
@@ -77,7 +77,7 @@ def landings(moving: npt.NDArray[np.bool_]) -> npt.NDArray[np.intp]:
 
 
 def laid_later(walks: Sequence[Walk]) -> dict[str, int]:
-    """For each make of sensor, how many samples after a foot's own strike the labels have it lie flat.
+    """Return, for each make of sensor, how many samples after its own strike a foot is labelled as flat.
 
     Those who labelled read signals, and read those of one make otherwise than those of the other. Healthy
     people alone say by how much: the median over them of each one's median, rounded.
@@ -93,7 +93,7 @@ def laid_later(walks: Sequence[Walk]) -> dict[str, int]:
 
 
 def _later(walk: Walk) -> list[int]:
-    """From each strike in a foot's own signal to when the labels have it lie flat, where that follows."""
+    """Count from each strike in a foot's own signal until the labels have it lie flat, where they do."""
     later: list[int] = []
     for pitch, moving in zip((walk.rates[:, 1], walk.rates[:, 4]), walk.moving, strict=True):
         flat, own = landings(moving), heel_strikes(pitch)

@@ -30,7 +30,7 @@ class Person:
 
 
 def rows_of(people: Sequence[Person]) -> dict[str, dict[str, float]]:
-    """Each group's figures, the worst first by models of healthy people; then each make of sensor's share."""
+    """Return each group's figures, the worst first by models of healthy people; then by make of sensor."""
     groups = {name: [one for one in people if one.group == name] for name in {one.group for one in people}}
     order = sorted(groups, key=lambda name: -_mean(groups[name], "healthy_rmse_percent"))
     rows = {name: _row(groups[name]) for name in order}
@@ -43,7 +43,7 @@ def rows_of(people: Sequence[Person]) -> dict[str, dict[str, float]]:
 
 
 def figures_of(people: Sequence[Person], rows: Mapping[str, Mapping[str, float]]) -> dict[str, float]:
-    """Return the worst group's figures, what patients lose, and what a minute gives the worst."""
+    """Return the worst group's figures, what patients gain from mixed models, and what a minute gives."""
     names = {one.group for one in people}
     found: dict[str, float] = {}
     for model in MODELS:
@@ -119,7 +119,7 @@ def _adaptation(people: Sequence[Person], model: str) -> dict[str, float]:
 
 
 def _cut_interval(pairs: Floats) -> tuple[float, float]:
-    """Of (n, 2) errors before and after, of people drawn anew."""
+    """Return the interval of the cut, of (n, 2) errors before and after; people are drawn anew."""
     drawn = np.random.default_rng(0).integers(0, len(pairs), (DRAWS, len(pairs)))
     before, after = pairs[drawn].mean(axis=1).T
     low, high = np.quantile(1.0 - after / before, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
@@ -135,6 +135,6 @@ def _gains(people: Sequence[Person]) -> float:
 
 
 def _mean(people: Sequence[Person], figure: str) -> float:
-    """Over those of whom it is known; NaN of nobody."""
+    """Return the mean over those of whom it is known; NaN of nobody."""
     known = [value for one in people if not math.isnan(value := one.figures[figure])]
     return float(np.mean(known)) if known else math.nan

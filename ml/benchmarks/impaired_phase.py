@@ -55,7 +55,7 @@ class Judged:
 
 
 def evaluate(path: Path, search: Search) -> Outcome:  # noqa: ARG001 - there is nothing to choose
-    """Five folds of people, judged by groups."""
+    """Judge five folds of people, by groups."""
     walks = impaired.read(path)
     later = impaired.laid_later(walks)
     if lacking := {walk.sensor for walk in walks} - set(later):
@@ -82,7 +82,7 @@ def evaluate(path: Path, search: Search) -> Outcome:  # noqa: ARG001 - there is 
 
 
 def folds_of(groups: Mapping[int, str]) -> Iterator[Fold]:
-    """Folds of people, each with its share of every group.
+    """Make folds of people, each with its share of every group.
 
     Raises:
         UnusableData: nobody healthy is left in one.
@@ -101,7 +101,7 @@ def folds_of(groups: Mapping[int, str]) -> Iterator[Fold]:
 
 
 def mixed(groups: Mapping[int, str], count: int) -> list[int]:
-    """`count` of these people, as many of each group as there are, spread over their numbers."""
+    """Choose `count` of these people, as many of each group as there are, spread over their numbers."""
     names = sorted(set(groups.values()))
     chosen: list[int] = []
     for place, name in enumerate(names):
@@ -129,7 +129,7 @@ def _fitted(taught: Decisions, people: Sequence[int]) -> PhaseModel:
 def _of_model(
     model: PhaseModel, data: Decisions, late: Flags, people: Mapping[int, Flags]
 ) -> dict[int, tuple[Floats, Floats]]:
-    """Each person's errors, and those after the minute once it has been learned from."""
+    """Return each person's errors, and those after the minute once it has been learned from."""
     found = {}
     for subject, rows in people.items():
         early, later = data.of(rows & ~late), data.of(rows & late)
@@ -147,7 +147,7 @@ def _errors(model: PhaseModel, data: Decisions) -> Floats:
 def _person(
     data: Decisions, groups: Mapping[int, str], makes: str, judged: Mapping[int, Judged], subject: int
 ) -> Person:
-    """One person's figures. What is promised comes from others whom the same kind of model had not seen."""
+    """Return one person's figures; what is promised comes from others, judged as he is."""
     own, rows = judged[subject], data.subject == subject
     hindsight = metrics.circular_error(data.hindsight[rows], data.phase[rows])
     figures = {"hindsight_rmse_percent": _percent(hindsight[~np.isnan(hindsight)])}

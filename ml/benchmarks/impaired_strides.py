@@ -40,7 +40,7 @@ class Decisions:
 
 
 def lessons(walks: Sequence[impaired.Walk], later: Mapping[str, int], data: Decisions) -> Decisions:
-    """Return what these people teach: `data`, and their walks as if they were slower or faster."""
+    """Return what these people teach: `data`, and their walks as slower and faster people would walk."""
     people = {walk.subject for walk in walks}
     made = [data.of(np.isin(data.subject, list(people)))]
     for factor in PACES:
@@ -63,7 +63,7 @@ def _stretched(walk: impaired.Walk, factor: float) -> impaired.Walk:
 
 
 def decisions(walks: Iterable[impaired.Walk], later: Mapping[str, int], step: int = STEP) -> Decisions:
-    """Every walk's strides, a decision each `step` samples; `later` as `impaired.laid_later` gives it.
+    """Return every walk's strides, a decision each `step` samples; `later` as `impaired.laid_later` gives it.
 
     Raises:
         UnusableData: nobody has a stride.
@@ -97,12 +97,12 @@ def strikes_of(moving: Flags, later: int) -> npt.NDArray[np.intp]:
 
 
 def phases(strikes: npt.NDArray[np.intp], rows: int) -> Floats:
-    """Each row's phase: 0 at a strike, linear to the next one; NaN outside strides."""
+    """Return each row's phase: 0 at a strike, linear to the next one; NaN outside strides."""
     return ipol.phase(strikes, rows, STRIDE_S)
 
 
 def minutes(walks: Sequence[impaired.Walk], later: Mapping[str, int]) -> dict[int, int]:
-    """Each person's walk in which the first minute within strides ends."""
+    """Return each person's walk in which the first minute within strides ends."""
     walked: dict[int, float] = {}
     ends: dict[int, int] = {}
     for walk in walks:
@@ -116,6 +116,6 @@ def minutes(walks: Sequence[impaired.Walk], later: Mapping[str, int]) -> dict[in
 
 
 def late_of(data: Decisions, minute: Mapping[int, int]) -> Flags:
-    """Return the decisions in walks after each person's first minute."""
+    """Mark the decisions in walks after each person's first minute."""
     last = np.array([minute[subject] for subject in data.subject.tolist()])
     return np.asarray(data.walk > last)

@@ -1,10 +1,9 @@
-"""Recipes by the angular velocity of both feet alone, 100 Hz: a foot's phase, and when it begins to move.
+"""The recipe for the gait phase of one foot by the angular velocity of both feet alone, 100 Hz.
 
 For recordings that tell no more. Of the three axes only the pitch is told apart, so that it does not matter
 how else a sensor was turned on its foot. One recipe serves both feet: for the right one they are swapped.
 """
 
-from collections.abc import Callable
 from typing import Final
 
 import numpy as np
@@ -19,8 +18,6 @@ from ml.features.signals import length
 from ml.features.windows import Samples
 
 CHANNELS: Final = tuple(name for name in EVERY if "_foot.angular_velocity_" in name)
-EVENT_LOOK_BACK: Final = 120
-EVENT_DELAY: Final = 15  # samples: what follows an event tells it from others
 
 
 def _phase(left: Samples, right: Samples) -> Features:
@@ -38,33 +35,22 @@ def _phase(left: Samples, right: Samples) -> Features:
     return np.concatenate(columns, axis=1, dtype=np.float32)
 
 
-def _events(left: Samples, right: Samples) -> Features:
-    this, that = _told(left), _told(right)
-    columns = [bins(this, 1, 44), bins(this, 8, 14), bins(that, 4, 12), bins(that, 10, 12)]
-    return np.concatenate(columns, axis=1, dtype=np.float32)
-
-
 def _told(foot: Samples) -> Samples:
     """Return a foot's pitch rate, and how fast it turns at all."""
     return np.stack([foot[:, 1], length(foot)], axis=1)
 
 
-def _of(compute: Callable[[Samples, Samples], Features], name: str, look_back: int) -> tuple[Recipe, Recipe]:
-    """Return the recipe for the left foot and that for the right one."""
-
-    def left(windows: Samples) -> Features:
-        feet = mended(windows)
-        return compute(feet[:, :3], feet[:, 3:])
-
-    def right(windows: Samples) -> Features:
-        feet = mended(windows)
-        return compute(feet[:, 3:], feet[:, :3])
-
-    return (
-        Recipe(f"{name}_left", RATE_HZ, look_back, CHANNELS, left),
-        Recipe(f"{name}_right", RATE_HZ, look_back, CHANNELS, right),
-    )
+def _left(windows: Samples) -> Features:
+    feet = mended(windows)
+    return _phase(feet[:, :3], feet[:, 3:])
 
 
-PHASES: Final = _of(_phase, "foot_rates_phase", LOOK_BACK)
-EVENTS: Final = _of(_events, "foot_rates_events", EVENT_LOOK_BACK)
+def _right(windows: Samples) -> Features:
+    feet = mended(windows)
+    return _phase(feet[:, 3:], feet[:, :3])
+
+
+PHASES: Final = (
+    Recipe("foot_rates_phase_left", RATE_HZ, LOOK_BACK, CHANNELS, _left),
+    Recipe("foot_rates_phase_right", RATE_HZ, LOOK_BACK, CHANNELS, _right),
+)

@@ -99,7 +99,7 @@ def _feet(walk: impaired.Walk) -> Iterator[Foot]:
 
 
 def found_in(steps: Sequence[Interval], swings: Sequence[Interval]) -> Iterator[tuple[int, int]]:
-    """Labelled steps in which the middle of a swing lies, each step and each swing once."""
+    """Pair each labelled step with the swing whose middle lies in it, each step and each swing once."""
     place = 0
     for number, (begin, end) in enumerate(swings):
         middle = (begin + end) / 2
@@ -111,7 +111,7 @@ def found_in(steps: Sequence[Interval], swings: Sequence[Interval]) -> Iterator[
 
 
 def _usual(feet: Sequence[Foot]) -> dict[tuple[EventKind, str], float]:
-    """From the label to the event, by kind and make of sensor: the median of healthy people's medians."""
+    """Measure from label to event, by kind and make of sensor: the median of healthy people's medians."""
     apart: dict[tuple[EventKind, str], dict[int, list[float]]] = defaultdict(lambda: defaultdict(list))
     for foot in feet:
         if foot.walk.group == impaired.HEALTHY:
@@ -151,7 +151,7 @@ def _show(people: Iterable[Person], later: Mapping[tuple[EventKind, str], float]
 
 
 def _row(people: Sequence[Person]) -> dict[str, tuple[float, ...]]:
-    """Means over people with their 95 % intervals; and the worst third and the worst one in step F1."""
+    """Return means over people with 95 % intervals; and the worst third and the worst one in step F1."""
     each = [person.figures for person in people]
     row: dict[str, tuple[float, ...]] = {"people": (float(len(people)),)}
     for figure in each[0]:
