@@ -45,7 +45,7 @@ class DeviceClock:
         return self._uncertainty_ns
 
     def stamp(self, ticks: int, received_ns: int) -> int | None:
-        """The robot's time (monotonic, ns) at which the frame of `ticks` was taken.
+        """Return the robot's time (monotonic, ns) at which the frame of `ticks` was taken.
 
         Never after `received_ns` and never before the stamp of the frame before. `None` for a frame that is
         older than one already seen.

@@ -224,14 +224,14 @@ _UNKNOWN: Final = "look into the drive's manual for the code"
 
 
 def error_text(code: int, vendor_id: int | None = None) -> str:
-    """An error code of an EMCY or of 603Fh, in words: the vendor's, the profile's, or its class."""
+    """Return an error code of an EMCY or of 603Fh, in words: the vendor's, the profile's, or its class."""
     vendors = _VENDORS.get(vendor_id or 0, {})
     words = vendors.get(code) or _CODES.get(code) or _class_text(code)
     return f"0x{code:04X} {words}"
 
 
 def error_check(code: int) -> str:
-    """What to check where a device tells this code; a vendor's own lies in the class of its like."""
+    """Return what to check where a device tells this code; a vendor's own lies in the class of its like."""
     masks = (0xFFFF, 0xFFF0, 0xFF00, 0xF000)
     return next((said for mask in masks if (said := _CHECKS.get(code & mask)) is not None), _UNKNOWN)
 

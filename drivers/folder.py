@@ -49,7 +49,7 @@ class Folder(Mapping[str, F]):
 
 
 def not_a_format(name: str, known: Iterable[str]) -> str:
-    """What is said of the key `format` where it names none of these."""
+    """Return what is said of the key `format` where it names none of these."""
     import difflib  # for who has mistyped only
 
     names = list(known)

@@ -4,7 +4,7 @@ from drivers.samples import State
 
 
 def silence_text(age_ms: float | None) -> str:
-    """What there is to say of a silence whose cause nobody knows."""
+    """Return what there is to say of a silence whose cause nobody knows."""
     return "no sample has come yet" if age_ms is None else f"no new sample for {age_ms / 1000:.1f} s"
 
 
@@ -23,7 +23,7 @@ class Freshness:
         self._last_ns, self._connected, self.stale = None, False, 0
 
     def seen(self, stamp_ns: int) -> None:
-        """A sample came at `stamp_ns`."""
+        """Take a sample of `stamp_ns`."""
         if self._last_ns is not None and stamp_ns - self._last_ns > self._stale_after_ns:
             self.stale += 1
         self._last_ns, self._connected = stamp_ns, True

@@ -40,7 +40,10 @@ def candidates() -> Iterator[tuple[str, str | None, Callable[[], Parser[Any]]]]:
 
 
 def matches(data: bytes) -> list[Match]:
-    """The formats that fit `data`, the best first; of equal ones a device's own before a described one."""
+    """Return the formats that fit `data`, the best first.
+
+    Of equal ones a device's own before a described one.
+    """
     found = [match for candidate in candidates() if (match := _try(data, *candidate)) is not None]
     if not found and (lines := _number_lines(data)) is not None:
         found.append(lines)
@@ -48,12 +51,12 @@ def matches(data: bytes) -> list[Match]:
 
 
 def recognise(data: bytes) -> Match | None:
-    """The format that fits `data` best, if any does."""
+    """Return the format that fits `data` best, if any does."""
     return next(iter(matches(data)), None)
 
 
 def format_of(data: bytes) -> str | None:
-    """The name of that format."""
+    """Return the name of that format."""
     match = recognise(data)
     return None if match is None else match.format_name
 

@@ -5,7 +5,7 @@ from typing import Generic, Protocol, TypeVar
 
 from drivers.parsing import Parser
 from drivers.port import SerialPort
-from drivers.standstill import Standstill
+from drivers.reader_stalls import ReaderStalls
 
 F = TypeVar("F")
 Listening = TypeVar("Listening", contravariant=True)
@@ -24,7 +24,7 @@ class User(Protocol[Listening]):
     """A component that takes frames; called in the port's thread."""
 
     def received(self, frames: Sequence[Listening], stamp_ns: int) -> None:
-        """The frames, one or more, that one read has completed."""
+        """Take the frames, one or more, completed by one read."""
         ...
 
     def disconnected(self) -> None: ...
@@ -45,11 +45,11 @@ class Line(Generic[F]):
         format_name: str,
         make_parser: Callable[[], Parser[F]],
         recognise: Recognise = unrecognised,
-        standstill: Standstill | None = None,
+        standstill: ReaderStalls | None = None,
     ) -> None:
         """`standstill` is that of a bus which the same computer reads: a port's thread only waits."""
         self.path = path
-        self.standstill = standstill or Standstill()
+        self.standstill = standstill or ReaderStalls()
         self.format_name = format_name
         self.parser = make_parser()
         self.reconnects = 0
@@ -76,7 +76,7 @@ class Line(Generic[F]):
             self._port.stop()
 
     def problem(self, now_ns: int) -> str | None:
-        """What is wrong with the line, in words with what to check; `None` while frames come."""
+        """Return what is wrong with the line, in words with what to check; `None` while frames come."""
         if self._port.problem is not None:
             return self._port.problem
         opened_ns = self._port.opened_ns

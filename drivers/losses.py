@@ -1,24 +1,24 @@
 """Whether a sensor's frames go missing on their way: by its own numbers, else by how many come."""
 
-from drivers.noted import found
-from drivers.pace import Pace
+from drivers.findings import active_findings
+from drivers.frame_rate import FrameRate
+from drivers.frame_shares import missing_frames
 from drivers.parsing import Counters
+from drivers.reader_stalls import ReaderStalls
 from drivers.samples import Finding
-from drivers.shares import missing_frames
-from drivers.standstill import Standstill
 
 
 class Losses:
     """Fed with what a line's parser has counted."""
 
-    def __init__(self, standstill: Standstill) -> None:
+    def __init__(self, standstill: ReaderStalls) -> None:
         """`standstill` is that of the computer that reads: what that has missed is no sensor's fault."""
-        self._missing, self._pace = missing_frames(), Pace()
+        self._missing, self._pace = missing_frames(), FrameRate()
         self._standstill = standstill
         self._stood = standstill.times
 
     def restart(self) -> None:
-        """The line is another one."""
+        """Restart for another line."""
         self._missing.restart()
         self._pace.restart()
 
@@ -36,4 +36,4 @@ class Losses:
     @property
     def findings(self) -> tuple[Finding, ...]:
         """What is missing."""
-        return found([self._missing, self._pace])
+        return active_findings([self._missing, self._pace])

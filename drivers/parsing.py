@@ -36,11 +36,11 @@ class Parser(Protocol[F]):
     def counters(self) -> Counters: ...
 
     def feed(self, data: bytes) -> list[F]:
-        """The frames that `data` completes, in the order of the stream."""
+        """Return the frames that `data` completes, in the order of the stream."""
         ...
 
     def finish(self) -> list[F]:
-        """The frames that only the end of the stream completes; what remains is dropped.
+        """Return the frames that only the end of the stream completes; what remains is dropped.
 
         What is fed next is another stream: the device may count anew.
         """
@@ -54,7 +54,7 @@ SAVED = 1 << 18  # of those, the most that are kept for later
 
 
 def needs(count: int) -> int:
-    """What a format says of a length that so many bytes of the frame will tell more about."""
+    """Return what a format says of a length that so many bytes of the frame will tell more about."""
     return -count
 
 
@@ -91,7 +91,7 @@ class FrameScanner(Generic[F]):
         self._granted, self._paid_to = SAVED, self._cut
 
     def feed(self, data: bytes) -> list[F]:
-        """The frames that `data` completes, in the order of the stream."""
+        """Return the frames that `data` completes, in the order of the stream."""
         self._buffer += data
         frames: list[F] = []
         while (frame := self._in_step()) is not None or (frame := self._next()) is not None:
@@ -121,7 +121,7 @@ class FrameScanner(Generic[F]):
         return 0
 
     def _decode(self, raw: bytes) -> F | None:
-        """The frame in `raw`; `None`, with the reason counted, where it is not valid."""
+        """Return the frame in `raw`; `None`, with the reason counted, where it is not valid."""
         raise NotImplementedError
 
     def _find(self, buffer: bytearray, start: int, end: int) -> int:
@@ -134,7 +134,10 @@ class FrameScanner(Generic[F]):
         return self._ended - self._cut
 
     def _in_step(self) -> F | None:
-        """The frame that begins where the last one ended, if no other could end before it: the usual case."""
+        """Return the frame that begins where the last one ended, if no other could end before it.
+
+        The usual case.
+        """
         start, buffer = self._begin - self._cut, self._buffer
         if self._open or self._searched != self._begin or not buffer.startswith(self.sync, start):
             return None
@@ -152,7 +155,7 @@ class FrameScanner(Generic[F]):
         return frame
 
     def _next(self) -> F | None:
-        """The valid frame that ends first, if one has ended."""
+        """Return the valid frame that ends first, if one has ended."""
         end_of_data = self._cut + len(self._buffer)
         while True:
             place = self._due[0][0] if self._due else end_of_data
@@ -211,7 +214,7 @@ class FrameScanner(Generic[F]):
         return self._decode(bytes(self._buffer[start - self._cut : end - self._cut]))
 
     def _go_on_behind(self, start: int, end: int) -> None:
-        """A valid frame was there: what began before its end is none."""
+        """Skip a valid frame: nothing that begins before its end is one."""
         self._drop_until(start)
         self._begin = self._searched = self._ended = end
         self._due.clear()
@@ -295,7 +298,7 @@ class DelimitedParser(Generic[F]):
         self._overlong = False  # the frame that is arriving is too long already
 
     def feed(self, data: bytes) -> list[F]:
-        """The frames that `data` completes, in the order of the stream."""
+        """Return the frames that `data` completes, in the order of the stream."""
         *ended, rest = data.split(self.delimiter)
         frames: list[F] = []
         for piece in ended:
@@ -320,7 +323,10 @@ class DelimitedParser(Generic[F]):
         """Another stream begins."""
 
     def _decode(self, raw: bytes) -> list[F] | None:
-        """The frames in `raw`, none for a comment; `None`, with the reason counted, where it is not valid."""
+        """Return the frames in `raw`, none for a comment.
+
+        `None`, with the reason counted, where it is not valid.
+        """
         raise NotImplementedError
 
     def _take(self, raw: bytes) -> list[F]:

@@ -17,7 +17,7 @@ from pathlib import Path
 import serial
 
 from drivers.errors import Unavailable
-from drivers.urgency import make_urgent
+from drivers.realtime_priority import make_realtime
 
 FIRST_RETRY_S = 0.1
 LAST_RETRY_S = 2.0
@@ -28,7 +28,7 @@ Received = Callable[[bytes, int], None]
 
 
 def _nothing() -> None:
-    """What happens at opening and closing when nobody wants to know."""
+    """Do nothing at opening and closing."""
 
 
 class SerialPort:
@@ -76,7 +76,7 @@ class SerialPort:
         self.problem = None
 
     def _run(self) -> None:
-        make_urgent()
+        make_realtime()
         retry_s = FIRST_RETRY_S
         while True:
             try:

@@ -49,7 +49,7 @@ class Finding:
     check: str
 
     def text(self, now_ns: int) -> str:
-        """`it hangs (for 3 s): check its power`."""
+        """Return the finding as in `it hangs (for 3 s): check its power`."""
         return f"{self.words} (for {max(0, now_ns - self.since_ns) / 1e9:.0f} s): {self.check}"
 
 

@@ -75,7 +75,7 @@ def configured(
     values: Mapping[Key, Number],
     now: datetime,
 ) -> bytes:
-    """The DCF of a node whose EDS has this text: these values, and no others, are its configuration.
+    """Return the DCF of a node whose EDS has this text: these values, and no others, are its configuration.
 
     Raises:
         EdsError: the EDS has no section for one of the values.
@@ -150,7 +150,7 @@ def _set_values(sections: list[_Section], values: Mapping[Key, Number], end: str
 
 
 def _add_compact(sections: list[_Section], index: str, entries: Mapping[int, str], end: str) -> None:
-    """The values of an array whose entries have no sections of their own (CiA 306-1 §4.6.4)."""
+    """Set the values of an array whose entries have no sections of their own (CiA 306-1 §4.6.4)."""
     section = _Section(f"{index}value")
     section.lines = [f"{end}[{index.upper()}Value]{end}", f"NrOfEntries={len(entries)}{end}"]
     section.lines += [f"{subindex}={value}{end}" for subindex, value in entries.items()]
@@ -159,7 +159,7 @@ def _add_compact(sections: list[_Section], index: str, entries: Mapping[int, str
 
 
 def _first(sections: list[_Section], name: str, header: str, end: str) -> _Section:
-    """The section of that name, made where there is none."""
+    """Return the section of that name, made where there is none."""
     found = next((one for one in sections if one.name == name), None)
     if found is None:
         found = _Section(name)
@@ -190,7 +190,7 @@ def _commissioning(node: Commissioning, end: str) -> _Section:
 
 
 def owner(path: Path) -> tuple[int | None, str]:
-    """The node's id and name that a DCF is for; some vendors' files name neither.
+    """Return the node's id and name that a DCF is for; some vendors' files name neither.
 
     Raises:
         EdsError: it cannot be read, or its NodeID is none.

@@ -49,7 +49,7 @@ class Description:
         return self.variable(index, subindex) is not None
 
     def variable(self, index: int, subindex: int = 0) -> ODVariable | None:
-        """The description of one object, `None` where the file has none."""
+        """Return the description of one object, `None` where the file has none."""
         if index not in self.object_dictionary.indices:
             return None  # without an error that canopen makes and takes
         found = self.object_dictionary.get_variable(index, subindex)

@@ -30,7 +30,7 @@ class IniText:
 
 
 def section_key(header: str) -> str:
-    """A section's name as it is compared: lower case, without blanks or a leading 0x."""
+    """Return a section's name as it is compared: lower case, without blanks or a leading 0x."""
     name = re.sub(r"\s+", "", header).lower()
     return name.removeprefix("0x")
 

@@ -41,7 +41,7 @@ def standing_in(name: str) -> Iterator[None]:
 
 
 def import_canopen() -> None:
-    """It reads EDS files. Without python-can, for a process that opens no bus by that: 10 MB, and 0.2 s."""
+    """Import canopen without python-can, which a process without a bus does not need: 10 MB, 0.2 s."""
     with standing_in("can"):
         importlib.import_module("canopen")
 

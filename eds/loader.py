@@ -79,7 +79,7 @@ def load_file(path: Path, node_id: int) -> Description:
 
 
 def read_text(path: Path) -> str:
-    """The file's text, in UTF-8 or as Windows writes it; raises `EdsError` where it cannot be read."""
+    """Return the file's text, in UTF-8 or as Windows writes it; raises `EdsError` where it cannot be read."""
     try:
         with path.open("rb") as file:
             data = file.read(MAX_BYTES + 1)
@@ -103,7 +103,7 @@ def read_text(path: Path) -> str:
 
 @functools.lru_cache(KEPT)
 def _repaired(text: str) -> bytes:
-    """The text's findings, its repaired sections and the node id that it was made for, pickled."""
+    """Return the text's findings, its repaired sections and the node id that it was made for, pickled."""
     ini = read_ini(text)
     sections, file_node_id = repair(ini)
     return pickle.dumps((IniText(findings=ini.findings), sections, file_node_id))
@@ -127,7 +127,7 @@ def _import(path: Path, sections: Sections, node_id: int) -> canopen.ObjectDicti
 
 @functools.lru_cache(KEPT)
 def _imported(text: str) -> bytes:
-    """The object dictionary of a repaired text for node 0, pickled."""
+    """Return the object dictionary of a repaired text for node 0, pickled."""
     return pickle.dumps(canopen.import_od(_EdsText(text), 0))
 
 
@@ -202,7 +202,7 @@ def _set_limits(ini: IniText, sections: Sections, dictionary: canopen.ObjectDict
 
 
 def _described(dictionary: canopen.ObjectDictionary, section: str) -> ODVariable | None:
-    """What a section like [1018sub1] or [6064] describes."""
+    """Return what a section like [1018sub1] or [6064] describes."""
     index, _, subindex = section.partition("sub")
     return dictionary.get_variable(int(index, 16), int(subindex or "0", 16))
 

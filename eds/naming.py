@@ -19,13 +19,16 @@ def identifier(text: str) -> str:
 
 
 def remark(text: str) -> str:
-    """What a name ends with in brackets, where files tell the unit: `Profile velocity (counts/s)`."""
+    """Return what a name ends with in brackets, where files tell the unit: `Profile velocity (counts/s)`."""
     found = _LAST_BRACKETS.search(text)
     return found[1].strip() if found else ""
 
 
 def object_name(variable: "ODVariable") -> str:
-    """An object's own name; a sub-object's stands behind its object's, unless it begins with it anyway."""
+    """Return an object's own name.
+
+    A sub-object's stands behind its object's, unless it begins with it anyway.
+    """
     own = identifier(variable.name)
     whole = identifier(variable.qualname.removesuffix(f".{variable.name}"))
     if variable.qualname == variable.name or own.startswith(whole):

@@ -11,7 +11,7 @@ _NODE_ID = re.compile(r"\$?NODEID", re.IGNORECASE)
 
 
 def parse_integer(text: str) -> int | None:
-    """The number, or `None` where the text is none, or can be read in two ways.
+    """Return the number, or `None` where the text is none, or can be read in two ways.
 
     CiA 306 reads a leading zero as octal; many tools write it meaning decimal. Where both readings
     agree (`007`) there is no doubt; where they do not (`0010`) the number is unknown.
@@ -33,7 +33,10 @@ def parse_integer(text: str) -> int | None:
 
 
 def parse_relative(text: str) -> int | None:
-    """What stands beside the node id in `$NODEID+0x180`, `0x180 + $NODEID` or `NODEID`; `None` elsewhere."""
+    """Return what stands beside the node id in `$NODEID+0x180`, `0x180 + $NODEID` or `NODEID`.
+
+    `None` elsewhere.
+    """
     if not _NODE_ID.search(text):
         return None
     rest = _NODE_ID.sub("", text, count=1).replace(" ", "").strip("+")

@@ -79,7 +79,7 @@ class Profile:
 
 
 def profile_of(description: Description) -> Profile | None:
-    """The profile for a device, `None` where nobody has written one."""
+    """Return the profile for a device, `None` where nobody has written one."""
     fitting = [one for one in profiles() if one.fits(description)]
     return next((one for one in fitting if one.products), fitting[0] if fitting else None)
 

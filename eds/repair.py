@@ -163,7 +163,7 @@ def _variable(
     object_type: ObjectType,
     subindex: int = 0,
 ) -> dict[str, str]:
-    """The keys of one variable, every one in a spelling that the importer takes."""
+    """Return the keys of one variable, every one in a spelling that the importer takes."""
     is_count = subindex == 0 and "sub" in section
     data_type = _data_type(ini, where, source, object_type, is_count)
     variable = {

@@ -99,7 +99,10 @@ def joint_text(description: Description) -> str:
 
 
 def grouped_findings(description: Description) -> list[tuple[str, str, str, int]]:
-    """Findings as (severity, first place, text, how often): what stands in thirty sections is told once."""
+    """Return findings as (severity, first place, text, how often).
+
+    What stands in thirty sections is told once.
+    """
     first: dict[tuple[str, str], str] = {}
     often: Counter[tuple[str, str]] = Counter()
     for finding in description.findings:
@@ -110,7 +113,7 @@ def grouped_findings(description: Description) -> list[tuple[str, str, str, int]
 
 
 def file_value(description: Description, index: int, subindex: int) -> int | None:
-    """What the file says that an object holds, a DCF's value before a default; `None` for nothing."""
+    """Return what the file says that an object holds, a DCF's value before a default; `None` for nothing."""
     variable = description.variable(index, subindex)
     if variable is None:
         return None

@@ -9,7 +9,10 @@ from eds.numbers import parse_integer, parse_relative
 
 
 def in_type(number: int, data_type: DataType) -> int | None:
-    """The number as its type has it: files write -1 as 0xFFFFFFFF. `None` where the type cannot hold it."""
+    """Return the number as its type has it: files write -1 as 0xFFFFFFFF.
+
+    `None` where the type cannot hold it.
+    """
     bits = data_type.bits or 64
     low, high = (-(1 << bits - 1), 1 << bits - 1) if data_type.kind == "signed" else (0, 1 << bits)
     if low <= number < high:
@@ -19,7 +22,10 @@ def in_type(number: int, data_type: DataType) -> int | None:
 
 
 def canonical(text: str, data_type: DataType) -> tuple[str | None, str]:
-    """The value as the importer takes it, `None` where there is none; and what is wrong with it, or ""."""
+    """Return the value as the importer takes it, `None` where there is none.
+
+    And what is wrong with it, or "".
+    """
     if not text:
         return None, ""
     value = _FORMS[data_type.kind](text)

@@ -9,7 +9,7 @@ def counted(count: int, one: str, more: str = "") -> str:
 
 
 def percent(value: float | None) -> str:
-    """A share of one hundred."""
+    """Return a share of one hundred."""
     return NONE if value is None else f"{value:.1f} %"
 
 

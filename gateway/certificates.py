@@ -16,17 +16,17 @@ class KeyProblem(Exception):
 
 
 def fingerprint(der: bytes) -> str:
-    """A certificate's SHA-256, as it is compared."""
+    """Return a certificate's SHA-256, as it is compared."""
     return hashlib.sha256(der).hexdigest()
 
 
 def grouped(fingerprint: str) -> str:
-    """The same for people: eight signs a group."""
+    """Return the same for people: eight signs a group."""
     return " ".join(fingerprint[at : at + 8] for at in range(0, len(fingerprint), 8))
 
 
 def der_of(pem: bytes) -> bytes:
-    """The one certificate of a PEM text.
+    """Return the one certificate of a PEM text.
 
     Raises:
         KeyProblem: it holds none, or more than one.

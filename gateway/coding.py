@@ -29,19 +29,22 @@ class CodingError(ValueError):
 
 
 def scaled(number: Number, scale: float) -> Number:
-    """`number` · `scale`; whole numbers stay whole."""
+    """Return `number` · `scale`; whole numbers stay whole."""
     if isinstance(number, int) and scale.is_integer():
         return number * int(scale)
     return float(Decimal(repr(number)) * Decimal(repr(scale)))
 
 
 def text(value: Number) -> str:
-    """A value with every digit that a person needs to tell it from another one."""
+    """Return a value with every digit that a person needs to tell it from another one."""
     return str(value) if isinstance(value, int) else f"{value:.10g}"
 
 
 def words(data: bytes, data_type: int) -> str:
-    """What is no number: a text as it stands, other bytes in hexadecimal; a long one ends in its length."""
+    """Return what is no number: a text as it stands, other bytes in hexadecimal.
+
+    A long one ends in its length.
+    """
     if DATA_TYPES[data_type].kind == "text":
         encoding = "utf-16-le" if data_type == _UNICODE_STRING else "utf-8"
         said = data.decode(encoding, errors="replace").rstrip("\0")
@@ -63,7 +66,7 @@ class Coding:
         return DATA_TYPES[self.data_type]
 
     def decode(self, data: bytes) -> Number:
-        """The value that the bytes mean.
+        """Return the value that the bytes mean.
 
         Raises:
             CodingError: they mean no number, or none that can be told exactly at this scale.
@@ -80,7 +83,7 @@ class Coding:
         return value
 
     def encode(self, value: Number) -> bytes:
-        """The bytes nearest to the value.
+        """Return the bytes nearest to the value.
 
         Raises:
             CodingError: it does not fit, or has lost digits on its way here.
@@ -102,7 +105,7 @@ class Coding:
             ) from error
 
     def nearest(self, limit: Number) -> Number:
-        """A limit as its device can hold it: the REAL32 that is nearest to 0.6 lies above it."""
+        """Return a limit as its device can hold it: the REAL32 that is nearest to 0.6 lies above it."""
         if self.type.kind != "real":
             return limit
         try:
@@ -123,7 +126,7 @@ class Coding:
 
 
 def coding_of(type_name: str, scale: float) -> Coding | None:
-    """The coding of a parameter as a robot describes it; `None` where it does not tell its type."""
+    """Return the coding of a parameter as a robot describes it; `None` where it does not tell its type."""
     code = DATA_TYPE_BY_NAME.get(type_name)
     return None if code is None else Coding(code, scale)
 
@@ -152,7 +155,7 @@ class Limited(Protocol):
 def broken_limit(
     parameter: Limited, coding: Coding | None, value: Number, before: Number | None = None
 ) -> Limit | None:
-    """The first limit that a value is beyond, as the device would hold that limit; `None` where it keeps all.
+    """Return the first limit that a value exceeds, as the device would hold it; `None` for no limit.
 
     `before` is what it would take the place of. A step of exactly the largest, in binary, is none too far.
     """

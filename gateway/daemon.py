@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING
 from gateway.access.folder import AccessFolder
 from gateway.access.identity import ANYBODY
 from gateway.config.robot import RobotConfig
+from gateway.connections.authentication import Authentication
 from gateway.connections.classic import ClassicPort
+from gateway.connections.connection_slots import ConnectionSlots
 from gateway.connections.doors import check_classic
-from gateway.connections.entrance import Entrance
-from gateway.connections.inlet import Inlet
+from gateway.connections.incoming_bytes import IncomingBytes
 from gateway.connections.intake import Intake
-from gateway.connections.places import Places
 from gateway.connections.session import Session
 from gateway.connections.sharing import Sharing
 from gateway.process.loop import Loop, Timer
@@ -52,10 +52,12 @@ class Daemon:
         local: socket.socket | None = None,
         *,
         ends_idle: bool = False,
+        rested_without_keys: bool = False,
     ) -> None:
         """`classic` is where the paper's own exchange is served, `local` a Unix socket.
 
-        With `ends_idle`, `run` returns too when nobody has needed the gateway for its `linger_s`.
+        With `ends_idle`, `run` returns too when nobody has needed the gateway for its `linger_s`. Where
+        it has `rested_without_keys`, it is served without them again.
 
         Raises:
             DoorProblem: one of these sockets must not be served.
@@ -67,7 +69,7 @@ class Daemon:
         self._loop = Loop()
         self._service = Service(config, self._loop, specs)
         self._service.registry.when_off = self._look_whether_idle
-        self._places = Places()
+        self._places = ConnectionSlots()
         self._sharing = Sharing(self._loop)
         self._ending = False
         self._told = False
@@ -76,7 +78,13 @@ class Daemon:
         self._idle: Timer | None = None
         self._sockets = [listener] if local is None else [listener, local]
         folder = AccessFolder(config.access)
-        self._entrance = Entrance(self._sockets, folder, self._complain, lambda: self._loop.post(self._left))
+        self._entrance = Authentication(
+            self._sockets,
+            folder,
+            self._complain,
+            lambda: self._loop.post(self._left),
+            rested_without_keys=rested_without_keys,
+        )
         self._known: Known | None = None  # of the last look, while somebody is there by a key or account
         doors, registry = self._entrance.doors, self._service.registry
         self._intake = Intake(self._loop, doors, self._open, lambda: registry.stop_now)
@@ -97,6 +105,11 @@ class Daemon:
         """Host and port that clients connect to."""
         host, port = self._listener.getsockname()[:2]
         return host, port
+
+    @property
+    def has_keys(self) -> bool:
+        """Whether it is served with them."""
+        return self._entrance.has_keys
 
     @property
     def told(self) -> bool:
@@ -147,7 +160,7 @@ class Daemon:
         """While inside, SIGINT and SIGTERM end the daemon. For the main thread only."""
         return _signals(self._loop.wake_writer, self.end)
 
-    def _open(self, inlet: Inlet) -> None:
+    def _open(self, inlet: IncomingBytes) -> None:
         if self._ending:
             inlet.close()
             return

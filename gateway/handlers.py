@@ -49,7 +49,7 @@ class Handlers:
         return frozenset(self._by_name)
 
     def answer(self, method: AnyMethod, session: "Session", params: Struct) -> "Answer":
-        """The answer to one request, now or later.
+        """Return the answer to one request, now or later.
 
         Raises:
             RpcError: it is refused; no_lease, where the method needs the lease and the connection has none.

@@ -15,62 +15,62 @@ from gateway import __version__
 # name → (where it lives, what it does). A module here is imported only when its command runs.
 COMMANDS: dict[str, tuple[str, str]] = {
     "gateway": ("gateway.cli.serve:main", "serve a robot over TCP, on demand"),
-    "install-service": ("gateway.cli.install_service:main", "systemd units for a robot's file"),
-    "keys": ("gateway.cli.keys:main", "on the robot: who is let in, and as what"),
-    "pair": ("gateway.cli.pair:main", "let a robot know this desk, and this desk the robot"),
-    "check": ("gateway.cli.check:main", "what is wrong with a robot's or server's file, or a scenario"),
-    "doctor": ("gateway.cli.doctor:main", "what is wrong with a robot, by which figures, what mends it"),
-    "describe": ("gateway.cli.describe:main", "what a robot is made of, and what is wrong with it"),
-    "snapshot": ("gateway.cli.snapshot:main", "one look at resources, components or status"),
-    "cost": ("gateway.cli.cost:main", "what monitoring costs the robot, client by client"),
-    "bench": ("gateway.cli.bench:main", "measure a robot's gateway: latency, CPU and memory of what it does"),
-    "blame": ("gateway.cli.blame:main", "when the control loop is late, and what ran instead"),
-    "watch": ("gateway.cli.watch:main", "follow channels live"),
-    "top": ("server_gui.cli.top:main", "one robot in the terminal, live: tune, stop, reset"),
-    "plot": ("server_gui.cli.plot:main", "channels over time, in the window or the terminal"),
+    "install-service": ("gateway.cli.install_service:main", "write systemd units for a robot's file"),
+    "keys": ("gateway.cli.keys:main", "on the robot: admit and revoke clients"),
+    "pair": ("gateway.cli.pair:main", "pair this desk with a robot"),
+    "check": ("gateway.cli.check:main", "check a robot's or server's file, or a scenario"),
+    "doctor": ("gateway.cli.doctor:main", "diagnose a robot, with evidence and fixes"),
+    "describe": ("gateway.cli.describe:main", "list a robot's components and problems"),
+    "snapshot": ("gateway.cli.snapshot:main", "take a snapshot of resources, components or status"),
+    "cost": ("gateway.cli.cost:main", "show the cost of monitoring, client by client"),
+    "bench": ("gateway.cli.bench:main", "measure a robot's gateway: latency, CPU and memory"),
+    "blame": ("gateway.cli.blame:main", "name the processes that delay the control loop"),
+    "watch": ("gateway.cli.watch:main", "show channels live"),
+    "top": ("server_gui.cli.top:main", "monitor one robot in the terminal: tune, stop, reset"),
+    "plot": ("server_gui.cli.plot:main", "plot channels, in the window or the terminal"),
     "get": ("gateway.cli.get:main", "read parameters from the devices"),
     "set": ("gateway.cli.set:main", "change parameters, all or none, read back"),
-    "params": ("gateway.cli.params:main", "parameters as files: save, compare, apply"),
-    "od": ("gateway.cli.od:main", "a device's object dictionary: search, limits, live values, write"),
-    "store": ("gateway.cli.store:main", "make a device keep its parameters"),
-    "restore": ("gateway.cli.restore:main", "give a device its defaults back"),
-    "journal": ("gateway.cli.journal:main", "who did what to the robot; is the record whole"),
+    "params": ("gateway.cli.params:main", "save, compare and apply parameter files"),
+    "od": ("gateway.cli.od:main", "search, read and write a device's object dictionary"),
+    "store": ("gateway.cli.store:main", "store a device's parameters in its memory"),
+    "restore": ("gateway.cli.restore:main", "restore a device's defaults"),
+    "journal": ("gateway.cli.journal:main", "show and verify the robot's journal"),
     "stop": ("gateway.cli.stop:main", "quick stop on every drive (not a safety-rated stop)"),
     "reset": ("gateway.cli.reset:main", "end a held stop: every drive switched off, none enabled"),
     "enable": ("gateway.cli.enable:main", "enable drives, as the master of a bench"),
     "completion": ("gateway.cli.completion:main", "complete commands in bash, zsh and fish"),
-    "docs": ("gateway.cli.docs:main", "the pages of the docs, as they were installed"),
-    "eds": ("eds.cli.eds:main", "what an EDS or DCF file says, and what is wrong with it"),
-    "scan": ("drivers.cli.scan:main", "what is on a CAN bus: nodes, what they are, whose EDS; serial ports"),
-    "lss": ("drivers.cli.lss:main", "CANopen devices without a node id found; node ids and bit rates given"),
-    "trace": ("drivers.cli.trace:main", "every frame of a CAN bus, decoded by EDS; candump and PCAP files"),
-    "commission": ("gateway.cli.commission:main", "a robot's file found out on the bench, joint by joint"),
-    "sensor": ("drivers.cli.sensor:main", "what is on a serial port; record, replay and decode it"),
-    "calibrate": ("gateway.cli.calibrate:main", "an insole's pressure, an IMU's or a joint's zero"),
+    "docs": ("gateway.cli.docs:main", "show the installed documentation"),
+    "eds": ("eds.cli.eds:main", "show and check an EDS or DCF file"),
+    "scan": ("drivers.cli.scan:main", "identify nodes on a CAN bus, and sensors on serial ports"),
+    "lss": ("drivers.cli.lss:main", "find CANopen devices without a node id; set ids and bit rates"),
+    "trace": ("drivers.cli.trace:main", "decode the frames of a CAN bus by EDS; candump and PCAP files"),
+    "commission": ("gateway.cli.commission:main", "build a robot's file on the bench, joint by joint"),
+    "sensor": ("drivers.cli.sensor:main", "identify, record, replay and decode a serial sensor"),
+    "calibrate": ("gateway.cli.calibrate:main", "calibrate an insole's pressure, an IMU's or a joint's zero"),
     "joint-test": (
         "server_gui.cli.joint_test:main",
-        "a joint tested on a bench: step, chirp, friction, relay",
+        "test a joint on a bench: step, chirp, friction, relay",
     ),
     "collect": ("server_gui.cli.collect:main", "record every robot into the store, without a window"),
     "sessions": (
         "server_gui.cli.sessions:main",
-        "recordings: list, look into, export as CSV, Parquet, MCAP",
+        "list, inspect and export recordings: CSV, Parquet, MCAP",
     ),
-    "edits": ("server_gui.cli.edits:main", "what each edit of a parameter did to the walk"),
-    "ab": ("server_gui.cli.experiments:ab_main", "two values of a parameter against each other, walking"),
-    "sweep": ("server_gui.cli.experiments:sweep_main", "values of a parameter upwards, while you watch"),
-    "label": ("server_gui.cli.label:main", "what robot and wearer did in a recorded session"),
-    "train": ("server_gui.cli.train:main", "a model from labelled sessions, judged before it serves"),
-    "cloud": ("server_gui.cli.cloud:main", "the store: browse, upload, download, verify, tidy"),
-    "query": ("server_gui.cli.query:main", "SQL over everything recorded"),
-    "models": ("server_gui.cli.models:main", "learned models: look at, promote, roll back, export"),
-    "predict": ("server_gui.cli.predict:main", "what robot and wearer do, live or over a recording"),
-    "gui": ("server_gui.cli.gui:main", "the window: robots live, parameters changed, STOP in sight"),
-    "evaluate": ("server_gui.cli.evaluate:main", "how well predictions hold for people never seen"),
-    "demo": ("server_gui.cli.demo:demo", "simulator, gateway and live view with one command"),
-    "sim": ("hil_sim.cli.sim:main", "the simulated robot, ready for a gateway; runs scenario files"),
-    "sim-record": ("hil_sim.cli.record:main", "simulated wearers' channels with the truth, to learn from"),
-    "sim-fault": ("hil_sim.cli.fault:main", "break something in a simulated robot that runs"),
+    "edits": ("server_gui.cli.edits:main", "show the effect of each parameter edit on the walk"),
+    "ab": ("server_gui.cli.experiments:ab_main", "compare two values of a parameter during a walk"),
+    "sweep": ("server_gui.cli.experiments:sweep_main", "raise a parameter in steps, while you watch"),
+    "label": ("server_gui.cli.label:main", "label the activities in a recorded session"),
+    "train": ("server_gui.cli.train:main", "train a model on labelled sessions, judged before it serves"),
+    "cloud": ("server_gui.cli.cloud:main", "browse, upload, download, verify and tidy the store"),
+    "query": ("server_gui.cli.query:main", "run SQL over all recordings"),
+    "models": ("server_gui.cli.models:main", "inspect, promote, roll back and export models"),
+    "predict": ("server_gui.cli.predict:main", "predict activity and gait, live or over a recording"),
+    "gui": ("server_gui.cli.gui:main", "open the window: monitor robots, change parameters, STOP"),
+    "evaluate": ("server_gui.cli.evaluate:main", "evaluate predictions on people never seen"),
+    "demo": ("server_gui.cli.demo:demo", "start simulator, gateway and live view"),
+    "sim": ("hil_sim.cli.sim:main", "simulate a robot for a gateway; run scenario files"),
+    "sim-record": ("hil_sim.cli.record:main", "record simulated wearers with the truth, as training data"),
+    "sim-fault": ("hil_sim.cli.fault:main", "inject faults into a running simulated robot"),
 }
 
 # The exit status of a failure where 1 is an answer: that of diff(1).
@@ -80,13 +80,13 @@ OUR_PACKAGES = frozenset({"gateway", "drivers", "eds", "server_gui", "ml", "hil_
 
 
 def usage() -> str:
-    """The manual's first page."""
+    """Return the manual's first page."""
     width = max(map(len, COMMANDS))
     lines = [
         "usage: gwrms COMMAND [ARGUMENTS]",
         "",
-        "GWRMS watches and tunes a lower-limb exoskeleton: a light daemon on the robot,",
-        "a live view on the desk, and a whole simulated robot for the bench.",
+        "GWRMS monitors and tunes a lower-limb exoskeleton: a light daemon on the robot,",
+        "a live view on the desk, and a complete simulated robot for the bench.",
         "",
         "commands:",
         *(f"  {name:<{width}}  {what}" for name, (_, what) in COMMANDS.items()),
@@ -105,11 +105,11 @@ def find(name: str) -> Callable[[list[str]], int]:
 
 
 def explain(error: Exception, command: str) -> str:
-    """An exception of a command as the sentences a user can act on."""
+    """Return an exception of a command as the sentences a user can act on."""
     if isinstance(error, ModuleNotFoundError) and error.name is not None:
-        from gateway import missing
+        from gateway import missing_extras
 
-        return missing.explained(error.name, command)
+        return missing_extras.explained(error.name, command)
     ours = type(error).__module__.partition(".")[0] in OUR_PACKAGES
     if isinstance(error, OSError) and not ours and error.strerror:
         return f"{error.filename}: {error.strerror}" if error.filename else error.strerror
@@ -119,12 +119,12 @@ def explain(error: Exception, command: str) -> str:
 
 
 def _help_without(error: Exception, arguments: Sequence[str]) -> str | None:
-    """The help that was asked for, of a command of which a package is missing."""
+    """Return the help that was asked for, of a command of which a package is missing."""
     if not isinstance(error, ModuleNotFoundError):
         return None
-    from gateway import missing
+    from gateway import missing_extras
 
-    return missing.help_of(arguments)
+    return missing_extras.help_of(arguments)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -148,7 +148,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _replace_closed_streams() -> None:
-    """What whoever started us has closed goes nowhere; nothing that is opened later takes its number."""
+    """Open closed standard streams to nowhere, so that no later file takes their numbers."""
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
             setattr(sys, name, open(os.devnull, mode))  # noqa: PTH123, SIM115 - for as long as we run

@@ -10,7 +10,7 @@ from gateway.certificates import KeyProblem
 
 
 def run(arguments: Sequence[str], given: bytes, *descriptors: int) -> bytes:
-    """What it writes to its standard output.
+    """Return what it writes to its standard output.
 
     Raises:
         KeyProblem: it is not here, or did not do it; with its own last words.
@@ -31,7 +31,10 @@ def run(arguments: Sequence[str], given: bytes, *descriptors: int) -> bytes:
 
 @contextlib.contextmanager
 def piped(content: bytes) -> Iterator[int]:
-    """A descriptor to read this from, so that no file is ever readable for others; for what a pipe holds."""
+    """Return a descriptor to read this from, so that no file is ever readable for others.
+
+    For what a pipe holds.
+    """
     reader, writer = os.pipe()
     try:
         os.write(writer, content)

@@ -19,7 +19,10 @@ def pages() -> dict[str, Path]:
 
 
 def find(name: str) -> Path | None:
-    """The page that is meant by `how-to/predict`, `predict` or a link to it; None where there is none."""
+    """Return the page that is meant by `how-to/predict`, `predict` or a link to it.
+
+    None where there is none.
+    """
     known = pages()
     by_last = {page.rpartition("/")[2]: path for page, path in known.items()}
     wanted = name.removeprefix("docs/").removesuffix(".md")
@@ -27,6 +30,6 @@ def find(name: str) -> Path | None:
 
 
 def title(page: Path) -> str:
-    """What a page is about: its first heading."""
+    """Return what a page is about: its first heading."""
     with page.open(encoding="utf-8") as lines:
         return next((line.strip("# \n") for line in lines if line.startswith("# ")), "")

@@ -22,7 +22,7 @@ def forbid_core_dumps() -> None:
 
 
 def check_private(file: Path) -> None:
-    """A file and its folder are for their owner alone, as ssh demands it of its keys.
+    """Check that file and folder belong to their owner alone, as ssh requires for its keys.
 
     Where it is a link, nobody else may change the folder that it leads to.
 

@@ -17,7 +17,7 @@ from enum import StrEnum
 from typing import Protocol
 
 from gateway.config.robot import RobotConfig
-from gateway.connections.inlet import StopNow
+from gateway.connections.incoming_bytes import StopNow
 from gateway.handlers import Handlers
 from gateway.process.futures import done, failed
 from gateway.process.loop import Loop, Timer
@@ -126,12 +126,15 @@ class Registry:
         return self._closing is not None
 
     def running(self, name: str) -> Module | None:
-        """The module, where it is running now."""
+        """Return the module, where it is running now."""
         slot = self._slots[name]
         return slot.module if slot.phase is Phase.RUNNING else None
 
     def use(self, name: str, user: Hashable | None) -> "Future[Module]":
-        """The running module; `user` keeps it (and what it needs) until `leave`. No user: it lingers only."""
+        """Return the running module; `user` keeps it (and what it needs) until `leave`.
+
+        Without a user it lingers only.
+        """
         slot = self._slots[name]
         if self.ending:
             return failed(framing.refuse(framing.Kind.UNAVAILABLE, "the gateway is ending"))

@@ -123,7 +123,7 @@ class Service:
             control.who_is_known(known)
 
     def opened(self, session: Session) -> None:
-        """A client has come."""
+        """Take a new client."""
         self._sessions[session] = None
         session.on_close(lambda: self._closed(session))
 
@@ -132,7 +132,7 @@ class Service:
         self.registry.leave(session)
 
     def handle(self, session: Session, request: framing.Request) -> Answer:
-        """The answer to one request, now or later.
+        """Return the answer to one request, now or later.
 
         Raises:
             RpcError: the method or its parameters cannot be served.
@@ -157,7 +157,7 @@ class Service:
         return then(module, answer)
 
     def use_resource(self, user: Hashable) -> "Future[ResourceModule]":
-        """The module that measures the computer, running for `user` until the registry is told to leave."""
+        """Return the running resource module, kept for `user` until it leaves the registry."""
         return cast("Future[ResourceModule]", self.registry.use("resource", user))
 
     def _use(self, name: str, session: Session) -> "Future[Module]":

@@ -10,7 +10,7 @@ MOST_BYTES: Final = 512  # of a signature; one with P-256 has 72
 
 
 def sign(key: Path, message: bytes) -> bytes:
-    """The signature of a message; each kind of message begins with words of its own.
+    """Return the signature of a message; each kind of message begins with words of its own.
 
     Raises:
         KeyProblem: the key cannot be used, or there is no program to do it.

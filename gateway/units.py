@@ -138,7 +138,7 @@ def with_minus(number: str) -> str:
 
 
 def percent_body_weight(body_mass: float) -> Unit:
-    """Forces as a share of the wearer's weight; `body_mass` in kg, with the machine where it is worn.
+    """Return forces as a share of the wearer's weight; `body_mass` in kg, with the machine where it is worn.
 
     Raises:
         ValueError: no mass of a person.

@@ -5,7 +5,7 @@ import os
 
 
 def user_name() -> str:
-    """The user's name; the account's number where it has none, as in containers."""
+    """Return the user's name; the account's number where it has none, as in containers."""
     try:
         return getpass.getuser()
     except (KeyError, OSError):

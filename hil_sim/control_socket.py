@@ -111,7 +111,7 @@ def ask(folder: Path, request: dict[str, Any]) -> dict[str, Any]:
 
 
 def _why(folder: Path, error: OSError | ValueError) -> str:
-    """What keeps it from answering, and what to do."""
+    """Return what keeps it from answering, and what to do."""
     start = f"start one: gwrms sim --dir {folder}"
     match error:
         case NotADirectoryError():
@@ -129,7 +129,7 @@ def _why(folder: Path, error: OSError | ValueError) -> str:
 
 @contextmanager
 def _short(folder: Path) -> Iterator[str]:
-    """A name of the socket that fits into an address (107 bytes), however long the folder's is."""
+    """Return a name of the socket that fits into an address (107 bytes), however long the folder's is."""
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
         yield f"/proc/self/fd/{descriptor}/{NAME}"

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import eds
 from hil_sim import controller, personality
+from hil_sim.bench_user import BenchUser
 from hil_sim.bus.can_bus import CanBus
 from hil_sim.clock import MILLISECOND_NS, SECOND_NS, Clock, Event
 from hil_sim.controller import GaitController
@@ -20,7 +21,6 @@ from hil_sim.gait.subject import subject
 from hil_sim.gait.timetable import Entry, Pace, timetable
 from hil_sim.gait.walks import NAMES, ORDINARY, WALKS
 from hil_sim.gait.wearer import Wearer
-from hil_sim.hands import Hands
 from hil_sim.mounting import Mounting
 from hil_sim.node.lss import UNCONFIGURED
 from hil_sim.node.node import Node
@@ -100,7 +100,7 @@ class Exoskeleton:
         self.controller = self._controller(person)
         self.wearer = Wearer(self.controller.generator)
         self.sensors = SensorSuite(sensors or SensorChoice(), self.clock, self.bus, seed)
-        self.hands = Hands()
+        self.hands = BenchUser()
         self._entries = timetable(scenario, seed)
         self._next_entry: Event | None = None
         self._take_own_pace()
@@ -144,7 +144,7 @@ class Exoskeleton:
             self._next_entry = self.clock.after(round(entry.seconds * SECOND_NS), self._go_on)
 
     def own_pace(self, pace: Pace | None) -> Pace | None:
-        """What this wearer makes of a pace that ordinary ones are told to walk at."""
+        """Return what this wearer makes of a pace that ordinary ones are told to walk at."""
         return pace if pace is None or self.walk == ORDINARY else WALKS[self.walk].pace(*pace)
 
     def _take_own_pace(self) -> None:
@@ -212,7 +212,7 @@ def _known(what: str, name: str, names: Collection[str]) -> str:
 
 
 def _refuse_to_lead_others(without: Collection[str]) -> None:
-    """A controller that enables drives may only do so to simulated ones."""
+    """Refuse a controller that would enable real drives."""
     joints = [name for name in JOINTS if name in without]
     if joints and CONTROLLER not in without:
         raise SimulatorError(

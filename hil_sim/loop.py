@@ -82,7 +82,7 @@ class Loop:
         self._simulated_start_ns = simulated_ns - simulated_ns % self._step_ns
 
     def _target_ns(self) -> int:
-        """The simulated time that should be reached now."""
+        """Return the simulated time that should be reached now."""
         now_ns = self.clock.now_ns
         if self.speed is None:
             return now_ns + _FAST_SLICE_NS

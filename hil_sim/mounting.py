@@ -18,19 +18,19 @@ class Mounting:
     zero: int = 0
 
     def seen(self, angle: float) -> float:
-        """The joint's angle, rate or torque as the motor has it; and back."""
+        """Return the joint's angle, rate or torque as the motor has it; and back."""
         return self.direction * angle
 
     def counts(self, angle: float, counts_per_radian: float) -> int:
-        """What the drive counts at an angle of the joint (rad)."""
+        """Return what the drive counts at an angle of the joint (rad)."""
         return round(self.direction * angle * counts_per_radian) + self.zero
 
     def angle(self, counts: float, counts_per_radian: float) -> float:
-        """The joint's angle (rad) at these counts of the drive."""
+        """Return the joint's angle (rad) at these counts of the drive."""
         return self.direction * (counts - self.zero) / counts_per_radian
 
     def constants(self, joint: JointConstants) -> JointConstants:
-        """The joint's as the motor sees them."""
+        """Return the joint's as the motor sees them."""
         if self.direction > 0:
             return joint
         return replace(joint, low_stop=-joint.high_stop, high_stop=-joint.low_stop)
@@ -39,7 +39,7 @@ class Mounting:
 def choose(
     words: Iterable[str], usual: Mapping[str, int], taken: Collection[int] = ()
 ) -> dict[str, Mounting]:
-    """The mounting of each joint; a word is `JOINT=NODE[,DIRECTION[,ZERO]]`. `taken` are other nodes' ids.
+    """Return each joint's mounting, from `JOINT=NODE[,DIRECTION[,ZERO]]`; `taken` are other ids.
 
     Raises `SimulatorError`.
     """

@@ -6,13 +6,13 @@ from dataclasses import asdict
 from typing import Any
 
 from hil_sim import controller
+from hil_sim.bench_user import FEET
 from hil_sim.errors import SimulatorError
 from hil_sim.exoskeleton import JOINTS, Exoskeleton
 from hil_sim.faults.injector import Faults, check_fault, find
 from hil_sim.faults.registry import FAULTS
 from hil_sim.gait.activity import Activity
 from hil_sim.gait.timetable import Entry
-from hil_sim.hands import FEET
 
 Request = Mapping[str, Any]
 Answer = dict[str, Any]
@@ -100,7 +100,7 @@ def verb_of(request: Request) -> str:
 
 
 def further(verb: str) -> tuple[str, ...]:
-    """What else a request of this kind may hold."""
+    """Return what else a request of this kind may hold."""
     return _CHECKS[verb][0]
 
 

@@ -14,7 +14,6 @@ from hil_sim.errors import SimulatorError
 from hil_sim.exoskeleton import Exoskeleton, Scenario
 from hil_sim.faults.injector import Faults
 from hil_sim.gait.walks import ORDINARY
-from hil_sim.housing import Housing
 from hil_sim.loop import Loop
 from hil_sim.mistakes import computer, registry
 from hil_sim.mistakes.mistake import written
@@ -24,10 +23,11 @@ from hil_sim.operator import Operator
 from hil_sim.sensors.serial_port import SerialPort
 from hil_sim.sensors.suite import SensorChoice
 from hil_sim.sensors.tables import companions
+from hil_sim.simulation_host import SimulationHost
 from hil_sim.truth import TruthFile
 
 
-class SimulatedRobot(Housing):
+class SimulatedRobot(SimulationHost):
     """A robot in a folder, to be run by its caller's thread (`run`) or, in a `with` block, by one of its own.
 
         with SimulatedRobot(tmp_path, virtual_channel="bench") as robot:
@@ -40,7 +40,7 @@ class SimulatedRobot(Housing):
     is that table of robot.toml. `mistakes` are made by their names; with them, or an empty list, the files of
     the robot's computer are written to `computer` in the folder. `say` is told when the interface goes and
     comes back, and when the bus is overloaded. `faults` and `operator` belong to the thread that runs it;
-    others use the control socket in the folder. For the rest see `Housing`.
+    others use the control socket in the folder. For the rest see `SimulationHost`.
     """
 
     def __init__(
@@ -89,7 +89,7 @@ class SimulatedRobot(Housing):
         return companions(self.exoskeleton.sensors.choice)
 
     def _check_guard(self) -> None:
-        """What was there before stays, so it must be what is wanted; raises `SimulatorError`."""
+        """Check that an existing file is the requested one; raises `SimulatorError`."""
         if self._guard is None or self.config_is_ours:
             return
         if tomllib.loads(self.config.read_text(encoding="utf-8")).get("guard") != self._guard:
@@ -99,7 +99,7 @@ class SimulatedRobot(Housing):
             )
 
     def _check_mistakes(self) -> None:
-        """A file that was there before may be right; raises `SimulatorError`."""
+        """Refuse mistakes that need lines in an existing file; raises `SimulatorError`."""
         if not self.config_is_ours and any(mistake.lines for mistake in self._mistakes or ()):
             raise SimulatorError(f"{self.config} is there already: delete it, or choose another folder")
 

@@ -41,5 +41,8 @@ def _value(value: Any) -> str:
 
 
 def _text(value: str) -> str:
-    """A basic string: JSON's escapes are TOML's, which has one character more that cannot stand there."""
+    """Return a basic string.
+
+    JSON's escapes are TOML's, which has one character more that cannot stand there.
+    """
     return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")

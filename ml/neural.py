@@ -21,7 +21,7 @@ def scaled(*steps: Any) -> Pipeline:
 
 @contextmanager
 def fixed_epochs() -> Iterator[None]:
-    """A network that stops after the epochs that were tuned has not failed to converge: no warnings of that.
+    """Suppress convergence warnings: the network stops after the tuned number of epochs.
 
     Warnings are the whole process's: enter this outside of any threads that train.
     """

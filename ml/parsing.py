@@ -16,7 +16,7 @@ _alone = threading.RLock()
 
 
 def parsing(call: Callable[[], Result]) -> Result:
-    """What `call` gives, which parses Python's syntax, itself or in a library, and can be done again."""
+    """Return the result of `call`, which parses Python's syntax and can be repeated."""
     with _alone:
         for _ in range(TRIES - 1):
             try:

@@ -21,8 +21,8 @@ from gateway.wire.stop import Stopped
 from server_gui.core.archive.archive import Archive
 from server_gui.core.commissioning.commissioning import Commissioning
 from server_gui.core.desk.desk import Desk
-from server_gui.core.desk.ending import Ending
 from server_gui.core.desk.feeds import Feeds, Record
+from server_gui.core.desk.shutdown import Shutdown
 from server_gui.core.desk.station import Station
 from server_gui.core.desk.ticks import Ticks
 from server_gui.core.evidence.file import Told
@@ -31,22 +31,22 @@ from server_gui.core.follow.feed import FollowSettings
 from server_gui.core.follow.mailbox import Mailbox
 from server_gui.core.prediction.news import PredictionNews
 from server_gui.core.settings.server_file import ServerSettings, name_of
-from server_gui.core.tuning.link import Link
+from server_gui.core.tuning.link import CommandLink
+from server_gui.processes.demo_robot import DemoRobot
 from server_gui.processes.file_gateway import FileGateway
-from server_gui.processes.own_robot import OwnRobot
+from server_gui.processes.interactive_command import talk
 from server_gui.processes.sim_control import SimControl
-from server_gui.processes.talking import talk
 from server_gui.views.first_run.demo_bar import DemoBar
 from server_gui.views.first_run.opening import Opening
 from server_gui.views.frame.application import application, kept_settings, kept_theme
 from server_gui.views.frame.closing import wait_closed
 from server_gui.views.frame.empty import STARTS
 from server_gui.views.frame.garbage import Garbage
-from server_gui.views.frame.kept import kept_units
 from server_gui.views.frame.main_window import MainWindow
+from server_gui.views.frame.saved_state import kept_units
 from server_gui.views.frame.stop_keys import StopKeys
 from server_gui.views.frame.x11_keys import NoX, X11Keys
-from server_gui.views.pace import SLOW
+from server_gui.views.refresh_rate import SLOW
 from server_gui.views.theme import Look, Theme
 
 FRAME_MS: Final = 33
@@ -138,7 +138,7 @@ class App:
         self._predicts = settings.prediction.enabled
         self._foresees = self._predicts and settings.prediction.danger
         self._opening = opening
-        self._own = OwnRobot() if opening is None else opening.own
+        self._own = DemoRobot() if opening is None else opening.own
         self.demo: DemoBar | None = None  # once a simulated robot of ours is followed
         self.desk.shown.units = kept_units(kept)
         self.theme = theme or kept_theme(qt, kept)
@@ -146,7 +146,7 @@ class App:
         self._archive = Archive(settings, self.desk, self._poster.deliver, operator, file)
         self.commissioning = Commissioning(talk)
         self._gateway: FileGateway | None = None  # of a robot that was commissioned here
-        self.ending = Ending(self.feeds, self._close_others, self._close_own)
+        self.ending = Shutdown(self.feeds, self._close_others, self._close_own)
         self.window = MainWindow(self.desk, self.theme, kept, self._archive, self.commissioning)
         self.window.tabs.connect_to.connect(self._start_gateway)
         self.window.stopped.connect(lambda: self.stop("STOP button of the window"))
@@ -203,7 +203,7 @@ class App:
         """Another robot, from now on."""
         mailbox = Mailbox()
         network = self.feeds.network
-        link = Link(network, address, mailbox.put, lambda: self._poster.deliver(station.lost_control))
+        link = CommandLink(network, address, mailbox.put, lambda: self._poster.deliver(station.lost_control))
         is_named = name not in (name_of(str(address)), OWN)
         station = Station(name, str(address), link, self._poster.deliver, self.desk.news, is_named=is_named)
         station.predictions.off = not self._predicts
@@ -276,7 +276,7 @@ class App:
             self.tick()
 
     def _show(self, robot: str, event: Event) -> None:
-        """What has come; in the network's thread."""
+        """Take events; in the network's thread."""
         mailbox = self._mailboxes.get(robot)  # of one that was left a last event may come
         if mailbox is not None:
             mailbox.put(event)

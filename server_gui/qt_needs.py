@@ -67,7 +67,7 @@ def prefer_x(environment: MutableMapping[str, str] = os.environ) -> None:
 
 
 def check_version(qt: str, python: tuple[int, int]) -> None:
-    """Raises `NoWindow` for the one pair that aborts in the middle of work."""
+    """Refuse the one pair of versions that aborts in the middle of work; raises `NoWindow`."""
     if (qt, python) == BROKEN:
         raise NoWindow(
             f"PySide6 {qt} on Python {python[0]}.{python[1]} loses a reference with every call and aborts "
@@ -76,7 +76,7 @@ def check_version(qt: str, python: tuple[int, int]) -> None:
 
 
 def check_display(environment: Mapping[str, str], platform: str) -> None:
-    """Raises `NoWindow` where there is nothing to open a window on."""
+    """Check that there is a display; raises `NoWindow`."""
     if not platform and not (environment.get("DISPLAY") or environment.get("WAYLAND_DISPLAY")):
         raise NoWindow(
             "there is no display here. On a desk: log in graphically, or ssh -X. Without one: gwrms watch, "
@@ -85,7 +85,7 @@ def check_display(environment: Mapping[str, str], platform: str) -> None:
 
 
 def check_libraries(wanted: Mapping[str, str], is_there: Callable[[str], bool]) -> None:
-    """Raises `NoWindow` with the line that installs what is missing."""
+    """Check the system libraries; raises `NoWindow` with the line that installs missing ones."""
     missing = [package for library, package in wanted.items() if not is_there(library)]
     if missing:
         raise NoWindow(

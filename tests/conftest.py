@@ -84,6 +84,7 @@ def pytest_collection() -> Generator[None, object, object]:
     finally:
         gc.freeze()
         gc.enable()
+        gc.set_threshold(20_000, 20, 50)  # to look for garbage as often as Python does takes 6 % of the time
         atexit.register(gc.unfreeze)  # else libraries tell at the end what they have leaked
 
 

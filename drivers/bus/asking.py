@@ -49,7 +49,7 @@ class Asking:
             self._worker.submit(_ask_type)
 
     def silence(self, now_ns: int) -> str | None:
-        """That a node without a heartbeat answers no more, in words; `None` while it does."""
+        """Return in words that a node without a heartbeat stopped answering; `None` while it answers."""
         silent_s = self._unheard_s(now_ns)
         if silent_s <= SILENT_S:
             return None
@@ -62,7 +62,7 @@ class Asking:
         return (self._life.silent_ms(now_ns) or 0.0) / 1000
 
     def _guard(self, now_ns: int) -> None:
-        """The answer is the node's state and counts as a heartbeat."""
+        """Ask by node guarding; the answer is the node's state and counts as a heartbeat."""
         if self._life.heartbeat_ns is None:
             self._life.heartbeat_ns = now_ns  # from now on silence counts
         try:

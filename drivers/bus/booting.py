@@ -48,7 +48,7 @@ class Booting:
         return attempt is not None and not attempt.done() and self.step is _COMING_UP
 
     def overtake(self) -> None:
-        """A boot that is under way does not know all that it should: it counts no more."""
+        """Invalidate a boot that is under way: it does not know all that it should."""
         with self._lock:
             self._generation += 1
             self.ready = False
@@ -61,7 +61,7 @@ class Booting:
             self.retry_s, self._retry_ns = FIRST_RETRY_S, 0
 
     def hurry(self) -> None:
-        """It is there: try at the next `retry`."""
+        """Note that the node is there: try at the next `retry`."""
         if not self.ready:
             self._retry_ns = 0
 

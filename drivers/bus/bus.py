@@ -23,10 +23,10 @@ from drivers.bus.settings import CanSettings, Role
 from drivers.bus.thread_switching import FastSwitching
 from drivers.bus.traffic import Traffic
 from drivers.errors import Unavailable
-from drivers.noted import found
+from drivers.findings import active_findings
+from drivers.reader_stalls import ReaderStalls
+from drivers.realtime_priority import make_realtime
 from drivers.samples import Finding
-from drivers.standstill import Standstill
-from drivers.urgency import make_urgent
 
 TICK_S = 0.05  # how long the thread waits for a frame before it looks at the clock
 FIRST_RETRY_S = 0.1
@@ -68,7 +68,7 @@ class CanBus:
         self.problem: str | None = None  # why it is not open, in words
         self.health = BusHealth(settings.bitrate)
         self.traffic = Traffic()
-        self.standstill = Standstill()
+        self.standstill = ReaderStalls()
         self.frames = 0  # that came; error frames are none of them
         self.opened = 0  # times
         self.failed_handlers = 0  # those of users' ticks are among them
@@ -102,7 +102,7 @@ class CanBus:
     @property
     def findings(self) -> tuple[Finding, ...]:
         """What is wrong with it, or with who reads it."""
-        return (*self.health.findings, *found((self.standstill,)))
+        return (*self.health.findings, *active_findings((self.standstill,)))
 
     @property
     def is_open(self) -> bool:
@@ -207,7 +207,7 @@ class CanBus:
 
     def _run(self) -> None:
         if self._urgent:
-            make_urgent()
+            make_realtime()
         retry_s = FIRST_RETRY_S
         while not self._stopping.is_set():
             began = time.monotonic()

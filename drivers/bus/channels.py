@@ -27,7 +27,7 @@ _NUMBERS = ("boolean", "signed", "unsigned", "real")
 
 
 def channels_of(component: str, chosen: Chosen) -> tuple[Channel, ...]:
-    """The channels that the robot's file adds to a component, in its order."""
+    """Return the channels that the robot's file adds to a component, in its order."""
     return tuple(
         Channel(f"{component}.{name}", component, name, one.unit, one.states) for name, one in chosen.items()
     )
@@ -151,7 +151,7 @@ class ObjectChannels:
                 yield f"no {' and '.join(names)}: {bringer}"
 
     def _mapped(self, tpdo: Tpdo) -> Iterator[tuple[_Source, Field]]:
-        """What this TPDO carries of them."""
+        """Yield what this TPDO carries of them."""
         for place in tpdo.objects:
             for one in self._sources:
                 if one.settings.address == (place.index, place.subindex) and one.fits(place.bits):
@@ -213,7 +213,7 @@ class ObjectChannels:
             self._take(plan, one, asked_ns, None if number is None else one.value(number))
 
     def _take(self, plan: int, one: _Source, asked_ns: int, value: float | None) -> None:
-        """What it answered, as old as the question: nobody knows how long the answer has waited."""
+        """Take the answer, as old as the question: nobody knows how long it has waited."""
         with self._lock:
             if plan != self._plan:
                 return

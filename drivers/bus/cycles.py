@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from drivers.errors import Unavailable
-from drivers.urgency import make_urgent
+from drivers.realtime_priority import make_realtime
 
 Send = Callable[[int, bytes], None]
 
@@ -48,7 +48,7 @@ class Cycles:
                 self._thread = None
 
     def _run(self) -> None:
-        make_urgent()
+        make_realtime()
         due = dict.fromkeys(self._cycles, time.monotonic())
         while not self._stopping.wait(max(0.0, min(due.values()) - time.monotonic())):
             now = time.monotonic()

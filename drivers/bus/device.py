@@ -28,7 +28,7 @@ class CanDevice:
         description: Description,
         chosen: Chosen | None = None,
     ) -> None:
-        """Raises `SettingsError` where another table describes the same node differently."""
+        """Describe a device; raises `SettingsError` if another table describes its node differently."""
         self.name = name
         self.settings = settings
         self.node = shared_node(bus, settings.node_id, description, settings)
@@ -92,7 +92,7 @@ class CanDevice:
                 self._objects.install(tpdos)
 
     def _tpdos(self, sdo: SdoChannel) -> tuple[tuple[Tpdo, ...], str | None]:
-        """What it sends; nothing, and why, where its mapping cannot be understood."""
+        """Return what it sends; nothing, and why, where its mapping cannot be understood."""
         try:
             return read_tpdos(sdo, self._description), None
         except (DeviceTimeout, Unavailable):

@@ -29,7 +29,7 @@ class Emcy:
 
 
 def parse_emcy(stamp_ns: int, data: bytes) -> Emcy | None:
-    """An EMCY frame; `None` for one that is too short."""
+    """Return an EMCY frame; `None` for one that is too short."""
     if len(data) < 3:
         return None
     return Emcy(stamp_ns, int.from_bytes(data[:2], "little"), data[2], data[3:])

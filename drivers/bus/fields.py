@@ -41,7 +41,7 @@ class Field:
 
 
 def unpacker(fields: Sequence[Field]) -> Unpack:
-    """What makes a frame's bytes the numbers of these fields, in their order."""
+    """Return what makes a frame's bytes the numbers of these fields, in their order."""
     return _by_struct(fields) or _by_bits(fields)
 
 
@@ -70,7 +70,7 @@ def _by_bits(fields: Sequence[Field]) -> Unpack:
 
 
 def _meaning(field: Field) -> Callable[[int], int | float]:
-    """The number that these bits are."""
+    """Return the number that these bits are."""
     half, wrap = 1 << field.bits >> 1, 1 << field.bits
     if field.kind == "signed":
         return lambda part: part - wrap if part >= half else part

@@ -17,7 +17,7 @@ FrameHandler = Callable[[int, bytes], None]  # stamp_ns, data; in the bus's thre
 
 
 def wire_id(cob_id: int) -> int:
-    """A configured identifier with its flag: above 7FFh it is an extended one."""
+    """Return a configured identifier with its flag: above 7FFh it is an extended one."""
     return cob_id | EXTENDED if cob_id > STANDARD_IDS else cob_id
 
 

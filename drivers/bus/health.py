@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Callable
 
 from drivers.bus.interfaces.controller_state import BusState, bus_state
-from drivers.noted import Noted, found
+from drivers.findings import FindingState, active_findings
 from drivers.samples import Finding
 
 LOOK_S = 1.0
@@ -24,7 +24,7 @@ STATE_WORDS = {
 
 
 def bits_per_s(frames_per_s: float, bytes_per_s: float) -> float:
-    """What frames with so many bytes of data take of a bus's time, in bits."""
+    """Return what frames with so many bytes of data take of a bus's time, in bits."""
     return FRAME_BITS * frames_per_s + BYTE_BITS * bytes_per_s
 
 
@@ -38,7 +38,12 @@ class BusHealth:
         self.load_percent: float | None = None  # of the last second; None: bitrate or time not known
         self.frames_per_s: float | None = None
         self._bitrate = bitrate
-        self._state, self._load, self._errors, self._lost = Noted(), Noted(), Noted(), Noted()
+        self._state, self._load, self._errors, self._lost = (
+            FindingState(),
+            FindingState(),
+            FindingState(),
+            FindingState(),
+        )
         self._before: tuple[int, int, int, int] | None = None
         self._errors_before = 0
         self._recent_errors: deque[int] = deque(maxlen=ERROR_LOOKS)
@@ -51,10 +56,10 @@ class BusHealth:
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        return found((self._state, self._load, self._errors, self._lost))
+        return active_findings((self._state, self._load, self._errors, self._lost))
 
     def opened(self) -> None:
-        """The controller begins anew, as does what is measured."""
+        """Restart all measurements with the controller."""
         self.state = BusState.ACTIVE
         self.load_percent = self.frames_per_s = self._before = None
         self._errors_before = self.error_frames
@@ -63,7 +68,7 @@ class BusHealth:
             noted.clear()
 
     def take_error(self, stamp_ns: int, can_id: int, data: bytes) -> None:
-        """An error frame: of the wire, or of our controller's state."""
+        """Take an error frame: of the wire, or of our controller's state."""
         state = bus_state(can_id, data)
         if state is None:
             self.error_frames += 1

@@ -6,7 +6,7 @@ from typing import Protocol
 
 from drivers.bus.emcy import Emcy, parse_emcy
 from drivers.bus.nmt import NmtState, parse_heartbeat
-from drivers.standstill import Standstill
+from drivers.reader_stalls import ReaderStalls
 
 EMCY_HISTORY = 64
 HEARTBEATS_MISSED = 2.5  # periods without a heartbeat, where no time is configured
@@ -26,7 +26,7 @@ class LifeListener(Protocol):
 class NodeLife:
     """Fed by the bus's thread, read by any. Stamps are ns of the monotonic clock."""
 
-    def __init__(self, configured_timeout_s: float | None, standstill: Standstill | None = None) -> None:
+    def __init__(self, configured_timeout_s: float | None, standstill: ReaderStalls | None = None) -> None:
         """`standstill` is that of the bus on which it is heard."""
         self.emcy_history: deque[Emcy] = deque(maxlen=EMCY_HISTORY)
         self.boots = 0
@@ -39,7 +39,7 @@ class NodeLife:
         self.timeout_s = configured_timeout_s
         self._configured_timeout_s = configured_timeout_s
         self._period_s: float | None = None
-        self._standstill = standstill or Standstill()
+        self._standstill = standstill or ReaderStalls()
         self._beats: deque[float] = deque(maxlen=BEATS)
         self._listeners: tuple[LifeListener, ...] = ()
 
@@ -60,13 +60,13 @@ class NodeLife:
         self._beats.clear()
 
     def expect_every(self, period_s: float | None) -> None:
-        """The device's own heartbeat period, where no time is configured; `None`: it has no heartbeat."""
+        """Take the device's own heartbeat period if no time is configured; `None`: no heartbeat."""
         if self._configured_timeout_s is None:
             self._period_s = period_s
             self.timeout_s = period_s * HEARTBEATS_MISSED if period_s else None
 
     def _learn(self, interval_s: float) -> None:
-        """The period that a device really has: its 1017h may be given to it later, by another master.
+        """Take the actual period of a device: another master may set its 1017h later.
 
         The second shortest of the last intervals, so that neither a lost nor a doubled frame counts.
         """
@@ -120,7 +120,7 @@ class NodeLife:
         return self._standstill.silent_ns(self.heartbeat_ns, now_ns) / 1e9 > self.timeout_s
 
     def problem(self, now_ns: int) -> str | None:
-        """What is wrong with a node that came up, in words."""
+        """Return what is wrong with a node that came up, in words."""
         if self.lost(now_ns):
             words = self._standstill.words(now_ns, self.heartbeat_ns, self.timeout_s or 0.0)
             if words is not None:

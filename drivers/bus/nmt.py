@@ -19,7 +19,10 @@ class NmtState(IntEnum):
 
 
 def parse_heartbeat(data: bytes) -> NmtState | None:
-    """The state in a frame of 700h + node id; `None` for anything else. Bit 7 is node guarding's toggle."""
+    """Return the state in a frame of 700h + node id; `None` for anything else.
+
+    Bit 7 is node guarding's toggle.
+    """
     if len(data) != 1:
         return None
     try:

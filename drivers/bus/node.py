@@ -11,10 +11,11 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from typing import Protocol, TypeVar, cast
 
-from drivers.bus.arrivals import Arrivals
 from drivers.bus.asking import Asking
+from drivers.bus.boot_diagnosis import why_silent
 from drivers.bus.booting import Booting
 from drivers.bus.bus import BusUser, CanBus
+from drivers.bus.frame_losses import FrameLosses
 from drivers.bus.life import NodeLife
 from drivers.bus.nmt import HEARTBEAT, NmtState
 from drivers.bus.objects import identity_problem, read, read_optional, read_rest
@@ -23,9 +24,8 @@ from drivers.bus.sdo.channel import SdoChannel
 from drivers.bus.sdo.protocol import confirmed_write
 from drivers.bus.sdo.worker import SdoWorker
 from drivers.bus.settings import NodeTimes, Role
-from drivers.bus.stuck import why_silent
 from drivers.errors import DeviceTimeout, DriverError, SettingsError
-from drivers.noted import found
+from drivers.findings import active_findings
 from drivers.samples import Finding
 from eds import Description
 
@@ -46,7 +46,7 @@ class NodeUser(Protocol):
         """Read from the device what is needed, in the worker's thread. A `DriverError` is tried again."""
 
     def forget(self) -> None:
-        """What was read and received is no longer true: the node rebooted or its bus is gone."""
+        """Forget all values: the node rebooted or its bus is gone."""
 
 
 class Node(BusUser):
@@ -57,7 +57,7 @@ class Node(BusUser):
         self.node_id = node_id
         self.description = description
         self.life = NodeLife(times.heartbeat_timeout_s, bus.standstill)
-        self.arrivals: tuple[Arrivals, ...] = ()  # of the PDOs that its users follow
+        self.arrivals: tuple[FrameLosses, ...] = ()  # of the PDOs that its users follow
         self._findings: tuple[str, ...] = ()
         self._stranger: str | None = _NOT_ASKED  # why it may not be the device that it should be
         self._times = times
@@ -127,7 +127,7 @@ class Node(BusUser):
         """What is wrong with its answers and its PDOs, each since when, and what to check."""
         if not self.ready:
             return ()
-        return (*self.channel.round_trips.findings, *found(self.arrivals))
+        return (*self.channel.round_trips.findings, *active_findings(self.arrivals))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -141,10 +141,10 @@ class Node(BusUser):
         self._asking.probes = True
 
     def silence(self, now_ns: int) -> str | None:
-        """That a node without a heartbeat, which is probed, answers no more, in words."""
+        """Return in words that a probed node without a heartbeat stopped answering."""
         return self._asking.silence(now_ns) if self.ready else None
 
-    def follow(self, arrivals: Arrivals) -> Callable[[], None]:
+    def follow(self, arrivals: FrameLosses) -> Callable[[], None]:
         """Watch whether frames are missing; returns how to end it."""
         arrivals.restart()
         self.arrivals = (*self.arrivals, arrivals)
@@ -228,13 +228,13 @@ class Node(BusUser):
         self.worker.wake()
 
     def problem(self, now_ns: int) -> str | None:
-        """What is wrong with the node now, in words with what to check; `None` when nothing is."""
+        """Return what is wrong with the node now, in words with what to check; `None` when nothing is."""
         if not self.ready:
             return self.bus.trouble or (_REMAPPED if now_ns < self._settled_ns else self._booting.step)
         return self.life.problem(now_ns) or self._asking.guard_problem or self.bus.trouble
 
     def counters(self) -> dict[str, int]:
-        """What happened since the node's object was made."""
+        """Return what happened since the node's object was made."""
         sdo = self.channel.counters
         return {
             "boots": self.life.boots,
@@ -370,7 +370,7 @@ class Node(BusUser):
 
 
 def shared_node(bus: CanBus, node_id: int, description: Description, times: NodeTimes) -> Node:
-    """The one node object of this id: two axes of a drive, or a joint and its parameters, share it.
+    """Return the one node object of this id: two axes of a drive, or a joint and its parameters, share it.
 
     Raises `SettingsError` where two tables describe the same node with different files.
     """

@@ -9,7 +9,10 @@ from eds import Description
 
 
 def read(sdo: SdoChannel, description: Description, index: int, subindex: int) -> bytes:
-    """An object's bytes, no more than its type has: some devices answer with four whatever its size."""
+    """Return an object's bytes, no more than its type has.
+
+    Some devices answer with four whatever its size.
+    """
     data = sdo.upload(index, subindex)
     variable = description.variable(index, subindex)
     size = None if variable is None else size_of(variable.data_type or 0)
@@ -34,7 +37,7 @@ def read_rest(
 
 
 def read_optional(sdo: SdoChannel, description: Description, index: int, subindex: int) -> int | None:
-    """A number that not every device has."""
+    """Return a number that not every device has."""
     if not description.has(index, subindex):
         return None
     try:

@@ -80,7 +80,7 @@ def _numbers(description: Description) -> Iterable[int]:
 
 
 def read_tpdo(sdo: SdoChannel, description: Description | None, number: int) -> Tpdo | None:
-    """The TPDO at 1800h + `number`; `None` where the device has none. Raises `DriverError`.
+    """Return the TPDO at 1800h + `number`; `None` where the device has none. Raises `DriverError`.
 
     Without a description the device itself says what it has.
     """
@@ -115,12 +115,12 @@ def _event_timer_s(sdo: SdoChannel, description: Description | None, parameter: 
 
 
 def read_mapping(sdo: SdoChannel, mapping: int) -> tuple[MappedObject, ...]:
-    """The objects of a PDO, by the index of its mapping parameter; raises `DriverError`."""
+    """Return the objects of a PDO, by the index of its mapping parameter; raises `DriverError`."""
     return _read_entries(sdo, mapping) or ()
 
 
 def _read_entries(sdo: SdoChannel, mapping: int) -> tuple[MappedObject, ...] | None:
-    """The same; `None` for an MPDO, which has no mapping of its own."""
+    """Return the same; `None` for an MPDO, which has no mapping of its own."""
     count = unsigned(sdo.upload(mapping, 0)[:1])
     if count in _MULTIPLEXED:
         return None

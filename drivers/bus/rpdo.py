@@ -32,7 +32,7 @@ class Rpdo:
         )
 
     def frame(self, values: Mapping[tuple[int, int], bytes]) -> bytes:
-        """The data of a frame with these values of its objects."""
+        """Return the data of a frame with these values of its objects."""
         packed = 0
         for mapped in self.objects:
             value = unsigned(values.get((mapped.index, mapped.subindex), b""))
@@ -48,7 +48,7 @@ def find_rpdo(sdo: SdoChannel, description: Description, index: int) -> tuple[Rp
 
 
 def read_values(sdo: SdoChannel, rpdo: Rpdo) -> dict[tuple[int, int], bytes]:
-    """What the device holds of the objects that it takes from an RPDO; raises `DriverError`."""
+    """Return what the device holds of the objects that it takes from an RPDO; raises `DriverError`."""
     return {
         (one.index, one.subindex): sdo.upload(one.index, one.subindex)
         for one in rpdo.objects

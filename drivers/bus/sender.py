@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from drivers.bus.frames import Transport
 from drivers.errors import Unavailable
-from drivers.urgency import make_urgent
+from drivers.realtime_priority import make_realtime
 
 SEND_TIMEOUT_S = 0.1  # how long a frame waits for a bus that takes none
 URGENT_S = 1.0  # how long an urgent one does, which nobody waits for
@@ -33,7 +33,7 @@ class StillLeaving(BusFull):
 
 
 def always() -> bool:
-    """A frame that nothing overtakes; one that was sent."""
+    """Return a frame that nothing overtakes; one that was sent."""
     return True
 
 
@@ -180,8 +180,8 @@ class Sender:
             self._empty_and_leave(transport, only_urgent=only_urgent, until=until)
 
     def _run(self, transport: Transport) -> None:
-        """The thread: does what nobody else can."""
-        make_urgent()
+        """Run the thread that does the blocking sends."""
+        make_realtime()
         while self._transport is transport:
             self._order.wait()
             self._order.clear()
@@ -270,7 +270,7 @@ class Sender:
         return self._transport
 
     def _queue(self, frame: _Frame) -> _Frame:
-        """The frame to wait for: where the same one waits already, urgently, it does not leave twice."""
+        """Return the frame to wait for: one that is queued urgently already is not sent twice."""
         same = (frame.can_id, frame.data)
         for one in (self._urgent.get(frame.key), self._in_hand):
             if one is not None and one.is_urgent and (one.can_id, one.data) == same:

@@ -53,7 +53,7 @@ class CanSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
 
     @classmethod
     def from_table(cls, table: Mapping[str, Any]) -> "CanSettings":
-        """The settings in a TOML table whose further keys are python-can's.
+        """Return the settings in a TOML table whose further keys are python-can's.
 
         Raises `msgspec.ValidationError`, which names the key and what is allowed.
         """
@@ -79,7 +79,7 @@ class CanSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
 
     @classmethod
     def parted(cls, table: Mapping[str, Any]) -> dict[str, Any]:
-        """The table with python-can's keys in `more`."""
+        """Return the table with python-can's keys in `more`."""
         ours = {key: value for key, value in table.items() if key in cls.__struct_fields__ and key != "more"}
         return {**ours, "more": {key: value for key, value in table.items() if key not in ours}}
 
@@ -94,7 +94,7 @@ class NodeTimes(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     guard_time_s: Seconds | None = None  # node guarding by us, for a device without heartbeat; master only
 
     def sdo_ids(self, node_id: int) -> tuple[int, int]:
-        """The identifiers of its SDO channel, of requests and of responses, with their flags."""
+        """Return the identifiers of its SDO channel, of requests and of responses, with their flags."""
         request, response = self.sdo_cob_ids or (SDO_REQUEST + node_id, SDO_RESPONSE + node_id)
         return wire_id(request), wire_id(response)
 

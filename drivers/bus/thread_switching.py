@@ -19,7 +19,7 @@ class FastSwitching:
 
     @classmethod
     def begin(cls) -> None:
-        """A bus opened."""
+        """Note that a bus opened."""
         with cls._lock:
             if cls._open == 0:
                 cls._before_s = sys.getswitchinterval()
@@ -28,7 +28,7 @@ class FastSwitching:
 
     @classmethod
     def end(cls) -> None:
-        """A bus closed; the last one restores what was set before."""
+        """Note that a bus closed; the last one restores the old setting."""
         with cls._lock:
             cls._open -= 1
             if cls._open == 0:

@@ -16,7 +16,7 @@ def size_of(data_type: int) -> int | None:
 
 
 def decode(data: bytes, data_type: int) -> Number | None:
-    """A number out of an object's bytes; `None` for types that are no numbers.
+    """Return a number out of an object's bytes; `None` for types that are no numbers.
 
     Some devices answer with all four bytes of a frame: those beyond the type are cut off. What is longer
     still is something else, such as a text.
@@ -32,5 +32,5 @@ def decode(data: bytes, data_type: int) -> Number | None:
 
 
 def unsigned(data: bytes) -> int:
-    """The bytes as an unsigned number."""
+    """Return the bytes as an unsigned number."""
     return int.from_bytes(data, "little")

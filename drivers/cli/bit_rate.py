@@ -20,7 +20,7 @@ RATELESS = ("socketcan", "socketcand", "virtual", "udp_multicast")
 
 @contextmanager
 def opened(name: str, settings: CanSettings) -> Iterator[CanBus]:
-    """The bus, open; raises `Unavailable`."""
+    """Return the bus, open; raises `Unavailable`."""
     bus = CanBus(name, settings)
     bus.start()
     try:
@@ -47,7 +47,7 @@ def check(name: str, settings: CanSettings, bitrate: int, others: Collection[int
 
 
 def next_steps(settings: CanSettings, bitrate: int) -> str:
-    """What is to be done after a bit rate was stored."""
+    """Return what is to be done after a bit rate was stored."""
     line = f"sudo ip link set {settings.channel} down, then up type can bitrate {bitrate} restart-ms 100"
     how = f" ({line})" if settings.interface == "socketcan" else ""
     return f"Switch it off, set the bus and all who are on it to that rate{how}, and switch it on"

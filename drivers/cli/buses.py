@@ -29,7 +29,7 @@ def named(buses: Sequence[str], bitrate: int | None) -> Iterator[tuple[str, CanS
 
 
 def _of_file(path: Path) -> Iterator[tuple[str, CanSettings]]:
-    """The buses of a robot's file; the rest of it may be wrong.
+    """Yield the buses of a robot's file; the rest of it may be wrong.
 
     Raises:
         SettingsError: it has none, or cannot be read.

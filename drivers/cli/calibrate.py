@@ -11,6 +11,7 @@ from pathlib import Path
 
 import msgspec
 
+from drivers.build_context import BuildContext
 from drivers.bus.bus import CanBus
 from drivers.bus.settings import CanSettings
 from drivers.cli.named import named
@@ -33,7 +34,6 @@ from drivers.insole.layout import Layout
 from drivers.insole.settings import InsoleSettings
 from drivers.line import Line
 from drivers.samples import State
-from drivers.site import Site
 
 STANDARD_GRAVITY = 9.80665
 AVERAGE_S = 2.0
@@ -58,7 +58,7 @@ def main(arguments: Sequence[str]) -> int:
     kind, *rest = arguments
     parser = argparse.ArgumentParser(prog=f"gwrms calibrate {kind}")
     parser.add_argument("port", metavar="PORT")
-    parser.add_argument("--write", type=Path, required=True, metavar="FILE", help="where the result goes")
+    parser.add_argument("--write", type=Path, required=True, metavar="FILE", help="file for the result")
     return run_parsed(parser, kinds[kind](parser), rest)
 
 
@@ -75,9 +75,9 @@ def _insole_options(parser: argparse.ArgumentParser) -> Callable[[argparse.Names
     parser.add_argument(
         "--layout", help=f"a shipped layout or a .toml file; default: the device's own, else {USUAL_LAYOUT}"
     )
-    parser.add_argument("--foot", choices=("left", "right"), help="where both feet are on the port")
-    parser.add_argument("--falling", type=float, metavar="FULL_SCALE", help="fewer counts are more load")
-    parser.add_argument("--saturation", type=float, help="counts from which a cell says no more")
+    parser.add_argument("--foot", choices=("left", "right"), help="needed if both feet are on the port")
+    parser.add_argument("--falling", type=float, metavar="FULL_SCALE", help="fewer counts mean more load")
+    parser.add_argument("--saturation", type=float, help="counts at which a cell saturates")
     parser.add_argument("--power", action="store_true", help="fit a power law (two different loads or more)")
     return _insole
 
@@ -188,7 +188,7 @@ def _insole_on_port(options: argparse.Namespace) -> _Sole:
 
 
 def _insole_in_file(where: str) -> _Sole | None:
-    """The insole at `ROBOT.toml:NAME`; `None` for a port.
+    """Return the insole at `ROBOT.toml:NAME`; `None` for a port.
 
     Raises:
         SettingsError: the file, its table or the layout cannot be used.
@@ -225,7 +225,7 @@ def _imu_on_port(options: argparse.Namespace) -> Imu:
 
 
 def _imu_in_file(where: str) -> TrunkImu | None:
-    """The IMU at `ROBOT.toml:NAME`, with no zero yet; `None` for a port.
+    """Return the IMU at `ROBOT.toml:NAME`, with no zero yet; `None` for a port.
 
     Raises:
         SettingsError: the file or its table cannot be used.
@@ -238,7 +238,7 @@ def _imu_in_file(where: str) -> TrunkImu | None:
         bus = found.table.get("bus")
         tables = {} if bus is None else {bus: found.tables["can"][bus]}
         buses = {name: CanBus(name, CanSettings.from_table(table)) for name, table in tables.items()}
-    return build_imu(found.name, settings, Site(found.file, buses, recognise=format_of))
+    return build_imu(found.name, settings, BuildContext(found.file, buses, recognise=format_of))
 
 
 def _average(line: Line[InsoleFrame], foot: Foot | None, cells: int) -> list[float]:
@@ -256,7 +256,7 @@ def _average(line: Line[InsoleFrame], foot: Foot | None, cells: int) -> list[flo
 
 
 def _mass() -> float | None:
-    """The next known load in kg; `None` when there are no more."""
+    """Return the next known load in kg; `None` when there are no more."""
     while True:
         _say("Put a known load on the whole insole, type its mass in kg and press Enter (empty: done).")
         text = _read()

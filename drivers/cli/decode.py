@@ -33,11 +33,11 @@ def options(parser: argparse.ArgumentParser) -> Callable[[argparse.Namespace], i
         'Prints a JSON line a frame, {"frame": kind, …}, in SI with angles in rad, then {"counters": {…}}. '
         "Exit status 1 where most bytes belong to no frame of this format."
     )
-    parser.add_argument("--format", required=True, choices=FORMATS, help="the language of the bytes")
+    parser.add_argument("--format", required=True, choices=FORMATS, help="the sensor's data format")
     parser.add_argument(
-        "--layout", help=f"an insole's layout file, or one that ships: {', '.join(layouts.shipped())}"
+        "--layout", help=f"an insole's layout file, or a shipped one: {', '.join(layouts.shipped())}"
     )
-    parser.add_argument("capture", nargs="?", metavar="CAPTURE", help="a file; without it, standard input")
+    parser.add_argument("capture", nargs="?", metavar="CAPTURE", help="a file (default: standard input)")
     return run
 
 
@@ -99,7 +99,7 @@ def _line(values: dict[str, object]) -> str:
 
 
 def _with_load(layout: Layout) -> Flatten:
-    """Adds pressure, force and centre of pressure where the layout says enough."""
+    """Add pressure, force and centre of pressure where the layout suffices."""
     count = len(layout.cells)
     cells = Cells(layout.calibration, count) if layout.calibration is not None and count else None
 

@@ -35,7 +35,7 @@ class Heard:
 
 
 def listen(port: str, baudrate: int | None = None) -> Iterator[Heard]:
-    """What speaks at this baud rate, or at each, until one fits.
+    """Yield what speaks at this baud rate, or at each, until one fits.
 
     Raises:
         Unavailable: the port cannot be opened, or goes away.
@@ -50,12 +50,12 @@ def listen(port: str, baudrate: int | None = None) -> Iterator[Heard]:
 
 
 def best(heard: Sequence[Heard]) -> Heard:
-    """That of which a format explains most."""
+    """Return the candidate of which a format explains most."""
     return max(heard, key=lambda one: one.match.share if one.match else -1.0)
 
 
 def nothing(port: str, heard: Sequence[Heard]) -> str:
-    """What to do where no format fits."""
+    """Return what to do where no format fits."""
     if not any(one.bytes for one in heard):
         return f"{port} is silent: check the sensor's power and its TX wire, and whether it has to be started"
     rates = f"{heard[0].baudrate} baud" if len(heard) == 1 else "any usual baud rate"

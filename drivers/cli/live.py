@@ -25,12 +25,14 @@ AXES = "# which of its axes point forward, left and up; here as its maker means 
 
 
 def options(parser: argparse.ArgumentParser) -> Callable[[argparse.Namespace], int]:
-    parser.add_argument("port", metavar="PORT", help="best a stable path: /dev/serial/by-id/…")
+    parser.add_argument("port", metavar="PORT", help="preferably a stable path: /dev/serial/by-id/…")
     parser.add_argument("--baud", type=int, help="try this baud rate only")
     parser.add_argument(
-        "--seconds", type=float, help="show it live for so long (0: not at all; default: Ctrl-C)"
+        "--seconds", type=float, help="show live values for so long (0: not at all; default: until Ctrl-C)"
     )
-    parser.add_argument("--json", action="store_true", help="one JSON line: what was found, with the table")
+    parser.add_argument(
+        "--json", action="store_true", help="print the result as one JSON line, with the table"
+    )
     return run
 
 
@@ -64,7 +66,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def table(port: str, baudrate: int, match: Match) -> str:
-    """What of the robot's file wires the sensor: a table, or one for each foot."""
+    """Return what of the robot's file wires the sensor: a table, or one for each foot."""
     keys = f'port = "{port}"\nbaudrate = {baudrate}\nformat = "{match.format_name}"\n'
     if match.format_name in IMU_FORMATS:
         axes = msgspec.json.encode(IMU_FORMATS[match.format_name].conventions.axes).decode()
@@ -79,7 +81,7 @@ def table(port: str, baudrate: int, match: Match) -> str:
 
 
 def _layout(match: Match) -> str | None:
-    """What the table has to name; `None` where the format knows where its cells are."""
+    """Return what the table has to name; `None` where the format knows where its cells are."""
     if match.layout is not None or INSOLE_FORMATS[match.format_name].layout is not None:
         return match.layout
     return next(

@@ -16,7 +16,7 @@ from drivers.errors import NotPermitted, SettingsError
 from drivers.lss.change import Device, give_bitrate, give_node_id, inquire
 from drivers.lss.fastscan import unconfigured
 from drivers.lss.master import BITRATES, SCAN_S, UNCONFIGURED, Identity, LssMaster
-from drivers.lss.surroundings import Surroundings, identity_of, is_taken, listen
+from drivers.lss.preconditions import BusSurvey, identity_of, is_taken, listen
 
 MORE = """\
 examples:
@@ -42,34 +42,38 @@ NODE_IDS = range(1, 128)
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="gwrms lss",
-        description="Finds CANopen devices that have no node id yet; gives node ids and bit rates (CiA 305).",
+        description="Find CANopen devices without a node id; set node ids and bit rates (CiA 305).",
         epilog=MORE,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
     parser.add_argument("action", choices=tuple(ACTIONS), help="what to do")
     parser.add_argument("bus", metavar="BUS", help="can0, INTERFACE:CHANNEL, or a robot's file with one bus")
-    parser.add_argument("device", metavar="DEVICE", nargs="?", help="which one; not for find")
-    parser.add_argument("--node-id", type=int, metavar="N", help="set: the node id that it is to have")
+    parser.add_argument("device", metavar="DEVICE", nargs="?", help="the device; not for find")
+    parser.add_argument("--node-id", type=int, metavar="N", help="set: the new node id")
     parser.add_argument(
         "--new-bitrate",
         type=int,
         choices=tuple(BITRATES),
         metavar="N",
-        help="set: the bit rate that it stores",
+        help="set: the bit rate to store",
     )
     parser.add_argument(
-        "--activate", action="store_true", help="set: let the bit rate count at once, and look for the device"
+        "--activate", action="store_true", help="set: apply the bit rate at once, and look for the device"
     )
-    parser.add_argument("--no-store", action="store_true", help="set: a node id until it is switched off")
-    parser.add_argument("--bitrate", type=int, help="bit/s of the bus now, for interfaces opened with one")
+    parser.add_argument("--no-store", action="store_true", help="set: keep the node id until power-off only")
+    parser.add_argument("--bitrate", type=int, help="present bit/s of the bus, for interfaces that need one")
     parser.add_argument("--seconds", type=float, default=WAIT_S, help="how long to listen first (default 3)")
     parser.add_argument(
-        "--timeout", type=float, default=SCAN_S, metavar="S", help="find: for each answer (default 0.05)"
+        "--timeout",
+        type=float,
+        default=SCAN_S,
+        metavar="S",
+        help="find: timeout of each answer (default 0.05)",
     )
-    parser.add_argument("--anyway", action="store_true", help="although something is at work on the bus")
-    parser.add_argument("--yes", action="store_true", help="do not ask")
-    parser.add_argument("--json", action="store_true", help="one JSON line, for machines")
+    parser.add_argument("--anyway", action="store_true", help="go on although the bus is in use")
+    parser.add_argument("--yes", action="store_true", help="do not ask for confirmation")
+    parser.add_argument("--json", action="store_true", help="print one JSON line, for programs")
     return parser
 
 
@@ -134,7 +138,7 @@ class _Task:
         bus: CanBus,
         settings: CanSettings,
         master: LssMaster,
-        heard: Surroundings,
+        heard: BusSurvey,
         options: argparse.Namespace,
         wait: Callable[[float], object],
     ) -> None:
@@ -153,7 +157,7 @@ class _Task:
             sys.stdout.write(msgspec.json.encode(found).decode() + "\n")
 
     def device(self) -> Device:
-        """The device that is meant, as it is now."""
+        """Return the device that is meant, as it is now."""
         text = self.options.device
         if text == "new":
             found = unconfigured(self.master)
@@ -228,7 +232,7 @@ def _set(task: _Task) -> int:
 
 
 def _plan(device: Device, node_id: int | None, bitrate: int | None, *, stored: bool) -> Iterator[str]:
-    """What will happen, line by line."""
+    """Yield what will happen, line by line."""
     if node_id is not None:
         keeps = "stores that" if stored else "forgets that when it is switched off"
         yield f"  it becomes node {node_id}, and {keeps}"

@@ -22,7 +22,7 @@ class Named(NamedTuple):
 
 @contextmanager
 def named(where: str, kind: str) -> Iterator[Named | None]:
-    """The table `[kind.NAME]` of `FILE.toml:NAME`, while its settings are made; `None` for a port.
+    """Return the table `[kind.NAME]` of `FILE.toml:NAME`, while its settings are made; `None` for a port.
 
     Raises:
         SettingsError: the file or its table cannot be used.

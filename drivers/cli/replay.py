@@ -46,9 +46,9 @@ def record_options(parser: argparse.ArgumentParser) -> Callable[[argparse.Namesp
     parser.add_argument(
         "--raw",
         action="store_true",
-        help=f"whatever comes, as of a sensor that nobody knows yet (without --baud at {DEFAULT_BAUDRATE})",
+        help=f"record any bytes, as of an unknown sensor (without --baud at {DEFAULT_BAUDRATE})",
     )
-    parser.add_argument("--seconds", type=float, help="for so long; default: until Ctrl-C or SIGTERM")
+    parser.add_argument("--seconds", type=float, help="duration (default: until Ctrl-C or SIGTERM)")
     return record
 
 
@@ -58,14 +58,10 @@ def replay_options(parser: argparse.ArgumentParser) -> Callable[[argparse.Namesp
         'Prints {"ready": true, "port": …} when it can be opened.'
     )
     parser.add_argument("file", metavar="FILE", type=Path)
-    parser.add_argument(
-        "--link", type=Path, help="a path that points to the pseudo-terminal while it is there"
-    )
-    parser.add_argument(
-        "--baud", type=int, default=DEFAULT_BAUDRATE, help="the pace where FILE.json is missing"
-    )
-    parser.add_argument("--speed", type=float, default=1.0, help="times faster than recorded")
-    parser.add_argument("--loop", action="store_true", help="again and again, until Ctrl-C")
+    parser.add_argument("--link", type=Path, help="a path that links to the pseudo-terminal while it exists")
+    parser.add_argument("--baud", type=int, default=DEFAULT_BAUDRATE, help="the pace if FILE.json is missing")
+    parser.add_argument("--speed", type=float, default=1.0, help="speed relative to the recording")
+    parser.add_argument("--loop", action="store_true", help="repeat until Ctrl-C")
     return replay
 
 

@@ -36,7 +36,7 @@ WAIT_S = 3.0
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="gwrms scan",
-        description="Says what is on a CAN bus and on serial ports. Listens; asks only with --active.",
+        description="Identify the devices on a CAN bus and on serial ports. Only listens without --active.",
         epilog=MORE,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
@@ -47,14 +47,16 @@ def _parser() -> argparse.ArgumentParser:
         metavar="BUS",
         help="can0, INTERFACE:CHANNEL of python-can, or a robot's file",
     )
-    parser.add_argument("--bitrate", type=int, help="bit/s, for interfaces that are opened with one")
+    parser.add_argument("--bitrate", type=int, help="bit/s, for interfaces that need one")
     parser.add_argument("--seconds", type=float, default=WAIT_S, help="how long to listen (default 3)")
-    parser.add_argument("--active", action="store_true", help="ask all 127 node ids what they are")
+    parser.add_argument("--active", action="store_true", help="query all 127 node ids")
     parser.add_argument(
         "--eds", type=Path, action="append", default=[], metavar="DIR", help="folder of EDS files"
     )
     parser.add_argument("--serial", action="append", default=[], metavar="PORT", help="a serial port")
-    parser.add_argument("--json", action="store_true", help="one JSON line a bus or port, for machines")
+    parser.add_argument(
+        "--json", action="store_true", help="print one JSON line per bus or port, for programs"
+    )
     return parser
 
 

@@ -27,7 +27,7 @@ def main(arguments: Sequence[str]) -> int:
             prog="gwrms sensor",
             usage="gwrms sensor PORT [--baud N] [--seconds N] [--json]\n"
             "       gwrms sensor record|replay|decode …  (each explains itself with --help)",
-            description="Says what is on a serial port, how well it fits, and shows it live.",
+            description="Identify the sensor on a serial port, and show its values live.",
             epilog=MORE,
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )

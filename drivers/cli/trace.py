@@ -16,7 +16,7 @@ from drivers.bus.settings import CanSettings
 from drivers.cli.buses import named
 from drivers.cli.trace_known import Known
 from drivers.cli.trace_load import Meters, show_load
-from drivers.trace.decoding import Decoder, Kind, Line
+from drivers.trace.decoding import DecodedFrame, Decoder, Kind
 from drivers.trace.devices import Devices
 from drivers.trace.files import SUFFIXES, Captured, Put, is_file, writing
 from drivers.trace.merged import merged
@@ -42,7 +42,7 @@ _IDENTIFIER = 0x1FFF_FFFF
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="gwrms trace",
-        description="Shows the frames of CAN buses or of recordings, decoded by EDS. Only listens.",
+        description="Show the frames of CAN buses or recordings, decoded by EDS. Only listens.",
         epilog=MORE,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
@@ -54,17 +54,21 @@ def _parser() -> argparse.ArgumentParser:
         help="can0, INTERFACE:CHANNEL of python-can, a robot's file; or FILE.log, FILE.pcap; or several",
     )
     parser.add_argument(
-        "--robot", type=Path, metavar="FILE", help="robot's file that names nodes and EDS files"
+        "--robot", type=Path, metavar="FILE", help="robot's file with names of nodes and EDS files"
     )
     parser.add_argument(
         "--eds",
         action="append",
         default=[],
         metavar="NODE=FILE",
-        help="EDS or DCF of a node (again for others); can1/5=FILE: on that interface alone",
+        help="EDS or DCF of a node (repeatable); can1/5=FILE: on that interface only",
     )
     parser.add_argument(
-        "--node", action="append", default=[], metavar="NODE", help="only this one, by id or name (or again)"
+        "--node",
+        action="append",
+        default=[],
+        metavar="NODE",
+        help="only this node, by id or name (repeatable)",
     )
     parser.add_argument(
         "--kind", action="append", default=[], metavar="KIND", help=f"only these: {', '.join(Kind)}"
@@ -76,15 +80,17 @@ def _parser() -> argparse.ArgumentParser:
         metavar="OBJECT",
         help="only 0x6041, 0x1018:4 or '*position*'",
     )
-    parser.add_argument("--write", type=Path, metavar="FILE", help="what is shown also to *.log or *.pcap")
-    parser.add_argument("--quiet", action="store_true", help="show nothing: with --write")
     parser.add_argument(
-        "--load", action="store_true", help="a table a second: frames and load by node and kind"
+        "--write", type=Path, metavar="FILE", help="also write the frames shown to *.log or *.pcap"
     )
-    parser.add_argument("--bitrate", type=int, help="bit/s, for the load, and for interfaces opened with one")
+    parser.add_argument("--quiet", action="store_true", help="with --write: show nothing")
+    parser.add_argument(
+        "--load", action="store_true", help="print a table per second: frames and load by node and kind"
+    )
+    parser.add_argument("--bitrate", type=int, help="bit/s, for the load, and for interfaces that need one")
     parser.add_argument("--seconds", type=float, metavar="N", help="end after N seconds (default: Ctrl-C)")
-    parser.add_argument("--count", type=int, metavar="N", help="end after N frames that are shown")
-    parser.add_argument("--json", action="store_true", help="one JSON line a frame, or a table")
+    parser.add_argument("--count", type=int, metavar="N", help="end after N frames shown")
+    parser.add_argument("--json", action="store_true", help="print one JSON line per frame or table")
     return parser
 
 
@@ -132,7 +138,7 @@ def _live(buses: Mapping[str, CanSettings]) -> Batches:
 
 
 def _robot(sources: Sequence[str]) -> Path | None:
-    """A robot's file among what is traced."""
+    """Return a robot's file among what is traced."""
     return next((Path(name) for name in sources if name.endswith(".toml")), None)
 
 
@@ -182,7 +188,7 @@ class Shown:
         self._with_interface = with_interface
 
     def line(self, captured: Captured) -> str | None:
-        """What is shown of a frame; `None` where it is not wanted."""
+        """Return what is shown of a frame; `None` where it is not wanted."""
         interface = captured.interface
         if interface not in self._decoders:
             self._decoders[interface] = Decoder(Devices(self._known.on(interface)))
@@ -191,7 +197,7 @@ class Shown:
             return None
         return _json(line) if self._as_json else self._text(line)
 
-    def _text(self, line: Line) -> str:
+    def _text(self, line: DecodedFrame) -> str:
         captured = line.captured
         moment = datetime.datetime.fromtimestamp(captured.stamp_ns // 10**9).astimezone()
         clock = f"{moment:%H:%M:%S}.{captured.stamp_ns % 10**9 // 1000:06d}"
@@ -228,7 +234,7 @@ def _wanted(options: argparse.Namespace, known: Known) -> list[Wanted]:
     return found
 
 
-def _json(line: Line) -> str:
+def _json(line: DecodedFrame) -> str:
     captured = line.captured
     told: dict[str, Any] = {
         "t": captured.stamp_ns / 1e9,

@@ -28,7 +28,7 @@ class Meters:
         meter.take(captured)
 
     def told(self, seconds: float) -> dict[str, Load]:
-        """What came since the last time, which was so long ago, by interface; begins anew."""
+        """Return what came since the last time, which was so long ago, by interface; begins anew."""
         return {name: meter.told(seconds) for name, meter in self._by_interface.items()}
 
 
@@ -64,7 +64,7 @@ def _json(interface: str, load: Load) -> str:
 
 
 def table(load: Load, names: Mapping[int, str]) -> Iterator[str]:
-    """The shares, the most first, and their sum."""
+    """Yield the shares, the most first, and their sum."""
     yield f"{'NODE':<14} {'KIND':<12} {'FRAMES/S':>9} {'kbit/s':>8} {'LOAD':>7}"
     for share in load.shares:
         node = "" if share.node_id is None else names.get(share.node_id, f"node {share.node_id}")

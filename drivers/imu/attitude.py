@@ -60,7 +60,7 @@ class ComplementaryFilter:
 
 
 def _turn(angular_velocity: Vector, seconds: float) -> Quaternion:
-    """The rotation of a constant rate over a time."""
+    """Return the rotation of a constant rate over a time."""
     x, y, z = angular_velocity
     rate = math.hypot(x, y, z)
     half = rate * seconds / 2
@@ -69,7 +69,7 @@ def _turn(angular_velocity: Vector, seconds: float) -> Quaternion:
 
 
 def _upright(up: Vector) -> Quaternion | None:
-    """The attitude without heading in which the sensor measures `up` (any length)."""
+    """Return the attitude without heading in which the sensor measures `up` (any length)."""
     x, y, z = up
     if math.hypot(x, y, z) < 0.1 * STANDARD_GRAVITY:
         return None

@@ -2,13 +2,13 @@
 
 import msgspec
 
+from drivers.build_context import BuildContext
 from drivers.imu.settings import MountedSettings, wiring_of
 from drivers.imu.trunk import TrunkImu
-from drivers.site import Site
 
 
-def build_imu(name: str, settings: MountedSettings, site: Site) -> TrunkImu:
-    """The IMU that `settings` describe.
+def build_imu(name: str, settings: MountedSettings, site: BuildContext) -> TrunkImu:
+    """Return the IMU that `settings` describe.
 
     Raises:
         SettingsError: they contradict themselves or the device's file.

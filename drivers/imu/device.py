@@ -3,15 +3,15 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+from drivers.frame_shares import beside
 from drivers.imu.formats import FORMATS
 from drivers.imu.frame import ImuFrame, moments
 from drivers.imu.settings import ImuSettings
 from drivers.imu.trunk import TrunkImu
 from drivers.line import Line, Recognise, unrecognised
 from drivers.losses import Losses
+from drivers.reader_stalls import ReaderStalls
 from drivers.samples import Quality, State
-from drivers.shares import beside
-from drivers.standstill import Standstill
 
 
 class Imu(TrunkImu):
@@ -23,7 +23,7 @@ class Imu(TrunkImu):
         settings: ImuSettings,
         beside: Path | None = None,
         recognise: Recognise = unrecognised,
-        standstill: Standstill | None = None,
+        standstill: ReaderStalls | None = None,
     ) -> None:
         imu_format = FORMATS[settings.format]
         super().__init__(name, settings, imu_format.conventions, settings.attitude, beside)
@@ -66,7 +66,7 @@ class Imu(TrunkImu):
         self._take(frame, stamp_ns)
 
     def disconnected(self) -> None:
-        """The port went away."""
+        """Note that the port went away."""
         self._forget()
         self._losses.restart()
         self._clock = self._clock_spec.make() if self._clock_spec else None

@@ -11,22 +11,22 @@ from drivers.imu.settings import CanImuSettings, ImuSettings, NodeImuSettings
 from drivers.parsing import Parser
 
 if TYPE_CHECKING:
+    from drivers.build_context import BuildContext
     from drivers.imu.trunk import TrunkImu
-    from drivers.site import Site
 
-    Build = Callable[[str, Any, Site], TrunkImu]  # name, settings of its kind, site
+    Build = Callable[[str, Any, BuildContext], TrunkImu]  # name, settings of its kind, site
 
 
 # The components are imported by who builds one: they need what is here.
 
 
-def _on_port(name: str, settings: ImuSettings, site: "Site") -> "TrunkImu":
+def _on_port(name: str, settings: ImuSettings, site: "BuildContext") -> "TrunkImu":
     from drivers.imu.device import Imu
 
     return Imu(name, settings, site.folder, site.recognise, site.standstill)
 
 
-def _on_bus(name: str, settings: CanImuSettings, site: "Site") -> "TrunkImu":
+def _on_bus(name: str, settings: CanImuSettings, site: "BuildContext") -> "TrunkImu":
     from drivers.imu.can_device import CanImu
 
     return CanImu(name, settings, site.buses[settings.bus], site.folder)

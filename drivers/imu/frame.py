@@ -48,7 +48,10 @@ def moments(frames: Sequence[ImuFrame]) -> list[ImuFrame]:
 
 
 def _together(group: list[ImuFrame]) -> ImuFrame:
-    """What frames of different kinds say that a trunk needs; where two say the same, the later one counts."""
+    """Return what frames of different kinds say that a trunk needs.
+
+    Where two say the same, the later one counts.
+    """
     acceleration = rate = angles = orientation = temperature = None
     z_down = False
     for frame in group:
@@ -80,7 +83,7 @@ _PARTS = {
 
 
 def flat(frame: ImuFrame) -> dict[str, object]:
-    """What `frame` carries, by the channels' names; angles in rad as `roll`, `pitch`, `yaw`."""
+    """Return what `frame` carries, by the channels' names; angles in rad as `roll`, `pitch`, `yaw`."""
     line: dict[str, object] = {"frame": frame.kind}
     for number in ("sequence", "ticks"):
         if (value := getattr(frame, number)) is not None:

@@ -13,6 +13,7 @@ from drivers.bus.node import shared_node
 from drivers.bus.pdo import Tpdo
 from drivers.bus.sdo.channel import SdoChannel
 from drivers.errors import SettingsError
+from drivers.frame_shares import beside
 from drivers.imu import slopes
 from drivers.imu.canopen.cia410 import InclinometerSettings
 from drivers.imu.conventions import Conventions
@@ -20,7 +21,6 @@ from drivers.imu.motion import TILT
 from drivers.imu.slopes import MappedSlope, SlopePlan
 from drivers.imu.trunk import TrunkImu
 from drivers.samples import Quality, State
-from drivers.shares import beside
 from eds import Description
 
 
@@ -37,7 +37,7 @@ class Inclinometer(TrunkImu):
         description: Description,
         beside: Path | None = None,
     ) -> None:
-        """Raises `SettingsError` also where the file describes one axis only, or shares its node wrongly."""
+        """Build it; raises `SettingsError` also for a file with one axis only, or a wrongly shared node."""
         super().__init__(name, settings, Conventions(), "device", beside)
         if not slopes.has_two_axes(description):
             raise SettingsError(
@@ -127,7 +127,7 @@ class Inclinometer(TrunkImu):
         self._received(plan, time.monotonic_ns(), counts)
 
     def _received(self, plan: SlopePlan, stamp_ns: int, counts: dict[int, int]) -> None:
-        """Some slopes in counts; with both at hand, a frame."""
+        """Take slopes in counts; with both present, make a frame."""
         with self._lock:
             if self._plan is not plan:
                 return

@@ -42,7 +42,7 @@ ZERO_FRAMES = 200  # about a second of the fastest device
 
 
 def channels(name: str, count: int = len(UNITS)) -> tuple[Channel, ...]:
-    """The channels of the IMU `name`: all, or the first `count`, tilt before all else."""
+    """Return the channels of the IMU `name`: all, or the first `count`, tilt before all else."""
     quantities = list(UNITS.items())[:count]
     return tuple(Channel(f"{name}.{quantity}", name, quantity, unit) for quantity, unit in quantities)
 
@@ -104,13 +104,13 @@ class TrunkMotion:
         self._sensor_from_trunk = rotation.conjugate(self._trunk_from_sensor)
 
     def restart(self) -> None:
-        """The stream begins anew."""
+        """Restart with the stream."""
         self._filter.restart()
         self.recent.clear()
         self._raw_from_ns: int | None = None  # when a device without attitude is known to have none to send
 
     def felt(self, frame: ImuFrame, stamp_ns: int) -> Felt:
-        """What `frame`, taken at `stamp_ns`, says of the trunk."""
+        """Return what `frame`, taken at `stamp_ns`, says of the trunk."""
         indices: tuple[int, ...] = ()
         values: tuple[float, ...] = ()
         acceleration = angular_velocity = up = None
@@ -134,7 +134,7 @@ class TrunkMotion:
         return Felt(indices, values, acceleration, angular_velocity, up)
 
     def ups_as_mounted(self) -> list[Vector]:
-        """The world's up in the axes of the trunk without a zero, of the last second or so."""
+        """Return the world's up in the axes of the trunk without a zero, of the last second or so."""
         mounted = rotation.matrix(self._mounted_from_sensor)
         return [rotation.transform(mounted, up) for up in self.recent]
 
@@ -150,7 +150,7 @@ class TrunkMotion:
         return self._filter.update(stamp_ns, frame.angular_velocity, frame.acceleration)
 
     def _device_attitude(self, frame: ImuFrame, stamp_ns: int) -> Quaternion | None:
-        """What the device says itself: its quaternion, else its angles."""
+        """Return what the device says itself: its quaternion, else its angles."""
         device: Quaternion | None = None
         if frame.orientation is not None:
             device = rotation.normalised(frame.orientation)

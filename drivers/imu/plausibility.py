@@ -3,8 +3,8 @@
 import math
 from collections import deque
 
+from drivers.findings import FindingState
 from drivers.imu.rotation import Vector
-from drivers.noted import Noted
 
 STANDARD_GRAVITY = 9.80665
 SETTLED_S = 10.0
@@ -17,7 +17,7 @@ FROZEN_S = 5.0
 PERIOD_NS = 39_000_000  # for slow means, faster frames are left out
 
 
-class ImuCheck(Noted):
+class ImuCheck(FindingState):
     """Watches one IMU in trunk axes."""
 
     def __init__(self, name: str) -> None:
@@ -26,7 +26,7 @@ class ImuCheck(Noted):
         self.restart()
 
     def restart(self) -> None:
-        """The stream begins anew."""
+        """Restart with the stream."""
         self.clear()
         self._judged_ns = 0
         self._force: Vector | None = None  # specific force, slow mean
@@ -41,7 +41,7 @@ class ImuCheck(Noted):
     def update(
         self, stamp_ns: int, acceleration: Vector | None, angular_velocity: Vector | None, up: Vector | None
     ) -> None:
-        """What one frame carries: m/s², rad/s, and the direction of up by the attitude."""
+        """Take the values of one frame: m/s², rad/s, and the direction of up by the attitude."""
         self._now_ns = stamp_ns
         if self._began_ns is None:
             self._began_ns = self._changed_ns = stamp_ns
@@ -69,7 +69,7 @@ class ImuCheck(Noted):
             self.clear()
 
     def _judge(self) -> tuple[str, str] | None:
-        """What is wrong with what it measures, and what to check."""
+        """Return what is wrong with what it measures, and what to check."""
         if len(self._fast_ns) == TOO_FAST and self._now_ns - self._fast_ns[0] < TOO_FAST_IN_S * 1e9:
             return (
                 f"{self._name} reports turns faster than {FASTEST:.0f} rad/s, which no trunk does",
@@ -101,7 +101,7 @@ class ImuCheck(Noted):
 
 
 def _slow(mean: Vector | None, value: Vector, step_s: float) -> Vector:
-    """The mean moved towards `value`, as a low-pass of the time constant does."""
+    """Return the mean moved towards `value`, as a low-pass of the time constant does."""
     if mean is None:
         return value
     share = min(1.0, step_s / TIME_CONSTANT_S)

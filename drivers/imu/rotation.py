@@ -13,7 +13,7 @@ IDENTITY: Quaternion = (1.0, 0.0, 0.0, 0.0)
 
 
 def multiply(p: Quaternion, q: Quaternion) -> Quaternion:
-    """The rotation that does `q` first, then `p`."""
+    """Return the rotation that does `q` first, then `p`."""
     pw, px, py, pz = p
     qw, qx, qy, qz = q
     return (
@@ -25,7 +25,7 @@ def multiply(p: Quaternion, q: Quaternion) -> Quaternion:
 
 
 def conjugate(q: Quaternion) -> Quaternion:
-    """The rotation back."""
+    """Return the rotation back."""
     w, x, y, z = q
     return (w, -x, -y, -z)
 
@@ -40,7 +40,7 @@ def normalised(q: Quaternion) -> Quaternion | None:
 
 
 def matrix(q: Quaternion) -> Matrix:
-    """The rotation matrix of the unit quaternion `q`."""
+    """Return the rotation matrix of the unit quaternion `q`."""
     w, x, y, z = q
     return (
         (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
@@ -57,7 +57,7 @@ def transform(m: Matrix, v: Vector) -> Vector:
 
 
 def up(q: Quaternion) -> Vector:
-    """The direction of the world's z in the axes of the body whose attitude (world from body) is `q`."""
+    """Return the direction of the world's z in body axes, for attitude `q` (world from body)."""
     w, x, y, z = q
     return (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y))
 
@@ -85,7 +85,7 @@ def from_yaw_pitch_roll(roll: float, pitch: float, yaw: float) -> Quaternion:
 
 
 def from_axes(axes: tuple[str, str, str]) -> Quaternion:
-    """The rotation from sensor to body where `axes` name the sensor's axis along the body's x, y and z.
+    """Return the rotation from sensor to body; `axes` are the sensor's along the body's x, y and z.
 
     Raises:
         ValueError: they do not name three different axes of a right-handed frame.
@@ -101,7 +101,7 @@ def from_axes(axes: tuple[str, str, str]) -> Quaternion:
 
 
 def from_matrix(m: Matrix) -> Quaternion:
-    """The unit quaternion of the rotation matrix `m` (Shepperd's method: the largest part first)."""
+    """Return the unit quaternion of the rotation matrix `m` (Shepperd's method: the largest part first)."""
     (a, b, c), (d, e, f), (g, h, i) = m
     parts = (1 + a + e + i, 1 + a - e - i, 1 - a + e - i, 1 - a - e + i)
     largest = max(range(4), key=parts.__getitem__)

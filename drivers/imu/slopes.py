@@ -79,7 +79,7 @@ def make_plan(sdo: SdoChannel, description: Description, poll_hz: float) -> Slop
 
 
 def up(longitudinal: float, lateral: float, directions: tuple[int, int]) -> Vector:
-    """The direction of up in the sensor's axes, from the angles of its x and y axis against the horizon."""
+    """Return up in the sensor's axes, from the angles of its x and y axis to the horizon."""
     x = -directions[0] * math.sin(longitudinal)
     y = -directions[1] * math.sin(lateral)
     z = math.sqrt(max(0.0, 1.0 - x * x - y * y))
@@ -88,12 +88,15 @@ def up(longitudinal: float, lateral: float, directions: tuple[int, int]) -> Vect
 
 
 def frame(longitudinal: float, lateral: float, directions: tuple[int, int]) -> ImuFrame:
-    """What the two slopes (rad) say."""
+    """Return what the two slopes (rad) say."""
     return ImuFrame("slopes", up=up(longitudinal, lateral, directions))
 
 
 def _chosen(sdo: SdoChannel, enabled: list[Tpdo]) -> tuple[SlopePair, bool]:
-    """The pair to read, and whether TPDOs keep it fresh; else one that they bring, else one that answers."""
+    """Return the pair to read, and whether TPDOs keep it fresh.
+
+    Else one that they bring, else one that answers.
+    """
     for tpdos, fresh in (([one for one in enabled if one.cyclic], True), (enabled, False)):
         for pair in PAIRS:
             if set(pair.objects) <= {place.index for tpdo in tpdos for place in tpdo.objects}:

@@ -5,6 +5,8 @@ from pathlib import Path
 
 from drivers.calibration_file import mark
 from drivers.component import Kind
+from drivers.findings import active_findings
+from drivers.frame_shares import beside
 from drivers.freshness import Freshness, silence_text
 from drivers.imu import zero
 from drivers.imu.conventions import Conventions
@@ -14,9 +16,7 @@ from drivers.imu.plausibility import ImuCheck
 from drivers.imu.rotation import IDENTITY, Quaternion, Vector
 from drivers.imu.settings import Attitude, MountedSettings
 from drivers.latest import Latest
-from drivers.noted import found
 from drivers.samples import Quality, State
-from drivers.shares import beside
 
 
 class TrunkImu:
@@ -76,11 +76,11 @@ class TrunkImu:
         return measured
 
     def ups_as_mounted(self) -> list[Vector]:
-        """The world's up in the axes of the trunk without a zero, of the last second or so."""
+        """Return the world's up in the axes of the trunk without a zero, of the last second or so."""
         return self._motion.ups_as_mounted()
 
     def _take(self, frame: ImuFrame, stamp_ns: int) -> None:
-        """A frame that was taken at `stamp_ns`."""
+        """Take a frame of `stamp_ns`."""
         felt = self._motion.felt(frame, stamp_ns)
         if felt.indices:
             self.check.update(stamp_ns, felt.acceleration, felt.angular_velocity, felt.up)
@@ -100,5 +100,5 @@ class TrunkImu:
         counters = {**counters, "stale": self._freshness.stale}
         if state is not State.OK:
             return Quality(state, age_ms, silence or silence_text(age_ms), counters)
-        findings = found([self.check])
+        findings = active_findings([self.check])
         return beside(Quality(State.FAULT if findings else state, age_ms, None, counters), findings, now_ns)

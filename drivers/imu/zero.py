@@ -31,7 +31,7 @@ class Zero(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
 
 
 def measure(ups: Sequence[Vector]) -> Quaternion:
-    """The zero from directions of up (unit vectors, trunk axes) of somebody who stands upright and still.
+    """Return the zero from directions of up (unit vectors, trunk axes) of a person upright and still.
 
     Raises:
         NotUpright: nothing was measured, the trunk moved, or it was further from upright than a mounting is.
@@ -61,7 +61,7 @@ def measure(ups: Sequence[Vector]) -> Quaternion:
 
 
 def load(path: Path) -> Quaternion:
-    """The zero in the file at `path`.
+    """Return the zero in the file at `path`.
 
     Raises:
         SettingsError: it cannot be read or is wrong; the message names file and key.
@@ -71,7 +71,7 @@ def load(path: Path) -> Quaternion:
 
 
 def text(zero: Quaternion, taken_utc: str) -> str:
-    """What to write into the file."""
+    """Return what to write into the file."""
     numbers = ", ".join(f"{part:.9f}" for part in zero)
     return (
         "# The trunk's tilt reads zero in the posture in which this was taken.\n"

@@ -4,13 +4,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import cast
 
+from drivers.build_context import BuildContext
 from drivers.component import Component, Kind
 from drivers.insole.device import Insole, layout_of, line_for
 from drivers.insole.settings import InsoleSettings
-from drivers.site import Site
 
 
-def build_insole(name: str, settings: InsoleSettings, site: Site) -> Insole:
+def build_insole(name: str, settings: InsoleSettings, site: BuildContext) -> Insole:
     """One foot; those that name the same port share its line.
 
     Raises:
@@ -46,7 +46,7 @@ def insoles(settings: Mapping[str, InsoleSettings], folder: Path | None = None) 
         SettingsError: a layout or calibration is wrong.
 
     """
-    site = Site((folder or Path()) / "robot.toml")
+    site = BuildContext((folder or Path()) / "robot.toml")
     made = [build_insole(name, one, site) for name, one in settings.items()]
     pair(made)
     return made

@@ -93,7 +93,7 @@ class Cells:
 
 
 def load(path: Path) -> Calibration:
-    """The calibration in the file at `path`.
+    """Return the calibration in the file at `path`.
 
     Raises:
         SettingsError: it cannot be read or is wrong; the message names file and key.

@@ -6,6 +6,8 @@ from pathlib import Path
 from drivers.calibration_file import mark
 from drivers.component import Kind
 from drivers.errors import SettingsError
+from drivers.findings import active_findings
+from drivers.frame_shares import beside, saturated_frames
 from drivers.freshness import Freshness, silence_text
 from drivers.insole import calibration as calibrations
 from drivers.insole import layout as layouts
@@ -20,10 +22,8 @@ from drivers.insole.settings import InsoleSettings
 from drivers.latest import Latest
 from drivers.line import Line, Recognise, unrecognised
 from drivers.losses import Losses
-from drivers.noted import found
+from drivers.reader_stalls import ReaderStalls
 from drivers.samples import Channel, Finding, Quality, State
-from drivers.shares import beside, saturated_frames
-from drivers.standstill import Standstill
 
 USUAL_LAYOUT = "insole-16"
 CONTACT = {0: "in the air", 1: "on the ground"}
@@ -101,7 +101,7 @@ class Insole:
     def quality(self, now_ns: int) -> Quality:
         state, age_ms = self._freshness.state(now_ns)
         if state is State.OK:
-            wrong = (*self._implausible(), *found([self._saturated_share]))
+            wrong = (*self._implausible(), *active_findings([self._saturated_share]))
             state = State.FAULT if self._fault is not None or wrong else state
             findings = (*wrong, *self._losses.findings)
             return beside(Quality(state, age_ms, self._fault, self._counters()), findings, now_ns)
@@ -109,8 +109,8 @@ class Insole:
         return Quality(state, age_ms, silence or silence_text(age_ms), self._counters())
 
     def _implausible(self) -> tuple[Finding, ...]:
-        """The first thing that cannot be, for what else is told follows from it."""
-        return (*self.check.findings, *found((self._feet_check, self._swap_check)))[:1]
+        """Return the first thing that cannot be, for what else is told follows from it."""
+        return (*self.check.findings, *active_findings((self._feet_check, self._swap_check)))[:1]
 
     def received(self, frames: Sequence[InsoleFrame], stamp_ns: int) -> None:
         """Frames of the line; called in the port's thread."""
@@ -138,7 +138,7 @@ class Insole:
         self._update(stamp_ns, self._pressures(frame))
 
     def disconnected(self) -> None:
-        """The port went away: nothing that it said before is true any more."""
+        """Forget all values: the port went away."""
         self.latest.clear()
         self._freshness.disconnected()
         self._fault, self._foreign = None, 0
@@ -219,7 +219,7 @@ class Insole:
 
 
 def layout_of(format_name: str, layout_name: str | None, beside: Path | None = None) -> Layout:
-    """The layout of that name; without one, the device's own, or the usual one.
+    """Return the layout of that name; without one, the device's own, or the usual one.
 
     Raises:
         SettingsError: there is none, or it is wrong; the message names file and key.
@@ -235,9 +235,9 @@ def line_for(
     settings: InsoleSettings,
     layout: Layout,
     recognise: Recognise = unrecognised,
-    standstill: Standstill | None = None,
+    standstill: ReaderStalls | None = None,
 ) -> Line[InsoleFrame]:
-    """The line that `settings` describe.
+    """Return the line that `settings` describe.
 
     Raises:
         SettingsError: the format needs a description that the layout does not have.

@@ -88,7 +88,7 @@ def _with_exponent(
 
 
 def text(fitted: Fit, taken_utc: str) -> str:
-    """The calibration as the file that `calibration = …` names."""
+    """Return the calibration as the file that `calibration = …` names."""
     lines = [f'taken_utc = "{taken_utc}"', f"# fitted to known loads within {fitted.rms_error:.1f} N (rms)"]
     for number, cell in fitted.calibration.cell.items():
         lines += ["", f"[cell.{number}]", f'polarity = "{cell.polarity}"']

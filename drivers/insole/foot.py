@@ -7,5 +7,5 @@ FEET: tuple[Foot, ...] = ("left", "right")
 
 
 def foot_in(name: str) -> Foot | None:
-    """The foot that a component's name begins with."""
+    """Return the foot that a component's name begins with."""
     return next((foot for foot in FEET if name.startswith(foot)), None)

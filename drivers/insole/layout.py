@@ -56,7 +56,7 @@ class Layout(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         return tuple(y * area for _, y, area in self.cells)
 
     def for_foot(self, foot: Foot) -> "Layout":
-        """The same cells on `foot`: as they are, or mirrored."""
+        """Return the same cells on `foot`: as they are, or mirrored."""
         if foot == self.foot:
             return self
         mirrored = tuple((x, -y, area) for x, y, area in self.cells)
@@ -69,7 +69,7 @@ def shipped() -> list[str]:
 
 
 def load(name: str, beside: Path | None = None) -> Layout:
-    """The layout `name`: a shipped name, or a TOML file, looked for in the folder `beside` first.
+    """Return the layout `name`: a shipped name, or a TOML file, looked for in the folder `beside` first.
 
     Raises:
         SettingsError: there is none, or it is wrong; the message names file and key.

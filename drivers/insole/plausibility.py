@@ -7,7 +7,7 @@ import math
 from collections.abc import Sequence
 from typing import cast
 
-from drivers.noted import Noted, found
+from drivers.findings import FindingState, active_findings
 from drivers.samples import Finding
 
 STEPS = 10  # landings that make a window
@@ -58,11 +58,11 @@ class FootCheck:
     def __init__(self, name: str, cells: int) -> None:
         self._name = name
         self._cells = cells
-        self._frozen, self._stepped = Noted(), Noted()
+        self._frozen, self._stepped = FindingState(), FindingState()
         self.restart()
 
     def restart(self) -> None:
-        """The stream begins anew."""
+        """Restart with the stream."""
         self.landings = 0
         self._steps = StepDetector()
         self._frozen.clear()
@@ -96,7 +96,7 @@ class FootCheck:
     @property
     def findings(self) -> tuple[Finding, ...]:
         """What is wrong, with what to check."""
-        return found((self._frozen, self._stepped))
+        return active_findings((self._frozen, self._stepped))
 
     def _judge_frozen(self, stamp_ns: int) -> None:
         since_ns = self._frozen_since_ns
@@ -124,7 +124,7 @@ class FootCheck:
             self._stepped.note(stamp_ns, *wrong)
 
     def _judge(self) -> tuple[str, str] | None:
-        """What the steps of this window have shown, and what to check."""
+        """Return what the steps of this window have shown, and what to check."""
         hardest = max(self._high)
         if self._force_high < LOW_PEAK or self._force_high > HIGH_PEAK:
             most = f"{self._name} measured at most {self._force_high:.0f} N over {STEPS} steps"
@@ -162,7 +162,7 @@ class FootCheck:
         self._jumps = [0] * self._cells
 
 
-class FeetCheck(Noted):
+class FeetCheck(FindingState):
     """Watches one foot against the other: both must step."""
 
     def __init__(self, name: str) -> None:
@@ -189,7 +189,7 @@ class FeetCheck(Noted):
             )
 
 
-class SwapCheck(Noted):
+class SwapCheck(FindingState):
     """Watches the feet's force against the hips: a loaded leg's hip extends, a free leg's hip flexes."""
 
     SETTLED_S = 15.0

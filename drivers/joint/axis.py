@@ -21,7 +21,7 @@ class Axis:
         self.sdo.download(CONTROLWORD + self.offset, 0, controlword.data, timeout_s)
 
     def state(self, timeout_s: float | None = None) -> DriveState | None:
-        """What its statusword says now; `None` for a pattern that the standard does not know."""
+        """Return what its statusword says now; `None` for a pattern that the standard does not know."""
         return drive_state(unsigned(self.read(STATUSWORD, 2, timeout_s=timeout_s)))
 
     def error_code(self) -> int:
@@ -29,11 +29,11 @@ class Axis:
         return unsigned(self.read(ERROR_CODE, 2))
 
     def position(self) -> int:
-        """Counts of 6064h."""
+        """Return counts of 6064h."""
         return int.from_bytes(self.read(POSITION_ACTUAL, 4), "little", signed=True)
 
     def read(self, index: int, size: int, subindex: int = 0, timeout_s: float | None = None) -> bytes:
-        """An object's first `size` bytes: some devices answer with four, whatever the object has."""
+        """Return an object's first `size` bytes: some devices answer with four, whatever the object has."""
         return self.sdo.upload(index + self.offset, subindex, attempts=1, timeout_s=timeout_s)[:size]
 
     def write(self, index: int, data: bytes, subindex: int = 0) -> None:

@@ -49,7 +49,7 @@ STATE_OF: tuple[DriveState | None, ...] = tuple(_decode(bits) for bits in range(
 
 
 def drive_state(statusword: int) -> DriveState | None:
-    """The state in a statusword; `None` for a pattern that the standard does not know."""
+    """Return the state in a statusword; `None` for a pattern that the standard does not know."""
     return STATE_OF[statusword & STATE_BITS]
 
 
@@ -86,7 +86,7 @@ MODES: dict[int, str] = {
 
 
 def option_text(options: dict[int, str], value: int | None) -> str:
-    """An option code in words."""
+    """Return an option code in words."""
     if value is None:
         return "is not told by the device"
     return options.get(value, f"is the vendor's own ({value})")

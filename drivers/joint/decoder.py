@@ -21,7 +21,10 @@ class Decoder:
 
 
 def make_decoder(tpdo: Tpdo, fields: Sequence[Field], statusword: int, state: int) -> Decoder:
-    """A decoder of `fields`; where one is the channel `statusword`, the channel `state` is made of it."""
+    """Return a decoder of `fields`.
+
+    Where one is the channel `statusword`, the channel `state` is made of it.
+    """
     unpack = _finite(unpacker(fields)) if any(one.kind == "real" for one in fields) else unpacker(fields)
     linears = tuple((field.linear.scale, field.linear.offset) for field in fields)
     channels = tuple(field.channel for field in fields)
@@ -50,5 +53,5 @@ def make_decoder(tpdo: Tpdo, fields: Sequence[Field], statusword: int, state: in
 
 
 def _finite(unpack: Unpack) -> Unpack:
-    """A REAL can be no number at all."""
+    """Return a reader of REAL values that gives `None` for NaN and infinity."""
     return lambda data: tuple([raw if math.isfinite(raw) else None for raw in unpack(data)])

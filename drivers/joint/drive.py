@@ -12,9 +12,9 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 
-from drivers.bus.arrivals import Arrivals
 from drivers.bus.bus import CanBus
 from drivers.bus.channels import Chosen, ObjectChannels, channels_of
+from drivers.bus.frame_losses import FrameLosses
 from drivers.bus.frames import EXTENDED, FrameHandler
 from drivers.bus.lengths import Lengths
 from drivers.bus.node import shared_node
@@ -26,7 +26,7 @@ from drivers.errors import DeviceAbort, Mismatch
 from drivers.freshness import Freshness
 from drivers.joint.cia402 import STATE_BITS, STATE_OF, DriveState
 from drivers.joint.decoder import Decoder
-from drivers.joint.plan import Plan, Source, make_plan
+from drivers.joint.plan import Plan, QuantitySource, make_plan
 from drivers.joint.power import PowerDrive
 from drivers.joint.quantities import POSITION, STATE, STATUSWORD, Quantity, channels, quantities
 from drivers.joint.reading import DriveReading, read_drive
@@ -75,7 +75,7 @@ class JointDrive(PowerDrive):
         self._index = {channel.quantity: index for index, channel in enumerate(self.channels)}
         self._freshness = Freshness(settings.stale_after_s, settings.lost_after_s)
         self._watch = JointWatch(self.latest, bus.standstill, description)
-        self._arrivals = Arrivals()
+        self._arrivals = FrameLosses()
         self._plan: Plan | None = None
         self._started = False
         self._lock = threading.RLock()  # the plan and its undoing; values come from two threads
@@ -205,7 +205,7 @@ class JointDrive(PowerDrive):
                 self._undo.append(self.node.worker.repeat(1 / hz, partial(self._poll, deque(polled))))
 
     def _handler(self, decoder: Decoder) -> FrameHandler:
-        """What is done with each frame of a TPDO: the hot path."""
+        """Return what is done with each frame of a TPDO: the hot path."""
         indices, values = decoder.channels, decoder.values
         update, lock = self.latest.update, self._lock
         position = self._index[POSITION] in indices
@@ -225,7 +225,7 @@ class JointDrive(PowerDrive):
 
         return on_frame
 
-    def _poll(self, polled: deque[Source], sdo: SdoChannel) -> None:
+    def _poll(self, polled: deque[QuantitySource], sdo: SdoChannel) -> None:
         """Ask for each; after one that is not answered the next turn begins with the others."""
         for _ in range(len(polled)):
             one, asked_ns = polled[0], time.monotonic_ns()
@@ -242,8 +242,8 @@ class JointDrive(PowerDrive):
         variable = self._description.variable(quantity.index, quantity.subindex)
         return 0 if variable is None else variable.data_type or 0
 
-    def _take(self, one: Source, counts: Number, stamp_ns: int) -> None:
-        """What it answered, as old as the question: nobody knows how long the answer has waited."""
+    def _take(self, one: QuantitySource, counts: Number, stamp_ns: int) -> None:
+        """Take the answer, as old as the question: nobody knows how long it has waited."""
         indices: tuple[int, ...] = (one.channel,)
         values: tuple[float | None, ...] = (counts * one.linear.scale + one.linear.offset,)
         if one.quantity.name == STATUSWORD:
@@ -259,7 +259,7 @@ class JointDrive(PowerDrive):
     # What is wrong, in words.
 
     def _notes(self, now_ns: int, findings: tuple[Finding, ...]) -> Iterator[str | None]:
-        """What explains something comes before what it explains."""
+        """Yield what explains something comes before what it explains."""
         plan = self._plan
         yield self._watch.held_off.words
         yield from () if plan is None else plan.contradictions
@@ -286,7 +286,7 @@ class JointDrive(PowerDrive):
         return "the drive is in fault and does not say why (no EMCY was seen, 603Fh is empty)"
 
     def _emcy_text(self, state: State, now_ns: int) -> str | None:
-        """What a drive reports that goes on all the same."""
+        """Return what a drive reports that goes on all the same."""
         emcy = self.node.life.active_emcy
         if emcy is None or state is State.LOST or self._drive_state(now_ns) in _IN_FAULT:
             return None

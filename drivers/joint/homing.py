@@ -77,7 +77,7 @@ class Progress(Enum):
 
 
 def progress(statusword: int) -> Progress:
-    """What a statusword says of homing; true only while the axis is enabled in that mode."""
+    """Return what a statusword says of homing; true only while the axis is enabled in that mode."""
     error, attained, reached = (statusword >> bit & 1 for bit in (13, 12, 10))
     return Progress.RESERVED if error and attained else Progress(error << 2 | attained << 1 | reached)
 
@@ -114,7 +114,7 @@ class Seen:
 
 
 def offered(number: Number, description: Description, offset: int) -> tuple[int, ...]:
-    """The methods of METHODS that the drive has: by 60E3h, else those within its file's limits of 6098h.
+    """Return the drive's methods of METHODS: by 60E3h, else by its file's limits of 6098h.
 
     Those that move nothing come first. None where the drive says that it has no such mode (6502h). Raises
     what `number` does.
@@ -160,7 +160,10 @@ def set_up(axis: Axis, setup: Setup) -> None:
 
 
 def mode_of(axis: Axis) -> bytes:
-    """The mode of operation that was asked of it (6060h): 6061h may show another while it has no power."""
+    """Return the mode of operation that was asked of it (6060h).
+
+    6061h may show another while it has no power.
+    """
     try:
         return axis.read(MODE, 1)
     except DeviceAbort:

@@ -15,7 +15,7 @@ MIN_BITS = 8
 
 
 @dataclass(frozen=True, slots=True)
-class Source:
+class QuantitySource:
     """A quantity with the channel and the scaling that are its own."""
 
     quantity: Quantity
@@ -28,8 +28,8 @@ class Plan:
     """How a joint is read, and what an integrator should know about it."""
 
     decoders: tuple[tuple[Tpdo, Decoder], ...]
-    polled_often: tuple[Source, ...]  # position and statusword that no TPDO brings
-    polled_seldom: tuple[Source, ...]  # all else, and what TPDOs bring only when it changes
+    polled_often: tuple[QuantitySource, ...]  # position and statusword that no TPDO brings
+    polled_seldom: tuple[QuantitySource, ...]  # all else, and what TPDOs bring only when it changes
     contradictions: tuple[str, ...]  # of the file and the drive
     notes: tuple[str, ...]
     position_from: Tpdo | None
@@ -39,7 +39,7 @@ def make_plan(settings: JointSettings, found: tuple[Quantity, ...], reading: Dri
     """Decode every enabled TPDO; poll what none of them brings, or keeps fresh."""
     linears = scalings(settings, reading.scaling)
     wanted = {
-        (q.index, q.subindex): Source(q, channel, linear)
+        (q.index, q.subindex): QuantitySource(q, channel, linear)
         for channel, q in enumerate(found)
         if (linear := _linear(q, linears)) is not None
     }
@@ -67,8 +67,11 @@ def make_plan(settings: JointSettings, found: tuple[Quantity, ...], reading: Dri
     )
 
 
-def _fields(tpdo: Tpdo, wanted: Mapping[tuple[int, int], Source]) -> list[Field]:
-    """What this TPDO carries of what is wanted, as wide as its type: a part of it would be another number."""
+def _fields(tpdo: Tpdo, wanted: Mapping[tuple[int, int], QuantitySource]) -> list[Field]:
+    """Return what this TPDO carries of what is wanted, as wide as its type.
+
+    A part of it would be another number.
+    """
     return [
         Field(one.channel, mapped.at, mapped.bits, one.quantity.kind, one.linear)
         for mapped in tpdo.objects
@@ -80,7 +83,7 @@ def _fits(mapped: MappedObject, quantity: Quantity) -> bool:
     return mapped.bits == quantity.bits or (quantity.bits is None and mapped.bits >= MIN_BITS)
 
 
-def _width_notes(reading: DriveReading, wanted: Mapping[tuple[int, int], Source]) -> Iterator[str]:
+def _width_notes(reading: DriveReading, wanted: Mapping[tuple[int, int], QuantitySource]) -> Iterator[str]:
     for tpdo in reading.tpdos:
         for mapped in tpdo.objects:
             one = wanted.get((mapped.index, mapped.subindex))
@@ -92,7 +95,7 @@ def _width_notes(reading: DriveReading, wanted: Mapping[tuple[int, int], Source]
 
 
 def _bringer(channel: int, mapped: Sequence[tuple[Tpdo, list[Field]]]) -> Tpdo | None:
-    """The TPDO that brings a channel; one that comes cyclically rather than one that does not."""
+    """Return the TPDO that brings a channel; one that comes cyclically rather than one that does not."""
     bringers = [tpdo for tpdo, fields in mapped if any(field.channel == channel for field in fields)]
     return next((tpdo for tpdo in bringers if tpdo.cyclic), bringers[0] if bringers else None)
 
@@ -109,7 +112,9 @@ def _unscaled_notes(found: tuple[Quantity, ...], linears: Mapping[str, Linear | 
     ]
 
 
-def _polling_notes(settings: JointSettings, polled: tuple[Source, ...], tpdos: tuple[Tpdo, ...]) -> list[str]:
+def _polling_notes(
+    settings: JointSettings, polled: tuple[QuantitySource, ...], tpdos: tuple[Tpdo, ...]
+) -> list[str]:
     if not polled:
         return []
     names = [one.quantity.name for one in polled]

@@ -8,8 +8,8 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from drivers.joint.mirror import MirrorCheck
-from drivers.noted import Noted, found
+from drivers.findings import FindingState, active_findings
+from drivers.joint.mirror_check import MirrorCheck
 from drivers.samples import Finding
 
 FROZEN_S = 0.5
@@ -49,7 +49,7 @@ class Motion:
     enabled: bool
 
 
-class FrozenCheck(Noted):
+class FrozenCheck(FindingState):
     """The position stays the same to the count although the joint is moved, or is to move."""
 
     def __init__(self) -> None:
@@ -112,7 +112,7 @@ class FrozenCheck(Noted):
             )
 
 
-class JumpCheck(Noted):
+class JumpCheck(FindingState):
     """The position changes from one sample to the next by more than the joint's speed explains.
 
     Across a gap in sampling, ours or the drive's, nobody knows its speed: what it can have gone at its
@@ -172,7 +172,7 @@ def _explained(before: Motion, now: Motion, way: float, step_s: float) -> float:
     return MARGIN * along * (step_s + LATE_S) + back * step_s / 2
 
 
-class LoadedCheck(Noted):
+class LoadedCheck(FindingState):
     """High torque for a long time without motion: the joint is blocked, or its encoder does not tell."""
 
     def __init__(self) -> None:
@@ -223,14 +223,14 @@ class JointCheck:
         self.mirror = MirrorCheck(self._name, other)
 
     def restart(self) -> None:
-        """What was seen before is of another life of the drive."""
+        """Forget everything seen before the drive's restart."""
         for check in self._own:
             check.restart()
         if self.mirror is not None:
             self.mirror.restart()
 
     def skip(self) -> None:
-        """What came last may have waited, or nobody has looked: how it moved until now is not known."""
+        """Forget the motion until now: samples may have waited, or nobody has looked."""
         self._jump.skip()
 
     @property
@@ -239,7 +239,7 @@ class JointCheck:
         return self._jump.was_gap
 
     def update(self, now: Motion, other: Callable[[], float | None]) -> None:
-        """What is known now; a position that is as old as the last time says nothing new."""
+        """Take the present values; a position as old as the last one is ignored."""
         if now.stamp_ns == self._last_ns:
             self._jump.was_gap = False
             return
@@ -254,4 +254,4 @@ class JointCheck:
     @property
     def findings(self) -> tuple[Finding, ...]:
         """What is wrong, with what to check."""
-        return found(self._own if self.mirror is None else (*self._own, self.mirror))
+        return active_findings(self._own if self.mirror is None else (*self._own, self.mirror))

@@ -136,7 +136,7 @@ class PowerDrive:
         return Axis(sdo, self._offset)
 
     def _errand(self, timeout_s: float, wanted: Callable[[], bool]) -> Errand:
-        """It ends with the next stop; one that was asked for before this began is the caller's to know."""
+        """Return an errand that ends with the next stop. Earlier stops are the caller's responsibility."""
         last_stop = self._last_stop
         counts_per_turn = self.settings.counts_per_revolution * self.settings.gear_ratio
         return Errand(lambda: self._last_stop is last_stop and wanted(), timeout_s, counts_per_turn)

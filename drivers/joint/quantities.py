@@ -55,7 +55,7 @@ REQUIRED = ((0x6041, "statusword"), (0x6064, "position actual value"))
 
 
 def quantities(description: Description, axis: int) -> tuple[Quantity, ...]:
-    """What this drive has of what a joint can tell; raises `EdsError` where it cannot be a joint."""
+    """Return what this drive has of what a joint can tell; raises `EdsError` where it cannot be a joint."""
     offset = axis * AXIS_OFFSET
     description.require(
         [(index + offset, name) for index, name in REQUIRED], "a joint" if axis == 0 else f"axis {axis}"
@@ -66,7 +66,7 @@ def quantities(description: Description, axis: int) -> tuple[Quantity, ...]:
 
 
 def channels(component: str, found: tuple[Quantity, ...]) -> tuple[Channel, ...]:
-    """The channels of a joint: one a quantity, in their order, and its state last."""
+    """Return the channels of a joint: one a quantity, in their order, and its state last."""
     return (
         *(Channel(f"{component}.{q.name}", component, q.name, q.unit, q.enum) for q in found),
         Channel(f"{component}.{STATE}", component, STATE, "", STATE_WORDS),
@@ -74,7 +74,7 @@ def channels(component: str, found: tuple[Quantity, ...]) -> tuple[Channel, ...]
 
 
 def _makers(description: Description) -> Iterator[Quantity]:
-    """What CiA 402 has no object for, or what not every drive has there, by the product's profile."""
+    """Yield what CiA 402 has no object for, or what not every drive has there, by the product's profile."""
     profile = profile_of(description)
     if profile is None:
         return
@@ -92,7 +92,7 @@ def _described(quantity: Quantity, description: Description) -> bool:
 
 
 def _as_described(quantity: Quantity, description: Description) -> Quantity:
-    """The number as the device's own data type has it."""
+    """Return the number as the device's own data type has it."""
     variable = description.variable(quantity.index, quantity.subindex)
     data_type = None if variable is None else DATA_TYPES.get(variable.data_type or 0)
     kinds = ("signed", "unsigned") if quantity.name == STATUSWORD else ("signed", "unsigned", "real")

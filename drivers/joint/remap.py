@@ -77,7 +77,7 @@ def free_tpdos(tpdos: Collection[Tpdo], node_id: int, taken: Collection[int]) ->
 
 
 def frames(first: Sequence[Entry], more: Sequence[Entry]) -> Iterator[tuple[Entry, ...]]:
-    """What goes into which frame: `first` with what fits beside it, then the rest, in its order."""
+    """Yield what goes into which frame: `first` with what fits beside it, then the rest, in its order."""
     left, frame = list(more), list(first)
     while frame:
         for one in list(left):
@@ -129,7 +129,7 @@ def _map(sdo: SdoChannel, description: Description, free: Free, entries: Sequenc
 
 
 def _as_it_is(sdo: SdoChannel, description: Description, tpdo: Tpdo) -> list[_Write]:
-    """What makes the TPDO what it is now, in the order in which it is to be written (CiA 301 §7.5.2.36)."""
+    """Return the writes that restore the TPDO, in their order (CiA 301 §7.5.2.36)."""
     parameter, mapping = TPDO_PARAMETER + tpdo.number - 1, TPDO_MAPPING + tpdo.number - 1
     cob_id = sdo.upload(parameter, 1)
     count = sdo.upload(mapping, 0)[:1]
@@ -158,7 +158,7 @@ def _upload(sdo: SdoChannel, index: int, subindex: int) -> bytes | None:
 def _write_all(
     sdo: SdoChannel, description: Description, tpdo: Tpdo, cob_id: int, entries: Sequence[Entry], ms: int
 ) -> str:
-    """Returns what makes it come, in words."""
+    """Write the mapping; return the trigger of the TPDO in words."""
     parameter, mapping = TPDO_PARAMETER + tpdo.number - 1, TPDO_MAPPING + tpdo.number - 1
     _write(sdo, parameter, 1, cob_id | NOT_VALID | _NO_REMOTE, 4)
     _write(sdo, mapping, 0, 0, 1)

@@ -28,7 +28,7 @@ Readings = Mapping[str, float | None]
 
 
 def drive_speed(rad_s: float, counts_per_turn: float, gear_ratio: float, unit: int | None) -> float | None:
-    """A speed of the joint in the drive's own unit of velocity (60A9h); `None` where that is not known.
+    """Return a joint speed in the drive's unit of velocity (60A9h); `None` if that is unknown.
 
     `counts_per_turn` are those of the joint. Without 60A9h, or with 0 there, it is counts/s (CiA 402-2).
     """
@@ -59,7 +59,7 @@ def rated_torque(settings: JointSettings, readings: Readings) -> float | None:
 
 
 def rated_current(settings: JointSettings, readings: Readings) -> float | None:
-    """A: as configured, else 6075h."""
+    """Return A, as configured, else by 6075h."""
     motor_ma = readings.get("rated_current_ma")
     return settings.rated_current or (motor_ma / 1000 if motor_ma else None)
 

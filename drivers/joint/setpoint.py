@@ -57,7 +57,7 @@ def hold_still(axis: Axis, still_in: Collection[int] = ()) -> int:
 
 
 def _zero(axis: Axis, index: int, size: int) -> None:
-    """An offset that the drive does not have adds nothing."""
+    """Zero an offset, unless the drive does not have it."""
     try:
         _hold(axis, index, 0, bytes(size))
     except DeviceAbort as error:

@@ -43,12 +43,15 @@ class StopRpdo:
         return self.node.bus.send_urgent(self.rpdo.can_id, self.rpdo.frame(values))
 
     def _held(self, object_: Object) -> bytes | None:
-        """What the device holds of an object now, as far as it has confirmed that; `None`: nobody knows."""
+        """Return what the device holds of an object now, as far as it has confirmed that.
+
+        `None`: nobody knows.
+        """
         return self.node.channel.known(*object_, self.values[object_])
 
 
 def find_stop_rpdo(node: Node, sdo: SdoChannel, axis_offset: int) -> StopRpdo | None:
-    """The RPDO for a stop of this axis; `None` where it must go by SDO. Raises `DriverError`."""
+    """Return the RPDO for a stop of this axis; `None` where it must go by SDO. Raises `DriverError`."""
     if node.bus.role is not Role.MASTER:
         return None
     our_sync = node.bus.settings.sync_period_s is not None

@@ -48,7 +48,7 @@ class Errand:
 
 
 def look(axis: Axis) -> Led:
-    """What its statusword says now; where it does not tell, why."""
+    """Return what its statusword says now; where it does not tell, why."""
     try:
         return _read(axis)
     except DriverError as error:
@@ -130,7 +130,7 @@ class _Descent:
                     self._axis.command(controlword)
 
     def _may_step(self, state: DriveState) -> bool:
-        """An axis that brakes is not let go limp, and a fault is not reset again too soon."""
+        """Return whether to go on: an axis that brakes is not let go limp, no fault reset too soon."""
         if state is DriveState.QUICK_STOP_ACTIVE:
             return self._stands()
         if state is DriveState.FAULT:

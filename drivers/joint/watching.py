@@ -4,12 +4,12 @@ from collections.abc import Callable, Iterable
 
 from drivers.bus.bus import BusUser
 from drivers.joint.cia402 import DriveState
-from drivers.joint.held_off import HeldOff
 from drivers.joint.plausibility import JointCheck, Motion
+from drivers.joint.power_inhibit import PowerInhibit
 from drivers.joint.quantities import POSITION, STATE
 from drivers.latest import Latest
+from drivers.reader_stalls import ReaderStalls
 from drivers.samples import Channel
-from drivers.standstill import Standstill
 from eds import Description
 
 BESIDE_S = 0.03  # PDOs of one SYNC; a velocity that was polled is older the next time
@@ -18,9 +18,9 @@ BESIDE_S = 0.03  # PDOs of one SYNC; a velocity that was polled is older the nex
 class JointWatch(BusUser):
     """Feeds `check`, about 20 times a second as long as the bus is open."""
 
-    def __init__(self, latest: Latest, standstill: Standstill, description: Description) -> None:
+    def __init__(self, latest: Latest, standstill: ReaderStalls, description: Description) -> None:
         self.check = JointCheck(latest.component)
-        self.held_off = HeldOff(description)
+        self.held_off = PowerInhibit(description)
         self._latest = latest
         self._standstill = standstill
         self._index = _index(latest.channels)
@@ -33,7 +33,7 @@ class JointWatch(BusUser):
         self._other = lambda now_ns: other.read(position, now_ns)[0]
 
     def restart(self) -> None:
-        """What was seen before is of another life of the drive."""
+        """Forget everything seen before the drive's restart."""
         self.check.restart()
         self.held_off.restart()
 
@@ -76,7 +76,10 @@ class JointWatch(BusUser):
 
 
 def beside(latest: Latest, index: int | None, stamp_ns: int, now_ns: int) -> float | None:
-    """A value of about the time of another one; one that is only polled now and then says nothing of it."""
+    """Return a value of about the time of another one.
+
+    One that is only polled now and then says nothing of it.
+    """
     value, at_ns = (None, None) if index is None else latest.read(index, now_ns)
     return None if at_ns is None or abs(stamp_ns - at_ns) > BESIDE_S * 1e9 else value
 

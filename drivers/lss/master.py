@@ -65,7 +65,10 @@ class Identity:
 
     @classmethod
     def parse(cls, text: str) -> Self:
-        """The identity in `VENDOR:PRODUCT:REVISION:SERIAL`, each decimal or 0x…; raises `SettingsError`."""
+        """Return the identity in `VENDOR:PRODUCT:REVISION:SERIAL`, each decimal or 0x….
+
+        Raises `SettingsError`.
+        """
         try:
             numbers = [int(word, 0) for word in text.split(":")]
         except ValueError:
@@ -121,7 +124,7 @@ class LssMaster:
         self._tell(_SWITCH_ALL, b"\x01")
 
     def select(self, identity: Identity) -> None:
-        """The device of this identity alone is to be configured."""
+        """Select the device of this identity for configuration."""
         for part, number in enumerate(identity.numbers[:-1]):
             self._tell(_SWITCH_ONE + part, number.to_bytes(4, "little"))
         serial = identity.serial_number.to_bytes(4, "little")
@@ -155,7 +158,7 @@ class LssMaster:
     # -- what the selected one says ------------------------------------------------------------------------
 
     def identity(self) -> Identity:
-        """What the selected device says that it is."""
+        """Return what the selected device says that it is."""
         numbers = []
         for part, name in enumerate(PARTS):
             answer = self._ask(_INQUIRE + part, b"", f"the {name}")
@@ -163,7 +166,7 @@ class LssMaster:
         return Identity(*numbers)
 
     def node_id(self) -> int:
-        """The node id that the selected device has now; 255: none."""
+        """Return the node id that the selected device has now; 255: none."""
         return self._ask(_INQUIRE_NODE_ID, b"", "the node id")[1]
 
     # -- what it is to become ------------------------------------------------------------------------------
@@ -221,7 +224,7 @@ class LssMaster:
         self._answers(command, content, _NOTHING, GAP_S)
 
     def _answers(self, command: int, content: bytes, wanted: int, timeout_s: float) -> list[bytes]:
-        """The answers to a request: until it is quiet again after the first one."""
+        """Return the answers to a request: until it is quiet again after the first one."""
         while not self._heard.empty():
             self._heard.get_nowait()
         self._bus.send(REQUEST, (bytes([command]) + content).ljust(8, b"\0"))

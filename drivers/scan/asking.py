@@ -122,7 +122,7 @@ class _Reader:
         )
 
     def _upload(self, index: int, subindex: int) -> bytes | None:
-        """An object's bytes; after one that was not answered nothing more is asked."""
+        """Return an object's bytes; after one that was not answered nothing more is asked."""
         if self._problem is not None:
             return None
         try:

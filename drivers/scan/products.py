@@ -46,7 +46,7 @@ class Library:
                 self._by_product.setdefault((found.vendor_id, found.product_code), []).append(path)
 
     def proposals(self, node: int, told: Told) -> tuple[Proposal, ...]:
-        """The files for this device, those that contradict it least first."""
+        """Return the files for this device, those that contradict it least first."""
         if told.vendor_id is None or told.product_code is None:
             return ()
         paths = self._by_product.get((told.vendor_id, told.product_code), ())

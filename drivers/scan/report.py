@@ -65,7 +65,7 @@ def _node_json(node: int, found: Found, proposals: Sequence[Proposal], bus: str)
 
 
 def _table(node: int, told: Told, proposals: Sequence[Proposal], bus: str) -> str | None:
-    """What to paste into a robot's file, by the EDS that fits best and what the device has said itself."""
+    """Return the table for a robot's file, by the best EDS and the device's own answers."""
     if not proposals:
         return None
     read = {(index, subindex): value for index, subindex, value in told.ratios}
@@ -124,7 +124,7 @@ def _node_text(node: int, found: Found, proposals: Sequence[Proposal]) -> Iterat
 
 
 def _names(proposals: Sequence[Proposal]) -> Callable[[int, int], str]:
-    """What objects are called by the file that fits best."""
+    """Return what objects are called by the file that fits best."""
     description = proposals[0].description if proposals else None
 
     def name(index: int, subindex: int) -> str:

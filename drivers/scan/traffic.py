@@ -81,7 +81,7 @@ class Traffic:
                 yield f"{words} {', '.join(map(str, sorted(nodes)))}"
 
     def others(self) -> tuple[int, ...]:
-        """Identifiers that the predefined connection set has no place for, extended ones among them."""
+        """Return identifiers outside of the predefined connection set, including extended ones."""
         known = {NMT, SYNC, TIME, LSS_ANSWER, LSS_REQUEST}
         return tuple(
             sorted(can_id for can_id in self.seen if can_id not in known and not _is_of_a_node(can_id))

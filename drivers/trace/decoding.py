@@ -29,7 +29,7 @@ class Kind(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class DecodedFrame:
     """One frame, decoded. `node_id` is `None` where it belongs to no node."""
 
     captured: Captured
@@ -62,7 +62,7 @@ class Decoder:
         self.devices = devices or Devices()
         self._conversations: dict[int, Conversation] = {}
 
-    def take(self, captured: Captured) -> Line:
+    def take(self, captured: Captured) -> DecodedFrame:
         """Decode one frame."""
         can_id = captured.can_id & ~REMOTE
         if can_id & ERROR:
@@ -77,7 +77,7 @@ class Decoder:
             return decode(self, captured, node_id)
         return self._pdo_or_other(captured, can_id)
 
-    def _fixed(self, captured: Captured, can_id: int, kind: Kind) -> Line:
+    def _fixed(self, captured: Captured, can_id: int, kind: Kind) -> DecodedFrame:
         data = captured.data
         words = {
             Kind.NMT: lambda: services.nmt(data, self.devices.name),
@@ -87,30 +87,30 @@ class Decoder:
         }[kind]()
         return _plain(captured, kind, words)
 
-    def _line(self, captured: Captured, kind: Kind, title: str, node_id: int, words: str) -> Line:
-        return Line(captured, kind, title, node_id, self.devices.name(node_id), words)
+    def _line(self, captured: Captured, kind: Kind, title: str, node_id: int, words: str) -> DecodedFrame:
+        return DecodedFrame(captured, kind, title, node_id, self.devices.name(node_id), words)
 
     # -- of one node -----------------------------------------------------------------------------------------
 
-    def _emcy(self, captured: Captured, node_id: int) -> Line:
+    def _emcy(self, captured: Captured, node_id: int) -> DecodedFrame:
         words = services.emergency(captured.data, self.devices[node_id].vendor_id)
         return self._line(captured, Kind.EMCY, "EMCY", node_id, words)
 
-    def _heartbeat(self, captured: Captured, node_id: int) -> Line:
+    def _heartbeat(self, captured: Captured, node_id: int) -> DecodedFrame:
         asked = captured.can_id & REMOTE
         words = "is asked for its state (node guarding)" if asked else services.heartbeat(captured.data)
         return self._line(captured, Kind.HEARTBEAT, "heartbeat", node_id, words)
 
-    def _sdo_request(self, captured: Captured, node_id: int) -> Line:
+    def _sdo_request(self, captured: Captured, node_id: int) -> DecodedFrame:
         return self._sdo(captured, node_id, "SDO", self._conversation(node_id).request(captured.data))
 
-    def _sdo_answer(self, captured: Captured, node_id: int) -> Line:
+    def _sdo_answer(self, captured: Captured, node_id: int) -> DecodedFrame:
         return self._sdo(captured, node_id, "SDO answer", self._conversation(node_id).response(captured.data))
 
     def _conversation(self, node_id: int) -> Conversation:
         return self._conversations.setdefault(node_id, Conversation())
 
-    def _sdo(self, captured: Captured, node_id: int, title: str, said: Said) -> Line:
+    def _sdo(self, captured: Captured, node_id: int, title: str, said: Said) -> DecodedFrame:
         device = self.devices[node_id]
         if said.object is None:
             return self._line(captured, Kind.SDO, title, node_id, said.words.replace("{}", "an object"))
@@ -121,11 +121,11 @@ class Decoder:
             words += f": {values[0].words}"
             if said.done:
                 self.devices.learn(node_id, *said.object, said.value)
-        return Line(captured, Kind.SDO, title, node_id, device.name, words, values, said.object)
+        return DecodedFrame(captured, Kind.SDO, title, node_id, device.name, words, values, said.object)
 
     # -- PDOs ------------------------------------------------------------------------------------------------
 
-    def _pdo_of_node(self, captured: Captured, node_id: int) -> Line:
+    def _pdo_of_node(self, captured: Captured, node_id: int) -> DecodedFrame:
         can_id = captured.can_id & ~REMOTE
         commanded = can_id & 0x780 in _RPDOS
         pdo, receivers = self.devices.pdo(can_id, commanded=commanded)
@@ -134,13 +134,13 @@ class Decoder:
         title = (_RPDOS if commanded else _TPDOS)[can_id & 0x780]
         return self._line(captured, Kind.PDO, title, node_id, _raw(captured))
 
-    def _pdo_or_other(self, captured: Captured, can_id: int) -> Line:
+    def _pdo_or_other(self, captured: Captured, can_id: int) -> DecodedFrame:
         pdo, receivers = self.devices.pdo(can_id, commanded=False)
         if pdo is not None:
             return self._pdo(captured, pdo, receivers)
-        return Line(captured, Kind.OTHER, "other", None, None, _raw(captured))
+        return DecodedFrame(captured, Kind.OTHER, "other", None, None, _raw(captured))
 
-    def _pdo(self, captured: Captured, pdo: Pdo, receivers: tuple[int, ...]) -> Line:
+    def _pdo(self, captured: Captured, pdo: Pdo, receivers: tuple[int, ...]) -> DecodedFrame:
         device = self.devices[pdo.node_id]
         others = [self.devices.name(node) for node in receivers if node != pdo.node_id]
         heard_by = f"   to {', '.join(others)}" if others else ""
@@ -155,9 +155,9 @@ class Decoder:
         )
         missing = "" if len(values) == len(pdo.objects) else f", {len(data)} bytes, shorter than its mapping"
         words = (", ".join(map(str, values)) or _raw(captured)) + missing + heard_by
-        return Line(captured, Kind.PDO, pdo.name, pdo.node_id, device.name, words, values)
+        return DecodedFrame(captured, Kind.PDO, pdo.name, pdo.node_id, device.name, words, values)
 
-    _OF_NODE: ClassVar[dict[int, Callable[[Any, Captured, int], Line]]] = {
+    _OF_NODE: ClassVar[dict[int, Callable[[Any, Captured, int], DecodedFrame]]] = {
         _EMCY: _emcy,
         _SDO_ANSWER: _sdo_answer,
         _SDO_REQUEST: _sdo_request,
@@ -166,13 +166,13 @@ class Decoder:
     }
 
 
-def _plain(captured: Captured, kind: Kind, words: str) -> Line:
+def _plain(captured: Captured, kind: Kind, words: str) -> DecodedFrame:
     title = kind.value.upper() if kind in (Kind.NMT, Kind.SYNC, Kind.TIME, Kind.LSS) else kind.value
-    return Line(captured, kind, title, None, None, words)
+    return DecodedFrame(captured, kind, title, None, None, words)
 
 
 def _part(raw: int, mapped: Mapped) -> bytes:
-    """The bytes of one object of a PDO."""
+    """Return the bytes of one object of a PDO."""
     return (raw >> mapped.at & (1 << mapped.bits) - 1).to_bytes((mapped.bits + 7) // 8, "little")
 
 

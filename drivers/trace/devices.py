@@ -50,7 +50,7 @@ class Device:
         return None if self.description is None else self.description.vendor_id
 
     def learn(self, index: int, subindex: int, value: bytes) -> bool:
-        """An object's value was heard; whether it says something new about PDOs."""
+        """Take an object's value; return whether it is new about PDOs."""
         if index not in _CONFIGURATION:
             return False
         number = int.from_bytes(value, "little")
@@ -82,7 +82,7 @@ class Device:
 
 
 def _configured(description: Description) -> Iterator[tuple[Object, int]]:
-    """What the file says of PDOs: a DCF's value, else the default."""
+    """Yield what the file says of PDOs: a DCF's value, else the default."""
     for variable in description.variables():
         value = variable.default if variable.value is None else variable.value
         if variable.index in _CONFIGURATION and isinstance(value, int):
@@ -106,12 +106,12 @@ class Devices:
         return self[node_id].name
 
     def learn(self, node_id: int, index: int, subindex: int, value: bytes) -> None:
-        """A device holds this value."""
+        """Note that a device holds this value."""
         if index >= FIRST_OBJECT and self[node_id].learn(index, subindex, value):
             self._pdos = None
 
     def pdo(self, can_id: int, *, commanded: bool) -> tuple[Pdo | None, tuple[int, ...]]:
-        """The PDO that an identifier carries, and the nodes that take it.
+        """Return the PDO that an identifier carries, and the nodes that take it.
 
         Of a frame that commands, the receiver's objects say more than the sender's.
         """

@@ -44,7 +44,7 @@ def devices(path: Path, channel: str | int | None) -> Iterator[Device]:
 
 
 def described(node_id: int, name: str | None, description: str, beside: Path | None) -> Device:
-    """A device with its EDS, beside `beside` or one that ships; raises `SettingsError`."""
+    """Return a device with its EDS, beside `beside` or one that ships; raises `SettingsError`."""
     try:
         return Device(node_id, name, eds.load(eds.locate(description, beside), node_id))
     except eds.EdsError as error:

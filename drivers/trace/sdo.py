@@ -52,7 +52,7 @@ class Conversation:
     _block: list[bytes] = field(default_factory=list)
 
     def request(self, data: bytes) -> Said:
-        """A frame of the client."""
+        """Return a frame of the client."""
         if len(data) != 8:
             return Said(f"no SDO: {len(data)} bytes")
         if self._blocks is _Blocks.FROM_CLIENT and data[0] != _ABORT:
@@ -60,7 +60,7 @@ class Conversation:
         return self._REQUESTS.get(data[0] >> 5, _unknown)(self, data)
 
     def response(self, data: bytes) -> Said:
-        """A frame of the server."""
+        """Return a frame of the server."""
         if len(data) != 8:
             return Said(f"no SDO: {len(data)} bytes")
         if self._blocks is _Blocks.FROM_SERVER and data[0] != _ABORT:
@@ -109,7 +109,7 @@ class Conversation:
     # -- segments ------------------------------------------------------------------------------------------
 
     def _segment(self, data: bytes) -> Said:
-        """A segment of a write, or of a read."""
+        """Return a segment of a write, or of a read."""
         if self._object is None:
             return Said("a segment of a transfer whose beginning was not heard")
         self._data += data[1 : 8 - (data[0] >> 1 & 7)]
@@ -151,13 +151,13 @@ class Conversation:
         return self._missing() or Said("is {}", self._object, bytes(self._data), done=True)
 
     def _block_uploaded(self, data: bytes) -> Said:
-        """The server's side of a block upload: its beginning, or its end."""
+        """Return the server's side of a block upload: its beginning, or its end."""
         if data[0] & 0x01:
             return self._block_end(data)
         return Said(f"has {{}}, {self._size(data, data[0] & 0x02)} in blocks", self._object)
 
     def _block_downloaded(self, data: bytes) -> Said:
-        """The server's side of a block download: go on, so much has come, or it is over."""
+        """Return the server's side of a block download: go on, so much has come, or it is over."""
         step = data[0] & 0x03
         if step == 0:
             self._blocks = _Blocks.FROM_CLIENT
@@ -169,7 +169,7 @@ class Conversation:
         return self._missing() or Said("took {}", self._object, bytes(self._data), done=True, is_write=True)
 
     def _block_segment(self, data: bytes) -> Said:
-        """A segment: bit 7 marks the last of all. The other side acknowledges the block next."""
+        """Return a segment: bit 7 marks the last of all. The other side acknowledges the block next."""
         self._block.append(data[1:])
         if data[0] & _LAST_IN_BLOCK:
             self._blocks = _Blocks.NONE
@@ -186,7 +186,7 @@ class Conversation:
         return Said(f"{kept} segments of {{}} came", self._object, is_write=self._is_write)
 
     def _block_end(self, data: bytes) -> Said:
-        """The last segment has unused bytes."""
+        """Decode the last segment, without its unused bytes."""
         unused = data[0] >> 2 & 7
         if unused:
             del self._data[-unused:]

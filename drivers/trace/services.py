@@ -21,7 +21,7 @@ _LSS_BYTES = 8
 
 
 def nmt(data: bytes, name: Callable[[int], str]) -> str:
-    """An NMT command, and who is meant."""
+    """Return an NMT command, and who is meant."""
     if len(data) != 2:
         return f"no NMT command: {len(data)} bytes"
     service = _NMT.get(data[0], f"service 0x{data[0]:02X}, which CiA 301 does not know")
@@ -29,12 +29,12 @@ def nmt(data: bytes, name: Callable[[int], str]) -> str:
 
 
 def sync(data: bytes) -> str:
-    """A SYNC, with the counter that it may have."""
+    """Return a SYNC, with the counter that it may have."""
     return f"counter {data[0]}" if data else ""
 
 
 def time_of_day(data: bytes) -> str:
-    """The time that a TIME message tells."""
+    """Return the time that a TIME message tells."""
     if len(data) != 6:
         return f"no TIME: {len(data)} bytes"
     milliseconds = int.from_bytes(data[:4], "little") & 0x0FFF_FFFF
@@ -44,7 +44,7 @@ def time_of_day(data: bytes) -> str:
 
 
 def emergency(data: bytes, vendor_id: int | None) -> str:
-    """An EMCY: its code, the error register, and what its maker adds."""
+    """Return an EMCY: its code, the error register, and what its maker adds."""
     found = parse_emcy(0, data)
     if found is None:
         return f"no EMCY: {len(data)} bytes"
@@ -53,7 +53,7 @@ def emergency(data: bytes, vendor_id: int | None) -> str:
 
 
 def heartbeat(data: bytes) -> str:
-    """The state that a node says it is in."""
+    """Return the state that a node says it is in."""
     state = parse_heartbeat(data)
     if state is None:
         return f"no heartbeat: {data.hex(' ').upper() or 'empty'}"
@@ -61,7 +61,7 @@ def heartbeat(data: bytes) -> str:
 
 
 def error(can_id: int, data: bytes) -> str:
-    """An error frame: the controller's state, or an error on the wire."""
+    """Return an error frame: the controller's state, or an error on the wire."""
     state = bus_state(can_id, data)
     if state is None:
         return "error on the wire"
@@ -132,6 +132,6 @@ _ANSWERS: Mapping[int, Callable[[bytes], str]] = {
 
 
 def lss(data: bytes, *, answer: bool) -> str:
-    """A request of the LSS master, or an answer."""
+    """Return a request of the LSS master, or an answer."""
     words = (_ANSWERS if answer else _REQUESTS).get(data[0]) if len(data) == _LSS_BYTES else None
     return f"no LSS that is known: {data.hex(' ').upper() or 'empty'}" if words is None else words(data)

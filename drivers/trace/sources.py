@@ -26,7 +26,7 @@ Batches = Generator[Batch, None, None]
 
 
 def recorded(paths: Sequence[Path]) -> Batches:
-    """The frames of files, one by one, by their times; raises `SettingsError`."""
+    """Yield the frames of files by their times; raises `SettingsError`."""
     for captured in heapq.merge(*map(read, paths), key=lambda one: one.stamp_ns):
         yield Batch((captured,), captured.stamp_ns, live=False)
 

@@ -37,7 +37,7 @@ class Value:
 
 
 def label(description: Description | None, index: int, subindex: int) -> str:
-    """An object by address and name."""
+    """Return an object by address and name."""
     variable = None if description is None else description.variable(index, subindex)
     return Value(index, subindex, None if variable is None else variable.qualname, None, "").label
 

@@ -6,10 +6,10 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 
 from drivers.errors import SettingsError
-from drivers.trace.decoding import Kind, Line
+from drivers.trace.decoding import DecodedFrame, Kind
 from drivers.trace.devices import Device
 
-Wanted = Callable[[Line], bool]
+Wanted = Callable[[DecodedFrame], bool]
 _OBJECT = re.compile(r"(?:0x([0-9a-f]{4})|([0-9a-f]{4})h)(?::(?:0x)?([0-9a-f]{1,2}))?", re.IGNORECASE)
 
 
@@ -22,7 +22,7 @@ def by_node(words: Sequence[str], all_: Sequence[Device], on: Callable[[str], Se
         _check(word, all_)
     nodes_of = functools.cache(lambda interface: frozenset(_nodes(words, on(interface))))
 
-    def wanted(line: Line) -> bool:
+    def wanted(line: DecodedFrame) -> bool:
         nodes = nodes_of(line.captured.interface)
         if line.kind is Kind.NMT and len(line.captured.data) == 2:
             return line.captured.data[1] in nodes | {0}
@@ -61,7 +61,7 @@ def by_object(words: Sequence[str]) -> Wanted:
     """Lines about these objects: 0x6041, 6041h:00, or a pattern of their names, as *position*."""
     matches = [_matching(word) for word in words]
 
-    def wanted(line: Line) -> bool:
+    def wanted(line: DecodedFrame) -> bool:
         objects = {(value.index, value.subindex): value.name for value in line.values}
         if line.about is not None:
             objects.setdefault(line.about, None)

@@ -1,4 +1,4 @@
-"""`gwrms eds`: what an EDS or DCF file says, and what is wrong with it."""
+"""`gwrms eds`: show and check an EDS or DCF file."""
 
 import argparse
 import json
@@ -48,7 +48,7 @@ def _parser() -> argparse.ArgumentParser:
         nargs="+",
         metavar="FILE",
         type=Path,
-        help="an .eds or .dcf file, or the name of one that ships",
+        help="an .eds or .dcf file, or the name of a shipped one",
     )
     parser.add_argument(
         "--node-id",
@@ -57,7 +57,7 @@ def _parser() -> argparse.ArgumentParser:
         help="node id for COB-IDs that depend on it (1), and the table",
     )
     parser.add_argument("--brief", action="store_true", help="leave out the objects")
-    parser.add_argument("--json", action="store_true", help="one JSON object a file and line")
+    parser.add_argument("--json", action="store_true", help="print one JSON object per file, a line each")
     return parser
 
 

@@ -41,7 +41,7 @@ class Access:
         self._known: Known | None = None
 
     def now(self) -> Known:
-        """The same object as long as nothing has changed."""
+        """Return the same object as long as nothing has changed."""
         with self._lock:
             stamp = self.folder.stamp()
             if self._known is None or stamp != self._stamp:

@@ -98,7 +98,7 @@ class Pairing:
         self._context = _context(folder)
 
     def wait(self) -> Candidate:
-        """The desk that proves the code first.
+        """Return the desk that proves the code first.
 
         Raises:
             PairingEnded: the time is over, or the code was guessed at too often.
@@ -122,7 +122,7 @@ class Pairing:
                 (one.see_out if one.thread is self._winner else one.send_away)()
 
     def proof(self, candidate: Candidate) -> str:
-        """The robot's own, for the reply."""
+        """Return the robot's own, for the reply."""
         return proof(ROBOT, self._code, self._own, candidate.fingerprint)
 
     def _check(self) -> None:
@@ -183,7 +183,7 @@ class Pairing:
 
 
 def _line(secured: ssl.SSLSocket) -> bytes:
-    """The first line; raises `OSError` where it does not come in time, or is too long."""
+    """Return the first line; raises `OSError` where it does not come in time, or is too long."""
     until_s, found = time.monotonic() + SAY_S, b""
     while b"\n" not in found:
         left_s = until_s - time.monotonic()
@@ -198,7 +198,7 @@ def _line(secured: ssl.SSLSocket) -> bytes:
 
 
 def _context(folder: AccessFolder) -> ssl.SSLContext:
-    """The robot's key; of the desk nothing is asked but its proof."""
+    """Return the robot's key; of the desk nothing is asked but its proof."""
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     context.minimum_version = ssl.TLSVersion.TLSv1_3
     context.num_tickets = 0

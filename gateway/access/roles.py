@@ -21,7 +21,7 @@ GRANTED: Final[Mapping[str, AnyMethod]] = {"reset": ROBOT_RESET, "enable": ROBOT
 
 
 def least(who: Identity, method: AnyMethod) -> Role:
-    """The least role that may ask for a method, on the robot where `who` is known."""
+    """Return the least role that may ask for a method, on the robot where `who` is known."""
     granted = {GRANTED[word].name for word in who.granted}
     return Role.OPERATOR if method.name in granted else method.role
 
@@ -33,14 +33,14 @@ def check(who: Identity, method: AnyMethod) -> None:
 
 
 def check_params(who: Identity, method: AnyMethod, params: Any) -> None:
-    """The same for what its parameters ask for beyond it."""
+    """Check the role also for the parameters of the request."""
     field, value, what = BEYOND.get(method.name, ("", None, ""))
     if field and not who.role.includes(Role.MAINTAINER) and _asks(getattr(params, field), value):
         raise _refusal(who, Role.MAINTAINER, what)
 
 
 def refused(who: Identity) -> dict[str, str]:
-    """The methods that `who` may not ask for, and why, in words."""
+    """Return the methods that `who` may not ask for, and why, in words."""
     needed = {name: least(who, method) for name, method in METHODS.items()}
     return {
         name: str(_refusal(who, role, name)) for name, role in needed.items() if not who.role.includes(role)

@@ -26,7 +26,10 @@ class AccessTable(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def table_of(folder: AccessFolder) -> tuple[AccessTable, list[str]]:
-    """The table, and what is wrong with it: that is left out and told, so no mistake locks a stop out."""
+    """Return the table, and what is wrong with it.
+
+    That is left out and told, so no mistake locks a stop out.
+    """
     if not folder.table.exists():
         return AccessTable(), []
     decoding = Decoding()

@@ -17,7 +17,7 @@ ROOT: Final = 0
 
 
 def peer_of(connection: socket.socket) -> Peer:
-    """Raises `OSError` where the system does not say."""
+    """Return the peer of a socket; raises `OSError` where the system does not tell."""
     option = getattr(socket, "SO_PEERCRED", None)
     if option is None:
         raise OSError("this system does not tell who is at a Unix socket")
@@ -31,7 +31,7 @@ def is_maintainer(peer: Peer) -> bool:
 
 
 def identity_of(peer: Peer, table: AccessTable) -> Identity | None:
-    """The highest role that the user or one of their groups has; `None` for a stranger."""
+    """Return the highest role that the user or one of their groups has; `None` for a stranger."""
     name, groups = peer.name or str(peer.uid), {str(peer.gid), *peer.groups}
     roles = [Role.MAINTAINER] if is_maintainer(peer) else []
     roles += [role for user, role in table.users.items() if user in (name, str(peer.uid))]
@@ -41,7 +41,7 @@ def identity_of(peer: Peer, table: AccessTable) -> Identity | None:
 
 
 def resolved(peer: Peer) -> Peer:
-    """The same with the names that the system's directories have of it, which may ask the network.
+    """Return the peer with its names in the system's directories, which may query the network.
 
     A name of digits alone is none here: in a table it is a number, and somebody else's.
     """

@@ -45,8 +45,10 @@ class Figure(Struct, frozen=True):
 
 def main(argv: list[str]) -> int:
     """Run `gwrms bench`."""
-    made = parser("bench", "Measure a robot's gateway: latency, CPU and memory of what it does.", EPILOG)
-    made.add_argument("--requests", type=_count, default=REQUESTS, help="of each kind (default: %(default)d)")
+    made = parser("bench", "Measure a robot's gateway: latency, CPU and memory.", EPILOG)
+    made.add_argument(
+        "--requests", type=_count, default=REQUESTS, help="requests of each kind (default: %(default)d)"
+    )
     arguments = made.parse_args(argv)
     figures = []
     with connect(arguments, "bench") as robot:
@@ -90,7 +92,7 @@ def _took_ms(ask: Callable[[], object]) -> float:
 
 
 def _with_psutil(requests: int) -> Figure:
-    """The same table as `every process`, by a plain loop of psutil in this process."""
+    """Return the same table as `every process`, by a plain loop of psutil in this process."""
 
     def ask() -> None:
         for one in psutil.process_iter(["pid", "name", "cpu_percent", "memory_info"]):
@@ -132,7 +134,7 @@ def _ages_ms(batch: Batch, offset: ClockOffset | None) -> list[float]:
 
 
 def _quantiles(values: list[float]) -> tuple[float | None, float | None]:
-    """The median, and what 99 % stay below."""
+    """Return the median, and what 99 % stay below."""
     if not values:
         return None, None
     values = sorted(values)

@@ -28,8 +28,8 @@ _REASONS = {"others_ran": "others ran", "own_work": "its own work", "asleep": "i
 
 def main(argv: list[str]) -> int:
     """Run `gwrms blame`; Ctrl-C ends it with the summary."""
-    made = parser("blame", "Watch the robot's control loop, and name what made it late.", EPILOG)
-    made.add_argument("--seconds", type=seconds, help="to watch (default: until Ctrl-C)")
+    made = parser("blame", "Watch the robot's control loop, and name the processes that delay it.", EPILOG)
+    made.add_argument("--seconds", type=seconds, help="duration (default: until Ctrl-C)")
     arguments = made.parse_args(argv)
     end_s = float("inf") if arguments.seconds is None else time.monotonic() + arguments.seconds
     seen: list[Overrun] = []

@@ -15,7 +15,7 @@ from gateway.commission.bench import CanBench
 from gateway.commission.dialogue import run
 from gateway.commission.draft import Found, alone
 from gateway.commission.edit import NotEdited, comment_of, with_value
-from gateway.commission.keeping import journal, put
+from gateway.commission.robot_file import journal, write
 from gateway.commission.zero import PLAUSIBLE, NotRepeated, Zero, posture, repeated
 from gateway.config.reading import load
 from gateway.config.robot import JointTable, RobotConfig
@@ -43,7 +43,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="gwrms calibrate joint",
         description=(
-            "Finds a joint's zero again: hold it, without power, as the comment of its zero_offset says, or "
+            "Find a joint's zero again: hold it, without power, as the comment of its zero_offset says, or "
             "at --angle. Old and new are shown, and written into the robot's file on your word, with a "
             "comment and an entry of the journal. Nothing is moved. End this robot's gateway first."
         ),
@@ -51,18 +51,19 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("joint", metavar="ROBOT.toml:NAME", help="the joint of a robot's file")
     parser.add_argument(
-        "--angle", type=_degrees(-180, 360), metavar="DEGREES", help="at which it is held (flexion positive)"
+        "--angle",
+        type=_degrees(-180, 360),
+        metavar="DEGREES",
+        help="the angle at which it is held (flexion positive)",
     )
     parser.add_argument(
         "--max-change",
         type=_degrees(0, 540),
         default=PLAUSIBLE,
         metavar="DEGREES",
-        help="a larger change is refused (default: %(default)g)",
+        help="refuse a larger change (default: %(default)g)",
     )
-    parser.add_argument(
-        "--who", default=user_name(), help="who does it, for the record (default: your user name)"
-    )
+    parser.add_argument("--who", default=user_name(), help="name for the journal (default: your user name)")
     return parser
 
 
@@ -126,7 +127,7 @@ def _write(
     made = with_value(text, table, KEY, Found(zero.offset, zero.how))
     if _text(config.path) != text:
         raise NotEdited(f"{config.path} was changed meanwhile: begin again")
-    found = put(config.path, made)
+    found = write(config.path, made)
     if found.config is None:
         say(f"{config.path} is written and cannot be used: {'; '.join(one.words for one in found.findings)}")
         return 1

@@ -110,7 +110,7 @@ def main(argv: list[str]) -> int:
         say(json.dumps(_find(KINDS[arguments.schema].schema)(), indent=2, ensure_ascii=False) + "\n")
         return 0
     if not arguments.files:
-        parser.error("name a file, or say --schema")
+        parser.error("name a file, or use --schema")
     results = [check(file, arguments.kind, machine=arguments.machine) for file in arguments.files]
     for one in results:
         say_json(_as_json(one)) if arguments.json else say(_as_text(one))
@@ -206,16 +206,18 @@ def _parser() -> argparse.ArgumentParser:
         allow_abbrev=False,
     )
     parser.add_argument("files", nargs="*", type=Path, metavar="FILE", help="a file to check")
-    parser.add_argument("--kind", choices=tuple(KINDS), help="what the files are, whatever their tables show")
+    parser.add_argument(
+        "--kind", choices=tuple(KINDS), help="the kind of the files (default: by their tables)"
+    )
     parser.add_argument(
         "--no-machine",
         dest="machine",
         action="store_false",
-        help="only the files and what lies beside them: no address, ports and CAN links of this computer",
+        help="check only the files and those beside them, not this computer's address, ports and CAN links",
     )
-    parser.add_argument("--strict", action="store_true", help="exit status 1 for warnings too")
-    parser.add_argument("--json", action="store_true", help="one JSON object a file and line")
+    parser.add_argument("--strict", action="store_true", help="exit with status 1 for warnings too")
+    parser.add_argument("--json", action="store_true", help="print one JSON object per file, a line each")
     parser.add_argument(
-        "--schema", choices=tuple(KINDS), help="print the JSON Schema of such files, for editors, instead"
+        "--schema", choices=tuple(KINDS), help="print the JSON Schema of such files, for editors"
     )
     return parser

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from gateway.config.reading import examined
-from gateway.config.remains import remains
+from gateway.config.usable_parts import remains
 from gateway.tables.finding import Told, mistakes, told
 
 
@@ -16,7 +16,7 @@ def findings(file: Path, tables: Mapping[str, Any], *, machine: bool) -> Iterato
     config = found.config or found.rest
     if config is None:
         return
-    from gateway.surroundings import beside, here  # needs what drives and EDS files need
+    from gateway.prerequisites import beside, here  # needs what drives and EDS files need
 
     wrong = mistakes(found.findings)
     yield from told(beside(remains(config, wrong) if wrong else config))

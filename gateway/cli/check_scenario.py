@@ -27,7 +27,7 @@ def findings(file: Path, tables: Mapping[str, Any], *, machine: bool) -> Iterato
 
 
 def schema() -> dict[str, Any]:
-    """The scenario's, with the guard's of robot.toml."""
+    """Return the scenario's, with the guard's of robot.toml."""
     from gateway.config.schema import guard  # needs what drivers need
 
     made: dict[str, Any] = import_module(_SCHEMA).schema()

@@ -18,9 +18,9 @@ from gateway.cli.text import warn
 from gateway.commission.bench import CanBench
 from gateway.commission.dialogue import At, Talk, agree, run
 from gateway.commission.draft import Draft, alone
-from gateway.commission.keeping import journal, put
 from gateway.commission.powered_run import NotStopped
 from gateway.commission.progress import Progress
+from gateway.commission.robot_file import journal, write
 from gateway.commission.serial_bench import SerialPorts
 from gateway.commission.steps import commission
 from gateway.commission.writing import Written, text, unfinished
@@ -54,9 +54,10 @@ def main(argv: list[str]) -> int:
     if missing:
         parser.error(f"--eds {', '.join(missing)}: there is no such folder")
     with alone(options.file), ending(), ExitStack() as ends:
-        draft = Draft(options.file)
         bench = CanBench(name, settings)
         ends.callback(bench.close)
+        bench.check_opens()
+        draft = Draft(options.file)
         if not options.json:
             return _lead(draft, bench, settings, options, Terminal(), None)
         lines = ends.enter_context(Lines(stdin()))
@@ -98,7 +99,7 @@ def _lead(
 
 
 def _known_to(file: Path) -> Draft:
-    """What was found; where that cannot be read nothing is known, and a stop asks all."""
+    """Return what was found; where that cannot be read nothing is known, and a stop asks all."""
     try:
         return Draft(file)
     except SettingsError as error:
@@ -107,7 +108,7 @@ def _known_to(file: Path) -> Draft:
 
 
 def _not_stopped(draft: Draft, bench: CanBench, why: str, lines: Lines | None) -> int:
-    """A drive that was under power has not confirmed that it is off: it is asked once more."""
+    """Return a drive that was under power has not confirmed that it is off: it is asked once more."""
     warn("commission", f"NOT STOPPED: {why}")
     return stop_drives(draft, bench, as_json=lines is not None) or 1
 
@@ -120,27 +121,25 @@ def _left(draft: Draft, why: str, status: int) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="gwrms commission",
-        description="Finds out, one joint at a time, what a robot's file has to say, and writes it.",
+        description="Determine the contents of a robot's file, one joint at a time, and write it.",
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
-    parser.add_argument("file", type=Path, metavar="FILE", help="the robot's file that is to be written")
-    parser.add_argument(
-        "bus", metavar="BUS", help="can0, INTERFACE:CHANNEL, or a file that has only its [can.…]"
-    )
-    parser.add_argument("--bitrate", type=int, help="bit/s, for interfaces that are opened with one")
+    parser.add_argument("file", type=Path, metavar="FILE", help="the robot's file to write")
+    parser.add_argument("bus", metavar="BUS", help="can0, INTERFACE:CHANNEL, or a file with only its [can.…]")
+    parser.add_argument("--bitrate", type=int, help="bit/s, for interfaces that need one")
     parser.add_argument(
         "--eds", type=Path, action="append", default=[], metavar="DIR", help="folder of EDS files"
     )
     parser.add_argument(
         "--serial", action="append", default=[], metavar="PORT", help="an insole's or IMU's port"
     )
+    parser.add_argument("--who", default=user_name(), help="name for the journal (default: your user name)")
     parser.add_argument(
-        "--who", default=user_name(), help="who does it, for the record (default: your user name)"
-    )
-    parser.add_argument(
-        "--json", action="store_true", help="questions and answers as JSON lines, for other faces"
+        "--json",
+        action="store_true",
+        help="exchange questions and answers as JSON lines, for other front ends",
     )
     parser.add_argument(
         "--stop",
@@ -193,7 +192,7 @@ def _all(
 
 
 def _write(draft: Draft, made: str, who: str) -> Written:
-    found = put(draft.file, made)
+    found = write(draft.file, made)
     told = tuple((str(one.severity), one.words) for one in found.findings)
     if found.config is None:
         return Written(str(draft.file), made, told, usable=False)

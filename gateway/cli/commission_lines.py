@@ -65,7 +65,10 @@ class Lines:
         os.close(self._woken)
 
     def get(self, number: int, within_s: float | None) -> str | None:
-        """The answer to question `number`; `None` where none has come. Raises `EOFError` after the last."""
+        """Return the answer to question `number`; `None` where none has come.
+
+        Raises `EOFError` after the last.
+        """
         try:
             while (read := self._read.get(timeout=within_s)) is not None:
                 if read.number in (None, number):
@@ -136,7 +139,7 @@ class JsonFace:
         return self._lines.waits(LOOK_S)
 
     def _rest(self) -> None:
-        """A motion is over, where there was one."""
+        """Note that a motion, if any, is over."""
         if self._moving_s:
             self._moving_s = 0.0
             self._lines.drop()
@@ -147,7 +150,7 @@ class JsonFace:
         say_json({"say": text})
 
     def propose(self, made: str, file: str) -> None:
-        """The file as it would be written."""
+        """Send the file as it would be written."""
         say_json({"say": made, "file": file})
 
     def written(self, written: Written) -> None:

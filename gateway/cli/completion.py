@@ -4,7 +4,7 @@ import argparse
 from typing import Final
 
 from gateway.cli.text import say
-from gateway.missing import FOLDER
+from gateway.missing_extras import FOLDER
 
 SHELLS: Final = ("bash", "zsh", "fish")
 EPILOG: Final = """once, for your account
@@ -17,7 +17,7 @@ def main(argv: list[str]) -> int:
     """Run `gwrms completion`."""
     parser = argparse.ArgumentParser(
         prog="gwrms completion",
-        description="Print what completes commands, options and files in a shell.",
+        description="Print the script that completes commands, options and files in a shell.",
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,

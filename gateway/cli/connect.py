@@ -34,7 +34,7 @@ class NobodyToAsk(Exception):
 
 
 def parser(command: str, what: str, epilog: str = "") -> argparse.ArgumentParser:
-    """The arguments that all asking commands have: `--robot` and `--json`."""
+    """Return the arguments that all asking commands have: `--robot` and `--json`."""
     made = argparse.ArgumentParser(
         prog=f"gwrms {command}",
         description=what,
@@ -43,12 +43,12 @@ def parser(command: str, what: str, epilog: str = "") -> argparse.ArgumentParser
         allow_abbrev=False,
     )
     add_robot(made)
-    made.add_argument("--json", action="store_true", help="one JSON object a line, for machines")
+    made.add_argument("--json", action="store_true", help="print one JSON object per line, for programs")
     return made
 
 
 def add_robot(made: argparse.ArgumentParser) -> None:
-    """The argument `--robot`: which gateway."""
+    """Add the argument `--robot`, which names the gateway."""
     made.add_argument(
         "--robot",
         metavar="HOST:PORT",
@@ -59,7 +59,7 @@ def add_robot(made: argparse.ArgumentParser) -> None:
 
 
 def connect(arguments: argparse.Namespace, command: str) -> Robot:
-    """The robot that `--robot` names, connected.
+    """Return the robot that `--robot` names, connected.
 
     Raises:
         ClientError: it cannot be reached.
@@ -85,7 +85,7 @@ def connect(arguments: argparse.Namespace, command: str) -> Robot:
 
 
 def widened(asked: Iterable[str], description: Description) -> list[str]:
-    """A component's name alone means all that it has: `left_knee` is `left_knee.*`."""
+    """Return names with a component's name alone as a glob: `left_knee` is `left_knee.*`."""
     components = {each.name for each in description.components}
     components |= {
         each.component for each in description.channels
@@ -94,7 +94,7 @@ def widened(asked: Iterable[str], description: Description) -> list[str]:
 
 
 def meant(globs: Sequence[str], description: Description) -> list[ChannelInfo]:
-    """The channels that any of these globs names, in the robot's order."""
+    """Return the channels that any of these globs names, in the robot's order."""
     return [each for each in description.channels if any(fnmatch.fnmatchcase(each.name, g) for g in globs)]
 
 
@@ -118,7 +118,7 @@ def check_names(
 
 
 def modules_of(channels: Iterable[ChannelInfo]) -> list[ModuleName]:
-    """The modules that give the channels: the computer's own are the resource module's."""
+    """Return the modules that give the channels: the computer's own are the resource module's."""
     modules: set[ModuleName] = {
         "resource" if channel.component == "resource" else "component" for channel in channels
     }

@@ -22,8 +22,8 @@ examples:
 
 def main(argv: list[str]) -> int:
     """Run `gwrms cost`."""
-    made = parser("cost", "What monitoring costs a robot now: CPU, memory, wake-ups, bus, network.", EPILOG)
-    made.add_argument("--seconds", type=seconds, default=SECONDS, help="to look for (default: %(default)g)")
+    made = parser("cost", "Show the cost of monitoring a robot: CPU, memory, wake-ups, bus, network.", EPILOG)
+    made.add_argument("--seconds", type=seconds, default=SECONDS, help="duration (default: %(default)g)")
     arguments = made.parse_args(argv)
     with connect(arguments, "cost") as robot:
         robot.cost()  # rates are from here on

@@ -1,4 +1,4 @@
-"""`gwrms describe`: what a robot is made of, and what is wrong with it."""
+"""`gwrms describe`: list a robot's components and problems."""
 
 import re
 import textwrap
@@ -25,7 +25,7 @@ def main(argv: list[str]) -> int:
     """Run `gwrms describe`."""
     arguments = parser(
         "describe",
-        "What a robot is made of: its components and buses and what is wrong with them, since when and what\n"
+        "Show a robot's components and buses with their problems, since when and what\n"
         "to check, its channels and their units, its parameters and their limits, and what each drive does\n"
         "on a stop.",
     ).parse_args(argv)
@@ -91,7 +91,7 @@ def _profiles(components: list[ComponentInfo]) -> Iterator[str]:
 
 
 def _channels(channels: list[ChannelInfo]) -> str:
-    """The channels by component, numbered ones as one, and once for each state what it can be."""
+    """Return the channels by component, numbered ones as one, and once for each state what it can be."""
     by_component: dict[str, dict[str, str]] = {}
     for channel in channels:
         quantity, unit = (

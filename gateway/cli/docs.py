@@ -43,5 +43,5 @@ def _parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
-    parser.add_argument("page", nargs="?", metavar="PAGE", help="as in the list, or a link to it")
+    parser.add_argument("page", nargs="?", metavar="PAGE", help="a name from the list, or a link")
     return parser

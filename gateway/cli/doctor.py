@@ -57,7 +57,7 @@ def main(argv: Sequence[str]) -> int:
         say("".join(f"{rule.name:<18} {rule.meaning}; {rule.looks}\n" for rule in RULES))
         return 0
     if options.file is None:
-        parser.error("name the robot's file")
+        parser.error("name the robot's file: gwrms doctor /etc/gwrms/robot.toml")
     if options.fix and options.json:
         parser.error("--fix asks people, --json is for machines: say one of both")
     if options.yes and not options.fix:
@@ -177,11 +177,11 @@ def _parser() -> argparse.ArgumentParser:
         "--robot",
         metavar="HOST:PORT",
         type=address,
-        help="ask this gateway, and not the one that the file means",
+        help="query this gateway instead of the one in the file",
     )
-    parser.add_argument("--seconds", type=float, default=20.0, help="how long to watch (default 20)")
-    parser.add_argument("--silent", action="store_true", help="ask no gateway")
-    parser.add_argument("--active", action="store_true", help="where no gateway runs, ask devices by SDO")
+    parser.add_argument("--seconds", type=float, default=20.0, help="duration (default 20)")
+    parser.add_argument("--silent", action="store_true", help="query no gateway")
+    parser.add_argument("--active", action="store_true", help="query devices by SDO if no gateway runs")
     parser.add_argument(
         "--eds", type=Path, action="append", default=[], metavar="DIR", help="folder of EDS files"
     )
@@ -192,8 +192,8 @@ def _parser() -> argparse.ArgumentParser:
         metavar="DIR",
         help="a copy of /sys, /proc and /run (default /)",
     )
-    parser.add_argument("--fix", action="store_true", help="mend what is safe to mend, asking for each")
+    parser.add_argument("--fix", action="store_true", help="apply safe fixes, asking for each")
     parser.add_argument("--yes", action="store_true", help="with --fix: do not ask")
-    parser.add_argument("--rules", action="store_true", help="tell what is looked for, and by what")
-    parser.add_argument("--json", action="store_true", help="one JSON object, for machines")
+    parser.add_argument("--rules", action="store_true", help="list all findings, and their sources")
+    parser.add_argument("--json", action="store_true", help="print one JSON object, for programs")
     return parser

@@ -16,12 +16,12 @@ EPILOG = """examples:
 
 def main(argv: list[str]) -> int:
     """Run `gwrms get`."""
-    made = parser("get", "Read parameters from the devices, now.", EPILOG)
+    made = parser("get", "Read parameters from the devices.", EPILOG)
     made.add_argument(
         "names",
         metavar="GLOB",
         nargs="*",
-        help="names, addresses, globs, or a component (default: all that can be changed)",
+        help="names, addresses, globs, or a component (default: all writable ones)",
     )
     add_degrees(made)
     arguments = made.parse_args(argv)
@@ -51,5 +51,5 @@ def _row(info: ParameterInfo, value: ParameterValue, unit: Unit) -> tuple[str, .
 
 
 def _text(value: float | None, unit: Unit) -> str:
-    """A value with every digit that it has; in another unit, with those that are worth reading."""
+    """Return a value with every digit that it has; in another unit, with those that are worth reading."""
     return exact(value) if value is None or unit.symbol == unit.si else f"{value * unit.scale:.6g}"

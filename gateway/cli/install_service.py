@@ -1,4 +1,4 @@
-"""`gwrms install-service`: systemd units for a robot's file, written or shown."""
+"""`gwrms install-service`: write systemd units for a robot's file, written or shown."""
 
 import argparse
 import ipaddress
@@ -55,8 +55,10 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("config", metavar="CONFIG", type=Path, help="the robot's file")
     parser.add_argument("--print", action="store_true", help="show the units, write nothing")
     parser.add_argument("--user", action="store_true", help="for your own session instead of the computer")
-    parser.add_argument("--run-as", metavar="NAME", help="the account (default: one that systemd makes up)")
-    parser.add_argument("--name", type=_name, default="gwrms", help="of the units (default: %(default)s)")
+    parser.add_argument("--run-as", metavar="NAME", help="the account (default: a dynamic user of systemd)")
+    parser.add_argument(
+        "--name", type=_name, default="gwrms", help="folder of the units (default: %(default)s)"
+    )
     return parser
 
 
@@ -112,7 +114,7 @@ def _write(service: Service, into: Path) -> None:
 
 
 def _say_how(service: Service, into: Path, stale: Sequence[str]) -> None:
-    """The commands that follow; `stale` are units of before, for a file that has changed since."""
+    """Print the next commands; `stale` are old units, for a file that has changed since."""
     sudo, systemctl = ("", "systemctl --user") if service.of_user else ("sudo ", "sudo systemctl")
     say("\nNow:\n")
     if stale:

@@ -20,10 +20,10 @@ from gateway.commission.draft import Draft, alone
 from gateway.commission.powered_run import NotStopped, Outcome
 from gateway.config.reading import load
 from gateway.config.robot import RobotConfig
-from gateway.joint_test import left
+from gateway.joint_test import undo_file
+from gateway.joint_test.dialogue import Test, tested
 from gateway.joint_test.limits import LATE_S, Asked, NotAllowed
 from gateway.joint_test.motion import Kind, Wish
-from gateway.joint_test.talk import Test, tested
 from gateway.records.folder import RecordsFolder
 from gateway.records.records import Records
 from gateway.user_name import user_name
@@ -79,33 +79,33 @@ def _parser(test: str) -> argparse.ArgumentParser:
     )
     parser.add_argument("joint", metavar="ROBOT.toml:JOINT", help="the joint of a robot's file")
     parser.add_argument(
-        "--json", action="store_true", help="questions and answers as JSON lines, as of gwrms commission"
+        "--json",
+        action="store_true",
+        help="exchange questions and answers as JSON lines, like gwrms commission",
     )
     if test == "stop":
         return parser
     _motion(parser, Kind(test))
     parser.add_argument(
-        "--max-speed", type=_number(0.1, 360), metavar="°/S", help="power is taken beyond it (default: 180)"
+        "--max-speed", type=_number(0.1, 360), metavar="°/S", help="cut the power beyond it (default: 180)"
     )
     parser.add_argument(
         "--max-torque",
         type=_number(0.01, 1000),
         metavar="N·m",
-        help="power is taken beyond it (default: its rated torque)",
+        help="cut the power beyond it (default: its rated torque)",
     )
     parser.add_argument(
         "--late",
         type=_number(20, 200),
         default=LATE_S * 1000,
         metavar="MS",
-        help="power is taken where a cycle comes so late (default: %(default)g)",
+        help="cut the power if a cycle is so late (default: %(default)g)",
     )
     parser.add_argument(
         "--out", type=Path, metavar="FOLDER", help=f"of the recording (default: {FOLDER} beside the file)"
     )
-    parser.add_argument(
-        "--who", default=user_name(), help="who does it, for the record (default: your user name)"
-    )
+    parser.add_argument("--who", default=user_name(), help="name for the journal (default: your user name)")
     return parser
 
 
@@ -210,7 +210,10 @@ def _load(file: Path, joint: str) -> RobotConfig:
 
 @contextmanager
 def _records(config: RobotConfig) -> Iterator[Records]:
-    """The robot's records, for this command alone: no gateway runs meanwhile, and none has left something."""
+    """Return the robot's records, for this command alone.
+
+    No gateway runs meanwhile, and none has left something.
+    """
     records = Records(config.records)
     try:
         if records.unusable is not None:
@@ -309,14 +312,14 @@ def _stop(file: Path, joint: str, *, as_json: bool) -> int:
 
 
 def _cut_off(config: RobotConfig) -> str | None:
-    """What a test has left that nobody leads any more, in words."""
+    """Return what a test has left that nobody leads any more, in words."""
     folder = RecordsFolder(config.records)
     try:
         folder.open()
     except OSError:
         return None  # it is under way, or nobody can tell
     try:
-        found = left.read(folder.joint_test)
+        found = undo_file.read(folder.joint_test)
     except NotAllowed as error:
         return str(error)
     finally:

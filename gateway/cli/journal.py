@@ -56,7 +56,9 @@ def tail(argv: list[str]) -> int:
         "The newest entries: who did what, when, and what came of it. WHO is known by their key or account\n"
         "[in brackets]; behind that, the name that the program gives itself, and its address.",
     )
-    made.add_argument("-n", type=int, default=20, metavar="N", help="how many, at most 1000 (default 20)")
+    made.add_argument(
+        "-n", type=int, default=20, metavar="N", help="number of entries, at most 1000 (default 20)"
+    )
     arguments = made.parse_args(argv)
     with connect(arguments, "journal") as robot:
         found = robot.journal(arguments.n)
@@ -147,7 +149,10 @@ def _witnesses(arguments: argparse.Namespace) -> tuple[list[SignedHead], list[st
 
 
 def _key(arguments: argparse.Namespace) -> tuple[str | None, list[str]]:
-    """The fingerprint of the robot's key: as given, the robot's own, or that of the only paired robot."""
+    """Return the fingerprint of the robot's key.
+
+    As given, the robot's own, or that of the only paired robot.
+    """
     if arguments.key is not None or not arguments.witness:
         return arguments.key, []
     if arguments.path.suffix == ".toml":
@@ -162,7 +167,7 @@ def _key(arguments: argparse.Namespace) -> tuple[str | None, list[str]]:
 def _verify_parser() -> argparse.ArgumentParser:
     made = argparse.ArgumentParser(
         prog="gwrms journal verify",
-        description="Check every entry of a journal, in itself and against what desks have seen of it.",
+        description="Check every entry of a journal, and compare it with the witnesses of desks.",
         epilog=VERIFY_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
@@ -174,7 +179,7 @@ def _verify_parser() -> argparse.ArgumentParser:
         action="append",
         default=[],
         metavar="FILE",
-        help="what a desk has kept: gwrms cloud witnesses ROBOT > FILE; again for another desk's",
+        help="a desk's witnesses: gwrms cloud witnesses ROBOT > FILE; repeatable",
     )
     made.add_argument(
         "--key",
@@ -182,7 +187,7 @@ def _verify_parser() -> argparse.ArgumentParser:
         metavar="SHA256",
         help="of the robot, as pairing showed it (default: of robot.toml, or of the only paired robot)",
     )
-    made.add_argument("--json", action="store_true", help="one JSON object, for machines")
+    made.add_argument("--json", action="store_true", help="print one JSON object, for programs")
     return made
 
 

@@ -36,8 +36,9 @@ gwrms keys COMMAND --help says more.
 """
 _PAIR = """\
 Shows HOST:PORT and a code. On the desk, `gwrms pair HOST:PORT` asks for it and proves to know it; then you
-say here how that desk is called and what it may do. The robot's own key is made where it has none: from
-its gateway's next start on, every TCP connection is TLS.
+say here how that desk is called and what it may do. With its first desk the robot gets a key of its own: from
+its gateway's next start on, every TCP connection is TLS. Until a desk is let in nothing changes, also if this
+is cancelled.
 """
 
 
@@ -51,32 +52,32 @@ def pair(argv: list[str]) -> int:
     made = _parser("pair", _PAIR)
     made.add_argument("--host", help="address to listen on for the desk (default: [gateway] host)")
     made.add_argument("--port", type=int, default=PAIRING_PORT, help="its port (default %(default)s)")
-    made.add_argument("--name", type=keys_push.name_of, help="of the desk, instead of asking")
-    made.add_argument("--role", type=Role, choices=list(Role), help="what it may, instead of asking")
+    made.add_argument("--name", type=keys_push.name_of, help="name of the desk, instead of asking")
+    made.add_argument("--role", type=Role, choices=list(Role), help="its role, instead of asking")
     made.add_argument(
-        "--yes", action="store_true", help="with --name and --role: ask nothing, take who comes"
+        "--yes", action="store_true", help="with --name and --role: ask nothing, accept the first desk"
     )
     arguments = made.parse_args(argv)
     if arguments.yes and not (arguments.name and arguments.role):
-        made.error("--yes needs --name and --role: who comes is taken as that")
+        made.error("--yes needs --name and --role for the desk")
     if not arguments.yes and not sys.stdin.isatty():
         raise NobodyToAsk("there is no terminal to ask on; give --name, --role and --yes")
     forbid_core_dumps()
     robot, folder = _robot(arguments)
     if arguments.name:
         changes.check_free(folder, arguments.name)
-    if changes.ensure_keys(folder, robot.robot.name):
-        say(f"The robot's key was made in {folder.keys}. Start its gateway again: it speaks TLS only then.\n")
     host = arguments.host or robot.gateway.host
     with listen(host, arguments.port, "--host and --port") as listener:
-        code, own = new_code(), changes.own_fingerprint(folder)
-        pairing = Pairing(folder, listener, code, own)
+        _warn_of_loopback(listener, arguments)
+        keys = changes.ensure_keys(folder, robot.robot.name)
+        code, own = new_code(), changes.own_fingerprint(keys)
+        pairing = Pairing(keys, listener, code, own)
         _show(listener, code, own)
         candidate = pairing.wait()
     try:
         name, role = _confirmed(candidate, arguments, folder)
         candidate.check_waits()
-        changes.add(folder, name, candidate.der, role)
+        is_first = changes.admit(keys, own, name, candidate.der, role)
     except KeyProblem as error:
         candidate.answer(Reply(problem=str(error)))
         raise
@@ -89,7 +90,21 @@ def pair(argv: list[str]) -> int:
         )
     )
     say(f"{name} is let in from now on, as {role.value}.\n")
+    if is_first:
+        say(f"The robot's key is in {folder.keys} now.\n")
+        say(f"Start its gateway again: {name} reaches it only then.\n")
     return 0
+
+
+def _warn_of_loopback(listener: socket.socket, arguments: argparse.Namespace) -> None:
+    """Before a code is shown that no other desk could use."""
+    if is_loopback(listener.getsockname()):
+        warn(
+            "keys",
+            "only a desk on this computer can use the address below: it is this computer's own. "
+            'For other desks press Ctrl-C, set host = "0.0.0.0" under [gateway] in '
+            f"{arguments.config}, and begin again",
+        )
 
 
 def _show(listener: socket.socket, code: str, own: str) -> None:
@@ -100,15 +115,10 @@ def _show(listener: socket.socket, code: str, own: str) -> None:
     say(f"  gwrms pair {where}\n\nIt asks for this code:\n\n  {code}\n\n")
     say("".join(f"{one}\n" for one in _drawn(link(where, code))))
     say(f"This robot's key: {grouped(own)}\n")
-    if is_loopback(listener.getsockname()):
-        warn(
-            "keys",
-            "this listens on this computer only; for other desks set host in [gateway], or give --host",
-        )
 
 
 def _drawn(text: str) -> list[str]:
-    """The same for a camera, where this is a terminal that can show it."""
+    """Return the same for a camera, where this is a terminal that can show it."""
     try:
         "█▀▄".encode(sys.stdout.encoding or "ascii")
         return [*qr_code.lines(text), ""] if sys.stdout.isatty() else []
@@ -125,7 +135,7 @@ def _address() -> str:
 
 
 def _confirmed(candidate: Candidate, arguments: argparse.Namespace, folder: AccessFolder) -> tuple[str, Role]:
-    """What the person here says; raises `PairingEnded` where they refuse."""
+    """Return what the person here says; raises `PairingEnded` where they refuse."""
     if arguments.yes:
         return arguments.name, arguments.role
     wished = arguments.name or (candidate.name if NAME.fullmatch(candidate.name) else "")
@@ -156,7 +166,7 @@ def _role() -> Role:
 
 
 def _asked(question: str) -> str:
-    """Raises `PairingEnded` where the terminal has closed."""
+    """Ask a question; raises `PairingEnded` if the terminal has closed."""
     say(question)
     line = sys.stdin.buffer.readline()
     if not line:
@@ -166,8 +176,8 @@ def _asked(question: str) -> str:
 
 def list_(argv: list[str]) -> int:
     """Exit code: 0 all is well, 1 something in it is not."""
-    made = _parser("list", "Who is let in on this robot, and as what.")
-    made.add_argument("--json", action="store_true", help="one JSON object a line, for machines")
+    made = _parser("list", "List the clients of this robot, with their roles.")
+    made.add_argument("--json", action="store_true", help="print one JSON object per line, for programs")
     arguments = made.parse_args(argv)
     _, folder = _robot(arguments)
     known = known_in(folder)
@@ -187,7 +197,7 @@ def list_(argv: list[str]) -> int:
 
 def revoke(argv: list[str]) -> int:
     """Exit code: 0 gone, 1 there is nobody of that name, or it could not be removed."""
-    made = _parser("revoke", "Let somebody in no more. A gateway that runs closes their connections at once.")
+    made = _parser("revoke", "Revoke a client. A running gateway closes its connections at once.")
     made.add_argument("name", metavar="NAME")
     arguments = made.parse_args(argv)
     _, folder = _robot(arguments)
@@ -201,7 +211,7 @@ def add(argv: list[str]) -> int:
     made = _parser("add", keys_push.ADD)
     made.add_argument("name", metavar="NAME", type=keys_push.name_of)
     made.add_argument("--role", type=Role, choices=list(Role), required=True, help="what it may")
-    made.add_argument("--json", action="store_true", help="one JSON object, for machines")
+    made.add_argument("--json", action="store_true", help="print one JSON object, for programs")
     arguments = made.parse_args(argv)
     return keys_push.add(arguments, *_robot(arguments))
 
@@ -220,7 +230,7 @@ def _parser(command: str, what: str) -> argparse.ArgumentParser:
 
 
 def _robot(arguments: argparse.Namespace) -> tuple[config.RobotConfig, AccessFolder]:
-    """The robot of the file, and its folder on the disk, whoever runs this."""
+    """Return the robot of the file, and its folder on the disk, whoever runs this."""
     robot = config.load(arguments.config)
     return robot, AccessFolder(robot.access, {})
 

@@ -77,14 +77,18 @@ def _arguments(argv: list[str]) -> argparse.Namespace:
         allow_abbrev=False,
     )
     made.add_argument("hosts", metavar="[USER@]HOST", nargs="+", type=_host, help="robots, as ssh names them")
-    made.add_argument("--role", type=Role, choices=list(Role), required=True, help="what it may there")
-    made.add_argument("--certificate", metavar="FILE", type=Path, help="of somebody else, such as anna.crt")
-    made.add_argument("--name", type=name_of, help="that the robots are to call it (default: as its file)")
+    made.add_argument("--role", type=Role, choices=list(Role), required=True, help="its role there")
+    made.add_argument(
+        "--certificate", metavar="FILE", type=Path, help="another client's certificate, such as anna.crt"
+    )
+    made.add_argument(
+        "--name", type=name_of, help="the client's name on the robots (default: that of its file)"
+    )
     made.add_argument(
         "--config", metavar="PATH", help="the robots' file there (default: /etc/gwrms/robot.toml)"
     )
     made.add_argument(
-        "--remote", metavar="COMMAND", default=REMOTE, help="how gwrms is called there (default: %(default)s)"
+        "--remote", metavar="COMMAND", default=REMOTE, help="the gwrms command there (default: %(default)s)"
     )
     return made.parse_args(argv)
 
@@ -110,7 +114,7 @@ def _read(file: Path) -> bytes:
 
 
 def _added(host: str, name: str, pem: bytes, arguments: argparse.Namespace) -> dict[str, Any]:
-    """What the robot answers; raises `KeyProblem` with what it says where it refuses."""
+    """Return what the robot answers; raises `KeyProblem` with what it says where it refuses."""
     ssh = shutil.which("ssh")
     if ssh is None:
         raise KeyProblem("the program ssh is not here: apt install openssh-client")
@@ -126,7 +130,7 @@ def _added(host: str, name: str, pem: bytes, arguments: argparse.Namespace) -> d
 
 
 def _answer(output: bytes) -> dict[str, Any]:
-    """The last line, because a login may print others before."""
+    """Return the last line, because a login may print others before."""
     lines = output.strip().splitlines()
     try:
         found = json.loads(lines[-1]) if lines else None

@@ -39,7 +39,7 @@ class NotOne(ClientError):
 
 def main(argv: list[str]) -> int:
     """Run `gwrms od`."""
-    made = parser("od", "Look into a device's object dictionary: names, types, limits, values.", EPILOG)
+    made = parser("od", "Search a device's object dictionary: names, types, limits, values.", EPILOG)
     made.add_argument("device", metavar="DEVICE", help="a joint or device by name, or a node id")
     made.add_argument(
         "search",
@@ -48,13 +48,14 @@ def main(argv: list[str]) -> int:
         default="",
         help="0x6041, 0x1018:4, 0x60*, 0x6060-0x607F, 0x6060…, or words of the name (default: all)",
     )
-    made.add_argument("--read", action="store_true", help="ask the device what it holds now")
-    made.add_argument(
-        "--watch", action="store_true", help="a line whenever one holds something else, until Ctrl-C"
-    )
+    made.add_argument("--read", action="store_true", help="read the values from the device")
+    made.add_argument("--watch", action="store_true", help="print a line for every change, until Ctrl-C")
     made.add_argument("--count", type=lines, metavar="N", help="end --watch after N lines")
     made.add_argument(
-        "--set", metavar="VALUE", type=_value, help="write the one object that SEARCH finds; 3deg, 420mm"
+        "--set",
+        metavar="VALUE",
+        type=_value,
+        help="write the one object that SEARCH finds; units as in 3deg, 420mm",
     )
     add_trial(made)
     made.add_argument(
@@ -63,7 +64,7 @@ def main(argv: list[str]) -> int:
         help="can0, INTERFACE:CHANNEL of python-can, or a robot's file: read node DEVICE there, by --eds",
     )
     made.add_argument("--eds", metavar="FILE", help="the node's EDS or DCF, for --interface")
-    made.add_argument("--bitrate", type=int, help="bit/s, for interfaces that are opened with one")
+    made.add_argument("--bitrate", type=int, help="bit/s, for interfaces that need one")
     arguments = made.parse_args(argv)
     if wrong := _misused(arguments):
         made.error(wrong)
@@ -109,7 +110,7 @@ def _show_directly(arguments: argparse.Namespace) -> int:
 
 
 def _component(device: str, description: Description) -> str:
-    """The component's name; of a node with several the first, whose EDS is that of all."""
+    """Return the component's name; of a node with several the first, whose EDS is that of all."""
     if not device.isdecimal():
         return device
     nodes = {node.node_id: node.components for bus in description.buses for node in bus.nodes}
@@ -166,7 +167,7 @@ def _set(robot: Robot, found: ObjectList, description: Description, arguments: a
 
 
 def _value(text: str) -> Change:
-    """A value and its unit, for a parameter that is not known yet."""
+    """Return a value and its unit, for a parameter that is not known yet."""
     try:
         return change_of(f"object={text}")
     except argparse.ArgumentTypeError as error:

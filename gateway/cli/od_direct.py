@@ -15,7 +15,7 @@ from gateway.wire.object_search import fitting
 def read_directly(
     bus: str, node: int, file: str, search: str, bitrate: int | None
 ) -> tuple[list[ObjectInfo], dict[str, ObjectValue]]:
-    """The objects that fit, and what the node holds of them.
+    """Return the objects that fit, and what the node holds of them.
 
     Raises:
         DriverError: the file or the interface cannot be had, or somebody else asks the node.

@@ -1,4 +1,4 @@
-"""`gwrms pair`: let a robot know this desk, and this desk the robot."""
+"""`gwrms pair`: pair this desk with a robot."""
 
 import argparse
 import sys
@@ -35,15 +35,19 @@ def main(argv: list[str]) -> int:
         metavar="HOST:PORT",
         nargs="?",
         default="",
-        help="as the robot shows it (asked for, if not)",
+        help="as the robot shows it (default: ask)",
     )
     made.add_argument(
-        "code", metavar="CODE", nargs="?", default="", help="instead of being asked; others here may see it"
+        "code",
+        metavar="CODE",
+        nargs="?",
+        default="",
+        help="the code, instead of a question; others here may see it",
     )
     made.add_argument(
-        "--name", type=name_of, help="that the robot is to call this desk (default: your user and computer)"
+        "--name", type=name_of, help="this desk's name on the robot (default: your user and computer)"
     )
-    made.add_argument("--json", action="store_true", help="one JSON object, for machines")
+    made.add_argument("--json", action="store_true", help="print one JSON object, for programs")
     arguments = made.parse_args(argv)
     forbid_core_dumps()
     try:
@@ -77,12 +81,15 @@ def _typed(arguments: argparse.Namespace) -> tuple[Address, str]:
     Raises:
         ValueError: one is none.
         NobodyToAsk: nobody has typed it.
+        Unreachable: a person would type a code for nobody.
 
     """
     robot = arguments.robot or _asked("HOST:PORT, or the robot's link: ", arguments)
     if arguments.code or is_link(robot):
         return pairing.typed(robot, arguments.code)
     where = pairing.place(robot)
+    if sys.stdin.isatty():
+        pairing.check_waits(where)
     while True:
         try:
             return where, normal(_asked("The code that the robot shows: ", arguments))
@@ -93,7 +100,7 @@ def _typed(arguments: argparse.Namespace) -> tuple[Address, str]:
 
 
 def _asked(question: str, arguments: argparse.Namespace) -> str:
-    """A line of the standard input; where a person types it, they are asked.
+    """Return a line of the standard input; where a person types it, they are asked.
 
     Raises:
         NobodyToAsk: the input has ended.
@@ -105,5 +112,5 @@ def _asked(question: str, arguments: argparse.Namespace) -> str:
         asking.flush()
     line = sys.stdin.buffer.readline(_MOST)
     if not line:
-        raise NobodyToAsk(f"nothing was typed: {question.rstrip(': ')}")
+        raise NobodyToAsk(f"nothing was typed; it was asked for: {question.rstrip(': ')}")
     return line.decode("utf-8", "replace").strip()

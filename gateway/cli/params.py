@@ -43,7 +43,7 @@ COMPARE_EPILOG = """Values are the same when the device would store the same byt
 What the file does not name does not count.
 
 exit status, as of diff(1)
-  0  the robot holds all that the file says
+  0  the robot holds all values of the file
   1  something is different, or the robot does not have it
   2  nothing was compared: no gateway, a file that cannot be read, wrong usage
 
@@ -68,10 +68,10 @@ def main(argv: list[str]) -> int:
 
 def save(argv: list[str]) -> int:
     """Run `gwrms params save`."""
-    made = _parser("save", "Save parameters as the devices hold them now.", SAVE_EPILOG)
-    made.add_argument("globs", metavar="GLOB", nargs="*", help="names or globs of what to save")
+    made = _parser("save", "Save the present parameters of the devices.", SAVE_EPILOG)
+    made.add_argument("globs", metavar="GLOB", nargs="*", help="names or globs of the parameters")
     made.add_argument("--eds", type=Path, metavar="EDS", help="the device's file, to make a DCF from")
-    made.add_argument("--overwrite", action="store_true", help="where the file is there already")
+    made.add_argument("--overwrite", action="store_true", help="replace an existing file")
     arguments = made.parse_args(argv)
     file: Path = arguments.file
     kind = format_of(file)
@@ -92,7 +92,7 @@ def save(argv: list[str]) -> int:
 
 def compare_(argv: list[str]) -> int:
     """Run `gwrms params compare`."""
-    made = _parser("compare", "What a file says beside what the robot holds.", COMPARE_EPILOG)
+    made = _parser("compare", "Compare a file with the robot's parameters.", COMPARE_EPILOG)
     arguments = made.parse_args(argv)
     with connect(arguments, "params") as robot:
         rows = _rows(robot, Scope(robot.describe(), arguments.component), arguments.file)
@@ -106,9 +106,9 @@ def compare_(argv: list[str]) -> int:
 
 def apply(argv: list[str]) -> int:
     """Run `gwrms params apply`."""
-    made = _parser("apply", "Bring a robot's parameters to what a file says, all or none.", APPLY_EPILOG)
-    made.add_argument("--yes", action="store_true", help="do not ask")
-    made.add_argument("--skip", action="store_true", help="leave out what cannot be changed at all")
+    made = _parser("apply", "Set a robot's parameters to those of a file, all or none.", APPLY_EPILOG)
+    made.add_argument("--yes", action="store_true", help="do not ask for confirmation")
+    made.add_argument("--skip", action="store_true", help="skip parameters that cannot be changed")
     add_trial(made)
     arguments = made.parse_args(argv)
     with connect(arguments, "params") as robot:
@@ -149,7 +149,7 @@ def _rows(robot: Robot, scope: Scope, file: Path) -> list[Row]:
 
 
 def _changes(rows: Iterable[Row], file: Path, *, skip: bool) -> dict[str, Number]:
-    """What is to be written; raises `FileProblem` where the file cannot be brought about."""
+    """Return what is to be written; raises `FileProblem` where the file cannot be brought about."""
     found = Counter(row.verdict for row in rows)
     refused = sum(found[verdict] for verdict in REFUSED)
     if refused:
@@ -190,7 +190,7 @@ def _say_unlike(rows: Sequence[Row], *, json: bool) -> None:
     elif unlike:
         say(_table(unlike) + _summary(rows))
     else:
-        say("the robot holds all that the file says\n")
+        say("the robot holds all values of the file\n")
 
 
 def _table(rows: Iterable[Row]) -> str:

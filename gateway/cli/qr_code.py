@@ -38,7 +38,7 @@ class TooLong(Exception):
 
 
 def modules(text: str, mask: int | None = None) -> Modules:
-    """The code of a text, with the mask that disturbs least (§7.8.3).
+    """Return the code of a text, with the mask that disturbs least (§7.8.3).
 
     Raises:
         TooLong: the text has more than 78 bytes.
@@ -54,7 +54,7 @@ def modules(text: str, mask: int | None = None) -> Modules:
 
 
 def lines(text: str) -> list[str]:
-    """The code of a text as it is printed; raises `TooLong`."""
+    """Return the code of a text as it is printed; raises `TooLong`."""
     inner = modules(text)
     width = len(inner) + 2 * QUIET
     blank, side = [[False] * width] * QUIET, [False] * QUIET

@@ -12,8 +12,8 @@ example:
 
 def main(argv: list[str]) -> int:
     """Run `gwrms restore`."""
-    made = device_parser("restore", "Give a device its defaults back (1011h).", EPILOG)
-    made.add_argument("--yes", action="store_true", help="do not ask")
+    made = device_parser("restore", "Restore a device's defaults (1011h).", EPILOG)
+    made.add_argument("--yes", action="store_true", help="do not ask for confirmation")
     arguments = made.parse_args(argv)
     with connect(arguments, "restore") as robot:
         question = f"{arguments.component} loses what was stored in it, and takes its defaults. Go on?"

@@ -2,6 +2,7 @@
 
 import argparse
 import contextlib
+import dataclasses
 import gc
 import logging
 import os
@@ -49,7 +50,8 @@ Where [guard] heartbeat_ms has armed the drives, they are freed first, and the e
 while one is enabled: gwrms stop, then end it.
 
 Without keys it is served on 127.0.0.1 and its Unix socket only. `gwrms keys pair CONFIG` makes
-them: from then on every TCP connection is TLS, and lets in only whose key is known (gwrms docs pair).
+them with the first desk: from the gateway's next start on every TCP connection is TLS, and lets in
+only whose key is known (gwrms docs pair).
 
 exit status: 0 ended by a signal; 1 the address cannot be used, or CONFIG is wrong; 2 usage
 """
@@ -93,7 +95,14 @@ def main(arguments: Sequence[str]) -> int:
     by_hand, watched = handed is None or handed.woken, notify.watchdog_s()
     idle = watched is None
     try:
-        daemon = Daemon(robot, sockets.port, classic=sockets.classic, local=sockets.local, ends_idle=idle)
+        daemon = Daemon(
+            robot,
+            sockets.port,
+            classic=sockets.classic,
+            local=sockets.local,
+            ends_idle=idle,
+            rested_without_keys=sockets.without_keys,
+        )
     except (DoorProblem, KeyProblem) as error:
         if handed is None:
             sockets.close()
@@ -106,12 +115,15 @@ def main(arguments: Sequence[str]) -> int:
         daemon.run(ready=lambda: _announce(daemon, anew=not sockets.woken))
         signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)
         if by_hand and not daemon.told:
-            rest(sockets)
+            rest(dataclasses.replace(sockets, without_keys=not daemon.has_keys))
     return 0
 
 
 def _robot(options: argparse.Namespace, *, tell: bool) -> config.RobotConfig:
-    """The robot of the file; what is likely wrong with it, or files that it names, is logged on `tell`."""
+    """Return the robot of the file.
+
+    What is likely wrong with it, or files that it names, is logged on `tell`.
+    """
     robot, warnings = config.load_with_warnings(options.config)
     for one in (*warnings, *_beside(robot)) if tell else ():
         log.warning("%s: %s", options.config, one.words)
@@ -121,8 +133,8 @@ def _robot(options: argparse.Namespace, *, tell: bool) -> config.RobotConfig:
 
 
 def _beside(robot: config.RobotConfig) -> list[Finding]:
-    """What `gwrms check` says of EDS files, layouts and calibrations: each costs a component only."""
-    from gateway.surroundings import beside  # all that drivers need: not for a gateway that wakes for a stop
+    """Return what `gwrms check` says of EDS files, layouts and calibrations: each costs a component only."""
+    from gateway.prerequisites import beside  # all that drivers need: not for a gateway that wakes for a stop
 
     found = list(beside(robot))
     gc.collect()  # buses and components that were built to be looked at
@@ -141,12 +153,13 @@ def _listeners(robot: config.RobotConfig, handed: Listeners | None) -> Listeners
         except OSError:
             port.close()
             raise
-    local = _local(robot) if handed is None else handed.local
-    return Listeners(port, classic, local, woken=handed is not None and handed.woken)
+    if handed is not None:
+        return dataclasses.replace(handed, classic=classic)
+    return Listeners(port, classic, _local(robot))
 
 
 def _local(robot: config.RobotConfig) -> socket.socket | None:
-    """The Unix socket that the robot's file names, or one in the folder that we are given for such."""
+    """Return the Unix socket that the robot's file names, or one in the folder that we are given for such."""
     given = robot.gateway.socket
     folder = os.environ.get("RUNTIME_DIRECTORY") or os.environ.get("XDG_RUNTIME_DIR")
     if given == "" or (given is None and not folder):

@@ -10,7 +10,7 @@ from gateway.cli.text import warn
 from gateway.cli.writing import add_trial, write
 from gateway.client import ClientError, Robot
 from gateway.coding import Number
-from gateway.several import all_joints, mirrored, spread
+from gateway.several_joints import all_joints, mirrored, spread
 from gateway.units import unit_named
 from gateway.wire.robot import Description
 
@@ -66,17 +66,17 @@ def main(argv: list[str]) -> int:
         metavar="NAME[=VALUE[UNIT]]",
         nargs="+",
         type=change_of,
-        help="in the parameter's own unit, or in another: 3deg, 420mm, 30rpm",
+        help="value, in the parameter's own unit or another: 3deg, 420mm, 30rpm",
     )
     whom = made.add_mutually_exclusive_group()
-    whom.add_argument("--mirror", action="store_true", help="the same joint of the other side takes it, too")
-    whom.add_argument("--all-joints", action="store_true", help="every joint takes it")
+    whom.add_argument("--mirror", action="store_true", help="also set the same joint of the other side")
+    whom.add_argument("--all-joints", action="store_true", help="set every joint")
     made.add_argument(
         "--leave-out",
         action="append",
         default=[],
         metavar="JOINT",
-        help="with these: a joint that stays as it is (again: more)",
+        help="with these: skip this joint (repeatable)",
     )
     add_trial(made)
     arguments = made.parse_args(argv)
@@ -99,7 +99,7 @@ def main(argv: list[str]) -> int:
 
 
 def _spread(robot: Robot, arguments: argparse.Namespace, description: Description) -> dict[str, Number]:
-    """What each joint takes; raises `NotForAll` where one cannot and is not left out by word."""
+    """Return what each joint takes; raises `NotForAll` where one cannot and is not left out by word."""
     held = robot.read().values
     changes: dict[str, Number] = {}
     check_names("joint", arguments.leave_out, all_joints(description))
@@ -133,7 +133,7 @@ def _spread(robot: Robot, arguments: argparse.Namespace, description: Descriptio
 
 
 def _named(change: Change, description: Description) -> str:
-    """The parameter's name, also where its address was typed."""
+    """Return the parameter's name, also where its address was typed."""
     return next(
         info.name
         for info in description.parameters
@@ -152,7 +152,10 @@ def change_of(text: str) -> Change:
 
 
 def value_of(change: Change, description: Description) -> Number:
-    """The value in the parameter's own unit; a whole number as such, so that none of its digits is lost."""
+    """Return the value in the parameter's own unit.
+
+    A whole number as such, so that none of its digits is lost.
+    """
     if change.number is None:
         raise UnknownUnit(f"{change.name} has no value")
     if change.unit is None and change.number.lstrip("+-").isdecimal() and len(change.number) <= LONGEST:

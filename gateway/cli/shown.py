@@ -16,7 +16,9 @@ _EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
 
 def add_degrees(made: argparse.ArgumentParser) -> None:
     """Add the option `--deg`, which `unit_of` heeds."""
-    made.add_argument("--deg", action="store_true", help="angles in degrees, not in rad; JSON stays in SI")
+    made.add_argument(
+        "--deg", action="store_true", help="show angles in degrees, not in rad; JSON stays in SI"
+    )
 
 
 def unit_of(si: str, *, degrees: bool) -> Unit:

@@ -1,4 +1,4 @@
-"""`gwrms snapshot`: one look at resources, components or status."""
+"""`gwrms snapshot`: take a snapshot of resources, components or status."""
 
 import argparse
 import time
@@ -33,8 +33,8 @@ def main(argv: list[str]) -> int:
 
 
 def _parse(argv: list[str]) -> argparse.Namespace:
-    made = parser("snapshot", "One look at a robot: what it has now, asked once.", EPILOG)
-    made.add_argument("module", choices=("resource", "component", "status"), help="what to look at")
+    made = parser("snapshot", "Take a snapshot of a robot.", EPILOG)
+    made.add_argument("module", choices=("resource", "component", "status"), help="the module")
     made.add_argument(
         "channels", metavar="GLOB", nargs="*", default=[], help="component: only these channels"
     )
@@ -45,7 +45,7 @@ def _parse(argv: list[str]) -> argparse.Namespace:
     order.add_argument("--descending", dest="descending", action="store_const", const=True)
     group.add_argument("--limit", type=_count, metavar="N", help="only the first N processes")
     group.add_argument(
-        "--include", choices=INCLUDE, action="append", default=[], help="ask for more; repeatable"
+        "--include", choices=INCLUDE, action="append", default=[], help="include more; repeatable"
     )
     arguments = made.parse_args(argv)
     if arguments.channels and arguments.module != "component":

@@ -18,7 +18,7 @@ def main(argv: list[str]) -> int:
         "Exit status 0 only when every drive has confirmed, and every controller of the robot's file.",
         WARNING,
     )
-    made.add_argument("--reason", default="gwrms stop", help="what the robot's journal shall say")
+    made.add_argument("--reason", default="gwrms stop", help="reason for the robot's journal")
     arguments = made.parse_args(argv)
     try:
         with connect(arguments, "stop") as robot:

@@ -8,7 +8,7 @@ from gateway.cli.connect import connect, parser
 from gateway.cli.storage import add_component, say_stored
 from gateway.cli.text import say, say_json, table
 from gateway.client import CallTimeout, LinkLost, NotConnected, RemoteError, Robot
-from gateway.several import Outcome, refused_or_unknown, storing
+from gateway.several_joints import Outcome, refused_or_unknown, storing
 
 EPILOG = """Refused while one of its drives is enabled or in a state that is not known, while something
 is on trial, and where the device does not say that it can (1010h). All of its parameters are stored, whoever
@@ -33,9 +33,9 @@ class Result(Struct, frozen=True):
 
 def main(argv: list[str]) -> int:
     """Run `gwrms store`."""
-    made = parser("store", "Make a device keep its parameters as they are now (1010h).", EPILOG)
+    made = parser("store", "Store a device's present parameters in its memory (1010h).", EPILOG)
     add_component(made, "?")
-    made.add_argument("--all", action="store_true", help="every device that can, one after another")
+    made.add_argument("--all", action="store_true", help="every device that can store, one after another")
     arguments = made.parse_args(argv)
     if arguments.all == (arguments.component is not None):
         made.error("name one COMPONENT, or say --all")

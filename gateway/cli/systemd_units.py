@@ -150,7 +150,7 @@ class Service:
         )
 
     def _path(self) -> str:
-        """Starts it, at boot or after a kill, where a stop is held or a write is to be taken back."""
+        """Return the path unit, which starts it if a stop is held or a write must be reverted."""
         folder = self._records
         return (
             f"{MARK}\n[Unit]\nDescription=What the {self._gateway} has to finish\n\n"

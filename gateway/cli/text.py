@@ -8,7 +8,7 @@ import msgspec
 
 from gateway.amounts import NONE, percent
 from gateway.coding import text as digits
-from gateway.plain import json_plain, plain
+from gateway.plain_text import json_plain, plain
 from gateway.wire.component import ChannelInfo
 from gateway.wire.cost import BudgetInfo
 
@@ -44,13 +44,16 @@ def say_json(answer: object) -> None:
 
 
 def warn(command: str, text: str) -> None:
-    """A sentence on stderr; no line of it can pass for another warning."""
+    """Print a warning on stderr; no line of it can pass for another warning."""
     shown = plain(text, "\n").replace("\n", "\n  ")
     sys.stderr.write(f"gwrms {command}: {shown}\n")
 
 
 def measured(value: float | None, channel: ChannelInfo | None = None) -> str:
-    """A channel's value: a state as its word, a number with few decimals, a dash where there is none."""
+    """Return a channel's value.
+
+    A state as its word, a number with few decimals, a dash where there is none.
+    """
     if value is None:
         return NONE
     unit = "" if channel is None else channel.unit
@@ -60,12 +63,12 @@ def measured(value: float | None, channel: ChannelInfo | None = None) -> str:
 
 
 def exact(value: float | None) -> str:
-    """A parameter's value, with every digit that it has."""
+    """Return a parameter's value, with every digit that it has."""
     return NONE if value is None else digits(value)
 
 
 def budget(info: BudgetInfo) -> str:
-    """What the gateway may use, and what its streams give up for it."""
+    """Return what the gateway may use, and what its streams give up for it."""
     shed = f": streams send one row of {info.shed}" if info.shed > 1 else ""
     return f"at most {percent(info.max_cpu_percent)} of a core{shed}"
 

@@ -16,7 +16,7 @@ class Typed:
         self._over = False
 
     def line(self) -> str:
-        """The next line, with its end; raises `EOFError` where none comes any more."""
+        """Return the next line, with its end; raises `EOFError` where none comes any more."""
         while b"\n" not in self._held and not self._over:
             self._read()
         if not self._held:

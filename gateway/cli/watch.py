@@ -20,7 +20,7 @@ from gateway.cli.connect import (
 from gateway.cli.shown import Channels, add_degrees, utc
 from gateway.cli.text import measured, say, say_json, warn
 from gateway.client import Batch, ClientError, Robot
-from gateway.plain import plain
+from gateway.plain_text import plain
 from gateway.wire.robot import Clock
 from gateway.wire.stream import ModuleName
 
@@ -42,7 +42,7 @@ examples:
 
 def main(argv: list[str]) -> int:
     """Run `gwrms watch`."""
-    made = parser("watch", "Follow channels live, one line for every tick.", EPILOG)
+    made = parser("watch", "Show channels live, one line per tick.", EPILOG)
     made.add_argument(
         "channels", metavar="CHANNEL", nargs="+", help="names, globs, or a component: all of its channels"
     )
@@ -50,7 +50,9 @@ def main(argv: list[str]) -> int:
         "--rate", type=_rate, default=10.0, metavar="HZ", help="ticks a second, 0.1 to 1000 (default 10)"
     )
     made.add_argument(
-        "--csv", action="store_true", help="comma-separated, a column a channel; empty is missing"
+        "--csv",
+        action="store_true",
+        help="print comma-separated values, a column per channel; missing ones are empty",
     )
     add_degrees(made)
     made.add_argument("--count", type=lines, metavar="N", help="end after N lines")
@@ -97,7 +99,7 @@ def _rows(
 
 
 def _clock(robot: Robot) -> Clock | None:
-    """What it says of its clocks now; None where it does not: no time is better than a wrong one."""
+    """Return what it says of its clocks now; None where it does not: no time is better than a wrong one."""
     try:
         return robot.describe().clock
     except ClientError:

@@ -20,7 +20,7 @@ def add_trial(made: argparse.ArgumentParser) -> None:
         "--trial",
         metavar="S",
         type=_trial_s,
-        help="try it for S seconds (at most 300); exit status 0 if kept",
+        help="write on trial for S seconds (at most 300); exit status 0 if kept",
     )
 
 

@@ -82,7 +82,7 @@ class Robot:
         return self._client.link.hello
 
     def describe(self) -> Description:
-        """What the robot is made of."""
+        """Return what the robot is made of."""
         return self._wait(self._client.describe())
 
     def resources(self, params: ResourceSnapshotParams | None = None) -> ResourceSnapshot:
@@ -90,7 +90,7 @@ class Robot:
         return self._wait(self._client.resources(params))
 
     def components(self, *channels: str) -> Snapshot:
-        """The newest value of the channels (globs; none means all)."""
+        """Return the newest value of the channels (globs; none means all)."""
         return self._wait(self._client.components(*channels))
 
     def buses(self) -> Buses:
@@ -98,7 +98,7 @@ class Robot:
         return self._wait(self._client.buses())
 
     def cost(self) -> GatewayCost:
-        """What monitoring costs the robot; rates are since the last call, None the first time."""
+        """Return what monitoring costs the robot; rates are since the last call, None the first time."""
         return self._wait(self._client.cost())
 
     def overruns(self) -> Overruns:
@@ -106,7 +106,7 @@ class Robot:
         return self._wait(self._client.overruns())
 
     def status(self) -> Snapshot:
-        """The merged set that status prediction needs."""
+        """Return the merged set that status prediction needs."""
         return self._wait(self._client.status())
 
     def watch(
@@ -136,11 +136,14 @@ class Robot:
         return self._wait(self._client.read(*names))
 
     def objects(self, component: str, search: str = "") -> ObjectList:
-        """What an EDS says of a component's objects; `search`: an address, a range, or words of the name."""
+        """Return what an EDS says of a component's objects.
+
+        `search`: an address, a range, or words of the name.
+        """
         return self._wait(self._client.objects(component, search))
 
     def read_objects(self, component: str, *objects: str) -> ObjectValues:
-        """What a device holds of objects such as `0x6041:0` now; at most 64."""
+        """Return what a device holds of objects such as `0x6041:0` now; at most 64."""
         return self._wait(self._client.read_objects(component, *objects))
 
     def write(self, changes: Mapping[str, float]) -> Written:
@@ -195,7 +198,7 @@ class Robot:
         return self._wait(store())
 
     def restore(self, component: str) -> Stored:
-        """The same for its defaults (1011h), which act after its next reset; raises as `store`."""
+        """Return the same for its defaults (1011h), which act after its next reset; raises as `store`."""
 
         async def restore() -> Stored:
             async with self._client.writing():
@@ -204,11 +207,14 @@ class Robot:
         return self._wait(restore())
 
     def journal(self, count: int = 20) -> JournalEntries:
-        """The newest entries of the robot's journal, oldest first."""
+        """Return the newest entries of the robot's journal, oldest first."""
         return self._wait(self._client.journal(count))
 
     def journal_head(self) -> JournalProof:
-        """The journal's newest entry, signed by the robot: whoever keeps it can tell if it is rewritten."""
+        """Return the journal's newest entry, signed by the robot.
+
+        Whoever keeps it can tell if it is rewritten.
+        """
         return self._wait(self._client.journal_head())
 
     def stop(self, reason: str) -> Stopped:

@@ -117,7 +117,7 @@ class Client:
         await self.link.close()
 
     async def describe(self) -> Description:
-        """What the robot is made of."""
+        """Return what the robot is made of."""
         return await self.link.call(ROBOT_DESCRIBE, Params())
 
     async def resources(self, params: ResourceSnapshotParams | None = None) -> ResourceSnapshot:
@@ -125,7 +125,7 @@ class Client:
         return await self.link.call(RESOURCE_SNAPSHOT, params or ResourceSnapshotParams())
 
     async def components(self, *channels: str) -> Snapshot:
-        """The newest value of the channels (globs; none means all)."""
+        """Return the newest value of the channels (globs; none means all)."""
         return await self.link.call(COMPONENT_SNAPSHOT, SnapshotParams(list(channels) or None))
 
     async def buses(self) -> Buses:
@@ -133,7 +133,7 @@ class Client:
         return await self.link.call(BUS_SNAPSHOT, Params())
 
     async def cost(self) -> GatewayCost:
-        """What monitoring costs the robot; rates are since the last call, None the first time."""
+        """Return what monitoring costs the robot; rates are since the last call, None the first time."""
         return await self.link.call(GATEWAY_COST, Params())
 
     async def overruns(self) -> Overruns:
@@ -141,7 +141,7 @@ class Client:
         return await self.link.call(RESOURCE_OVERRUNS, Params())
 
     async def status(self) -> Snapshot:
-        """The merged set that status prediction needs."""
+        """Return the merged set that status prediction needs."""
         return await self.link.call(STATUS_SNAPSHOT, Params())
 
     @contextlib.asynccontextmanager
@@ -152,7 +152,7 @@ class Client:
         modules: Iterable[ModuleName] = ("component",),
         depth: int = 1024,
     ) -> AsyncIterator[Subscription]:
-        """A stream of these channels (globs; none means all), started again on every new link.
+        """Return a stream of these channels (globs; none means all), started again on every new link.
 
         `rate_hz` 0 gives every sample of every source. At most `depth` notifications wait to be taken.
         """
@@ -168,11 +168,14 @@ class Client:
         return await self.link.call(PARAMETER_READ, ParameterParams(list(names) or None), WRITE_TIMEOUT_S)
 
     async def objects(self, component: str, search: str = "") -> ObjectList:
-        """What an EDS says of a component's objects; `search`: an address, a range, or words of the name."""
+        """Return what an EDS says of a component's objects.
+
+        `search`: an address, a range, or words of the name.
+        """
         return await self.link.call(OBJECT_LIST, ObjectListParams(component, search))
 
     async def read_objects(self, component: str, *objects: str) -> ObjectValues:
-        """What a device holds of objects such as `0x6041:0` now; at most 64."""
+        """Return what a device holds of objects such as `0x6041:0` now; at most 64."""
         params = ObjectReadParams(component, list(objects))
         return await self.link.call(OBJECT_READ, params, WRITE_TIMEOUT_S)
 
@@ -258,11 +261,14 @@ class Client:
         return await self.link.call(PARAMETER_RESTORE, ComponentParams(component), STORE_TIMEOUT_S)
 
     async def journal(self, count: int = 20) -> JournalEntries:
-        """The newest entries of the robot's journal, oldest first."""
+        """Return the newest entries of the robot's journal, oldest first."""
         return await self.link.call(JOURNAL_TAIL, TailParams(count))
 
     async def journal_head(self) -> JournalProof:
-        """The journal's newest entry, signed by the robot: whoever keeps it can tell if it is rewritten."""
+        """Return the journal's newest entry, signed by the robot.
+
+        Whoever keeps it can tell if it is rewritten.
+        """
         return await self.link.call(JOURNAL_HEAD, Params())
 
     @contextlib.asynccontextmanager

@@ -22,7 +22,7 @@ from gateway.client.errors import (
     Unreachable,
 )
 from gateway.client.keys import check_pin, context_for, pin_of
-from gateway.plain import plain
+from gateway.plain_text import plain
 from gateway.wire import framing
 
 OnNotification = Callable[[str, msgspec.Raw], None]
@@ -231,7 +231,7 @@ def _not_let_in(address: Address) -> str:
 
 
 def _said(refusal: Refusal) -> str:
-    """The robot's own words, as far as they are told."""
+    """Return the robot's own words, as far as they are told."""
     return plain(refusal.message[:LONGEST_REFUSAL])
 
 

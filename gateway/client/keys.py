@@ -24,7 +24,7 @@ _HERE: Final = re.compile(r"127(\.\d{1,3}){3}|localhost|::1")  # a name that onl
 
 
 def user_folder() -> Path:
-    """The user's own configuration (XDG base directories)."""
+    """Return the user's own configuration (XDG base directories)."""
     folder = os.environ.get("XDG_CONFIG_HOME")
     return (Path(folder) if folder else Path.home() / ".config") / "gwrms"
 
@@ -34,12 +34,12 @@ def keys_folder() -> Path:
 
 
 def server_file() -> Path:
-    """The user's own `server.toml`, in which robots are pinned."""
+    """Return the user's own `server.toml`, in which robots are pinned."""
     return user_folder() / "server.toml"
 
 
 def pin_of(address: Address) -> str | None:
-    """The certificate that a robot must have, by its address; None where it is not paired.
+    """Return the certificate that a robot must have, by its address; None where it is not paired.
 
     Raises:
         NotPaired: it is on another computer and not paired: nothing is said to that in plain. Or the server's
@@ -114,7 +114,7 @@ def check_pin(address: Address, pin: str, der: bytes | None) -> None:
 
 
 def checked_pin(text: str) -> str:
-    """Raises `ValueError` where a pin is none."""
+    """Return a pin in its normal form; raises `ValueError` for an invalid one."""
     if len(text) != PIN_LENGTH or not set(text.lower()) <= set("0123456789abcdef"):
         raise ValueError(f"pin is the SHA-256 of the robot's certificate, {PIN_LENGTH} hexadecimal digits")
     return text.lower()

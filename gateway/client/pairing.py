@@ -51,7 +51,7 @@ class Paired:
 
 
 def typed(where: str, code: str = "") -> tuple[Address, str]:
-    """What a person typed: HOST:PORT and the code, or the link that has both.
+    """Return what a person typed: HOST:PORT and the code, or the link that has both.
 
     Raises:
         ValueError: it is neither; it says which of the two is wrong.
@@ -90,17 +90,31 @@ def pair(
     context.check_hostname = False
     context.verify_mode = ssl.CERT_NONE  # the proof is bound to the certificate, whichever it is
     try:
-        plain = socket.create_connection((where.host, where.port), SAY_S)
-        with plain, context.wrap_socket(plain) as secured:
+        with _connected(where) as plain, context.wrap_socket(plain) as secured:
             return _paired(secured, where, code, pem, name or own_name(), given_up)
     except ClientError:
         raise
     except OSError as error:
-        reason = error.strerror or str(error)
-        raise Unreachable(
-            f"no robot pairs at {where} ({reason}): does `gwrms keys pair` wait there, and is it the address "
-            "that it shows?"
-        ) from error
+        raise _nobody(where, error) from error
+
+
+def check_waits(where: Address) -> None:
+    """Raise `Unreachable` where nobody pairs, before a person types a code; it costs no try."""
+    try:
+        _connected(where).close()
+    except OSError as error:
+        raise _nobody(where, error) from error
+
+
+def _connected(where: Address) -> socket.socket:
+    return socket.create_connection((where.host, where.port), SAY_S)
+
+
+def _nobody(where: Address, error: OSError) -> Unreachable:
+    return Unreachable(
+        f"no robot pairs at {where} ({error.strerror or error}): does `gwrms keys pair` wait there, and is "
+        "it the address that it shows?"
+    )
 
 
 def _paired(
@@ -144,7 +158,7 @@ def _reply(secured: ssl.SSLSocket, where: Address, given_up: Callable[[], bool])
 
 
 def own_certificate() -> bytes:
-    """A desk's own (PEM), made with its key where there is none; raises `KeyProblem`."""
+    """Return a desk's own (PEM), made with its key where there is none; raises `KeyProblem`."""
     folder = keys_folder()
     try:
         with alone_in(folder.parent):
@@ -157,7 +171,7 @@ def own_certificate() -> bytes:
 
 
 def own_name() -> str:
-    """What a robot may call this desk: its user and computer."""
+    """Return what a robot may call this desk: its user and computer."""
     name = f"{user_name()}-{socket.gethostname()}"
     return re.sub(r"[^A-Za-z0-9_.-]", "-", name).lstrip("_.-")[:64] or "desk"
 

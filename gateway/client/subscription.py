@@ -96,7 +96,7 @@ class Subscription:
     # --- what the link calls
 
     def restarted(self, stream: int, link: int) -> None:
-        """The stream runs on a new link under a new name; `seq` and `dropped` begin anew."""
+        """Continue the stream on a new link under a new name; `seq` and `dropped` restart."""
         self.stream = stream
         self.counters.restarts += self._link != 0
         self._link = link

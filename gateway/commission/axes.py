@@ -56,18 +56,18 @@ def counts(bench: Bench, axis: Axis) -> int | None:
 
 
 def nearest(counts: int, to: int) -> int:
-    """`counts` of a counter of 32 bits, unwrapped: of all that it can mean the one nearest to `to`."""
+    """Return the `counts` of a 32-bit counter, unwrapped to the value nearest to `to`."""
     return to + (counts - to + HALF) % (2 * HALF) - HALF
 
 
 def number(bench: Bench, axis: Axis, index: int, subindex: int = 0) -> int | None:
-    """An unsigned object of the axis; `None` where it has none. Raises `DriverError`."""
+    """Return an unsigned object of the axis; `None` where it has none. Raises `DriverError`."""
     data = bench.read(axis.node, axis.index(index), subindex)
     return None if data is None else unsigned(data)
 
 
 def answered(read: Callable[[], T]) -> Talk[T]:
-    """What `read` says; where a drive does not answer it waits for somebody to see to it, and asks again."""
+    """Return the value of `read`; if a drive does not answer, wait for the user, and ask again."""
     while True:
         try:
             return read()

@@ -15,7 +15,7 @@ class NoAxes(ValueError):
 
 
 def axes(upright: Vector, forward: Vector, left: Vector) -> tuple[str, str, str]:
-    """The sensor's axes along the trunk's forward, left and up.
+    """Return the sensor's axes along the trunk's forward, left and up.
 
     `upright`, `forward` and `left` are directions of up in the sensor's axes: of a trunk that stands, leans
     forward and leans to its left. Up moves away from where the trunk leans to.

@@ -39,7 +39,7 @@ class Bench(Protocol):
         ...
 
     def read(self, node: int, index: int, subindex: int = 0) -> bytes | None:
-        """An object's bytes; `None` where the device has none. Raises `DriverError`."""
+        """Return an object's bytes; `None` where the device has none. Raises `DriverError`."""
         ...
 
     def write(self, node: int, index: int, subindex: int, data: bytes) -> None:
@@ -56,7 +56,10 @@ class Bench(Protocol):
     def power(
         self, joint: JointSettings, description: Description, others: Collection[int] = ()
     ) -> AbstractContextManager[Power]:
-        """The axis as it may be put under power; entering raises `DriverError` where it must not be."""
+        """Return the axis as it may be put under power.
+
+        Entering raises `DriverError` where it must not be.
+        """
         ...
 
 
@@ -69,6 +72,11 @@ class CanBench:
         self._channels: dict[int, SdoChannel] = {}
         self._nodes: frozenset[int] = frozenset()  # that were heard, or answered
         self._heard: frozenset[int] = frozenset()  # identifiers that are somebody's
+
+    def check_opens(self) -> None:
+        """Raise `Unavailable` where the bus is not there: before a person is asked anything."""
+        self._open()
+        self.close()
 
     def nodes(self) -> Found:
         found = scan(self._settings, LISTEN_S, threading.Event().wait, active=True)
@@ -92,7 +100,7 @@ class CanBench:
             )
 
     def send_urgent(self, node: int, data: bytes) -> None:
-        """An SDO request past all that waits; nobody waits for its answer. Raises `Unavailable`."""
+        """Send an SDO request ahead of the queue, without waiting for its answer; raises `Unavailable`."""
         if not self._bus.is_open:
             self._open()
         self._bus.send_urgent(SDO_REQUEST + node, data)

@@ -70,7 +70,7 @@ class Face(Protocol):
     def say(self, text: str) -> None: ...
 
     def ask(self, question: Ask) -> str:
-        """What was typed; raises `EOFError` where nothing more can be."""
+        """Return what was typed; raises `EOFError` where nothing more can be."""
         ...
 
     def moving(self, text: str) -> str:
@@ -116,7 +116,7 @@ def press(text: str, live: Live | None = None) -> Talk[None]:
 def word(
     text: str, default: str | None = None, check: Callable[[str], str | None] | None = None
 ) -> Talk[str]:
-    """A word or more; `check` says what is wrong with it."""
+    """Ask for text; `check` says what is wrong with it."""
     refused = ""
     while True:
         typed = yield Ask(text, default=default, refused=refused)
@@ -150,7 +150,7 @@ def agree(text: str) -> Talk[bool]:
 def number(
     text: str, unit: str, low: float, high: float, default: float | None = None, live: Live | None = None
 ) -> Talk[float]:
-    """A number of this range, in this unit."""
+    """Ask for a number of this range, in this unit."""
     told, refused = None if default is None else f"{default:g}", ""
     while True:
         typed = yield Ask(text, (), told, unit, (low, high), refused=refused, live=live)

@@ -110,5 +110,5 @@ class Draft:
                     self.forget(one)
 
     def end(self) -> None:
-        """The file is written: nothing is left to go on with."""
+        """Remove the draft after the file is written."""
         durable.remove(self.path)

@@ -15,7 +15,7 @@ class NotEdited(ValueError):
 
 
 def with_value(text: str, table: str, key: str, found: Found) -> str:
-    """The text with this value, its ends of lines kept; all else is the same, by what TOML makes of both.
+    """Return the text with this value, line ends kept; the rest is the same by TOML's reading.
 
     Raises:
         NotEdited: the table, or the value, is not on lines of its own.
@@ -39,7 +39,7 @@ def with_value(text: str, table: str, key: str, found: Found) -> str:
 
 
 def comment_of(text: str, table: str, key: str) -> str:
-    """What stands beside the value, or above it in the words of `writing`; "" where nothing does."""
+    """Return what stands beside the value, or above it in the words of `writing`; "" where nothing does."""
     current, above = None, ""
     for one in text.splitlines():
         current = _head(one) or current

@@ -96,7 +96,7 @@ def armed(bench: Bench, axis: Axis) -> Talk[str | None]:
 
 
 def option(bench: Bench, axis: Axis, index: int, size: int = 2) -> int | None:
-    """A signed object; `None` where the drive has none. Raises `DriverError`."""
+    """Return a signed object; `None` where the drive has none. Raises `DriverError`."""
     data = bench.read(axis.node, axis.index(index))
     return None if data is None else int.from_bytes(data[:size], "little", signed=True)
 
@@ -151,7 +151,7 @@ def planned(bench: Bench, known: Known, method: int) -> Talk[Plan | None]:
 
 
 def _setup(bench: Bench, known: Known, method: int, rad_s: float) -> Setup | None:
-    """The drive's own units; raises `DriverError`."""
+    """Return the drive's own units; raises `DriverError`."""
     description, axis, gear = known.description, known.axis, known.scale.gear_ratio
     unit = number(bench, axis, VELOCITY_UNIT)
     fast = drive_speed(rad_s, known.counts_per_turn, gear, unit)
@@ -163,7 +163,7 @@ def _setup(bench: Bench, known: Known, method: int, rad_s: float) -> Setup | Non
 
 
 def explained(known: Known, method: int, plan: Plan, told: Mapping[int, int | None]) -> Iterator[str]:
-    """What will happen, line by line; `told` are the drive's objects TOLD."""
+    """Yield what will happen, line by line; `told` are the drive's objects TOLD."""
     one, turn = METHODS[method], known.counts_per_turn
     yield f"What will happen, to the {words(known.joint)} ({known.axis}) alone:"
     yield f"  method {method}: the drive {one.words}; its position then counts as 607Ch says"

@@ -40,7 +40,7 @@ def words(joint: str) -> str:
 
 
 def names(draft: Draft, axes: Sequence[Axis]) -> Talk[list[str]]:
-    """The robot's joints, in the order in which they are asked for."""
+    """Ask for the robot's joints, in the order of the questions."""
     if not draft.has("robot", "joints"):
         usual = " ".join(USUAL) if len(axes) == len(USUAL) else None
         typed = yield from word(
@@ -84,7 +84,7 @@ def stayed_off(bench: Bench, axes: Sequence[Axis]) -> Talk[bool]:
 
 
 def which_drive(draft: Draft, bench: Bench, joint: str, axes: Sequence[Axis]) -> Talk[Axis | None]:
-    """The drive that counts when this joint is moved by hand; `None` where the joint is left out."""
+    """Find the drive that counts when this joint is moved by hand; `None` to leave it out."""
     if draft.has(table(joint), "node_id"):
         return Axis(draft.value(table(joint), "node_id"), draft.value(table(joint), "axis", 0))
     while True:
@@ -122,7 +122,7 @@ def _moved(before: Mapping[Axis, int | None], after: Mapping[Axis, int | None]) 
 
 
 def _mover(moved: dict[Axis, int]) -> tuple[Axis | None, str]:
-    """The one that has moved far more than every other; else what is in the way, in words."""
+    """Return the one that has moved far more than every other; else what is in the way, in words."""
     order = sorted(moved, key=lambda axis: moved[axis], reverse=True)
     if not order or moved[order[0]] < LEAST_MOVE:
         return (
@@ -136,7 +136,7 @@ def _mover(moved: dict[Axis, int]) -> tuple[Axis | None, str]:
 
 
 def meaning(draft: Draft, bench: Bench, joint: str, axis: Axis) -> Talk[Scale]:
-    """What its counts mean, from two angles that somebody knows."""
+    """Determine the scale of its counts, from two known angles."""
     if not draft.has(table(joint), "zero_offset"):
         nominal = yield from answered(lambda: _nominal(bench, axis))
         while True:
@@ -192,7 +192,7 @@ def held(bench: Bench, joint: str, axis: Axis, where: str, near: int | None = No
 
 
 def _settled(first: Held, second: Held, nominal: Nominal) -> Talk[Scale | None]:
-    """Counts and gear that fit both the positions and the drive; `None` to measure again."""
+    """Return counts and gear that fit both the positions and the drive; `None` to measure again."""
     measured = scales.counts_per_turn(first, second)
     counts_per_revolution, ratio = nominal.counts_per_revolution, nominal.gear_ratio
     off = scales.disagreement(measured, nominal)
@@ -222,7 +222,7 @@ def _settled(first: Held, second: Held, nominal: Nominal) -> Talk[Scale | None]:
 
 
 def _fits(found: Scale, second: Held) -> Talk[None]:
-    """The gateway takes counts as they come: of an encoder whose counter wraps near here the angle jumps."""
+    """Warn of an encoder whose counter wraps near here: the gateway does not unwrap counts."""
     if not -HALF <= second.counts < HALF:
         yield Say(f"Its counter wraps around within the joint's way: {SET_ITS_ZERO}.")
     elif not scales.near(found):
@@ -291,7 +291,7 @@ RATINGS: tuple[tuple[str, int, str, str, Callable[[int, float, float], float]], 
 
 
 def ratings(draft: Draft, bench: Bench, joint: str, axis: Axis, gear: float) -> Talk[None]:
-    """What the drive knows is shown; what it does not know is asked for, and may stay unknown."""
+    """Show the drive's ratings, and ask for missing ones, which may stay unknown."""
     torque_nm = _rated_torque_nm(draft, axis.node)
     for key, index, unit, what, si in RATINGS:
         if draft.has(table(joint), key) or draft.has(f"told.{joint}", key):

@@ -79,7 +79,7 @@ def role(draft: Draft, found: Found) -> Talk[None]:
 
 
 def same_devices(draft: Draft, told: Mapping[int, Told]) -> Talk[None]:
-    """What was found of a node that is another device now (1018h) is forgotten, with its joints."""
+    """Forget the findings of a node that is another device now (1018h), with its joints."""
     for node, one in sorted(told.items()):
         identity = [one.vendor_id, one.product_code, one.serial_number]
         kept = draft.value(table(node), "identity", identity)
@@ -92,7 +92,7 @@ def same_devices(draft: Draft, told: Mapping[int, Told]) -> Talk[None]:
 
 
 def file_of(draft: Draft, library: Library, node: int, told: Told) -> Talk[None]:
-    """The EDS that is for this device."""
+    """Find the EDS for this device."""
     if draft.has(table(node), "eds"):
         return
     proposals = library.proposals(node, told)
@@ -133,7 +133,7 @@ def _unreadable(text: str, file: Path, node: int) -> str | None:
 
 
 def heartbeat(draft: Draft, bench: Bench, node: int) -> Talk[None]:
-    """A node that lives is known by its heartbeat: where it has none, one is offered."""
+    """Offer a heartbeat to a node that has none."""
     if draft.has(table(node), "heartbeat"):
         return
     period = yield from answered(lambda: number(bench, Axis(node), HEARTBEAT_TIME))

@@ -122,7 +122,7 @@ def opened(
     wait: Callable[[float], object],
     others: Collection[int] = (),
 ) -> Iterator[Power]:
-    """The axis, with the bus opened as its master; raises `DriverError` where it must not be.
+    """Return the axis, with the bus opened as its master; raises `DriverError` where it must not be.
 
     `others` are the nodes of further drives, which nobody may lead meanwhile.
     """

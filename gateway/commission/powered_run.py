@@ -136,7 +136,7 @@ class PoweredRun:
         raise NotImplementedError
 
     def _act(self) -> None:
-        """What is done under power; returns when it is over."""
+        """Do the work under power; return when it is over."""
         raise NotImplementedError
 
     def _restore(self) -> str | None:
@@ -152,7 +152,7 @@ class PoweredRun:
             raise Ended(f"the drive is in {'no known state' if led.state is None else led.state.words}")
 
     def _enable(self) -> None:
-        """The explicit act: one transition at a time, each confirmed, as long as nothing is in the way."""
+        """Enable the drive: one transition at a time, each confirmed, as long as nothing prevents it."""
         for origin in WAY_UP:
             led = self._wait(self._power.drive.step_up(origin, self._wanted, self.still_in))
             if led.problem is not None:
@@ -197,7 +197,7 @@ class PoweredRun:
             return None
 
     def _leave(self, mode: bytes) -> str | None:
-        """The mode that it had before."""
+        """Return the mode that it had before."""
         try:
             self._power.drive.ask(lambda axis: homing.leave(axis, mode)).result(STOP_S)
         except (DriverError, TimeoutError) as error:

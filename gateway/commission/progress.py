@@ -90,7 +90,7 @@ class Progress:
         self._seen.append(where)
 
     def end(self) -> None:
-        """The file is written."""
+        """Report that the file is written."""
         self._is_at_end = True
 
     def steps(self) -> tuple[Step, ...]:

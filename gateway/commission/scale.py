@@ -61,7 +61,7 @@ def disagreement(measured: float, nominal: Nominal) -> float | None:
 
 
 def scale(first: Held, second: Held, counts_per_revolution: float, gear_ratio: float) -> Scale:
-    """The scale with these; its direction and zero are those of the two positions."""
+    """Return the scale with these; its direction and zero are those of the two positions."""
     direction = 1 if counts_per_turn(first, second) > 0 else -1
     per_count = direction * math.tau / (counts_per_revolution * gear_ratio)
     zeros = [held.angle - held.counts * per_count for held in (first, second)]
@@ -69,7 +69,7 @@ def scale(first: Held, second: Held, counts_per_revolution: float, gear_ratio: f
 
 
 def gear(measured: float, counts_per_revolution: float) -> float:
-    """The gear ratio that makes them agree; whole where it nearly is."""
+    """Return the gear ratio that makes them agree; whole where it nearly is."""
     ratio = abs(measured) / counts_per_revolution
     whole = round(ratio)
     return float(whole) if whole and abs(ratio / whole - 1) <= WHOLE else round(ratio, 3)
@@ -81,13 +81,13 @@ def near(scale: Scale) -> bool:
 
 
 def counts_at_zero(scale: Scale) -> int:
-    """What its encoder counts where the joint's angle is 0."""
+    """Return what its encoder counts where the joint's angle is 0."""
     per_count = scale.direction * math.tau / (scale.counts_per_revolution * scale.gear_ratio)
     return round(-scale.zero_offset / per_count)
 
 
 def with_zero(scale: Scale, angle_there: float, counts: int) -> Scale:
-    """The scale by which these counts are this angle (rad)."""
+    """Return the scale by which these counts are this angle (rad)."""
     return replace(scale, zero_offset=angle_there - angle(replace(scale, zero_offset=0.0), counts))
 
 

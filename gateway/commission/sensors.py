@@ -38,7 +38,7 @@ class SerialBench(Protocol):
         ...
 
     def up(self, imu: Sensor) -> Vector:
-        """The direction of up in the sensor's axes, held still."""
+        """Return the direction of up in the sensor's axes, held still."""
         ...
 
 

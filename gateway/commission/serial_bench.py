@@ -5,6 +5,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
+from drivers.build_context import BuildContext
 from drivers.cli.listen import best, listen, nothing
 from drivers.errors import Unavailable
 from drivers.identify import format_of
@@ -16,7 +17,6 @@ from drivers.insole.formats import FORMATS as INSOLES
 from drivers.insole.frame import InsoleFrame
 from drivers.insole.settings import InsoleSettings
 from drivers.samples import State
-from drivers.site import Site
 from gateway.commission.sensors import Sensor
 
 LOOK_S = 3.0
@@ -47,7 +47,7 @@ class SerialPorts:
 
     def up(self, imu: Sensor) -> Vector:
         settings = ImuSettings(port=imu.port, baudrate=imu.baudrate, format=imu.format, axes=("x", "y", "z"))
-        device = build_imu("trunk", settings, Site(_HERE, recognise=format_of))
+        device = build_imu("trunk", settings, BuildContext(_HERE, recognise=format_of))
         device.start()
         try:
             threading.Event().wait(LOOK_S)
@@ -88,4 +88,4 @@ class _Swing:
             self._least = total if self._least is None else min(self._least, total)
 
     def disconnected(self) -> None:
-        """The port went away: what it has shown stays."""
+        """Note that the port went away; its values stay."""

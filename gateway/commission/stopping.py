@@ -91,7 +91,7 @@ def axes_of(draft: Draft) -> Iterator[Axis]:
 
 
 def _axes_in(file: Path) -> Iterator[Axis]:
-    """The joints of a robot's file; of one that is not there, or says nothing of use, none."""
+    """Yield the joints of a robot's file; of one that is not there, or says nothing of use, none."""
     with suppress(OSError, ValueError, msgspec.MsgspecError):
         joints = msgspec.toml.decode(file.read_bytes(), type=_File).joint
         yield from (Axis(one.node_id, one.axis) for one in joints.values())

@@ -45,7 +45,7 @@ class Written:
 
 
 def text(draft: Draft, who: str, when: str) -> str:
-    """The file as the draft has it."""
+    """Return the file as the draft has it."""
     name = str(draft.value("robot", "name"))
     return HEAD.format(robot=name, when=when, who=_plain(who)) + "\n".join(_tables(draft))
 
@@ -116,7 +116,7 @@ def _table(name: str, keys: Mapping[str, Found]) -> Iterator[str]:
 
 
 def line(key: str, found: Found) -> str:
-    """A value with its comment, beside it or above."""
+    """Return a value with its comment, beside it or above."""
     value = f"{key} = {_value(found.value)}"
     if not found.how:
         return value

@@ -31,7 +31,7 @@ class Zero:
 
 
 def posture(comment: str) -> float | None:
-    """The first angle (°) by which a zero was found, as its comment says."""
+    """Return the first angle (°) by which a zero was found, as its comment says."""
     found = re.search(r"(-?\d+(?:\.\d+)?)°", comment)
     return None if found is None else float(found[1])
 
@@ -39,7 +39,7 @@ def posture(comment: str) -> float | None:
 def repeated(
     bench: Bench, joint: str, settings: JointSettings, degrees: float | None, most: float
 ) -> Talk[Zero | None]:
-    """The zero by the joint held at `degrees`; `None` where somebody does not want it.
+    """Return the zero by the joint held at `degrees`; `None` if the user declines.
 
     Raises:
         NotRepeated: it moves, has no position, may have power, or the zero is more than `most` (°) off.

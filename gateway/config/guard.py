@@ -132,7 +132,7 @@ class GuardSettings(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
 
 def limit(rule: Rule) -> str:
-    """What makes it trip, in words."""
+    """Return what makes it trip, in words."""
     return rule.words(WATCHES[rule.watch].unit)
 
 
@@ -144,7 +144,7 @@ def ends(rule: Rule) -> tuple[float | None, float | None]:
 
 
 def quantities(rule: Rule) -> tuple[str, ...]:
-    """The channels that a rule looks at."""
+    """Return the channels that a rule looks at."""
     if isinstance(rule, HeatRule):
         return (rule.of,)
     return (rule.quantity,) if isinstance(rule, SymmetryRule) else WATCHES[rule.watch].quantities

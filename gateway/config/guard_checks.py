@@ -57,7 +57,7 @@ def complaints(config: RobotConfig, guard: GuardSettings) -> Iterator[Finding]:
 
 
 def _about_doubles(guard: GuardSettings) -> Iterator[Finding]:
-    """The same twice: who changes one of them believes that it is changed."""
+    """Yield the same twice: who changes one of them believes that it is changed."""
     seen: dict[bytes, str] = {}
     for name, rule in guard.rule.items():
         where = f"[guard.rule.{name}]"
@@ -106,7 +106,7 @@ def _about_numbers(where: str, rule: Rule) -> Iterator[Finding]:
 
 @singledispatch
 def _about(_rule: Rule, _where: str, _config: RobotConfig) -> Iterator[Finding]:
-    """What is wrong with the keys of this kind of rule."""
+    """Yield what is wrong with the keys of this kind of rule."""
     yield from ()
 
 

@@ -68,7 +68,7 @@ class Rule(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     clear_s: Positive = 1.0  # how long all must be well again before it is over
 
     def words(self, unit: str, /) -> str:
-        """What makes it trip, where `unit` is that of what is watched."""
+        """Return what makes it trip, where `unit` is that of what is watched."""
         raise NotImplementedError
 
 
@@ -160,12 +160,12 @@ class InputRule(Rule, frozen=True, forbid_unknown_fields=True, kw_only=True):
     for_s: NotNegative = 0.0
 
     def wrong(self, inputs: float) -> int:
-        """The bits of 60FDh that are not as they must be."""
+        """Return the bits of 60FDh that are not as they must be."""
         now = int(inputs)
         return (mask(self.must_be_set) & ~now) | (mask(self.must_be_clear) & now)
 
     def says(self, wrong: float) -> str:
-        """What it means that these bits are wrong."""
+        """Return what it means that these bits are wrong."""
         bits = int(wrong)
         found = ((mask(self.must_be_set) & bits, "clear"), (mask(self.must_be_clear) & bits, "set"))
         told = "; ".join(f"{bit_words(some)} {state}" for some, state in found if some)
@@ -231,7 +231,7 @@ class DriftRule(Rule, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
 
 def mask(bits: Bits) -> int:
-    """The bits that are meant, as one number."""
+    """Return the bits that are meant, as one number."""
     found = 0
     for bit in bits:
         if isinstance(bit, str):

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from drivers.bus.settings import CanSettings, Role
 from gateway.access.folder import AccessFolder
 from gateway.config.robot import RobotConfig, header
-from gateway.plain import LONGEST_NAME, NAME_SIGNS, ROBOT_SIGNS, is_name, is_robot_name
+from gateway.plain_text import LONGEST_NAME, NAME_SIGNS, ROBOT_SIGNS, is_name, is_robot_name
 from gateway.tables.finding import Finding, meant, warning
 
 BITRATES = (10_000, 20_000, 50_000, 83_333, 100_000, 125_000, 250_000, 500_000, 800_000, 1_000_000)
@@ -61,7 +61,7 @@ def _about_host(config: RobotConfig) -> Iterator[Finding]:
     if (host in _EVERYWHERE or not _LOCAL.match(host)) and not AccessFolder(config.access).has_keys:
         text = (
             f"{host!r} is open to other computers, and this robot has no keys yet: until `gwrms keys pair "
-            f"{config.path}` has made them, it is not served there"
+            f"{config.path}` has let a desk in, it is not served there"
         )
         yield warning("[gateway]", "host", text)
 

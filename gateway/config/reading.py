@@ -75,7 +75,7 @@ def load(path: Path) -> RobotConfig:
 
 
 def load_with_warnings(path: Path) -> tuple[RobotConfig, list[Finding]]:
-    """The same, with what is likely wrong; raises `ConfigError`."""
+    """Return the same, with what is likely wrong; raises `ConfigError`."""
     found = examine(path)
     if found.config is None:
         raise ConfigError(lines(path, mistakes(found.findings)))
@@ -92,7 +92,7 @@ def examine(path: Path) -> Examined:
 
 
 def examined(path: Path, document: Table) -> Examined:
-    """The same for what stands in it."""
+    """Return the same for what stands in it."""
     decoding = Decoding()
     config = _Reading(decoding).config(path, document)
     findings = decoding.findings
@@ -110,7 +110,7 @@ class _Reading:
         self._lost: dict[str, frozenset[str]] = {}
 
     def config(self, path: Path, document: Table) -> RobotConfig | None:
-        """What can be made of it; `None` where that is no robot at all."""
+        """Return what can be made of it; `None` where that is no robot at all."""
         self._decoding.tables(document, TABLES)
         if "robot" not in document:
             self._decoding.complain("[robot]", "", 'is missing: write [robot] and below it name = "…"')

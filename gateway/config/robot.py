@@ -149,16 +149,19 @@ class RobotConfig(Struct, frozen=True, kw_only=True):
         return table.bus, table.node_id
 
     def sharing(self, component: str) -> tuple[str, ...]:
-        """The joints and devices on one's node, itself among them: the axes of one drive."""
+        """Return the joints and devices on one's node, itself among them: the axes of one drive."""
         node = self.node_of(component)
         return tuple(name for name in (*self.joint, *self.device) if self.node_of(name) == node)
 
     def drives_of(self, component: str) -> tuple[str, ...]:
-        """The joints that its parameters may move: those on its node; where it has none, every joint."""
+        """Return the joints that its parameters may move: those on its node.
+
+        Where it has none, every joint.
+        """
         return tuple(name for name in self.sharing(component) if name in self.joint) or tuple(self.joint)
 
     def channels_of(self, component: str) -> dict[str, ChannelSettings]:
-        """What `[channel."COMPONENT.NAME"]` adds to a joint or device, by the names after the dot."""
+        """Return what `[channel."COMPONENT.NAME"]` adds to a joint or device, by the names after the dot."""
         whole = ((name.partition("."), one) for name, one in self.channel.items())
         return {quantity: one for (owner, _, quantity), one in whole if owner == component}
 

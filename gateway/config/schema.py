@@ -43,7 +43,7 @@ def guard() -> tuple[Schema, dict[str, Schema]]:
 
 
 def _tell_rules(defs: dict[str, Schema]) -> None:
-    """What each kind of rule can watch, and that a guard's rules are of these kinds."""
+    """Add to the schema the quantities that each kind of rule can watch."""
     for struct in _rules():
         watched = [name for name, watch in WATCHES.items() if watch.rule is struct]
         defs[struct.__name__]["properties"]["watch"]["enum"] = watched

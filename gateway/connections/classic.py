@@ -59,7 +59,7 @@ class _Exchange:
         self._rest = b""
 
     def next_piece(self, resource: Measuring) -> "Future[bytes]":
-        """The next bytes of the list; where none are left, a new list's length."""
+        """Return the next bytes of the list; where none are left, a new list's length."""
         if self._rest:
             piece, self._rest = self._rest[:PIECE_BYTES], self._rest[PIECE_BYTES:]
             return done(piece)
@@ -195,7 +195,7 @@ class _Call:
             self._on_ready(WRITE)
 
     def _send(self) -> None:
-        """What the socket takes; after the last byte the client is told so, and its own end is awaited."""
+        """Send as much as the socket takes; after the last byte shut down, and await the client's end."""
         self._output = self._output[self._socket.send(self._output) :]
         if not self._output:
             self._socket.shutdown(socket.SHUT_WR)

@@ -127,7 +127,7 @@ class Handshakes:
         return False
 
     def _make_room(self, *, speaks: bool) -> bool:
-        """The oldest of the address that has most under way gives up its place, unless it has just begun.
+        """Drop the oldest of the address with most under way, unless it has just begun.
 
         To who `speaks`, one that has said nothing gives it up at once: silence costs an attacker nothing.
         """
@@ -162,7 +162,7 @@ class Handshakes:
             log.error("%s", error)
 
     def is_over(self, handshake: "_Handshake") -> None:
-        """It has ended, in whatever way."""
+        """Note that it has ended, in whatever way."""
         self._running.remove(handshake)
         self._end_one()
         self._loop.post(self._settle)

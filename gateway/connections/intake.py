@@ -10,11 +10,11 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
-from drivers.urgency import make_urgent
+from drivers.realtime_priority import make_realtime
 from gateway.access.identity import Identity
 from gateway.connections.acceptor import Acceptor
 from gateway.connections.doors import Stream
-from gateway.connections.inlet import Inlet, StopNow
+from gateway.connections.incoming_bytes import IncomingBytes, StopNow
 from gateway.connections.pace import Pace
 from gateway.process.loop import Loop
 
@@ -32,7 +32,7 @@ class Intake:
         self,
         loop: Loop,
         doors: Mapping[socket.socket, Came],
-        opened: Callable[[Inlet], None],
+        opened: Callable[[IncomingBytes], None],
         stop_now: Callable[[], StopNow | None],
     ) -> None:
         """`stop_now` gives what carries out a stop at once, from any thread, where there is something.
@@ -43,7 +43,7 @@ class Intake:
         self._front = Loop()
         self._opened = opened
         self._stop_now = stop_now
-        self._inlets: set[Inlet] = set()
+        self._inlets: set[IncomingBytes] = set()
         self._spent_ns = 0
         self._pace = Pace(self._front)
         self._acceptors = [
@@ -84,7 +84,7 @@ class Intake:
         self._front.close()
 
     def _run(self) -> None:
-        make_urgent()
+        make_realtime()
         self._front.run()
 
     def _shut(self, shut: threading.Event) -> None:
@@ -100,7 +100,7 @@ class Intake:
         self._front.stop()
 
     def _spent(self) -> int:
-        """What the thread has worked since the last call: for the client it has worked for, in ns."""
+        """Return what the thread has worked since the last call: for the client it has worked for, in ns."""
         before_ns, self._spent_ns = self._spent_ns, time.thread_time_ns()
         return self._spent_ns - before_ns
 
@@ -111,7 +111,7 @@ class Intake:
 
     def _admit(self, connection: Stream, peer: str, identity: Identity) -> None:
         stop_now, spent, finished = self._stop_now, self._spent, self._inlets.discard
-        inlet = Inlet(
+        inlet = IncomingBytes(
             self._front, self._loop, connection, peer, identity, stop_now, spent, finished, self._pace
         )
         self._inlets.add(inlet)

@@ -16,7 +16,7 @@ from typing import Concatenate, ParamSpec, Protocol
 import msgspec
 from msgspec import UNSET, UnsetType
 
-from gateway.connections.inlet import FOREIGN, Heard, Inlet
+from gateway.connections.incoming_bytes import FOREIGN, Heard, IncomingBytes
 from gateway.connections.sharing import Sharing
 from gateway.connections.stop_lines import STOP
 from gateway.process.futures import outcome
@@ -46,7 +46,7 @@ class Outlet(Protocol):
     """A stream's end at one client."""
 
     def next_line(self) -> bytes | None:
-        """The next notification, or `None` when there is none yet."""
+        """Return the next notification, or `None` when there is none yet."""
 
 
 def _spends(work: "Callable[Concatenate[Session, P], None]") -> "Callable[Concatenate[Session, P], None]":
@@ -77,7 +77,7 @@ class Session:
     def __init__(
         self,
         loop: Loop,
-        inlet: Inlet,
+        inlet: IncomingBytes,
         handle: "Callable[[Session, framing.Request], Answer]",
         stuck_s: float,
         sharing: Sharing,
@@ -367,21 +367,21 @@ class Session:
             self.send(b"".join(lines))
 
     def _told(self, method: str, answer: object) -> object:
-        """A failure of our own as the error that it is answered with; it is logged."""
+        """Return a failure of our own as the error that it is answered with; it is logged."""
         if not isinstance(answer, Exception) or isinstance(answer, framing.RpcError):
             return answer
         log.error("%s from %s failed", method, self.peer, exc_info=answer)
         return framing.internal_error(method, answer)
 
     def _finish_if_done(self) -> None:
-        """A client that says nothing more gets its answers, then the end, streams or not."""
+        """End a client that sends nothing more after its answers, streams or not."""
         if self._input_ended and not self.waits:
             self.close()
 
     # Writing
 
     def _send_if_room(self, lines: list[bytes]) -> None:
-        """What nothing holds back while the client takes nothing."""
+        """Send the lines if the client reads; else only count them."""
         if self._output_bytes < OUTPUT_BYTES:
             self.send(b"".join(lines))
         else:
@@ -443,7 +443,7 @@ class Session:
 
 
 def _is_greeting(line: bytes | framing.BadLine) -> bool:
-    """What needs no module: a client of ours says it before it asks for a stop."""
+    """Return what needs no module: a client of ours says it before it asks for a stop."""
     try:
         return isinstance(line, bytes) and framing.decode_request(line).method in GREETINGS
     except framing.BadLine:

@@ -32,7 +32,7 @@ _REASON = re.compile(rb'"reason"\s{0,64}:\s{0,64}"((?:[^"\\]|\\.){0,800})', re.D
 
 
 def stop_in(line: bytes) -> StopRequest | None:
-    """The stop that a line asks for, in time that grows with its length only."""
+    """Return the stop that a line asks for, in time that grows with its length only."""
     if len(line) < _SHORTEST or not any(mark in line for mark in _MARKS):
         return None  # as nearly all are
     try:
@@ -44,7 +44,7 @@ def stop_in(line: bytes) -> StopRequest | None:
 
 
 def _decode(line: bytes) -> list[dict[str, Raw]]:
-    """The objects of a line, only as far as their keys: numbers by the thousand cost much to read."""
+    """Return the objects of a line, only as far as their keys: numbers by the thousand cost much to read."""
     begins = line.lstrip()[:1]
     each = (
         msgspec.json.decode(line, type=list[Raw]) if begins == b"[" else [msgspec.json.decode(line, type=Raw)]
@@ -88,7 +88,7 @@ def _printable(text: str) -> str:
 
 
 def _read(line: bytes) -> StopRequest:
-    """What can be read of a line that is no JSON."""
+    """Return what can be read of a line that is no JSON."""
     id_, reason = _ID.search(line), _REASON.search(line)
     return StopRequest(
         reason="" if reason is None else _printable(reason[1].decode(errors="replace")),
@@ -150,7 +150,10 @@ class StopSplitter(LineSplitter):
         return self._search is not None or any(mark in seam or mark in self._rest for mark in _MARKS)
 
     def newest_first(self, data: bytes) -> Iterator[StopRequest | None]:
-        """The stops in the last that comes, from its end on; in between `None`, so often that one can end."""
+        """Yield the stops in the last that comes, from its end on.
+
+        In between `None`, so often that one can end.
+        """
         begin = data.find(b"\n") + 1
         for line in _suspects(data, begin):
             yield from _last_stop(StopSplitter(), line)
@@ -178,7 +181,7 @@ class StopSplitter(LineSplitter):
 
 
 def _suspects(data: bytes, begin: int) -> Iterator[bytes]:
-    """The lines from `begin` on in which there is a mark, the last first; all others cost next to nothing."""
+    """Yield the lines from `begin` on with a mark, the last first; all others cost next to nothing."""
     end = len(data)
     marks = dict.fromkeys(_MARKS, end)
     while begin:
@@ -192,7 +195,7 @@ def _suspects(data: bytes, begin: int) -> Iterator[bytes]:
 
 
 def _last_stop(splitter: StopSplitter, line: bytes) -> Iterator[StopRequest | None]:
-    """The stop in the last line that this one cuts."""
+    """Yield the stop in the last line that this one cuts."""
     *pieces, rest = [line[at : at + _PIECE_BYTES] for at in range(0, len(line), _PIECE_BYTES)] or [b""]
     for piece in pieces:
         yield _newest(splitter.feed(piece))

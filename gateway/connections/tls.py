@@ -7,7 +7,7 @@ import stat
 import threading
 from typing import Final
 
-from drivers.urgency import lent_urgency
+from drivers.realtime_priority import lent_realtime
 from gateway.access.folder import AccessFolder
 from gateway.access.known import Known
 from gateway.certificates import KeyProblem
@@ -104,7 +104,7 @@ class TlsStream:
             self._come.write_eof()
 
     def send(self, data: bytes | memoryview) -> int:
-        """A record at most, so that whoever reads waits no longer than for that.
+        """Return a record at most, so that whoever reads waits no longer than for that.
 
         Raises `BlockingIOError` until all of it has gone: the same is to be sent again until then.
         """
@@ -123,12 +123,12 @@ class TlsStream:
 
     def _lock_to_read(self) -> None:
         if not self._lock.acquire(blocking=False):
-            with lent_urgency(self._writer):
+            with lent_realtime(self._writer):
                 self._lock.acquire()
 
 
 def context_of(folder: AccessFolder, known: Known) -> ssl.SSLContext:
-    """A robot's side: its own key, and nobody but those who are known.
+    """Return a robot's side: its own key, and nobody but those who are known.
 
     Raises:
         KeyProblem: the robot's key cannot be read; it says which file, and nothing of what is in it.

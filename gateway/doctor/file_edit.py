@@ -67,7 +67,7 @@ def _by_hand(edits: Sequence[Edit]) -> str:
 
 
 def edited(text: str, fix: Edit) -> str:
-    """The file with that line.
+    """Return the file with that line.
 
     Raises:
         NotMended: it cannot be found, or is not what was judged, or the file would say anything else too.
@@ -93,7 +93,7 @@ def edited(text: str, fix: Edit) -> str:
 
 
 def _check_same(fix: Edit, table: Mapping[str, Plain]) -> None:
-    """A key that is not there has its default, which is what was judged as long as it is not there."""
+    """Check that the key still has the judged value: a missing key has its default."""
     if fix.key in table and table[fix.key] != fix.was:
         raise NotMended(
             f"{header(fix.kind, fix.name)} {fix.key} is {json.dumps(table[fix.key])} by now, and was judged "
@@ -102,7 +102,7 @@ def _check_same(fix: Edit, table: Mapping[str, Plain]) -> None:
 
 
 def _with_line(text: str, fix: Edit) -> str:
-    """The key's line in its table with the new value and its comment, else a new one behind the header."""
+    """Return the key's line with the new value and its comment, else a new one after the header."""
     name = rf'(?:{re.escape(fix.name)}|"{re.escape(fix.name)}")'
     head = re.search(rf"^[ \t]*\[{fix.kind}\.{name}\][^\n]*\n?", text, re.MULTILINE)
     if head is None:

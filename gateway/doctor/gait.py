@@ -52,7 +52,7 @@ def joint_of(side: str, kind: str) -> str:
 
 
 def insole_of(seen: Observations, side: str) -> str | None:
-    """The insole of a foot."""
+    """Return the insole of a foot."""
     tables = seen.config.insole.items()
     return next((name for name, table in tables if str(table.side(name)) == side), None)
 
@@ -63,7 +63,7 @@ def force(seen: Observations, side: str) -> list[float] | None:
 
 
 def gait(seen: Observations) -> Gait | str:
-    """The gait in the samples, or why there is none that could be judged."""
+    """Return the gait in the samples, or why there is none that could be judged."""
     forces = {side: force(seen, side) for side in SIDES}
     if any(one is None for one in forces.values()):
         return "it needs both insoles, and they said nothing"
@@ -115,7 +115,7 @@ def _landings(values: Sequence[float], period_s: float) -> list[int]:
 
 
 def folded(values: Sequence[float], landings: Sequence[int]) -> list[float]:
-    """A joint over the stride, on average."""
+    """Return a joint over the stride, on average."""
     sums, counts = [0.0] * BINS, [0] * BINS
     for begin, end in pairwise(landings):
         for at in range(begin, end):

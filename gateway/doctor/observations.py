@@ -124,7 +124,7 @@ class Observations:
                 yield place
 
     def holds(self, place: Place, index: int, subindex: int = 0) -> Value:
-        """What its device holds there, of its own axis; `None` where it has none or did not tell."""
+        """Return what its device holds there, of its own axis; `None` where it has none or did not tell."""
         shift = AXIS_OFFSET * place.axis if index >= FIRST_PROFILE_OBJECT else 0
         return self.objects.get(place.name, {}).get((index + shift, subindex))
 
@@ -136,7 +136,7 @@ class Observations:
         return not asked and (description is None or description.has(index + shift, subindex))
 
     def whole(self, place: Place, index: int, subindex: int = 0) -> int | None:
-        """The same as a whole number."""
+        """Return the same as a whole number."""
         value = self.holds(place, index, subindex)
         return None if value is None else int(value)
 
@@ -148,7 +148,10 @@ class Observations:
         return self.samples.problems.get(component) or (late if known else self.samples.why_none)
 
     def column(self, channel: str) -> list[float] | None:
-        """A channel's values, a missing one as the one before; `None` where more than a tenth is missing."""
+        """Return a channel's values, a missing one as the one before.
+
+        `None` where more than a tenth is missing.
+        """
         column = self.samples.columns.get(channel, ())
         known = [value for value in column if value is not None and isfinite(value)]
         if not known or len(known) < 0.9 * len(column):

@@ -27,7 +27,10 @@ def well(verdicts: Sequence[Verdict]) -> list[str]:
 
 
 def as_text(verdicts: Sequence[Verdict]) -> Iterator[str]:
-    """What is wrong first, each with what mends it; then what could not be judged, then what is well."""
+    """Yield what is wrong first, each with what mends it.
+
+    Then what could not be judged, then what is well.
+    """
     for number, finding in enumerate(findings(verdicts), 1):
         yield f"{number}. {finding.about}: {finding.words} ({finding.rule})"
         yield from (f"{INDENT}{text}" for text in finding.evidence)
@@ -56,7 +59,7 @@ def summary(verdicts: Sequence[Verdict]) -> str:
 
 
 def as_json(verdicts: Sequence[Verdict]) -> dict[str, Any]:
-    """The same for machines."""
+    """Return the same for machines."""
     return {
         "findings": [
             {

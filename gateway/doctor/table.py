@@ -86,7 +86,10 @@ RULES: tuple[Rule, ...] = (
 
 
 def judged(seen: Observations) -> Iterator[Verdict]:
-    """What every rule says, in the table's order; values to be written are in their parameters' units."""
+    """Yield what every rule says, in the table's order.
+
+    Values to be written are in their parameters' units.
+    """
     every = components.unexplained(seen, (verdict for rule in RULES for verdict in rule.judge(seen)))
     for one in every:
         yield one if isinstance(one, Unknown) else replace(one, fixes=_in_units(seen, one.fixes))

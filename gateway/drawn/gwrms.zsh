@@ -10,57 +10,57 @@
 
 _shtab_gwrms_commands() {
   local _commands=(
-    ab:'Try two values of a parameter against each other while somebody walks.'
-    bench:'Measure a robot'"'"'s gateway: latency, CPU and memory of what it does.'
-    blame:'Watch the robot'"'"'s control loop, and name what made it late.'
-    calibrate:'an insole'"'"'s pressure, an IMU'"'"'s or a joint'"'"'s zero'
+    ab:'Compare two values of a parameter during a walk.'
+    bench:'Measure a robot'"'"'s gateway: latency, CPU and memory.'
+    blame:'Watch the robot'"'"'s control loop, and name the processes that delay it.'
+    calibrate:'calibrate an insole'"'"'s pressure, an IMU'"'"'s or a joint'"'"'s zero'
     check:'Checks a robot'"'"'s file, a server'"'"'s file or a scenario as a gateway, a collector or `gwrms sim run` would read'
-    cloud:'the store: browse, upload, download, verify, tidy'
-    collect:'Record every robot, whole, into the store; and ask how that goes.'
-    commission:'Finds out, one joint at a time, what a robot'"'"'s file has to say, and writes it.'
-    completion:'Print what completes commands, options and files in a shell.'
-    cost:'What monitoring costs a robot now: CPU, memory, wake-ups, bus, network.'
-    demo:'A simulated exoskeleton, its gateway and a live view, with one command.'
-    describe:'What a robot is made of: its components and buses and what is wrong with them, since when and what'
+    cloud:'browse, upload, download, verify and tidy the store'
+    collect:'Record all robots into the store; show the status of the running collector.'
+    commission:'Determine the contents of a robot'"'"'s file, one joint at a time, and write it.'
+    completion:'Print the script that completes commands, options and files in a shell.'
+    cost:'Show the cost of monitoring a robot: CPU, memory, wake-ups, bus, network.'
+    demo:'Start a simulated exoskeleton, its gateway and a live view.'
+    describe:'Show a robot'"'"'s components and buses with their problems, since when and what'
     docs:'Prints a page of the docs, which are installed with GWRMS; without a name, the list of all. A page'"'"'s own name'
     doctor:'Finds what is wrong with a robot: by its file, its buses, its sensors and its computer, through its gateway'
-    edits:'What each edit of a robot'"'"'s parameters did to the walk.'
+    edits:'Show the effect of each parameter edit on the walk.'
     eds:'Read EDS and DCF files (CiA 306) as a gateway would: the device, whether it can be a joint, its PDOs as the'
     enable:'Enable drives, one confirmed transition at a time.'
-    evaluate:'How well predictions hold for people, real or simulated, whom no model has seen.'
+    evaluate:'Evaluate predictions on people, real or simulated, whom no model has seen.'
     gateway:'Serves one robot over TCP: joints over CANopen, insoles and IMU over serial ports, and'
-    get:'Read parameters from the devices, now.'
-    gui:'The window: robots live, their parameters changed safely, STOP always in sight.'
+    get:'Read parameters from the devices.'
+    gui:'Open the window: monitor robots live, change parameters safely, STOP always in sight.'
     install-service:'Writes systemd units for the gateway of CONFIG.'
-    joint-test:'a joint tested on a bench: step, chirp, friction, relay'
-    journal:'who did what to the robot; is the record whole'
-    keys:'on the robot: who is let in, and as what'
-    label:'What robot and wearer did in a recorded session.'
-    lss:'Finds CANopen devices that have no node id yet; gives node ids and bit rates (CiA 305).'
-    models:'learned models: look at, promote, roll back, export'
-    od:'Look into a device'"'"'s object dictionary: names, types, limits, values.'
+    joint-test:'test a joint on a bench: step, chirp, friction, relay'
+    journal:'show and verify the robot'"'"'s journal'
+    keys:'on the robot: admit and revoke clients'
+    label:'Label the activities in a recorded session.'
+    lss:'Find CANopen devices without a node id; set node ids and bit rates (CiA 305).'
+    models:'inspect, promote, roll back and export models'
+    od:'Search a device'"'"'s object dictionary: names, types, limits, values.'
     pair:'Pairs this desk with the robot on which `gwrms keys pair` shows a code. The code is asked for, so that it'
-    params:'parameters as files: save, compare, apply'
-    plot:'Channels over time, live, until q, or Ctrl-C.'
-    predict:'What robot and wearer are doing, and how far to believe that.'
-    query:'SQL over the store'"'"'s tables.'
+    params:'save, compare and apply parameter files'
+    plot:'Plot channels live, until q or Ctrl-C.'
+    predict:'Predict the activity of robot and wearer, with the trust in the models.'
+    query:'Run SQL over the store'"'"'s tables.'
     reset:'End a held stop: every drive switched off, none enabled.'
-    restore:'Give a device its defaults back (1011h).'
-    scan:'Says what is on a CAN bus and on serial ports. Listens; asks only with --active.'
-    sensor:'Says what is on a serial port, how well it fits, and shows it live.'
-    sessions:'recordings: list, look into, export as CSV, Parquet, MCAP'
+    restore:'Restore a device'"'"'s defaults (1011h).'
+    scan:'Identify the devices on a CAN bus and on serial ports. Only listens without --active.'
+    sensor:'Identify the sensor on a serial port, and show its values live.'
+    sessions:'list, inspect and export recordings: CSV, Parquet, MCAP'
     set:'Change parameters: all or none, limit-checked, read back.'
     sim:'A whole lower-limb exoskeleton without hardware: six CiA 402 joint drives and a gait controller on a CANopen'
     sim-fault:'Makes a fault in the robot of a running `gwrms sim --dir DIR`, or ends it. Without --for it stays until it is'
     sim-record:'Writes what a gateway would report of the simulated robot (its names of channels, SI units, with the noise and'
-    snapshot:'One look at a robot: what it has now, asked once.'
+    snapshot:'Take a snapshot of a robot.'
     stop:'Quick stop on every drive, held until gwrms reset. Needs no lease.'
-    store:'Make a device keep its parameters as they are now (1010h).'
-    sweep:'Try values of a parameter upwards, in small steps, while you watch.'
-    top:'One robot in the terminal, live: its joints, feet, trunk, parameters and computer.'
-    trace:'Shows the frames of CAN buses or of recordings, decoded by EDS. Only listens.'
-    train:'A model from recorded sessions and their labels.'
-    watch:'Follow channels live, one line for every tick.'
+    store:'Store a device'"'"'s present parameters in its memory (1010h).'
+    sweep:'Raise a parameter in small steps, while you watch.'
+    top:'Show one robot live in the terminal: joints, feet, trunk, parameters and computer.'
+    trace:'Show the frames of CAN buses or recordings, decoded by EDS. Only listens.'
+    train:'Train a model on labelled sessions.'
+    watch:'Show channels live, one line per tick.'
   )
   _describe 'gwrms commands' _commands
 }
@@ -69,7 +69,7 @@ _shtab_gwrms_calibrate_commands() {
   local _commands=(
     imu:'Takes the present posture as upright and writes it. Stand upright and still; name the file in [imu.NAME] as `zero`. ROBOT.toml:NAME instead of a port takes everything from [imu.NAME], also for an IMU on a CAN bus.'
     insole:'Measures the unloaded cells, then known loads on the whole insole; fits, shows the fit, and asks before it writes. Name the file in [insole.NAME] as `calibration`. ROBOT.toml:NAME instead of a port takes everything from [insole.NAME]. A device that sends pressure needs no calibration.'
-    joint:'Finds a joint'"'"'s zero again: hold it, without power, as the comment of its zero_offset says, or at --angle. Old and new are shown, and written into the robot'"'"'s file on your word, with a comment and an entry of the journal. Nothing is moved. End this robot'"'"'s gateway first.'
+    joint:'Find a joint'"'"'s zero again: hold it, without power, as the comment of its zero_offset says, or at --angle. Old and new are shown, and written into the robot'"'"'s file on your word, with a comment and an entry of the journal. Nothing is moved. End this robot'"'"'s gateway first.'
   )
   _describe 'gwrms calibrate commands' _commands
 }
@@ -77,23 +77,23 @@ _shtab_gwrms_calibrate_commands() {
 _shtab_gwrms_cloud_commands() {
   local _commands=(
     compact:'Put small files together.'
-    download:'A store, or some of it, into a folder: a store too.'
-    du:'Space used in the store, by tables and robots.'
+    download:'Download a store, or a part of it, to a folder, which is a store too.'
+    du:'Show the space used in the store, by tables and robots.'
     forget:'Remove a wearer'"'"'s sessions: rows, labels, predictions, of every version; and prove that they are gone.'
-    ls:'The store'"'"'s tables, or with --path the files below one.'
+    ls:'List the store'"'"'s tables, or with --path the files below one.'
     mend:'Take files that are gone or damaged out of the store, and bring again what the spool still has of them.'
     retain:'Remove rows that are older than so many days.'
-    upload:'What waits in the spool, now; or a whole store.'
+    upload:'Upload pending data of the spool, or copy a whole store.'
     vacuum:'Delete files that no newer version needs.'
     verify:'Check every file of every table, and that each row which this computer'"'"'s spool has sent is there once,'
-    witnesses:'What this desk has seen of a robot'"'"'s journal, signed by the robot.'
+    witnesses:'Print this desk'"'"'s witnesses of a robot'"'"'s journal, signed by the robot.'
   )
   _describe 'gwrms cloud commands' _commands
 }
 
 _shtab_gwrms_edits_commands() {
   local _commands=(
-    show:'Everything that is known of one edit.'
+    show:'Show all data on one edit.'
   )
   _describe 'gwrms edits commands' _commands
 }
@@ -103,7 +103,7 @@ _shtab_gwrms_joint_test_commands() {
     chirp:'chirp: a sine that gets faster: bandwidth, phase margin.'
     friction:'friction: at constant speeds both ways: Coulomb and viscous friction, load, cogging.'
     relay:'relay: torque against where it is: ultimate gain and period.'
-    show:'What a test of a joint has measured.'
+    show:'Show the results of a joint test.'
     step:'step: there and back some times: rise, overshoot, settling.'
     stop:'stop: ask nothing: quick stop to every drive of the robot'"'"'s file.'
   )
@@ -113,7 +113,7 @@ _shtab_gwrms_joint_test_commands() {
 _shtab_gwrms_journal_commands() {
   local _commands=(
     tail:'The newest entries: who did what, when, and what came of it. WHO is known by their key or account'
-    verify:'Check every entry of a journal, in itself and against what desks have seen of it.'
+    verify:'Check every entry of a journal, and compare it with the witnesses of desks.'
   )
   _describe 'gwrms journal commands' _commands
 }
@@ -121,31 +121,31 @@ _shtab_gwrms_journal_commands() {
 _shtab_gwrms_keys_commands() {
   local _commands=(
     add:'Let a key in whose certificate (PEM) comes on the standard input. gwrms keys push runs this by ssh.'
-    list:'Who is let in on this robot, and as what.'
+    list:'List the clients of this robot, with their roles.'
     pair:'Shows HOST:PORT and a code. On the desk, `gwrms pair HOST:PORT` asks for it and proves to know it; then you'
     push:'Lets a key in on further robots: runs `gwrms keys add` on each by ssh, as whoever may log in there and use'
-    revoke:'Let somebody in no more. A gateway that runs closes their connections at once.'
+    revoke:'Revoke a client. A running gateway closes its connections at once.'
   )
   _describe 'gwrms keys commands' _commands
 }
 
 _shtab_gwrms_models_commands() {
   local _commands=(
-    export:'A model as ONNX; both judge the same rows before the file is written.'
-    history:'What has served, newest last.'
-    ls:'Every model, oldest first, and which robots it serves.'
+    export:'Export a model as ONNX; both are compared on the same rows before the file is written.'
+    history:'Show which models have served, newest last.'
+    ls:'List all models, oldest first, and the robots that they serve.'
     promote:'Let a model serve.'
-    rollback:'Let that serve which did before.'
-    show:'What is known of a model. Exit status 1: it cannot serve here.'
+    rollback:'Return to the model that served before.'
+    show:'Show a model'"'"'s card. Exit status 1: it cannot serve here.'
   )
   _describe 'gwrms models commands' _commands
 }
 
 _shtab_gwrms_params_commands() {
   local _commands=(
-    apply:'Bring a robot'"'"'s parameters to what a file says, all or none.'
-    compare:'What a file says beside what the robot holds.'
-    save:'Save parameters as the devices hold them now.'
+    apply:'Set a robot'"'"'s parameters to those of a file, all or none.'
+    compare:'Compare a file with the robot'"'"'s parameters.'
+    save:'Save the present parameters of the devices.'
   )
   _describe 'gwrms params commands' _commands
 }
@@ -161,13 +161,13 @@ _shtab_gwrms_sensor_commands() {
 
 _shtab_gwrms_sessions_commands() {
   local _commands=(
-    changed:'What changed from one session to another, and what moved with it.'
-    compare:'Which programs take more in sessions than in earlier ones.'
-    export:'A session, or a part of it, as a file.'
-    gait:'Cadence, step times, symmetry and ranges of motion of a recording.'
-    ls:'Every session, oldest first.'
-    resources:'Resources that each program on the robot'"'"'s computer used, and memory leaks.'
-    show:'What is known of a session, its channels, and what happened in it.'
+    changed:'Show what changed between two sessions, and what moved with it.'
+    compare:'Find programs that use more resources than in earlier sessions.'
+    export:'Export a session, or a part of it, to a file.'
+    gait:'Show cadence, step times, symmetry and ranges of motion of a recording.'
+    ls:'List all sessions, oldest first.'
+    resources:'Show the resources used by each program on the robot'"'"'s computer, and memory leaks.'
+    show:'Show a session'"'"'s metadata, channels and events.'
   )
   _describe 'gwrms sessions commands' _commands
 }
@@ -189,17 +189,17 @@ _shtab_gwrms_defaults_added=0
 _shtab_gwrms_ab_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
-  "--json[one JSON object a line, for machines]"
+  "--json[print one JSON object per line, for programs]"
   "--pairs[of A and B, 8 to 14 (default 10)]:N:"
-  "--seed[of the order (default\: another each time)]:N:"
+  "--seed[seed of the order (default\: random)]:N:"
   "--cycles[gait cycles that each value is held for (default 6)]:N:"
   "--transient[gait cycles left out after each change (default 2)]:N:"
-  "--seconds[hold each value for so long instead]:S:"
-  "--most-error[tracking error that ends it]:RAD:"
-  "--most-current[current that ends it]:A:"
-  "--config[the server\'s file\: where it is kept]:FILE:_files"
+  "--seconds[hold each value for so long, instead of cycles]:S:"
+  "--most-error[end at this tracking error]:RAD:"
+  "--most-current[end at this current]:A:"
+  "--config[the server\'s file, for the place of the result]:FILE:_files"
   ":the parameter, as in left_knee.position_gain:"
-  ":A and B, in its own unit or another\: 3deg:"
+  ":values A and B, in its own unit or another\: 3deg:"
 )
 
 # guard to ensure default positional specs are added only once per session
@@ -208,8 +208,8 @@ _shtab_gwrms_ab_defaults_added=0
 _shtab_gwrms_bench_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
-  "--json[one JSON object a line, for machines]"
-  "--requests[of each kind (default\: 200)]:requests:"
+  "--json[print one JSON object per line, for programs]"
+  "--requests[requests of each kind (default\: 200)]:requests:"
 )
 
 # guard to ensure default positional specs are added only once per session
@@ -218,8 +218,8 @@ _shtab_gwrms_bench_defaults_added=0
 _shtab_gwrms_blame_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
-  "--json[one JSON object a line, for machines]"
-  "--seconds[to watch (default\: until Ctrl-C)]:seconds:"
+  "--json[print one JSON object per line, for programs]"
+  "--seconds[duration (default\: until Ctrl-C)]:seconds:"
 )
 
 # guard to ensure default positional specs are added only once per session
@@ -234,7 +234,7 @@ _shtab_gwrms_calibrate_defaults_added=0
 
 _shtab_gwrms_calibrate_imu_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--write[where the result goes]:FILE:_files"
+  "--write[file for the result]:FILE:_files"
   "--format[default\: witmotion]:format:(bno08x-rvc microstrain vectornav witmotion xsens)"
   "--baud[default\: 115200]:baud:"
   "--axes[as in \[imu.NAME\], such as \'y -x z\'\; in quotes]:'X Y Z':"
@@ -247,13 +247,13 @@ _shtab_gwrms_calibrate_imu_defaults_added=0
 
 _shtab_gwrms_calibrate_insole_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--write[where the result goes]:FILE:_files"
+  "--write[file for the result]:FILE:_files"
   "--format[default\: insole-cobs]:format:(brilliant-star insole-cobs insole-csv insole-frame)"
   "--baud[default\: 230400]:baud:"
   "--layout[a shipped layout or a .toml file\; default\: the device\'s own, else insole-16]:layout:"
-  "--foot[where both feet are on the port]:foot:(left right)"
-  "--falling[fewer counts are more load]:FULL_SCALE:"
-  "--saturation[counts from which a cell says no more]:saturation:"
+  "--foot[needed if both feet are on the port]:foot:(left right)"
+  "--falling[fewer counts mean more load]:FULL_SCALE:"
+  "--saturation[counts at which a cell saturates]:saturation:"
   "--power[fit a power law (two different loads or more)]"
   ":PORT:"
 )
@@ -263,9 +263,9 @@ _shtab_gwrms_calibrate_insole_defaults_added=0
 
 _shtab_gwrms_calibrate_joint_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--angle[at which it is held (flexion positive)]:DEGREES:"
-  "--max-change[a larger change is refused (default\: 10)]:DEGREES:"
-  "--who[who does it, for the record (default\: your user name)]:who:"
+  "--angle[the angle at which it is held (flexion positive)]:DEGREES:"
+  "--max-change[refuse a larger change (default\: 10)]:DEGREES:"
+  "--who[name for the journal (default\: your user name)]:who:"
   ":the joint of a robot\'s file:"
 )
 
@@ -274,11 +274,11 @@ _shtab_gwrms_calibrate_joint_defaults_added=0
 
 _shtab_gwrms_check_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--kind[what the files are, whatever their tables show]:kind:(robot server scenario)"
-  "--no-machine[only the files and what lies beside them\: no address, ports and CAN links of this computer]"
-  "--strict[exit status 1 for warnings too]"
-  "--json[one JSON object a file and line]"
-  "--schema[print the JSON Schema of such files, for editors, instead]:schema:(robot server scenario)"
+  "--kind[the kind of the files (default\: by their tables)]:kind:(robot server scenario)"
+  "--no-machine[check only the files and those beside them, not this computer\'s address, ports and CAN links]"
+  "--strict[exit with status 1 for warnings too]"
+  "--json[print one JSON object per file, a line each]"
+  "--schema[print the JSON Schema of such files, for editors]:schema:(robot server scenario)"
   "(*)::a file to check:_files"
 )
 
@@ -295,9 +295,9 @@ _shtab_gwrms_cloud_defaults_added=0
 _shtab_gwrms_cloud_compact_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for machines]"
-  "--dry-run[say what would be done, and do nothing]"
-  "--alone[no server runs\: for a store that keeps no two writers apart]"
+  "--json[for programs]"
+  "--dry-run[only show what would be done]"
+  "--alone[confirm that no server runs, for a store without conditional writes]"
   ":file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file):"
 )
 
@@ -307,10 +307,10 @@ _shtab_gwrms_cloud_compact_defaults_added=0
 _shtab_gwrms_cloud_download_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for machines]"
+  "--json[for programs]"
   "--out[where to]:FOLDER:_files"
-  "*--robot[these alone\; repeat for more]:GLOB:"
-  "*--session[these alone\; repeat for more]:NAME:"
+  "*--robot[only these\; repeatable]:GLOB:"
+  "*--session[only these\; repeatable]:NAME:"
   ":file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file):"
 )
 
@@ -320,7 +320,7 @@ _shtab_gwrms_cloud_download_defaults_added=0
 _shtab_gwrms_cloud_du_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for machines]"
+  "--json[for programs]"
   ":file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file):"
 )
 
@@ -330,13 +330,13 @@ _shtab_gwrms_cloud_du_defaults_added=0
 _shtab_gwrms_cloud_forget_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for machines]"
+  "--json[for programs]"
   "--url[file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file)]:URL:"
-  "--wearer[who is to be forgotten]:ID:"
-  "--dry-run[say what would be removed, and do nothing]"
-  "--unpin[let go of versions that models name]"
-  "--alone[no other server runs\: for a store that keeps no two apart]"
-  "--yes[do not ask]"
+  "--wearer[the wearer to forget]:ID:"
+  "--dry-run[only show what would be removed]"
+  "--unpin[release versions that models name]"
+  "--alone[confirm that no other server runs, for a store without conditional writes]"
+  "--yes[do not ask for confirmation]"
 )
 
 # guard to ensure default positional specs are added only once per session
@@ -345,7 +345,7 @@ _shtab_gwrms_cloud_forget_defaults_added=0
 _shtab_gwrms_cloud_ls_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for machines]"
+  "--json[for programs]"
   "--path[as in telemetry\/000\/robot\=exo-01]:PATH:"
   ":file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file):"
 )
@@ -356,11 +356,11 @@ _shtab_gwrms_cloud_ls_defaults_added=0
 _shtab_gwrms_cloud_mend_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for machines]"
-  "--dry-run[say what would be done, and do nothing]"
-  "--alone[no other server runs\: for a store that keeps no two apart]"
-  "--accept-loss[then count what is there as what was sent]"
-  "--yes[do not ask]"
+  "--json[for programs]"
+  "--dry-run[only show what would be done]"
+  "--alone[confirm that no other server runs, for a store without conditional writes]"
+  "--accept-loss[accept the present rows as complete]"
+  "--yes[do not ask for confirmation]"
   ":file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file):"
 )
 
@@ -370,12 +370,12 @@ _shtab_gwrms_cloud_mend_defaults_added=0
 _shtab_gwrms_cloud_retain_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for machines]"
-  "--dry-run[say what would be done, and do nothing]"
-  "--alone[no server runs\: for a store that keeps no two writers apart]"
-  "--days[how old rows may become]:N:"
-  "*--table[of this table\; repeat for more]:table:(telemetry sessions resources events journal labels predictions)"
-  "--yes[do not ask]"
+  "--json[for programs]"
+  "--dry-run[only show what would be done]"
+  "--alone[confirm that no server runs, for a store without conditional writes]"
+  "--days[the greatest age of rows]:N:"
+  "*--table[only this table\; repeatable]:table:(telemetry sessions resources events journal labels predictions)"
+  "--yes[do not ask for confirmation]"
   ":file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file):"
 )
 
@@ -385,7 +385,7 @@ _shtab_gwrms_cloud_retain_defaults_added=0
 _shtab_gwrms_cloud_upload_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for machines]"
+  "--json[for programs]"
   "--from[the store to copy]:URL:"
   ":file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file):"
 )
@@ -396,9 +396,9 @@ _shtab_gwrms_cloud_upload_defaults_added=0
 _shtab_gwrms_cloud_vacuum_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for machines]"
-  "--dry-run[say what would be done, and do nothing]"
-  "--alone[no server runs\: for a store that keeps no two writers apart]"
+  "--json[for programs]"
+  "--dry-run[only show what would be done]"
+  "--alone[confirm that no server runs, for a store without conditional writes]"
   "--grace[(default\: 7)]:DAYS:"
   ":file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file):"
 )
@@ -409,10 +409,10 @@ _shtab_gwrms_cloud_vacuum_defaults_added=0
 _shtab_gwrms_cloud_verify_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for machines]"
-  "--quick[count the rows, and compare no values]"
-  "--deep[read every value, also of what has no receipt here]"
-  "--quiet[say nothing where it is whole, as for cron]"
+  "--json[for programs]"
+  "--quick[count the rows only, without comparing values]"
+  "--deep[read every value, even without a receipt here]"
+  "--quiet[print nothing if the store is whole, as for cron]"
   ":file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file):"
 )
 
@@ -422,7 +422,7 @@ _shtab_gwrms_cloud_verify_defaults_added=0
 _shtab_gwrms_cloud_witnesses_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for machines]"
+  "--json[for programs]"
   "--url[file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file)]:URL:"
   ":its name in the store:"
 )
@@ -433,16 +433,16 @@ _shtab_gwrms_cloud_witnesses_defaults_added=0
 _shtab_gwrms_collect_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file]:FILE:_files"
-  "*--robot[a robot beside those of the file\; again for another one]:NAME=HOST:PORT:"
-  "--operator[who records\; kept with the sessions]:WHO:"
+  "*--robot[a robot in addition to those of the file\; repeatable]:NAME=HOST:PORT:"
+  "--operator[operator\'s name\; kept with the sessions]:WHO:"
   "--notes[kept with the sessions]:TEXT:"
-  "--wearer[who wears the robots, as a pseudonym of the study\; gwrms cloud forget finds them by it]:ID:"
-  "--consent[what the wearer has agreed to, and when or where that is]:TEXT:"
-  "--status[ask the collector that runs how it goes]"
-  "--upload[tell it to upload what waits, now]"
-  "--mark[tell it to mark this instant in every robot\'s recording]:TEXT:"
+  "--wearer[the wearer\'s pseudonym in the study, by which gwrms cloud forget finds the data]:ID:"
+  "--consent[the wearer\'s consent, with its date or reference]:TEXT:"
+  "--status[show the status of the running collector]"
+  "--upload[make it upload pending data now]"
+  "--mark[mark this instant in every robot\'s recording]:TEXT:"
   "--unit[print a systemd unit for this installation]"
-  "--json[with --status\: one JSON object, for machines]"
+  "--json[with --status\: print one JSON object, for programs]"
 )
 
 # guard to ensure default positional specs are added only once per session
@@ -450,14 +450,14 @@ _shtab_gwrms_collect_defaults_added=0
 
 _shtab_gwrms_commission_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--bitrate[bit\/s, for interfaces that are opened with one]:bitrate:"
+  "--bitrate[bit\/s, for interfaces that need one]:bitrate:"
   "*--eds[folder of EDS files]:DIR:_files"
   "*--serial[an insole\'s or IMU\'s port]:PORT:"
-  "--who[who does it, for the record (default\: your user name)]:who:"
-  "--json[questions and answers as JSON lines, for other faces]"
+  "--who[name for the journal (default\: your user name)]:who:"
+  "--json[exchange questions and answers as JSON lines, for other front ends]"
   "--stop[ask nothing\: quick stop to every drive that was found until now, and what each confirms (software, not a safety-rated emergency stop)]"
-  ":the robot\'s file that is to be written:_files"
-  ":can0, INTERFACE\:CHANNEL, or a file that has only its \[can.\…\]:"
+  ":the robot\'s file to write:_files"
+  ":can0, INTERFACE\:CHANNEL, or a file with only its \[can.\…\]:"
 )
 
 # guard to ensure default positional specs are added only once per session
@@ -474,8 +474,8 @@ _shtab_gwrms_completion_defaults_added=0
 _shtab_gwrms_cost_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
-  "--json[one JSON object a line, for machines]"
-  "--seconds[to look for (default\: 2)]:seconds:"
+  "--json[print one JSON object per line, for programs]"
+  "--seconds[duration (default\: 2)]:seconds:"
 )
 
 # guard to ensure default positional specs are added only once per session
@@ -483,8 +483,8 @@ _shtab_gwrms_cost_defaults_added=0
 
 _shtab_gwrms_demo_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--headless[no screen\: a line a second, at last a table of what was seen]"
-  "--terminal[in the terminal, display or not]"
+  "--headless[no screen\: print a line per second, and a summary table at the end]"
+  "--terminal[use the terminal even with a display]"
   "--seconds[end after N seconds]:N:"
   "--dir[keep the simulated robot\'s files here (default\: a temporary folder)]:dir:_files"
   "--scenario[default\: walk]:scenario:(walk stand sit)"
@@ -497,7 +497,7 @@ _shtab_gwrms_demo_defaults_added=0
 _shtab_gwrms_describe_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
-  "--json[one JSON object a line, for machines]"
+  "--json[print one JSON object per line, for programs]"
 )
 
 # guard to ensure default positional specs are added only once per session
@@ -505,7 +505,7 @@ _shtab_gwrms_describe_defaults_added=0
 
 _shtab_gwrms_docs_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  ":as in the list, or a link to it:"
+  ":a name from the list, or a link:"
 )
 
 # guard to ensure default positional specs are added only once per session
@@ -513,16 +513,16 @@ _shtab_gwrms_docs_defaults_added=0
 
 _shtab_gwrms_doctor_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--robot[ask this gateway, and not the one that the file means]:HOST:PORT:"
-  "--seconds[how long to watch (default 20)]:seconds:"
-  "--silent[ask no gateway]"
-  "--active[where no gateway runs, ask devices by SDO]"
+  "--robot[query this gateway instead of the one in the file]:HOST:PORT:"
+  "--seconds[duration (default 20)]:seconds:"
+  "--silent[query no gateway]"
+  "--active[query devices by SDO if no gateway runs]"
   "*--eds[folder of EDS files]:DIR:_files"
   "--computer[a copy of \/sys, \/proc and \/run (default \/)]:DIR:_files"
-  "--fix[mend what is safe to mend, asking for each]"
+  "--fix[apply safe fixes, asking for each]"
   "--yes[with --fix\: do not ask]"
-  "--rules[tell what is looked for, and by what]"
-  "--json[one JSON object, for machines]"
+  "--rules[list all findings, and their sources]"
+  "--json[print one JSON object, for programs]"
   ":the robot\'s file:_files"
 )
 
@@ -532,8 +532,8 @@ _shtab_gwrms_doctor_defaults_added=0
 _shtab_gwrms_edits_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for machines]"
-  "*--robot[of this robot (again\: more)]:NAME:"
+  "--json[for programs]"
+  "*--robot[only this robot\'s edits (repeatable)]:NAME:"
 )
 
 # guard to ensure default positional specs are added only once per session
@@ -542,8 +542,8 @@ _shtab_gwrms_edits_defaults_added=0
 _shtab_gwrms_edits_show_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for machines]"
-  ":of gwrms edits\; may be cut off where it is unique:"
+  "--json[for programs]"
+  ":id from gwrms edits\; may be abbreviated:"
 )
 
 # guard to ensure default positional specs are added only once per session
@@ -553,8 +553,8 @@ _shtab_gwrms_eds_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--node-id[node id for COB-IDs that depend on it (1), and the table]:N:"
   "--brief[leave out the objects]"
-  "--json[one JSON object a file and line]"
-  "(*):an .eds or .dcf file, or the name of one that ships:_files"
+  "--json[print one JSON object per file, a line each]"
+  "(*):an .eds or .dcf file, or the name of a shipped one:_files"
 )
 
 # guard to ensure default positional specs are added only once per session
@@ -563,7 +563,7 @@ _shtab_gwrms_eds_defaults_added=0
 _shtab_gwrms_enable_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
-  "--json[one JSON object a line, for machines]"
+  "--json[print one JSON object per line, for programs]"
   "(*)::names or globs (default\: all):"
 )
 
@@ -572,11 +572,11 @@ _shtab_gwrms_enable_defaults_added=0
 
 _shtab_gwrms_evaluate_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--benchmark[one of those below]:NAME:(ipol-status ipol-phase ipol-adapt ipol-events sisfall-prefall aust-mode ipol-danger sisfall-danger sim-activity sim-phase sim-walks sim-falling sim-danger sim-danger-shipped)"
+  "--benchmark[a benchmark from the list below]:NAME:(ipol-status ipol-phase ipol-adapt ipol-events impaired-phase sisfall-prefall aust-mode ipol-danger sisfall-danger sim-activity sim-phase sim-walks sim-falling sim-danger sim-danger-shipped)"
   "--data[the recordings]:FILE:_files"
-  "--json[the figures, of groups too, as one JSON object, in the last line]"
+  "--json[print the figures, including groups, as a JSON object in the last line]"
   "--report[also write a page with tables and pictures]:FILE.html:_files"
-  "--search[choose the settings again, by training subjects alone]"
+  "--search[tune the settings again, on training subjects only]"
 )
 
 # guard to ensure default positional specs are added only once per session
@@ -595,9 +595,9 @@ _shtab_gwrms_gateway_defaults_added=0
 _shtab_gwrms_get_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
-  "--json[one JSON object a line, for machines]"
-  "--deg[angles in degrees, not in rad\; JSON stays in SI]"
-  "(*)::names, addresses, globs, or a component (default\: all that can be changed):"
+  "--json[print one JSON object per line, for programs]"
+  "--deg[show angles in degrees, not in rad\; JSON stays in SI]"
+  "(*)::names, addresses, globs, or a component (default\: all writable ones):"
 )
 
 # guard to ensure default positional specs are added only once per session
@@ -605,14 +605,14 @@ _shtab_gwrms_get_defaults_added=0
 
 _shtab_gwrms_gui_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "*--robot[a robot\'s gateway\; may be given more than once]:[NAME=]HOST:PORT:"
+  "*--robot[a robot\'s gateway\; repeatable]:[NAME=]HOST:PORT:"
   "--config[the server\'s file]:FILE:_files"
-  "--no-record[only show what comes, keep nothing]"
-  "--operator[who records\; kept with the sessions]:WHO:"
+  "--no-record[do not record]"
+  "--operator[operator\'s name\; kept with the sessions]:WHO:"
   "--notes[kept with the sessions]:TEXT:"
-  "--wearer[who wears the robots, as a pseudonym of the study\; gwrms cloud forget finds them by it]:ID:"
-  "--consent[what the wearer has agreed to, and when or where that is]:TEXT:"
-  "--look[colours\; kept for the next time]:look:(dark light)"
+  "--wearer[the wearer\'s pseudonym in the study, by which gwrms cloud forget finds the data]:ID:"
+  "--consent[the wearer\'s consent, with its date or reference]:TEXT:"
+  "--look[colours\; remembered]:look:(dark light)"
   "--scale[size of all text, \%]:80…200:(80 81 82 83 84 85 86 87 88 89 90 91 92 93 94 95 96 97 98 99 100 101 102 103 104 105 106 107 108 109 110 111 112 113 114 115 116 117 118 119 120 121 122 123 124 125 126 127 128 129 130 131 132 133 134 135 136 137 138 139 140 141 142 143 144 145 146 147 148 149 150 151 152 153 154 155 156 157 158 159 160 161 162 163 164 165 166 167 168 169 170 171 172 173 174 175 176 177 178 179 180 181 182 183 184 185 186 187 188 189 190 191 192 193 194 195 196 197 198 199 200)"
 )
 
@@ -623,8 +623,8 @@ _shtab_gwrms_install_service_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--print[show the units, write nothing]"
   "--user[for your own session instead of the computer]"
-  "--run-as[the account (default\: one that systemd makes up)]:NAME:"
-  "--name[of the units (default\: gwrms)]:name:"
+  "--run-as[the account (default\: a dynamic user of systemd)]:NAME:"
+  "--name[folder of the units (default\: gwrms)]:name:"
   ":the robot\'s file:_files"
 )
 
@@ -640,17 +640,17 @@ _shtab_gwrms_joint_test_defaults_added=0
 
 _shtab_gwrms_joint_test_chirp_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--json[questions and answers as JSON lines, as of gwrms commission]"
+  "--json[exchange questions and answers as JSON lines, like gwrms commission]"
   "--amplitude[how far it moves (default\: 1)]:°:"
   "--speed[of its target, at most (default\: 15)]:°/S:"
   "--from[Hz, where it begins (default\: 0.2)]:N:"
   "--to[Hz, where it ends (default\: 15)]:N:"
   "--seconds[how long it takes (default\: 30)]:N:"
-  "--max-speed[power is taken beyond it (default\: 180)]:°/S:"
-  "--max-torque[power is taken beyond it (default\: its rated torque)]:N·m:"
-  "--late[power is taken where a cycle comes so late (default\: 100)]:MS:"
+  "--max-speed[cut the power beyond it (default\: 180)]:°/S:"
+  "--max-torque[cut the power beyond it (default\: its rated torque)]:N·m:"
+  "--late[cut the power if a cycle is so late (default\: 100)]:MS:"
   "--out[of the recording (default\: joint-tests beside the file)]:FOLDER:_files"
-  "--who[who does it, for the record (default\: your user name)]:who:"
+  "--who[name for the journal (default\: your user name)]:who:"
   ":the joint of a robot\'s file:"
 )
 
@@ -659,14 +659,14 @@ _shtab_gwrms_joint_test_chirp_defaults_added=0
 
 _shtab_gwrms_joint_test_friction_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--json[questions and answers as JSON lines, as of gwrms commission]"
+  "--json[exchange questions and answers as JSON lines, like gwrms commission]"
   "--amplitude[how far it moves (default\: 10)]:°:"
   "--speed[of its target, at most (default\: 20)]:°/S:"
-  "--max-speed[power is taken beyond it (default\: 180)]:°/S:"
-  "--max-torque[power is taken beyond it (default\: its rated torque)]:N·m:"
-  "--late[power is taken where a cycle comes so late (default\: 100)]:MS:"
+  "--max-speed[cut the power beyond it (default\: 180)]:°/S:"
+  "--max-torque[cut the power beyond it (default\: its rated torque)]:N·m:"
+  "--late[cut the power if a cycle is so late (default\: 100)]:MS:"
   "--out[of the recording (default\: joint-tests beside the file)]:FOLDER:_files"
-  "--who[who does it, for the record (default\: your user name)]:who:"
+  "--who[name for the journal (default\: your user name)]:who:"
   ":the joint of a robot\'s file:"
 )
 
@@ -675,16 +675,16 @@ _shtab_gwrms_joint_test_friction_defaults_added=0
 
 _shtab_gwrms_joint_test_relay_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--json[questions and answers as JSON lines, as of gwrms commission]"
+  "--json[exchange questions and answers as JSON lines, like gwrms commission]"
   "--amplitude[how far it may swing (default\: 5)]:°:"
   "--repeat[times (default\: 8)]:repeat:"
   "--torque[of the relay]:N·m:"
   "--hysteresis[of the relay, against noise (default\: 0)]:°:"
-  "--max-speed[power is taken beyond it (default\: 180)]:°/S:"
-  "--max-torque[power is taken beyond it (default\: its rated torque)]:N·m:"
-  "--late[power is taken where a cycle comes so late (default\: 100)]:MS:"
+  "--max-speed[cut the power beyond it (default\: 180)]:°/S:"
+  "--max-torque[cut the power beyond it (default\: its rated torque)]:N·m:"
+  "--late[cut the power if a cycle is so late (default\: 100)]:MS:"
   "--out[of the recording (default\: joint-tests beside the file)]:FOLDER:_files"
-  "--who[who does it, for the record (default\: your user name)]:who:"
+  "--who[name for the journal (default\: your user name)]:who:"
   ":the joint of a robot\'s file:"
 )
 
@@ -693,9 +693,9 @@ _shtab_gwrms_joint_test_relay_defaults_added=0
 
 _shtab_gwrms_joint_test_show_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--compare[with this one (default\: the last one beside it)]:FILE:_files"
-  "--json[all of it, with the curves, as one JSON object]"
-  ":of gwrms joint-test step, chirp, \…:_files"
+  "--compare[compare with this one (default\: the last one beside it)]:FILE:_files"
+  "--json[print everything, with curves, as one JSON object]"
+  ":recording of gwrms joint-test step, chirp, \…:_files"
 )
 
 # guard to ensure default positional specs are added only once per session
@@ -703,15 +703,15 @@ _shtab_gwrms_joint_test_show_defaults_added=0
 
 _shtab_gwrms_joint_test_step_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--json[questions and answers as JSON lines, as of gwrms commission]"
+  "--json[exchange questions and answers as JSON lines, like gwrms commission]"
   "--amplitude[how far it moves (default\: 1)]:°:"
   "--speed[of its target, at most (default\: 10)]:°/S:"
   "--repeat[times (default\: 3)]:repeat:"
-  "--max-speed[power is taken beyond it (default\: 180)]:°/S:"
-  "--max-torque[power is taken beyond it (default\: its rated torque)]:N·m:"
-  "--late[power is taken where a cycle comes so late (default\: 100)]:MS:"
+  "--max-speed[cut the power beyond it (default\: 180)]:°/S:"
+  "--max-torque[cut the power beyond it (default\: its rated torque)]:N·m:"
+  "--late[cut the power if a cycle is so late (default\: 100)]:MS:"
   "--out[of the recording (default\: joint-tests beside the file)]:FOLDER:_files"
-  "--who[who does it, for the record (default\: your user name)]:who:"
+  "--who[name for the journal (default\: your user name)]:who:"
   ":the joint of a robot\'s file:"
 )
 
@@ -720,7 +720,7 @@ _shtab_gwrms_joint_test_step_defaults_added=0
 
 _shtab_gwrms_joint_test_stop_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--json[questions and answers as JSON lines, as of gwrms commission]"
+  "--json[exchange questions and answers as JSON lines, like gwrms commission]"
   ":the joint of a robot\'s file:"
 )
 
@@ -737,8 +737,8 @@ _shtab_gwrms_journal_defaults_added=0
 _shtab_gwrms_journal_tail_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
-  "--json[one JSON object a line, for machines]"
-  "-n[how many, at most 1000 (default 20)]:N:"
+  "--json[print one JSON object per line, for programs]"
+  "-n[number of entries, at most 1000 (default 20)]:N:"
 )
 
 # guard to ensure default positional specs are added only once per session
@@ -746,9 +746,9 @@ _shtab_gwrms_journal_tail_defaults_added=0
 
 _shtab_gwrms_journal_verify_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "*--witness[what a desk has kept\: gwrms cloud witnesses ROBOT \> FILE\; again for another desk\'s]:FILE:_files"
+  "*--witness[a desk\'s witnesses\: gwrms cloud witnesses ROBOT \> FILE\; repeatable]:FILE:_files"
   "--key[of the robot, as pairing showed it (default\: of robot.toml, or of the only paired robot)]:SHA256:"
-  "--json[one JSON object, for machines]"
+  "--json[print one JSON object, for programs]"
   ":robot.toml, a records folder, or a journal.jsonl:_files"
 )
 
@@ -765,7 +765,7 @@ _shtab_gwrms_keys_defaults_added=0
 _shtab_gwrms_keys_add_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--role[what it may]:role:(viewer operator maintainer)"
-  "--json[one JSON object, for machines]"
+  "--json[print one JSON object, for programs]"
   ":the robot\'s file:_files"
   ":NAME:"
 )
@@ -775,7 +775,7 @@ _shtab_gwrms_keys_add_defaults_added=0
 
 _shtab_gwrms_keys_list_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--json[one JSON object a line, for machines]"
+  "--json[print one JSON object per line, for programs]"
   ":the robot\'s file:_files"
 )
 
@@ -786,9 +786,9 @@ _shtab_gwrms_keys_pair_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--host[address to listen on for the desk (default\: \[gateway\] host)]:host:"
   "--port[its port (default 7421)]:port:"
-  "--name[of the desk, instead of asking]:name:"
-  "--role[what it may, instead of asking]:role:(viewer operator maintainer)"
-  "--yes[with --name and --role\: ask nothing, take who comes]"
+  "--name[name of the desk, instead of asking]:name:"
+  "--role[its role, instead of asking]:role:(viewer operator maintainer)"
+  "--yes[with --name and --role\: ask nothing, accept the first desk]"
   ":the robot\'s file:_files"
 )
 
@@ -797,11 +797,11 @@ _shtab_gwrms_keys_pair_defaults_added=0
 
 _shtab_gwrms_keys_push_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--role[what it may there]:role:(viewer operator maintainer)"
-  "--certificate[of somebody else, such as anna.crt]:FILE:_files"
-  "--name[that the robots are to call it (default\: as its file)]:name:"
+  "--role[its role there]:role:(viewer operator maintainer)"
+  "--certificate[another client\'s certificate, such as anna.crt]:FILE:_files"
+  "--name[the client\'s name on the robots (default\: that of its file)]:name:"
   "--config[the robots\' file there (default\: \/etc\/gwrms\/robot.toml)]:PATH:"
-  "--remote[how gwrms is called there (default\: sudo -n gwrms)]:COMMAND:"
+  "--remote[the gwrms command there (default\: sudo -n gwrms)]:COMMAND:"
   "(*):robots, as ssh names them:"
 )
 
@@ -820,20 +820,20 @@ _shtab_gwrms_keys_revoke_defaults_added=0
 _shtab_gwrms_label_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for machines]"
-  "--robot[where sessions of two robots have one name]:NAME:"
-  "--from[since when]:TIME:"
-  "--to[until when]:TIME:"
-  "--author[who says so (default\: your account)]:WHO:"
-  "--file[many labels\: from,to,label]:FILE.csv:_files"
-  "--truth[what a simulated wearer did]:FILE.jsonl:_files"
-  "--gait-events[steps that the recording itself shows]"
-  "--wearer[who wore the robot, all the time]:NAME:"
-  "--regression[never learn from this session, judge every model by it]"
-  "--ls[show the labels that hold]"
-  "--remove[take back what is named instead of keeping it]"
-  ":its name, or how that alone begins:"
-  ":what they did:"
+  "--json[for programs]"
+  "--robot[needed if sessions of two robots have one name]:NAME:"
+  "--from[beginning]:TIME:"
+  "--to[end]:TIME:"
+  "--author[author (default\: your account)]:WHO:"
+  "--file[a file of labels\: from,to,label]:FILE.csv:_files"
+  "--truth[truth of a simulated wearer]:FILE.jsonl:_files"
+  "--gait-events[label the steps found in the recording]"
+  "--wearer[the wearer of the whole session]:NAME:"
+  "--regression[use this session to judge every model, never to learn from]"
+  "--ls[list the valid labels]"
+  "--remove[remove the named label]"
+  ":its name, which may be abbreviated:"
+  ":the activity:"
 )
 
 # guard to ensure default positional specs are added only once per session
@@ -841,19 +841,19 @@ _shtab_gwrms_label_defaults_added=0
 
 _shtab_gwrms_lss_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--node-id[set\: the node id that it is to have]:N:"
-  "--new-bitrate[set\: the bit rate that it stores]:N:(1000000 800000 500000 250000 125000 50000 20000 10000)"
-  "--activate[set\: let the bit rate count at once, and look for the device]"
-  "--no-store[set\: a node id until it is switched off]"
-  "--bitrate[bit\/s of the bus now, for interfaces opened with one]:bitrate:"
+  "--node-id[set\: the new node id]:N:"
+  "--new-bitrate[set\: the bit rate to store]:N:(1000000 800000 500000 250000 125000 50000 20000 10000)"
+  "--activate[set\: apply the bit rate at once, and look for the device]"
+  "--no-store[set\: keep the node id until power-off only]"
+  "--bitrate[present bit\/s of the bus, for interfaces that need one]:bitrate:"
   "--seconds[how long to listen first (default 3)]:seconds:"
-  "--timeout[find\: for each answer (default 0.05)]:S:"
-  "--anyway[although something is at work on the bus]"
-  "--yes[do not ask]"
-  "--json[one JSON line, for machines]"
+  "--timeout[find\: timeout of each answer (default 0.05)]:S:"
+  "--anyway[go on although the bus is in use]"
+  "--yes[do not ask for confirmation]"
+  "--json[print one JSON line, for programs]"
   ":what to do:(find inquire set)"
   ":can0, INTERFACE\:CHANNEL, or a robot\'s file with one bus:"
-  ":which one\; not for find:"
+  ":the device\; not for find:"
 )
 
 # guard to ensure default positional specs are added only once per session
@@ -869,10 +869,10 @@ _shtab_gwrms_models_defaults_added=0
 _shtab_gwrms_models_export_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for machines]"
+  "--json[for programs]"
   "--url[file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file)]:URL:"
-  "--onnx[where to\; replaced if there]:FILE:_files"
-  ":its name, or how that alone begins:"
+  "--onnx[output file\; replaced if it exists]:FILE:_files"
+  ":its name, which may be abbreviated:"
 )
 
 # guard to ensure default positional specs are added only once per session
@@ -881,9 +881,9 @@ _shtab_gwrms_models_export_defaults_added=0
 _shtab_gwrms_models_history_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for machines]"
+  "--json[for programs]"
   "--url[file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file)]:URL:"
-  "--robot[its own models (default\: those for all)]:NAME:"
+  "--robot[this robot\'s own models (default\: those for all)]:NAME:"
   ":task:(activity gait_phase falling)"
 )
 
@@ -893,7 +893,7 @@ _shtab_gwrms_models_history_defaults_added=0
 _shtab_gwrms_models_ls_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for machines]"
+  "--json[for programs]"
   "--url[file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file)]:URL:"
   "--task[these alone]:task:(activity gait_phase falling)"
 )
@@ -904,13 +904,13 @@ _shtab_gwrms_models_ls_defaults_added=0
 _shtab_gwrms_models_promote_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for machines]"
+  "--json[for programs]"
   "--url[file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file)]:URL:"
-  "--instead-of[only while this one serves\; nothing\: only while none does]:MODEL:"
+  "--instead-of[promote only while this one serves\; nothing\: while none does]:MODEL:"
   "--robot[this robot alone (default\: that for every robot)]:NAME:"
-  "--who[who says so (default\: your account)]:WHO:"
-  "--why[kept in the history]:TEXT:"
-  ":its name, or how that alone begins:"
+  "--who[author (default\: your account)]:WHO:"
+  "--why[reason, kept in the history]:TEXT:"
+  ":its name, which may be abbreviated:"
 )
 
 # guard to ensure default positional specs are added only once per session
@@ -919,11 +919,11 @@ _shtab_gwrms_models_promote_defaults_added=0
 _shtab_gwrms_models_rollback_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for machines]"
+  "--json[for programs]"
   "--url[file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file)]:URL:"
   "--robot[this robot\'s own model (default\: that for every robot)]:NAME:"
-  "--who[who says so (default\: your account)]:WHO:"
-  "--why[kept in the history]:TEXT:"
+  "--who[author (default\: your account)]:WHO:"
+  "--why[reason, kept in the history]:TEXT:"
   ":task:(activity gait_phase falling)"
 )
 
@@ -933,9 +933,9 @@ _shtab_gwrms_models_rollback_defaults_added=0
 _shtab_gwrms_models_show_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for machines]"
+  "--json[for programs]"
   "--url[file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file)]:URL:"
-  ":its name, or how that alone begins:"
+  ":its name, which may be abbreviated:"
 )
 
 # guard to ensure default positional specs are added only once per session
@@ -944,15 +944,15 @@ _shtab_gwrms_models_show_defaults_added=0
 _shtab_gwrms_od_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
-  "--json[one JSON object a line, for machines]"
-  "--read[ask the device what it holds now]"
-  "--watch[a line whenever one holds something else, until Ctrl-C]"
+  "--json[print one JSON object per line, for programs]"
+  "--read[read the values from the device]"
+  "--watch[print a line for every change, until Ctrl-C]"
   "--count[end --watch after N lines]:N:"
-  "--set[write the one object that SEARCH finds\; 3deg, 420mm]:VALUE:"
-  "--trial[try it for S seconds (at most 300)\; exit status 0 if kept]:S:"
+  "--set[write the one object that SEARCH finds\; units as in 3deg, 420mm]:VALUE:"
+  "--trial[write on trial for S seconds (at most 300)\; exit status 0 if kept]:S:"
   "--interface[can0, INTERFACE\:CHANNEL of python-can, or a robot\'s file\: read node DEVICE there, by --eds]:BUS:"
   "--eds[the node\'s EDS or DCF, for --interface]:FILE:"
-  "--bitrate[bit\/s, for interfaces that are opened with one]:bitrate:"
+  "--bitrate[bit\/s, for interfaces that need one]:bitrate:"
   ":a joint or device by name, or a node id:"
   ":0x6041, 0x1018\:4, 0x60\*, 0x6060-0x607F, 0x6060\…, or words of the name (default\: all):"
 )
@@ -962,10 +962,10 @@ _shtab_gwrms_od_defaults_added=0
 
 _shtab_gwrms_pair_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--name[that the robot is to call this desk (default\: your user and computer)]:name:"
-  "--json[one JSON object, for machines]"
-  ":as the robot shows it (asked for, if not):"
-  ":instead of being asked\; others here may see it:"
+  "--name[this desk\'s name on the robot (default\: your user and computer)]:name:"
+  "--json[print one JSON object, for programs]"
+  ":as the robot shows it (default\: ask):"
+  ":the code, instead of a question\; others here may see it:"
 )
 
 # guard to ensure default positional specs are added only once per session
@@ -981,11 +981,11 @@ _shtab_gwrms_params_defaults_added=0
 _shtab_gwrms_params_apply_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
-  "--json[one JSON object a line, for machines]"
+  "--json[print one JSON object per line, for programs]"
   "--component[one joint or device, such as left_knee]:NAME:"
-  "--yes[do not ask]"
-  "--skip[leave out what cannot be changed at all]"
-  "--trial[try it for S seconds (at most 300)\; exit status 0 if kept]:S:"
+  "--yes[do not ask for confirmation]"
+  "--skip[skip parameters that cannot be changed]"
+  "--trial[write on trial for S seconds (at most 300)\; exit status 0 if kept]:S:"
   ":a .toml or .dcf file:_files"
 )
 
@@ -995,7 +995,7 @@ _shtab_gwrms_params_apply_defaults_added=0
 _shtab_gwrms_params_compare_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
-  "--json[one JSON object a line, for machines]"
+  "--json[print one JSON object per line, for programs]"
   "--component[one joint or device, such as left_knee]:NAME:"
   ":a .toml or .dcf file:_files"
 )
@@ -1006,12 +1006,12 @@ _shtab_gwrms_params_compare_defaults_added=0
 _shtab_gwrms_params_save_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
-  "--json[one JSON object a line, for machines]"
+  "--json[print one JSON object per line, for programs]"
   "--component[one joint or device, such as left_knee]:NAME:"
   "--eds[the device\'s file, to make a DCF from]:EDS:_files"
-  "--overwrite[where the file is there already]"
+  "--overwrite[replace an existing file]"
   ":a .toml or .dcf file:_files"
-  "(*)::names or globs of what to save:"
+  "(*)::names or globs of the parameters:"
 )
 
 # guard to ensure default positional specs are added only once per session
@@ -1020,7 +1020,7 @@ _shtab_gwrms_params_save_defaults_added=0
 _shtab_gwrms_plot_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
-  "--terminal[in the terminal, display or not]"
+  "--terminal[use the terminal even with a display]"
   "--seconds[end after N seconds]:N:"
   "(*):names, globs, or a component\: all of its channels:"
 )
@@ -1031,12 +1031,12 @@ _shtab_gwrms_plot_defaults_added=0
 _shtab_gwrms_predict_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for machines]"
-  "*--robot[live\: a robot of the server\'s file, or where one is\; repeat for more]:NAME|[NAME=]HOST:PORT:"
-  "--seconds[live\: end after so long]:N:"
-  "*--session[over a recording\: its name, or how that alone begins\; repeat for more]:SESSION:"
-  "*--model[over a recording\: this instead of the serving one\; repeat for more]:ID:"
-  "--rules[over recordings\: what the rules of the server\'s file would have done]"
+  "--json[for programs]"
+  "*--robot[live\: a robot of the server\'s file, or its address\; repeatable]:NAME|[NAME=]HOST:PORT:"
+  "--seconds[live\: duration]:N:"
+  "*--session[over a recording\: its name, which may be abbreviated\; repeatable]:SESSION:"
+  "*--model[over a recording\: use this model instead of the serving one\; repeatable]:ID:"
+  "--rules[over recordings\: rehearse the rules of the server\'s file]"
   "--benchmark[with --rules\: sisfall-prefall, ipol-falls, ipol-status]:NAME:(sisfall-prefall ipol-falls ipol-status)"
   "--data[the benchmark\'s recordings]:FILE.npz:_files"
   "--falls[for ipol-falls\: recordings of falls to learn from]:FILE.npz:_files"
@@ -1049,9 +1049,9 @@ _shtab_gwrms_predict_defaults_added=0
 _shtab_gwrms_query_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for machines]"
+  "--json[for programs]"
   "--csv[CSV, every row]"
-  "--robot[this robot\'s rows alone\: opens its shard alone]:NAME:"
+  "--robot[only this robot\'s rows\: opens its shard only]:NAME:"
   "--url[file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file)]:URL:"
   ":one statement, in DuckDB\'s SQL\; - reads it from stdin:"
 )
@@ -1062,7 +1062,7 @@ _shtab_gwrms_query_defaults_added=0
 _shtab_gwrms_reset_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
-  "--json[one JSON object a line, for machines]"
+  "--json[print one JSON object per line, for programs]"
 )
 
 # guard to ensure default positional specs are added only once per session
@@ -1071,8 +1071,8 @@ _shtab_gwrms_reset_defaults_added=0
 _shtab_gwrms_restore_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
-  "--json[one JSON object a line, for machines]"
-  "--yes[do not ask]"
+  "--json[print one JSON object per line, for programs]"
+  "--yes[do not ask for confirmation]"
   ":a joint or device, such as left_knee:"
 )
 
@@ -1081,12 +1081,12 @@ _shtab_gwrms_restore_defaults_added=0
 
 _shtab_gwrms_scan_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--bitrate[bit\/s, for interfaces that are opened with one]:bitrate:"
+  "--bitrate[bit\/s, for interfaces that need one]:bitrate:"
   "--seconds[how long to listen (default 3)]:seconds:"
-  "--active[ask all 127 node ids what they are]"
+  "--active[query all 127 node ids]"
   "*--eds[folder of EDS files]:DIR:_files"
   "*--serial[a serial port]:PORT:"
-  "--json[one JSON line a bus or port, for machines]"
+  "--json[print one JSON line per bus or port, for programs]"
   "(*)::can0, INTERFACE\:CHANNEL of python-can, or a robot\'s file:"
 )
 
@@ -1096,9 +1096,9 @@ _shtab_gwrms_scan_defaults_added=0
 _shtab_gwrms_sensor_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--baud[try this baud rate only]:baud:"
-  "--seconds[show it live for so long (0\: not at all\; default\: Ctrl-C)]:seconds:"
-  "--json[one JSON line\: what was found, with the table]"
-  ":best a stable path\: \/dev\/serial\/by-id\/\…:"
+  "--seconds[show live values for so long (0\: not at all\; default\: until Ctrl-C)]:seconds:"
+  "--json[print the result as one JSON line, with the table]"
+  ":preferably a stable path\: \/dev\/serial\/by-id\/\…:"
 )
 
 # guard to ensure default positional specs are added only once per session
@@ -1106,9 +1106,9 @@ _shtab_gwrms_sensor_defaults_added=0
 
 _shtab_gwrms_sensor_decode_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--format[the language of the bytes]:format:(bno08x-rvc microstrain vectornav witmotion xsens witmotion-can brilliant-star insole-cobs insole-csv insole-frame)"
-  "--layout[an insole\'s layout file, or one that ships\: insole-3, insole-8, insole-16, insole-18, insole-35]:layout:"
-  ":a file\; without it, standard input:"
+  "--format[the sensor\'s data format]:format:(bno08x-rvc microstrain vectornav witmotion xsens witmotion-can brilliant-star insole-cobs insole-csv insole-frame)"
+  "--layout[an insole\'s layout file, or a shipped one\: insole-3, insole-8, insole-16, insole-18, insole-35]:layout:"
+  ":a file (default\: standard input):"
 )
 
 # guard to ensure default positional specs are added only once per session
@@ -1117,8 +1117,8 @@ _shtab_gwrms_sensor_decode_defaults_added=0
 _shtab_gwrms_sensor_record_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--baud[default\: the first at which a format fits]:baud:"
-  "--raw[whatever comes, as of a sensor that nobody knows yet (without --baud at 115200)]"
-  "--seconds[for so long\; default\: until Ctrl-C or SIGTERM]:seconds:"
+  "--raw[record any bytes, as of an unknown sensor (without --baud at 115200)]"
+  "--seconds[duration (default\: until Ctrl-C or SIGTERM)]:seconds:"
   ":PORT:"
   ":FILE:_files"
 )
@@ -1128,10 +1128,10 @@ _shtab_gwrms_sensor_record_defaults_added=0
 
 _shtab_gwrms_sensor_replay_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--link[a path that points to the pseudo-terminal while it is there]:link:_files"
-  "--baud[the pace where FILE.json is missing]:baud:"
-  "--speed[times faster than recorded]:speed:"
-  "--loop[again and again, until Ctrl-C]"
+  "--link[a path that links to the pseudo-terminal while it exists]:link:_files"
+  "--baud[the pace if FILE.json is missing]:baud:"
+  "--speed[speed relative to the recording]:speed:"
+  "--loop[repeat until Ctrl-C]"
   ":FILE:_files"
 )
 
@@ -1148,10 +1148,10 @@ _shtab_gwrms_sessions_defaults_added=0
 _shtab_gwrms_sessions_changed_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for machines]"
-  "--facts[only what changed\: no telemetry is read]"
+  "--json[for programs]"
+  "--facts[show only what changed\; reads no telemetry]"
   "--url[file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file)]:URL:"
-  ":the session in which it worked\; how its name begins:"
+  ":the session in which it worked\; its name, which may be abbreviated:"
   ":the other one:"
 )
 
@@ -1161,10 +1161,10 @@ _shtab_gwrms_sessions_changed_defaults_added=0
 _shtab_gwrms_sessions_compare_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for machines]"
+  "--json[for programs]"
   "--url[file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file)]:URL:"
-  ":sessions, each by how its name begins:"
-  ":likewise, of another version:"
+  ":sessions by their names, which may be abbreviated:"
+  ":the same, of another version:"
 )
 
 # guard to ensure default positional specs are added only once per session
@@ -1173,14 +1173,14 @@ _shtab_gwrms_sessions_compare_defaults_added=0
 _shtab_gwrms_sessions_export_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for machines]"
+  "--json[for programs]"
   "--url[file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file)]:URL:"
-  "--out[where to\; replaced if it is there]:FILE:_files"
-  "--format[default\: what FILE ends with]:format:(csv parquet mcap)"
-  "*--channels[these only\; repeat for more (default\: all)]:GLOB:"
+  "--out[output file\; replaced if it exists]:FILE:_files"
+  "--format[default\: by the ending of FILE]:format:(csv parquet mcap)"
+  "*--channels[only these\; repeatable (default\: all)]:GLOB:"
   "--from[nothing before it\; a time (UTC), or seconds since the session\'s first sample]:TIME:"
   "--to[nothing from it on\; likewise]:TIME:"
-  ":its name, or how that alone begins:"
+  ":its name, which may be abbreviated:"
 )
 
 # guard to ensure default positional specs are added only once per session
@@ -1189,11 +1189,11 @@ _shtab_gwrms_sessions_export_defaults_added=0
 _shtab_gwrms_sessions_gait_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for machines]"
+  "--json[for programs]"
   "--from[a time (UTC), or seconds since the session\'s first sample]:TIME:"
   "--to[a time (UTC), or seconds since the session\'s first sample]:TIME:"
   "--url[file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file)]:URL:"
-  ":its name, or how that alone begins:"
+  ":its name, which may be abbreviated:"
 )
 
 # guard to ensure default positional specs are added only once per session
@@ -1202,8 +1202,8 @@ _shtab_gwrms_sessions_gait_defaults_added=0
 _shtab_gwrms_sessions_ls_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for machines]"
-  "--robot[of these robots]:GLOB:"
+  "--json[for programs]"
+  "--robot[only these robots]:GLOB:"
   "--from[nothing before it\; as ISO 8601 writes it, UTC]:TIME:"
   "--to[nothing from it on\; likewise]:TIME:"
   "--url[file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file)]:URL:"
@@ -1215,10 +1215,10 @@ _shtab_gwrms_sessions_ls_defaults_added=0
 _shtab_gwrms_sessions_resources_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for machines]"
-  "--all[also those that never used anything]"
+  "--json[for programs]"
+  "--all[include programs that used nothing]"
   "--url[file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file)]:URL:"
-  ":its name, or how that alone begins:"
+  ":its name, which may be abbreviated:"
 )
 
 # guard to ensure default positional specs are added only once per session
@@ -1227,9 +1227,9 @@ _shtab_gwrms_sessions_resources_defaults_added=0
 _shtab_gwrms_sessions_show_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for machines]"
+  "--json[for programs]"
   "--url[file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file)]:URL:"
-  ":its name, or how that alone begins:"
+  ":its name, which may be abbreviated:"
 )
 
 # guard to ensure default positional specs are added only once per session
@@ -1238,12 +1238,12 @@ _shtab_gwrms_sessions_show_defaults_added=0
 _shtab_gwrms_set_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
-  "--json[one JSON object a line, for machines]"
-  "--mirror[the same joint of the other side takes it, too]"
-  "--all-joints[every joint takes it]"
-  "*--leave-out[with these\: a joint that stays as it is (again\: more)]:JOINT:"
-  "--trial[try it for S seconds (at most 300)\; exit status 0 if kept]:S:"
-  "(*):in the parameter\'s own unit, or in another\: 3deg, 420mm, 30rpm:"
+  "--json[print one JSON object per line, for programs]"
+  "--mirror[also set the same joint of the other side]"
+  "--all-joints[set every joint]"
+  "*--leave-out[with these\: skip this joint (repeatable)]:JOINT:"
+  "--trial[write on trial for S seconds (at most 300)\; exit status 0 if kept]:S:"
+  "(*):value, in the parameter\'s own unit or another\: 3deg, 420mm, 30rpm:"
 )
 
 # guard to ensure default positional specs are added only once per session
@@ -1251,24 +1251,24 @@ _shtab_gwrms_set_defaults_added=0
 
 _shtab_gwrms_sim_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--dir[folder of this robot\; made if needed]:DIR:_files"
+  "--dir[folder of this robot\; created if necessary]:DIR:_files"
   "--bus[hub (default), or socketcan\:NAME for the CAN interface NAME of this computer]:BUS:"
-  "--without[joints, and gait, that are not simulated\; with commas between them, \* for any letters]:NODES:"
-  "--unconfigured[joints whose drives have no node id yet\: they say nothing until LSS gives them one (gwrms lss)]:JOINTS:"
+  "--without[joints, and gait, not to simulate\; comma-separated, \* for any letters]:NODES:"
+  "--unconfigured[joints whose drives have no node id\: they are silent until LSS assigns one (gwrms lss)]:JOINTS:"
   "--scenario[default\: walk]:scenario:(walk stand sit sit_to_stand stairs_up stairs_down ramp_up ramp_down turn_left turn_right stumble fall day)"
   "--imu[default\: witmotion]:imu:(bno08x-rvc microstrain vectornav vectornav-binary witmotion xsens cia410 witmotion-can)"
   "--insole[default\: insole-cobs]:insole:(brilliant-star insole-cobs insole-csv insole-frame)"
-  "--script[a scenario file, or one that ships\: what happens, and when]:FILE:_files"
+  "--script[a scenario file, or the name of a shipped one]:FILE:_files"
   "--seconds[end after N seconds (default\: run on)]:N:"
-  "--speed[times as fast as real time\; max for as fast as it goes (default\: 1)]:N:"
-  "--seed[of noise, losses and strides\; same seed, same bytes (default\: 0)]:S:"
-  "--subject[who wears the robot (default\: 0, nominal)]:N:"
+  "--speed[speed relative to real time\; max for as fast as possible (default\: 1)]:N:"
+  "--seed[seed of noise, losses and strides\; same seed, same bytes (default\: 0)]:S:"
+  "--subject[number of the wearer (default\: 0, nominal)]:N:"
   "--walks[how they walk\: ordinary, slow, hemiparetic, crouch, steppage, crutches_two_point, crutches_three_point (default\: ordinary)]:NAME:(ordinary slow hemiparetic crouch steppage crutches_two_point crutches_three_point)"
-  "--assists[the only leg that the robot is on, left or right]:SIDE:(left right)"
-  "*--drive[the EDS or DCF of the drives, or of one joint\'s (again for another one)]:[JOINT=]FILE:"
+  "--assists[the only leg with a robot, left or right]:SIDE:(left right)"
+  "*--drive[the EDS or DCF of the drives, or of one joint\'s drive (repeatable)]:[JOINT=]FILE:"
   "*--mount[a drive\'s node id, 1 or -1 (its motor built in the other way round), counts at zero]:JOINT=NODE[,DIRECTION[,ZERO]]:"
-  "*--mistake[make a mistake for gwrms doctor to find (again for more)\; none\: make none]:NAME:(none bit_rate terminator double_node_id second_sdo_client bus_load sync eds_product gear counts sign joints_swapped insoles_swapped zero heartbeat_slow velocity_unit imu_axes heartbeat pdo_mapping mode current_limit following_window reaction coasting sync_slow insole_scale imu_frozen latency_timer clock governor realtime txqueuelen)"
-  "--truth[write the ground truth there]:FILE:_files"
+  "*--mistake[simulate a mistake for gwrms doctor to find (repeatable)\; none\: a healthy robot]:NAME:(none bit_rate terminator double_node_id second_sdo_client bus_load sync eds_product gear counts sign joints_swapped insoles_swapped zero heartbeat_slow velocity_unit imu_axes heartbeat pdo_mapping mode current_limit following_window reaction coasting sync_slow insole_scale imu_frozen latency_timer clock governor realtime txqueuelen)"
+  "--truth[write the ground truth to this file]:FILE:_files"
 )
 
 # guard to ensure default positional specs are added only once per session
@@ -1277,12 +1277,12 @@ _shtab_gwrms_sim_defaults_added=0
 _shtab_gwrms_sim_fault_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--dir[folder of the simulator]:DIR:_files"
-  "--on[the device, where there is more than one]:DEVICE:(left_hip left_knee left_ankle right_hip right_knee right_ankle gait left_insole right_insole trunk)"
+  "--on[the device, if there are several]:DEVICE:(left_hip left_knee left_ankle right_hip right_knee right_ankle gait left_insole right_insole trunk)"
   "--for[end it after S simulated seconds]:S:"
   "--list[explain every fault]"
-  "--active[show what is on]"
+  "--active[show active faults]"
   "--clear[end a fault, or all]:NAME:(all node_lost reboot late_boot node_stopped emcy heartbeat_missing tpdo_silent bus_off sdo_duplicate sdo_late sdo_silent sdo_abort frame_loss error_frames bus_load bus_cut gateway_bus_off sync_lost overcurrent overtemperature undervoltage encoder_jump encoder_stuck gear_slip following_error sto limit_switch drift runaway sensor_unplugged sensor_garbage sensor_wrong_baud sensor_frozen sensor_dropout insole_stuck_cell insole_drift insole_saturated imu_drift imu_saturated swapped_feet swapped_ports friction_grows encoder_slips torque_fades oscillation wearer_resists insole_cells_die imu_slips fatigue fall_sideways fall_backward foot_slips trip_and_fall gait_asymmetry cpu_hog memory_hog slow_disk)"
-  "--activity[what the wearer does from now on]:WHAT:(stand walk sit stairs_up stairs_down ramp_up ramp_down turn_left turn_right stumble fall)"
+  "--activity[change the wearer\'s activity]:WHAT:(stand walk sit stairs_up stairs_down ramp_up ramp_down turn_left turn_right stumble fall)"
   "--controller[start or stop the gait controller]:WHAT:(start stop)"
   "--hand[move a joint without power by hand]:JOINT=DEGREES:"
   "--lean[lean the trunk, in degrees]:('FORWARD', 'LEFT'):"
@@ -1296,12 +1296,12 @@ _shtab_gwrms_sim_fault_defaults_added=0
 
 _shtab_gwrms_sim_record_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--out[what is written\; replaced]:FILE:_files"
-  "--minutes[of each wearer (default\: 6)]:M:"
-  "--subjects[who wears the robot (default\: 0)]:N[-N]:"
-  "--scenario[default\: practice]:scenario:(practice dangers walk stand sit sit_to_stand stairs_up stairs_down ramp_up ramp_down turn_left turn_right stumble fall day)"
+  "--out[output file\; replaced if it exists]:FILE:_files"
+  "--minutes[duration for each wearer (default\: 6)]:M:"
+  "--subjects[number of the wearer (default\: 0)]:N[-N]:"
+  "--scenario[default\: practice]:scenario:(practice dangers healthy walk stand sit sit_to_stand stairs_up stairs_down ramp_up ramp_down turn_left turn_right stumble fall day)"
   "--walks[how they walk\: ordinary, slow, hemiparetic, crouch, steppage, crutches_two_point, crutches_three_point (default\: ordinary)]:NAME:(ordinary slow hemiparetic crouch steppage crutches_two_point crutches_three_point)"
-  "--assists[the only leg that the robot is on, left or right]:SIDE:(left right)"
+  "--assists[the only leg with a robot, left or right]:SIDE:(left right)"
   "--seed[same seed, same recording (default\: 0)]:S:"
 )
 
@@ -1310,11 +1310,11 @@ _shtab_gwrms_sim_record_defaults_added=0
 
 _shtab_gwrms_sim_run_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--dir[of the robot and of gateway.log\; a robot.toml there is used (default\: a new one)]:DIR:_files"
-  "--speed[of the robot\; the gateway\'s own patience stays in real time (default\: 1)]:N:"
-  "--junit[write the results there as JUnit\'s XML, for CI systems]:FILE.xml:_files"
-  "--json[one JSON object a scenario and line, and a total]"
-  "(*):a scenario, or one that ships, by name:_files"
+  "--dir[folder for the robot and gateway.log\; an existing robot.toml is used (default\: a new folder)]:DIR:_files"
+  "--speed[speed of the robot\; the gateway stays in real time (default\: 1)]:N:"
+  "--junit[write the results as JUnit XML, for CI systems]:FILE.xml:_files"
+  "--json[print one JSON object per scenario, a line each, and a total]"
+  "(*):a scenario file, or the name of a shipped one:_files"
 )
 
 # guard to ensure default positional specs are added only once per session
@@ -1323,13 +1323,13 @@ _shtab_gwrms_sim_run_defaults_added=0
 _shtab_gwrms_snapshot_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
-  "--json[one JSON object a line, for machines]"
+  "--json[print one JSON object per line, for programs]"
   "--sort[default\: cpu]:sort:(cpu memory name pid)"
   "--ascending[descending]"
   "--descending[descending]"
   "--limit[only the first N processes]:N:"
-  "*--include[ask for more\; repeatable]:include:(disk network thermal kernel cmdline control)"
-  ":what to look at:(resource component status)"
+  "*--include[include more\; repeatable]:include:(disk network thermal kernel cmdline control)"
+  ":the module:(resource component status)"
   "(*)::component\: only these channels:"
 )
 
@@ -1339,8 +1339,8 @@ _shtab_gwrms_snapshot_defaults_added=0
 _shtab_gwrms_stop_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
-  "--json[one JSON object a line, for machines]"
-  "--reason[what the robot\'s journal shall say]:reason:"
+  "--json[print one JSON object per line, for programs]"
+  "--reason[reason for the robot\'s journal]:reason:"
 )
 
 # guard to ensure default positional specs are added only once per session
@@ -1349,8 +1349,8 @@ _shtab_gwrms_stop_defaults_added=0
 _shtab_gwrms_store_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
-  "--json[one JSON object a line, for machines]"
-  "--all[every device that can, one after another]"
+  "--json[print one JSON object per line, for programs]"
+  "--all[every device that can store, one after another]"
   ":a joint or device, such as left_knee:"
 )
 
@@ -1360,17 +1360,17 @@ _shtab_gwrms_store_defaults_added=0
 _shtab_gwrms_sweep_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
-  "--json[one JSON object a line, for machines]"
+  "--json[print one JSON object per line, for programs]"
   "--cycles[gait cycles that each value is held for (default 6)]:N:"
   "--transient[gait cycles left out after each change (default 2)]:N:"
-  "--seconds[hold each value for so long instead]:S:"
-  "--most-error[tracking error that ends it]:RAD:"
-  "--most-current[current that ends it]:A:"
-  "--config[the server\'s file\: where it is kept]:FILE:_files"
+  "--seconds[hold each value for so long, instead of cycles]:S:"
+  "--most-error[end at this tracking error]:RAD:"
+  "--most-current[end at this current]:A:"
+  "--config[the server\'s file, for the place of the result]:FILE:_files"
   ":the parameter, as in left_knee.position_gain:"
   ":first value, in its own unit or another\: 3deg:"
   ":last value, above FROM:"
-  ":between two values:"
+  ":step between two values:"
 )
 
 # guard to ensure default positional specs are added only once per session
@@ -1387,18 +1387,18 @@ _shtab_gwrms_top_defaults_added=0
 
 _shtab_gwrms_trace_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--robot[robot\'s file that names nodes and EDS files]:FILE:_files"
-  "*--eds[EDS or DCF of a node (again for others)\; can1\/5\=FILE\: on that interface alone]:NODE=FILE:"
-  "*--node[only this one, by id or name (or again)]:NODE:"
+  "--robot[robot\'s file with names of nodes and EDS files]:FILE:_files"
+  "*--eds[EDS or DCF of a node (repeatable)\; can1\/5\=FILE\: on that interface only]:NODE=FILE:"
+  "*--node[only this node, by id or name (repeatable)]:NODE:"
   "*--kind[only these\: nmt, sync, time, emcy, pdo, sdo, heartbeat, lss, error, other]:KIND:"
   "*--object[only 0x6041, 0x1018\:4 or \'\*position\*\']:OBJECT:"
-  "--write[what is shown also to \*.log or \*.pcap]:FILE:_files"
-  "--quiet[show nothing\: with --write]"
-  "--load[a table a second\: frames and load by node and kind]"
-  "--bitrate[bit\/s, for the load, and for interfaces opened with one]:bitrate:"
+  "--write[also write the frames shown to \*.log or \*.pcap]:FILE:_files"
+  "--quiet[with --write\: show nothing]"
+  "--load[print a table per second\: frames and load by node and kind]"
+  "--bitrate[bit\/s, for the load, and for interfaces that need one]:bitrate:"
   "--seconds[end after N seconds (default\: Ctrl-C)]:N:"
-  "--count[end after N frames that are shown]:N:"
-  "--json[one JSON line a frame, or a table]"
+  "--count[end after N frames shown]:N:"
+  "--json[print one JSON line per frame or table]"
   "(*):can0, INTERFACE\:CHANNEL of python-can, a robot\'s file\; or FILE.log, FILE.pcap\; or several:"
 )
 
@@ -1408,15 +1408,15 @@ _shtab_gwrms_trace_defaults_added=0
 _shtab_gwrms_train_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--config[the server\'s file, which names the store]:FILE:_files"
-  "--json[for machines]"
+  "--json[for programs]"
   "--url[file\:\/\/\/folder or s3\:\/\/bucket\/prefix (default\: of the server\'s file)]:URL:"
-  "--robot[learn from it alone, and serve it alone]:NAME:"
-  "*--session[these alone\; repeat for more]:NAME:"
-  "*--held-out[wearers, or sessions, to be judged by\; repeat for more]:WHO:"
-  "--promote[let it serve, if it is better]"
+  "--robot[learn from this robot only, and serve only it]:NAME:"
+  "*--session[only these\; repeatable]:NAME:"
+  "*--held-out[wearers, or sessions, to judge by\; repeatable]:WHO:"
+  "--promote[promote it if it is better]"
   "--pseudo-labels[learn also from what the serving model says with at least this probability, where nobody else says anything]:P:"
-  "--adapt-from[teach this one a wearer\'s gait (gait_phase)]:MODEL:"
-  "--progress[say how far it is, a line a step]"
+  "--adapt-from[adapt this model to a wearer\'s gait (gait_phase)]:MODEL:"
+  "--progress[print the progress, a line per step]"
   "--cluster[a Dask scheduler, for many sessions]:ADDRESS:"
   ":what it predicts\: activity, gait_phase, falling:(activity gait_phase falling)"
 )
@@ -1427,10 +1427,10 @@ _shtab_gwrms_train_defaults_added=0
 _shtab_gwrms_watch_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
   "--robot[the gateway to ask (default 127.0.0.1\:7420)]:HOST:PORT:"
-  "--json[one JSON object a line, for machines]"
+  "--json[print one JSON object per line, for programs]"
   "--rate[ticks a second, 0.1 to 1000 (default 10)]:HZ:"
-  "--csv[comma-separated, a column a channel\; empty is missing]"
-  "--deg[angles in degrees, not in rad\; JSON stays in SI]"
+  "--csv[print comma-separated values, a column per channel\; missing ones are empty]"
+  "--deg[show angles in degrees, not in rad\; JSON stays in SI]"
   "--count[end after N lines]:N:"
   "(*):names, globs, or a component\: all of its channels:"
 )

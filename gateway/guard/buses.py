@@ -67,7 +67,7 @@ class SyncWatcher(SilenceWatcher):
         super().__init__(rule, bus, now_ns, changed, pulse)
 
     def on_frame(self, stamp_ns: int, _data: bytes) -> None:
-        """A SYNC."""
+        """Take a SYNC."""
         last_ns, self._last_ns = self._last_ns, stamp_ns
         if last_ns is not None and stamp_ns - last_ns > self._longest_ns:
             self.judge(stamp_ns, True, lambda: f"SYNC came after {(stamp_ns - last_ns) / 1e9:.3f} s")

@@ -35,7 +35,7 @@ class Heat:
         self._stamp_ns: int | None = None
 
     def after(self, stamp_ns: int, value: float) -> float:
-        """The heat at `stamp_ns`, from when on the value is `value`."""
+        """Return the heat at `stamp_ns`, from when on the value is `value`."""
         if self._stamp_ns is not None:
             elapsed_s = min(max(0, stamp_ns - self._stamp_ns) / 1e9, self._longest_s)
             self.heat += (self._load - self.heat) * -math.expm1(-elapsed_s / self._time_constant_s)

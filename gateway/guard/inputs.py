@@ -38,7 +38,7 @@ class LevelWatcher(Watcher):
         stale_ns: int,
         coming_ns: int = 0,
     ) -> None:
-        """The first number may take `coming_ns` longer than devices take to come up."""
+        """Allow the first number `coming_ns` more than devices take to come up."""
         super().__init__(rule, component, what, now_ns, changed)
         self._says = judging.says
         self._band = judging.band
@@ -49,12 +49,12 @@ class LevelWatcher(Watcher):
         self._first_ns = now_ns + GRACE_NS + coming_ns
 
     def see(self, stamp_ns: int, value: float | None) -> None:
-        """The channel's value; what is no number is not seen."""
+        """Take the channel's value; ignore anything but a number."""
         if value is not None and math.isfinite(value):
             self.weigh(stamp_ns, self._measure(stamp_ns, value))
 
     def weigh(self, stamp_ns: int, number: float) -> None:
-        """What was made of it; infinite is beyond every limit."""
+        """Take a derived value; infinite is beyond every limit."""
         self._seen_ns = stamp_ns
         over = self._band.left(number, tripped=self.state is State.TRIPPED)
         if not over and (self.is_settled or self._is_late(stamp_ns)):
@@ -84,7 +84,7 @@ class Joining:
         self._lock = threading.Lock()  # parts may come in several threads
 
     def see(self, part: int, stamp_ns: int, value: float | None) -> None:
-        """The value of one of them; what is no number is not seen."""
+        """Take the value of one of them; ignore anything but a number."""
         if value is None or not math.isfinite(value):
             return
         with self._lock:
@@ -117,7 +117,7 @@ class SilenceWatcher(Watcher):
         return self._heard_ns + round(timeout_s * 1e9) + 1 if well else now_ns + AGAIN_NS
 
     def on_emcy(self, _emcy: Emcy) -> None:
-        """It speaks, which its pulse tells too."""
+        """Note that it sends, which its pulse shows too."""
 
     def on_boot_up(self, stamp_ns: int) -> None:
         """One that was heard before has lost all that it was doing."""

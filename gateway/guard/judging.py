@@ -26,7 +26,7 @@ Joined = Callable[[int, int, float], float | None]  # the same of several channe
 
 
 def as_it_is(_stamp_ns: int, value: float) -> float:
-    """A value that is compared itself."""
+    """Return a value that is compared itself."""
     return value
 
 
@@ -117,6 +117,6 @@ def _band(rule: RangeRule) -> Band:
 
 
 def _number(rule: Rule, unit: str) -> Callable[[float], str]:
-    """A number, and the limit that it is beyond."""
+    """Return a number, and the limit that it is beyond."""
     words = limit(rule)
     return lambda number: f"{with_unit(float(f'{number:.4g}'), unit)}, {words}"

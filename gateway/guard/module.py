@@ -12,7 +12,7 @@ from drivers.bus.arming import Arming
 from gateway.config.guard import GuardSettings, ends, limit, quantities
 from gateway.config.guard_rules import Action
 from gateway.guard.alarms import ALARM, WHO, Alarms, GuardSource
-from gateway.guard.armings import Armings
+from gateway.guard.armed_drives import ArmedDrives
 from gateway.guard.watcher import Change, State, Watcher
 from gateway.guard.wiring import Wiring
 from gateway.handlers import Handlers
@@ -46,7 +46,7 @@ class GuardModule:
         """Begin to watch, and arm the drives as they come up."""
         self._alarms = Alarms(self._loop, self._control.journal.append)
         drives = cast("Mapping[str, JointDrive]", self._control.drives)
-        self._armings = Armings(drives, self._settings.heartbeat_ms, self._arming_changed)
+        self._armings = ArmedDrives(drives, self._settings.heartbeat_ms, self._arming_changed)
         now_ns = time.monotonic_ns()
         self._wirings = {
             name: Wiring(
@@ -107,7 +107,7 @@ class GuardModule:
         return f"the guard's rule holds the parameters: {', '.join(found)}" if found else None
 
     def _tripped(self, action: Action) -> dict[str, str]:
-        """The rules with this action that are tripped, and why."""
+        """Return the rules with this action that are tripped, and why."""
         worst = {
             name: _worst(wiring).last
             for name, wiring in self._wirings.items()
@@ -138,7 +138,7 @@ class GuardModule:
         self._publish()
 
     def _act(self, name: str, watcher: Watcher, change: Change) -> None:
-        """What a trip leads to besides the stop."""
+        """Do a trip's actions other than the stop."""
         actions = watcher.rule.actions
         if Action.REVERT_TRIALS in actions:
             self._control.revert_trials(_why(name, change))
@@ -175,7 +175,10 @@ def _why(name: str, change: Change) -> str:
 
 
 def _worst(wiring: Wiring) -> Watcher:
-    """The input that decides a rule's state; the one that changed last of those that are equally bad."""
+    """Return the input that decides a rule's state.
+
+    The one that changed last of those that are equally bad.
+    """
     return max(wiring.watchers, key=lambda one: (one.state, one.last.stamp_ns))
 
 

@@ -49,7 +49,7 @@ class Window:
         self._stamp_ns: int | None = None
 
     def take(self, stamp_ns: int, value: float) -> None:
-        """A value, none older than the last one."""
+        """Take a value, not older than the last one."""
         if self._stamp_ns is None or stamp_ns - self._stamp_ns > self._longest_ns:
             self._begin(stamp_ns)
         elif stamp_ns < self._stamp_ns:
@@ -67,7 +67,7 @@ class Window:
         self.result = None
 
     def _turn(self, number: int) -> None:
-        """A slice is over: look at the whole ones before this one."""
+        """End a slice, and judge the complete ones before it."""
         while self._slices and self._slices[0].number < number - SLICES:
             self._slices.popleft()
         whole = number - self._first > SLICES and self._slices

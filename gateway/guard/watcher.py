@@ -76,7 +76,7 @@ class Watcher:
         raise NotImplementedError
 
     def judge(self, stamp_ns: int, over: bool, words: Callable[[], str], for_ns: int = 0) -> None:
-        """What was seen at `stamp_ns` is `over` the limit, or is well; over for `for_ns` it trips."""
+        """Take whether the value is `over` the limit at `stamp_ns`; over for `for_ns` it trips."""
         with self._lock:
             change = self._on_over(stamp_ns, words, for_ns) if over else self._on_well(stamp_ns)
         self._tell(change)

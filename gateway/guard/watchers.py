@@ -75,7 +75,7 @@ class Wire:
 
 @singledispatch
 def make(rule: Rule, wire: Wire, name: str) -> Iterator[Watcher]:
-    """The watchers of a component, or bus, that is there.
+    """Yield the watchers of a component, or bus, that is there.
 
     One for each channel; what has none of them is passed over where nobody has named it.
     """
@@ -241,7 +241,7 @@ def _on_node(component: Component) -> "JointDrive | CanDevice":
 
 
 def _pulse(component: Component, silent_s: float | None) -> Pulse:
-    """A node's heartbeat; where it has none, all that it sends; an insole's samples."""
+    """Return a node's heartbeat; where it has none, all that it sends; an insole's samples."""
     latest = component.latest
     if component.kind is Kind.INSOLE:
         insole = cast("Insole", component)

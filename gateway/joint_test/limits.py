@@ -62,7 +62,7 @@ def limits(
     angle: float,
     period_s: float,
 ) -> Limits:
-    """What holds during this test of a joint that stands at `angle`.
+    """Return what holds during this test of a joint that stands at `angle`.
 
     Raises:
         NotAllowed: something that must be known is not, or the test would go beyond it.
@@ -157,7 +157,7 @@ def _levels(rules: Mapping[str, Rule], joint: str, watch: str) -> tuple[float, .
 
 
 def of_joint(rules: Mapping[str, Rule], joint: str, watch: str) -> Iterator[Rule]:
-    """The guard's rules of this kind that watch the joint."""
+    """Yield the guard's rules of this kind that watch the joint."""
     for rule in rules.values():
         globs = rule.on or ("*",)
         if rule.watch == watch and any(fnmatch.fnmatchcase(joint, glob) for glob in globs):

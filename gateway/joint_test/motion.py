@@ -51,14 +51,14 @@ class Wish:
 
 
 def motion(wish: Wish, period_s: float) -> Motion:
-    """The targets of this test, one each `period_s`."""
+    """Return the targets of this test, one each `period_s`."""
     if wish.kind is Kind.RELAY:
         return _relay(wish, period_s)
     return _ignoring(_MADE[wish.kind](wish, period_s))
 
 
 def planned(wish: Wish, period_s: float) -> tuple[float, float, float, float]:
-    """The lowest and highest target, the fastest change of it (rad, rad/s), and how long it takes (s).
+    """Return the lowest and highest target, the fastest change of it (rad, rad/s), and how long it takes (s).
 
     Of a relay they are what it may come to: it goes by what the joint does.
     """
@@ -94,7 +94,7 @@ def _line(start: float, end: float, speed: float, period_s: float) -> Iterator[f
 
 
 def _chirp(wish: Wish, period_s: float) -> Iterator[float]:
-    """A sine whose frequency rises by equal factors in equal times, as wide as the speed allows."""
+    """Yield a sine whose frequency rises by equal factors in equal times, as wide as the speed allows."""
     yield from _rest(SWEEP_REST_S, 0.0, period_s)
     octaves = math.log(wish.high_hz / wish.low_hz)
     for cycle in range(round(wish.seconds / period_s)):
@@ -118,7 +118,7 @@ def _friction(wish: Wish, period_s: float) -> Iterator[float]:
 
 
 def _run(start: float, end: float, speed: float, period_s: float) -> Iterator[float]:
-    """A trapezoid of speed."""
+    """Yield a trapezoid of speed."""
     way = abs(end - start)
     ramp_s = min(RUN_RAMP_S, way / speed)
     total_s = way / speed + ramp_s

@@ -23,8 +23,8 @@ from drivers.joint.drive import JointDrive
 from drivers.joint.homing import MODE
 from drivers.joint.quantities import AXIS_OFFSET
 from drivers.joint.scaling import scalings
+from drivers.realtime_priority import make_realtime
 from drivers.samples import Sample
-from drivers.urgency import make_urgent
 from gateway.commission.power import Power
 from gateway.commission.powered_run import Ended, PoweredRun
 from gateway.joint_test import parameters
@@ -140,7 +140,7 @@ class TestRun(PoweredRun):
         return self._late_s
 
     def take(self) -> list[Row]:
-        """The samples since the last time."""
+        """Return the samples since the last time."""
         return [self._rows.popleft() for _ in range(len(self._rows))]
 
     # In the thread.
@@ -153,7 +153,7 @@ class TestRun(PoweredRun):
         self._check_place(int.from_bytes(data, "little", signed=True) * linear.scale + linear.offset)
 
     def _act(self) -> None:
-        make_urgent()
+        make_realtime()
         began = time.monotonic()
         self._start = self._hold()
         self._check_place(self._start)
@@ -207,7 +207,7 @@ class TestRun(PoweredRun):
         return seen
 
     def _aim(self, target: float) -> None:
-        """The target of the next SYNC, in the drive's own units; the drive confirms that it has it."""
+        """Send the target of the next SYNC, in the drive's own units, confirmed by the drive."""
         linear = self._linear("torque" if self._by_torque else "position")
         value = target if self._by_torque else self._start + target
         (index, size), counts = (

@@ -22,13 +22,16 @@ from gateway.wire.parameter import ParameterInfo
 
 
 def chosen(scope: Scope, globs: Sequence[str]) -> list[ParameterInfo]:
-    """What the globs mean in the device; without any, all that can be configured there, by whomever."""
+    """Return what the globs mean in the device.
+
+    Without any, all that can be configured there, by whomever.
+    """
     infos = _of_node(scope, _named(scope, scope.component)).values()
     return [info for info in infos if is_configuration(info) and (not globs or is_meant(info, globs))]
 
 
 def write(path: Path, scope: Scope, values: Mapping[str, Number]) -> bytes:
-    """The file's content, made from the device's EDS; raises `FileProblem` or `EdsError`."""
+    """Return the file's content, made from the device's EDS; raises `FileProblem` or `EdsError`."""
     component = _named(scope, scope.component)
     about = device(component)
     file = scope.eds or eds.locate(str(about["eds"]), path)
@@ -43,7 +46,7 @@ def write(path: Path, scope: Scope, values: Mapping[str, Number]) -> bytes:
 
 
 def read(path: Path, scope: Scope) -> Saved:
-    """What the file says of the device that it is for, or that `--component` names.
+    """Return what the file says of the device that it is for, or that `--component` names.
 
     Raises:
         FileProblem, EdsError: it cannot be read, or is another device's.
@@ -68,7 +71,7 @@ def _named(scope: Scope, name: str | None) -> ComponentInfo:
 
 
 def _guess(scope: Scope, node_id: int | None, node_name: str) -> str | None:
-    """The device of that name, else the only one of that node id."""
+    """Return the device of that name, else the only one of that node id."""
     names = [one.name for one in scope.robot.components if "eds" in device(one)]
     if node_name in names:
         return node_name
@@ -77,7 +80,7 @@ def _guess(scope: Scope, node_id: int | None, node_name: str) -> str | None:
 
 
 def _of_node(scope: Scope, component: ComponentInfo) -> dict[dcf.Key, ParameterInfo]:
-    """The parameters of a device, of all its axes, by object."""
+    """Return the parameters of a device, of all its axes, by object."""
     place = _place(component)
     sharing = {one.name for one in scope.robot.components if _place(one) == place}
     infos = (info for info in scope.robot.parameters if info.component in sharing and info.type)
@@ -95,13 +98,13 @@ def _key(info: ParameterInfo) -> dcf.Key:
 
 
 def _raw(info: ParameterInfo, value: Number) -> Number:
-    """The device's own number."""
+    """Return the device's own number."""
     data_type = DATA_TYPE_BY_NAME[info.type]
     return Coding(data_type).decode(Coding(data_type, info.scale).encode(value))
 
 
 def _in_units(component: str, info: ParameterInfo | None, key: dcf.Key, number: Number) -> tuple[str, Number]:
-    """The robot's name and value of it; its address and number, where the robot does not have it."""
+    """Return the robot's name and value of it; its address and number, where the robot does not have it."""
     if info is None:
         return f"{component}.0x{key[0]:04X}:{key[1]}", number
     return info.name, scaled(number, info.scale)

@@ -14,7 +14,7 @@ FORMATS: Final = {
 
 
 def format_of(file: Path) -> Format:
-    """The format of a file of this name; raises `FileProblem` where there is none."""
+    """Return the format of a file of this name; raises `FileProblem` where there is none."""
     found = FORMATS.get(file.suffix.lower())
     if found is None:
         raise FileProblem(f"{file}: give a name that ends in {' or '.join(FORMATS)}")
@@ -22,7 +22,7 @@ def format_of(file: Path) -> Format:
 
 
 def read_file(file: Path, scope: Scope) -> Saved:
-    """What a file says; raises `FileProblem` where it cannot be read, or is another device's."""
+    """Return what a file says; raises `FileProblem` where it cannot be read, or is another device's."""
     try:
         return format_of(file).read(file, scope)
     except EdsError as error:

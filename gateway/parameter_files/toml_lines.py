@@ -15,7 +15,7 @@ _TABLES = ("robot", "eds", "parameters")
 
 
 def chosen(scope: Scope, globs: Sequence[str]) -> list[ParameterInfo]:
-    """What the globs mean; without any, all that can be changed."""
+    """Return what the globs mean; without any, all that can be changed."""
     return [
         info
         for info in scope.robot.parameters
@@ -26,7 +26,7 @@ def chosen(scope: Scope, globs: Sequence[str]) -> list[ParameterInfo]:
 
 
 def write(path: Path, scope: Scope, values: Mapping[str, Number]) -> bytes:
-    """The file's content."""
+    """Return the file's content."""
     infos = {info.name: info for info in scope.robot.parameters}
     used = {infos[name].component for name in values}
     described = [one for one in scope.robot.components if one.name in used and "eds" in device(one)]
@@ -49,7 +49,7 @@ def write(path: Path, scope: Scope, values: Mapping[str, Number]) -> bytes:
 
 
 def read(path: Path, scope: Scope) -> Saved:
-    """What the file says; raises `FileProblem`."""
+    """Return what the file says; raises `FileProblem`."""
     document = _document(path)
     table = document["parameters"]
     values = {name: _value(path, name, value) for name, value in table.items()}

@@ -12,21 +12,21 @@ R = TypeVar("R")
 
 
 def done(result: T) -> "Future[T]":
-    """A future that has its result already."""
+    """Return a future that has its result already."""
     future: Future[T] = Future()
     future.set_result(result)
     return future
 
 
 def failed(error: BaseException) -> "Future[T]":
-    """A future that has failed already."""
+    """Return a future that has failed already."""
     future: Future[T] = Future()
     future.set_exception(error)
     return future
 
 
 def outcome(finished: "Future[T]") -> "T | Exception":
-    """What a finished future holds: its result, or its error (also that it was cancelled)."""
+    """Return what a finished future holds: its result, or its error (also that it was cancelled)."""
     try:
         return finished.result()
     except Exception as error:  # noqa: BLE001 - it is handed on, not handled
@@ -42,7 +42,10 @@ def then(first: "Future[T]", continue_: Callable[[T], R]) -> "Future[R]": ...
 
 
 def then(first: "Future[T]", continue_: Callable[[T], Any]) -> "Future[Any]":
-    """What `continue_` makes of the result of `first`, in the thread that gives it; errors pass through."""
+    """Return what `continue_` makes of the result of `first`, in the thread that gives it.
+
+    Errors pass through.
+    """
     result: Future[Any] = Future()
 
     def on_first(finished: "Future[T]") -> None:
@@ -96,14 +99,14 @@ def _settle(result: "Future[R]", following: "R | Future[R]") -> None:
 
 
 def back(loop: Loop, future: "Future[T]") -> "Future[T]":
-    """The same outcome, but given in the loop's thread, and so is whatever follows from it."""
+    """Return the same outcome, but given in the loop's thread, and so is whatever follows from it."""
     result: Future[T] = Future()
     future.add_done_callback(lambda done: loop.call(lambda: _settle(result, done)))
     return result
 
 
 def within(loop: Loop, future: "Future[T]", seconds: float, otherwise: T) -> "Future[T]":
-    """The result of `future`, or `otherwise` when that takes longer. For the loop's thread."""
+    """Return the result of `future`, or `otherwise` when that takes longer. For the loop's thread."""
     result: Future[T] = Future()
 
     def settle() -> None:

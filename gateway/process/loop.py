@@ -47,7 +47,7 @@ class Poll:
         return self._poll(None if timeout is None else timeout * 1000)
 
     def close(self) -> None:
-        """It holds nothing."""
+        """Do nothing."""
 
 
 _POLL: Callable[[], Any] = getattr(select, "epoll", Poll)

@@ -34,7 +34,7 @@ class Broken(ValueError):
 
 
 def line(head: Head, fields: Mapping[str, Any]) -> tuple[bytes, Head]:
-    """The line that follows `head`, without its newline, and the new head."""
+    """Return the line that follows `head`, without its newline, and the new head."""
     body = msgspec.json.encode({"n": head.n + 1, **fields, "previous": head.hash})[:-1]
     digest = hashlib.sha256(body).hexdigest()
     return body + _HASH + digest.encode() + _END, Head(head.n + 1, digest)

@@ -91,7 +91,7 @@ class Journal:
         return self._submit(_Waiting(fields)) if refusal is None else failed(TooMany(refusal))
 
     def tail(self, count: int) -> "Future[Tail]":
-        """The newest entries, also those that are being written now; reading delays no other entry."""
+        """Return the newest entries, also those that are being written now; reading delays no other entry."""
         found: Future[Tail] = Future()
         newest: Future[Head] = self._submit(_Waiting(None))
         newest.add_done_callback(
@@ -100,7 +100,10 @@ class Journal:
         return found
 
     def with_head(self, work: Callable[[Head], Found]) -> "Future[Found]":
-        """What `work` makes of the newest entry, in the thread that reads; it delays no entry either."""
+        """Return what `work` makes of the newest entry, in the thread that reads.
+
+        It delays no entry either.
+        """
         found: Future[Found] = Future()
         newest: Future[Head] = self._submit(_Waiting(None))
         newest.add_done_callback(lambda newest: self._begin_reading(lambda: work(newest.result()), found))
@@ -137,7 +140,7 @@ class Journal:
         return waiting.future
 
     def _fail_all(self) -> None:
-        """What came too late; any thread that has put something there may do it."""
+        """Fail entries that came too late; any thread with a queued entry may do it."""
         with contextlib.suppress(queue.Empty):
             while True:
                 late = self._queue.get_nowait()
@@ -174,7 +177,7 @@ class Journal:
         return [_Waiting({**self._now(now_ns), **summary}) for summary in due]
 
     def _do_whatever_comes(self, batch: Sequence[_Waiting]) -> None:
-        """The thread outlives every failure, and nobody waits for ever."""
+        """Run the thread, which survives every failure, so that nobody waits for ever."""
         try:
             self._do(batch)
         except Exception as error:
@@ -243,7 +246,7 @@ class Journal:
         self._head = head
 
     def _say(self, what: str, **details: Any) -> None:
-        """An entry of the journal's own."""
+        """Append an entry of the journal's own."""
         fields = {**self._now(time.monotonic_ns()), "who": "gateway", "what": what, **details}
         data, head = line(self._head, {**fields, **self._room})
         self._append(data + b"\n", head)
@@ -251,7 +254,7 @@ class Journal:
 
     @contextlib.contextmanager
     def _as_before_if_it_fails(self, file: BinaryIO) -> Iterator[None]:
-        """An entry that is reported lost stands neither in the journal nor in its head."""
+        """Take back what fails: an entry reported lost stands neither in the journal nor in its head."""
         size = file.seek(0, os.SEEK_END)
         try:
             yield
@@ -408,7 +411,7 @@ def _append(file: BinaryIO, data: bytes) -> None:
 
 
 def _last_hash(piece: Piece) -> str | None:
-    """What the line after it refers to; `None` where the piece is damaged."""
+    """Return what the line after it refers to; `None` where the piece is damaged."""
     try:
         with piece.path.open("rb") as file:
             last = next(journal_files.lines_backwards(file), None)
@@ -418,7 +421,10 @@ def _last_hash(piece: Piece) -> str | None:
 
 
 def _room(journal: Path, sizes: Sizes) -> Entry:
-    """What the first entry says of the room on the journal's file system; the log where it is little."""
+    """Return what the first entry says of the room on the journal's file system.
+
+    The log where it is little.
+    """
     folder = journal.parent
     try:
         found = os.statvfs(folder)

@@ -43,7 +43,7 @@ def head_file(journal: Path) -> Path:
 
 
 def read_head(journal: Path) -> Head | None:
-    """What the journal is known to reach; `None` where nobody wrote it down.
+    """Return what the journal is known to reach; `None` where nobody wrote it down.
 
     Raises:
         Broken: the head's file is damaged.
@@ -73,12 +73,12 @@ def closed_pieces(journal: Path) -> list[Piece]:
 
 
 def newest_line(journal: Path) -> bytes | None:
-    """The last whole line of all pieces, without its end."""
+    """Return the last whole line of all pieces, without its end."""
     return next(_newest_first(journal), None)
 
 
 def tail(journal: Path, count: int, newest: int) -> Tail:
-    """The newest entries up to the number `newest`, in time and memory linear in what is given.
+    """Return the newest entries up to the number `newest`, in time and memory linear in what is given.
 
     Raises:
         Broken: what is there is no journal.
@@ -102,7 +102,7 @@ def tail(journal: Path, count: int, newest: int) -> Tail:
 
 
 def decoded(line: bytes) -> Entry:
-    """An entry with its number; raises `Broken`."""
+    """Return an entry with its number; raises `Broken`."""
     try:
         entry = msgspec.json.decode(line, type=Entry)
     except UNDECODABLE as error:
@@ -113,7 +113,7 @@ def decoded(line: bytes) -> Entry:
 
 
 def hash_of(line: bytes) -> Head:
-    """What follows this line refers to; raises `Broken`."""
+    """Return what follows this line refers to; raises `Broken`."""
     return check(0, None, line)[0]
 
 

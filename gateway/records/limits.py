@@ -118,7 +118,7 @@ class Limits:
         )
 
     def summaries(self, now_ns: int | None) -> list[Entry]:
-        """What is to be summed up now; everything, where `now_ns` is `None`."""
+        """Return what is to be summed up now; everything, where `now_ns` is `None`."""
         due = [one for one, left in self._left_out.items() if now_ns is None or left.due_ns <= now_ns]
         return [self._left_out.pop(whose).entry(whose) for whose in due]
 
@@ -172,7 +172,10 @@ def _address(whose: str) -> str:
 
 
 def within_limits(fields: Entry) -> tuple[Entry, int]:
-    """The entry with what is too long cut off, which the field `cut` then says; and its size as JSON."""
+    """Return the entry with what is too long cut off, which the field `cut` then says.
+
+    And its size as JSON.
+    """
     size = _size(fields)
     if size <= WHO_BYTES:
         return fields, size
@@ -204,7 +207,7 @@ def _within(value: Any, most: int) -> tuple[Any, str | None]:
 
 
 def _first(items: "list[Any] | tuple[Any, ...]", most: int) -> list[Any]:
-    """The first of them that have room."""
+    """Return the first of them that have room."""
     left = most - 2
     for count, item in enumerate(items):
         left -= _size(item) + 1

@@ -27,7 +27,10 @@ def read_verified(journal: Path) -> list[Entry]:
 
 
 def verified(journal: Path) -> Iterator[Entry]:
-    """The same one by one. The first has not number 1 where the journal has removed what was before it."""
+    """Yield the same one by one.
+
+    The first has not number 1 where the journal has removed what was before it.
+    """
     head = read_head(journal)
     with contextlib.ExitStack() as opened:
         files = _open_all(journal, opened)
@@ -63,7 +66,7 @@ def _open(path: Path, opened: contextlib.ExitStack) -> BinaryIO | None:
 
 
 def _before(file: BinaryIO) -> Head:
-    """What the first line says that it follows; whether it is that line is checked with all others."""
+    """Return what the first line says that it follows; whether it is that line is checked with all others."""
     first = next(iter(file), b"")
     file.seek(0)
     try:
@@ -81,7 +84,7 @@ def _removed(entry: Mapping[str, Any]) -> Head | None:
 
 
 def _check_removed(begin: Head, removed: Head) -> None:
-    """What is not there at the beginning must be what the journal says that it has removed."""
+    """Check that missing entries at the beginning are those that the journal has removed."""
     if begin.n > removed.n:
         raise Broken(
             f"lines 1 to {begin.n} are missing, and the journal does not say that it removed them: "

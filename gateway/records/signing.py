@@ -29,7 +29,7 @@ class HeadSigner:
         self._newest: SignedHead | None = None
 
     def proof(self, head: Head) -> JournalProof:
-        """The head signed, or why it is not."""
+        """Return the head signed, or why it is not."""
         if head.n == 0:
             return JournalProof(unsigned=EMPTY)
         if not self._folder.has_keys:
@@ -49,5 +49,5 @@ class HeadSigner:
 
 
 def message(head: SignedHead) -> bytes:
-    """What is signed of it."""
+    """Return what is signed of it."""
     return _KIND + msgspec.json.encode([head.robot, head.n, head.hash, head.utc_ns])

@@ -72,7 +72,10 @@ class UndoFile:
         self._undos: dict[int, Undo] = {}
 
     def load(self) -> tuple[list[Undo], str | None]:
-        """What the last gateway left, oldest first; and what is wrong with the file, then put aside."""
+        """Return what the last gateway left, oldest first.
+
+        And what is wrong with the file, then put aside.
+        """
         if self.problem is not None:
             return [], None
         try:
@@ -98,7 +101,7 @@ class UndoFile:
         self._undos = changed
 
     def settle(self, put: Iterable[Undo] = (), drop: Iterable[int] = ()) -> None:
-        """The same for what has happened already: it is so whatever the disk does, which is only logged.
+        """Record a fact that has happened already; a failing disk is only logged.
 
         The disk has it with the next change; a gateway that finds it there takes back what is left of it.
         """

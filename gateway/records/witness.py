@@ -65,7 +65,7 @@ def objection(head: SignedHead, key: str | None) -> str | None:
 
 
 def judge(journal: Path, witnesses: Iterable[SignedHead], problem: str = NOBODY) -> Judgement:
-    """What these witnesses, to whom there is no `objection`, say of a journal; `problem` why there are none.
+    """Return the verdict of the valid witnesses on a journal; `problem` says why there are none.
 
     Raises:
         OSError: it cannot be read.

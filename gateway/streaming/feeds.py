@@ -37,7 +37,7 @@ class Tap:
         self._end()
 
     def drain(self) -> tuple[list[Sample], int]:
-        """The samples since the last call, oldest first, and how many more were lost."""
+        """Return the samples since the last call, oldest first, and how many more were lost."""
         with self._lock:
             samples, self._samples = self._samples, []
             lost, self._lost = self._lost, 0
@@ -107,7 +107,7 @@ class Feed:
 
 
 def values_a_second(rate_hz: float, channels: int) -> float:
-    """What such a stream costs: its values, and what its rows cost beside them."""
+    """Return what such a stream costs: its values, and what its rows cost beside them."""
     return (rate_hz or OWN_RATE_HZ) * (ROW_VALUES + channels)
 
 
@@ -182,7 +182,7 @@ class TickFeed(Feed):
             self._lose(late)
 
     def _forget_what_is_gone(self) -> None:
-        """What a source has cleared, as after a lost port, is not shown until it is stale."""
+        """Forget values that a source has cleared, as after a lost port, before they are stale."""
         for tap, places in zip(self._taps, self._places, strict=True):
             if tap.selection.source.latest.updated_ns is None:
                 self._early = [update for update in self._early if update[2] is not places]

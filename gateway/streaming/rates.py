@@ -24,7 +24,7 @@ class Rates:
         return None if before is None or self._elapsed_s <= 0 else (value - before) / self._elapsed_s
 
     def rounded(self, counter: Hashable, value: float | None) -> float | None:
-        """The same to a tenth; a counter that cannot be read has none."""
+        """Return the same to a tenth; a counter that cannot be read has none."""
         rate = None if value is None else self(counter, value)
         return None if rate is None else round(rate, 1)
 

@@ -98,7 +98,7 @@ def whole(source: Source) -> Selection:
 
 
 def narrow(selections: Iterable[Selection], globs: Sequence[str] | None) -> list[Selection]:
-    """What the globs leave of the selections; those left empty are gone."""
+    """Return what the globs leave of the selections; those left empty are gone."""
     narrowed, wanted = [], Wanted(globs)
     for one in selections:
         indices = tuple(index for index in one.indices if one.source.channels[index].name in wanted)
@@ -136,6 +136,6 @@ def check_globs(
 
 
 def channel_info(channel: Channel) -> ChannelInfo:
-    """A channel as `robot.describe` shows it; JSON's keys are text."""
+    """Return a channel as `robot.describe` shows it; JSON's keys are text."""
     enum = UNSET if channel.enum is None else {str(number): word for number, word in channel.enum.items()}
     return ChannelInfo(channel.name, channel.unit, channel.component, channel.quantity, enum)

@@ -88,7 +88,7 @@ class Streams:
         return True
 
     def of(self, session: Session) -> list[Outlet]:
-        """A client's streams."""
+        """Return a client's streams."""
         return [one for feed in self._feeds.values() for one in feed.outlets if one.session is session]
 
     def _share(self, session: Session) -> None:

@@ -11,8 +11,8 @@ from typing import Annotated, Any, Final, Literal, TypeVar, Union
 import msgspec
 from msgspec import Meta, Struct, ValidationError
 
+from gateway.decode_errors import key_of, said
 from gateway.tables.finding import Finding, meant, unknown
-from gateway.wording import key_of, said
 
 S = TypeVar("S", bound=Struct)
 Table = Mapping[str, Any]
@@ -46,7 +46,10 @@ class Decoding:
                 self.complain(where, key, f"is not known: {meant(name, names)}allowed are {', '.join(names)}")
 
     def struct(self, where: str, table: Any, kind: type[S]) -> S | None:
-        """The struct that a table means; where something is wrong, as far as the rest goes, or `None`."""
+        """Return the struct that a table means.
+
+        Where something is wrong, as far as the rest goes, or `None`.
+        """
         if not isinstance(table, dict):
             listed = isinstance(table, list)
             self.complain(
@@ -82,7 +85,7 @@ class Decoding:
         return made
 
     def _own(self, where: str, error: ValidationError, known: Iterable[str]) -> None:
-        """Checks of the struct itself: a line each, that begins with the key where it is about one."""
+        """Yield problems of the struct itself: a line each, beginning with the key, if any."""
         for text in said(error).split("\n"):
             key, _, rest = text.partition(" ")
             self.complain(where, *((key, rest) if key in known else ("", text)))
@@ -157,7 +160,7 @@ def _fits(value: str, kind: Any) -> bool:
 
 
 def toml(value: Any) -> str:
-    """A value as a file has it."""
+    """Return a value as a file has it."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, str):
@@ -171,7 +174,7 @@ def _choices_words(kind: Any) -> str:
 
 
 def _choices(kind: Any) -> list[object]:
-    """What an enumeration allows; empty where it is none."""
+    """Return what an enumeration allows; empty where it is none."""
     for one in _leaves(kind):
         if typing.get_origin(one) is Literal:
             return list(typing.get_args(one))
@@ -181,7 +184,7 @@ def _choices(kind: Any) -> list[object]:
 
 
 def _leaves(kind: Any) -> Iterator[Any]:
-    """A type, its notes and, of what can be one of several, each."""
+    """Yield a type, its notes and, of what can be one of several, each."""
     if typing.get_origin(kind) is Annotated:
         inner, *notes = typing.get_args(kind)
         yield from notes
@@ -194,7 +197,7 @@ def _leaves(kind: Any) -> Iterator[Any]:
 
 
 def _parts(value: Any, kind: Any) -> Iterator[tuple[str, Any, Any]]:
-    """The entries of a list or table with their places and types."""
+    """Yield the entries of a list or table with their places and types."""
     for one in _leaves(kind):
         origin, arguments = typing.get_origin(one), typing.get_args(one)
         if isinstance(value, dict) and origin is dict:

@@ -13,7 +13,7 @@ class NoSuchLine(ValueError):
 
 
 def with_entry(text: str, table: str, key: str, value: str | dict[str, str]) -> str:
-    """The text with `key = value` in `[table]`, which is added where there is none.
+    """Return the text with `key = value` in `[table]`, which is added where there is none.
 
     Raises:
         NoSuchLine: it cannot be set without touching more than that.
@@ -34,7 +34,7 @@ def with_entry(text: str, table: str, key: str, value: str | dict[str, str]) -> 
 
 
 def without_entry(text: str, table: str, key: str) -> str:
-    """The text without it; the same where there is none.
+    """Return the text without it; the same where there is none.
 
     Raises:
         NoSuchLine: it cannot be taken away without touching more than that.
@@ -48,7 +48,10 @@ def without_entry(text: str, table: str, key: str) -> str:
 
 
 def _without(text: str, table: str, key: str) -> tuple[list[str], int | None]:
-    """The lines without the entry, and where in them one of that table could stand; None: it is not there."""
+    """Return the lines without the entry, and where in them one of that table could stand.
+
+    None: it is not there.
+    """
     named = re.compile(rf"""\s*["']?{re.escape(key)}["']?\s*=""")
     kept: list[str] = []
     place: int | None = None

@@ -64,7 +64,7 @@ def _index(names: list[str], name: str) -> int:
 
 
 def lines(file: Path, findings: Iterable[Finding]) -> str:
-    """A line each, which begins with the file."""
+    """Return a line each, which begins with the file."""
     return "\n".join(f"{file}: {one.words}" for one in findings)
 
 
@@ -77,6 +77,6 @@ def meant(word: object, allowed: Iterable[str], cutoff: float = 0.6) -> str:
 
 
 def unknown(word: object, allowed: Iterable[object]) -> str:
-    """The words for something that is none of these."""
+    """Return the words for something that is none of these."""
     names = [str(one) for one in allowed]
     return f"{word!r} is not known: {meant(word, names)}allowed are {', '.join(names)}"

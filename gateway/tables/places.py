@@ -40,7 +40,7 @@ class Places:
 
 
 def _table(written: str) -> Path:
-    """A header's parts, also of one that is written without the quotes that it needs."""
+    """Return a header's parts, also of one that is written without the quotes that it needs."""
     try:
         return _path(tomllib.loads(f"[{written}]"))
     except tomllib.TOMLDecodeError:
@@ -67,7 +67,7 @@ def _statements(lines: list[str]) -> Iterator[tuple[Path, int]]:
 
 
 def _statement(lines: list[str]) -> tuple[dict[str, Any], int]:
-    """What the first line says, with as many more as its value goes on for."""
+    """Return what the first line says, with as many more as its value goes on for."""
     if not lines[0].strip() or lines[0].lstrip().startswith("#"):
         return {}, 1
     for count in range(1, len(lines) + 1):
@@ -80,7 +80,7 @@ def _statement(lines: list[str]) -> tuple[dict[str, Any], int]:
 
 
 def _path(said: dict[str, Any]) -> Path:
-    """The one way down in a header alone."""
+    """Return the one way down in a header alone."""
     path: Path = ()
     inner: Any = said
     while isinstance(inner, dict) and inner:

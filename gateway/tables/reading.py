@@ -38,7 +38,7 @@ class Unreadable(Exception):
 
 
 def read(file: Path) -> dict[str, Any]:
-    """The file's tables.
+    """Return the file's tables.
 
     Raises:
         Unreadable: there are none; it says at which line, and what was likely meant. Reading ends there.
@@ -55,7 +55,7 @@ def read(file: Path) -> dict[str, Any]:
 
 
 def parse(data: bytes) -> dict[str, Any]:
-    """The same for what stands in a file."""
+    """Return the same for what stands in a file."""
     try:
         text = data.decode("utf-8")
     except UnicodeDecodeError as error:
@@ -69,7 +69,7 @@ def parse(data: bytes) -> dict[str, Any]:
 
 
 def as_far_as_readable(file: Path, first: Finding) -> tuple[list[Finding], str | None]:
-    """What keeps a file from being TOML, each line that is none by itself; and the text without them.
+    """Return what keeps a file from being TOML, each line that is none by itself; and the text without them.
 
     `first` is what reading it has found. Behind a header that cannot be read, or a value that does not end,
     nobody knows what is meant: no text then.

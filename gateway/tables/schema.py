@@ -28,7 +28,7 @@ def definitions(structs: Iterable[type[Struct]]) -> dict[str, Schema]:
 
 
 def document(title: str, properties: Mapping[str, Schema], required: list[str], defs: Schema) -> Schema:
-    """A whole file's."""
+    """Return a whole file's."""
     return {
         "$schema": DIALECT,
         "title": title,

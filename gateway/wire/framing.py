@@ -12,8 +12,8 @@ from typing import Any, Final, Literal, TypeVar
 import msgspec
 from msgspec import UNSET, Raw, Struct, UnsetType
 
+from gateway.decode_errors import plainly
 from gateway.wire.limits import LINE_LIMIT, NAME_LENGTH
-from gateway.wording import plainly
 
 PROTOCOL: Final = 1
 ANSWER_LIMIT: Final = 16 * 1024 * 1024  # what a client accepts as one line
@@ -105,17 +105,17 @@ class RpcError(Exception):
 
 
 def refuse(kind: Kind, message: str, **data: Any) -> RpcError:
-    """An error of that kind; `data` are further fields of `ErrorData`."""
+    """Return an error of that kind; `data` are further fields of `ErrorData`."""
     return RpcError(message, ErrorData(kind, **data))
 
 
 def unknown_method(name: str) -> RpcError:
-    """What a method that does not exist is answered with (−32601)."""
+    """Return what a method that does not exist is answered with (−32601)."""
     return RpcError(f"there is no method {name!r}", ErrorData(Kind.UNKNOWN_NAME), METHOD_NOT_FOUND)
 
 
 def internal_error(method: str, error: Exception) -> RpcError:
-    """What a failure of our own is answered with (−32603)."""
+    """Return what a failure of our own is answered with (−32603)."""
     message = f"{method} failed inside the gateway: {type(error).__name__}: {error}; its log says more"
     return RpcError(message, ErrorData(Kind.UNAVAILABLE), INTERNAL_ERROR)
 
@@ -157,7 +157,7 @@ class LineSplitter:
         self.dropping = False  # the rest of a line that is too long
 
     def feed(self, data: bytes) -> list[Line]:
-        """The lines that `data` completes, in order."""
+        """Return the lines that `data` completes, in order."""
         lines: list[Line] = []
         *ended, rest = data.split(b"\n")
         whole = ended if self._rest or self.dropping else filter(None, ended)  # blank lines cost nothing
@@ -172,7 +172,7 @@ class LineSplitter:
         return lines
 
     def end(self) -> list[Line]:
-        """The last line, where the stream ended without a newline."""
+        """Return the last line, where the stream ended without a newline."""
         lines: list[Line] = []
         self._end_line(lines)
         return lines
@@ -211,7 +211,7 @@ class LineSplitter:
         """Nothing is kept of it."""
 
     def _end_dropping(self, lines: list[Line]) -> None:
-        """It has been reported."""
+        """Mark it as reported."""
 
 
 class Request(Struct, frozen=True, forbid_unknown_fields=True):
@@ -317,7 +317,7 @@ _strict = json.JSONDecoder(object_pairs_hook=_once, parse_int=_in_64_bits)
 
 
 def encode_refusal(line: bytes | BadLine, refusal: RpcError) -> bytes:
-    """What a line is answered with that is not served; nothing where it asks for no answer."""
+    """Return what a line is answered with that is not served; nothing where it asks for no answer."""
     try:
         if isinstance(line, BadLine):
             raise line
@@ -328,7 +328,7 @@ def encode_refusal(line: bytes | BadLine, refusal: RpcError) -> bytes:
 
 
 def _explain(line: bytes, error: Exception) -> BadLine:
-    """The slow way, taken only by what is no request: find out why, and whose it was."""
+    """Return the slow way, taken only by what is no request: find out why, and whose it was."""
     if isinstance(error, _Ambiguous):
         return BadLine(f"this is no request: {error}", PARSE_ERROR)
     try:
@@ -350,7 +350,7 @@ _Params = TypeVar("_Params", bound=Struct)
 
 
 def decode_params(raw: Raw | UnsetType, type: type[_Params]) -> _Params:  # noqa: A002
-    """The parameters of a request as the method's own struct.
+    """Return the parameters of a request as the method's own struct.
 
     Raises:
         RpcError: −32602; the message names the field and what is allowed.

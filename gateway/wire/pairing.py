@@ -48,13 +48,13 @@ class Reply(Struct, frozen=True):
 
 
 def new_code() -> str:
-    """A code that nobody guesses, as people read it."""
+    """Return a code that nobody guesses, as people read it."""
     signs = "".join(secrets.choice(_SIGNS) for _ in range(_LENGTH))
     return "-".join(signs[at : at + 4] for at in range(0, _LENGTH, 4))
 
 
 def normal(code: str) -> str:
-    """A code as it was typed, with what is easily misread; raises `ValueError` where it is none."""
+    """Return a code as it was typed, with what is easily misread; raises `ValueError` where it is none."""
     signs = code.upper().translate(_MISREAD).replace("-", "").replace(" ", "")
     if len(signs) != _LENGTH or not set(signs) <= set(_SIGNS):
         raise ValueError(f"a code has {_LENGTH} letters and digits, as the robot shows them")
@@ -86,7 +86,7 @@ def of_link(text: str) -> tuple[str, str]:
 
 
 def proof(whose: str, code: str, robot: str, desk: str) -> str:
-    """That `whose` side knows the code, where these are the fingerprints of both."""
+    """Return the proof that `whose` side knows the code, bound to both fingerprints."""
     message = f"gwrms pair 1 {whose} {robot} {desk}".encode("ascii")
     return hmac.new(normal(code).encode("ascii"), message, "sha256").hexdigest()
 

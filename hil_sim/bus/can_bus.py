@@ -155,7 +155,7 @@ class CanBus:
         del self._pending[_MOST_WAITING // 2 :]
 
     def withdraw(self, sender: object) -> None:
-        """The sender's controller is off: what waits of it never goes out, what is on the wire breaks off."""
+        """Drop a sender's frames after bus off: queued ones, and the one on the wire."""
         self._pending = [waiting for waiting in self._pending if waiting[3] is not sender]
         heapq.heapify(self._pending)
         if self._on_wire is not None and self._on_wire[3] is sender:
@@ -180,7 +180,7 @@ class CanBus:
         self._release()
 
     def deliver(self, frame: Frame, sender: object) -> None:
-        """A frame has come over the wire: every receiver but its sender gets it."""
+        """Deliver a frame to every receiver but its sender."""
         self.frames_carried += 1
         key = _EXTENDED_ROUTE if frame.extended else frame.cob_id
         disturbances = self.disturbances

@@ -17,12 +17,12 @@ def add_wearer(parser: argparse.ArgumentParser) -> None:
         help=f"how they walk: {', '.join(NAMES)} (default: %(default)s)",
     )
     parser.add_argument(
-        "--assists", choices=SIDES, metavar="SIDE", help="the only leg that the robot is on, left or right"
+        "--assists", choices=SIDES, metavar="SIDE", help="the only leg with a robot, left or right"
     )
 
 
 def speed(text: str) -> float | None:
-    """Simulated over real time; `None` for `max`, as fast as it goes."""
+    """Parse the speed, simulated over real time; `None` for `max`, as fast as possible."""
     if text == "max":
         return None
     value = number(text)

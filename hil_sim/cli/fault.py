@@ -1,4 +1,4 @@
-"""`gwrms sim-fault`: break something in a simulated robot that runs, and mend it again."""
+"""`gwrms sim-fault`: inject faults into a running simulated robot, and mend it again."""
 
 import argparse
 import sys
@@ -47,15 +47,15 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--dir", type=Path, metavar="DIR", help="folder of the simulator")
     parser.add_argument("name", nargs="?", metavar="NAME", help="the fault")
     parser.add_argument("params", nargs="*", metavar="KEY=VALUE", help="its parameters")
-    parser.add_argument("--on", metavar="DEVICE", help="the device, where there is more than one")
+    parser.add_argument("--on", metavar="DEVICE", help="the device, if there are several")
     parser.add_argument(
         "--for", dest="for_s", type=float, metavar="S", help="end it after S simulated seconds"
     )
     others = parser.add_mutually_exclusive_group()
     others.add_argument("--list", action="store_true", help="explain every fault")
-    others.add_argument("--active", action="store_true", help="show what is on")
+    others.add_argument("--active", action="store_true", help="show active faults")
     others.add_argument("--clear", metavar="NAME", help="end a fault, or all")
-    others.add_argument("--activity", metavar="WHAT", help="what the wearer does from now on")
+    others.add_argument("--activity", metavar="WHAT", help="change the wearer's activity")
     others.add_argument("--controller", metavar="WHAT", help="start or stop the gait controller")
     others.add_argument("--hand", metavar="JOINT=DEGREES", help="move a joint without power by hand")
     others.add_argument(
@@ -81,7 +81,7 @@ def main(argv: list[str]) -> int:
 
 
 def _request(parser: argparse.ArgumentParser, arguments: argparse.Namespace) -> dict[str, Any]:
-    """What is meant, as the socket takes it; leaves with the usage where nothing is."""
+    """Return what is meant, as the socket takes it; leaves with the usage where nothing is."""
     if arguments.dir is None:
         parser.error("--dir DIR says which simulator")
     given: dict[str, Any] = {
@@ -122,7 +122,7 @@ def _params(parser: argparse.ArgumentParser, words: list[str]) -> dict[str, str]
 
 
 def _told(answer: dict[str, Any]) -> str:
-    """An answer in words."""
+    """Return an answer in words."""
     if "begun" in answer:
         return f"begun: {_active(answer['begun'])}\n"
     for key in ("cleared", "active"):

@@ -65,9 +65,9 @@ def _parser() -> argparse.ArgumentParser:
         default=[],
         type=_capture,
         metavar="NAME=FILE",
-        help="what was recorded on serial ports",
+        help="recordings of serial ports",
     )
-    parser.add_argument("--channel", metavar="NAME", help="of several in the logs, the one that is played")
+    parser.add_argument("--channel", metavar="NAME", help="the channel to play, if the logs have several")
     parser.add_argument("--loop", action="store_true", help="begin again at the end")
     parser.add_argument("--seconds", type=seconds, metavar="N", help="end after N seconds")
     parser.add_argument(
@@ -75,7 +75,7 @@ def _parser() -> argparse.ArgumentParser:
         type=speed,
         default=1.0,
         metavar="N",
-        help="times as fast as recorded; max for as fast as it goes (default: 1)",
+        help="speed relative to the recording; max for as fast as possible (default: 1)",
     )
     return parser
 

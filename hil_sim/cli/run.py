@@ -55,29 +55,29 @@ def _parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument(
-        "files", nargs="+", type=Path, metavar="FILE", help="a scenario, or one that ships, by name"
+        "files", nargs="+", type=Path, metavar="FILE", help="a scenario file, or the name of a shipped one"
     )
     parser.add_argument(
         "--dir",
         type=Path,
         metavar="DIR",
-        help="of the robot and of gateway.log; a robot.toml there is used (default: a new one)",
+        help="folder for the robot and gateway.log; an existing robot.toml is used (default: a new folder)",
     )
     parser.add_argument(
         "--speed",
         type=speed,
         default=1.0,
         metavar="N",
-        help="of the robot; the gateway's own patience stays in real time (default: 1)",
+        help="speed of the robot; the gateway stays in real time (default: 1)",
     )
     parser.add_argument(
         "--junit",
         type=Path,
         metavar="FILE.xml",
-        help="write the results there as JUnit's XML, for CI systems",
+        help="write the results as JUnit XML, for CI systems",
     )
     parser.add_argument(
-        "--json", action="store_true", help="one JSON object a scenario and line, and a total"
+        "--json", action="store_true", help="print one JSON object per scenario, a line each, and a total"
     )
     return parser
 

@@ -6,16 +6,16 @@ import sys
 from collections.abc import Callable
 from types import FrameType
 
-from hil_sim.housing import Housing
 from hil_sim.pace import Pace
+from hil_sim.simulation_host import SimulationHost
 
 
 def say(sentence: str) -> None:
-    """A word to whoever started it."""
+    """Print a line for the parent process."""
     sys.stderr.write(f"gwrms sim: {sentence}\n")
 
 
-def run(robot: Housing, seconds: float | None, prepare: Callable[[], None]) -> int:
+def run(robot: SimulationHost, seconds: float | None, prepare: Callable[[], None]) -> int:
     """Run `robot` until SIGINT, SIGTERM or so many seconds; `prepare` is called when it is open.
 
     Returns the exit status.

@@ -148,7 +148,7 @@ def _parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument(
-        "--dir", required=True, type=Path, metavar="DIR", help="folder of this robot; made if needed"
+        "--dir", required=True, type=Path, metavar="DIR", help="folder of this robot; created if necessary"
     )
     parser.add_argument(
         "--bus",
@@ -161,14 +161,14 @@ def _parser() -> argparse.ArgumentParser:
         type=_nodes,
         default=[],
         metavar="NODES",
-        help="joints, and gait, that are not simulated; with commas between them, * for any letters",
+        help="joints, and gait, not to simulate; comma-separated, * for any letters",
     )
     parser.add_argument(
         "--unconfigured",
         type=_joints,
         default=[],
         metavar="JOINTS",
-        help="joints whose drives have no node id yet: they say nothing until LSS gives them one (gwrms lss)",
+        help="joints whose drives have no node id: they are silent until LSS assigns one (gwrms lss)",
     )
     parser.add_argument(
         "--scenario", choices=[str(scenario) for scenario in Scenario], default="walk", help="default: walk"
@@ -181,7 +181,7 @@ def _parser() -> argparse.ArgumentParser:
         "--script",
         type=Path,
         metavar="FILE",
-        help="a scenario file, or one that ships: what happens, and when",
+        help="a scenario file, or the name of a shipped one",
     )
     parser.add_argument("--seconds", type=seconds, metavar="N", help="end after N seconds (default: run on)")
     parser.add_argument(
@@ -189,17 +189,17 @@ def _parser() -> argparse.ArgumentParser:
         type=speed,
         default=1.0,
         metavar="N",
-        help="times as fast as real time; max for as fast as it goes (default: 1)",
+        help="speed relative to real time; max for as fast as possible (default: 1)",
     )
     parser.add_argument(
         "--seed",
         type=int,
         default=0,
         metavar="S",
-        help="of noise, losses and strides; same seed, same bytes (default: 0)",
+        help="seed of noise, losses and strides; same seed, same bytes (default: 0)",
     )
     parser.add_argument(
-        "--subject", type=int, default=0, metavar="N", help="who wears the robot (default: 0, nominal)"
+        "--subject", type=int, default=0, metavar="N", help="number of the wearer (default: 0, nominal)"
     )
     add_wearer(parser)
     parser.add_argument(
@@ -207,7 +207,7 @@ def _parser() -> argparse.ArgumentParser:
         action="append",
         default=[],
         metavar="[JOINT=]FILE",
-        help="the EDS or DCF of the drives, or of one joint's (again for another one)",
+        help="the EDS or DCF of the drives, or of one joint's drive (repeatable)",
     )
     parser.add_argument(
         "--mount",
@@ -221,14 +221,17 @@ def _parser() -> argparse.ArgumentParser:
         action="append",
         choices=(NONE, *MISTAKES),
         metavar="NAME",
-        help="make a mistake for gwrms doctor to find (again for more); none: make none",
+        help="simulate a mistake for gwrms doctor to find (repeatable); none: a healthy robot",
     )
-    parser.add_argument("--truth", type=Path, metavar="FILE", help="write the ground truth there")
+    parser.add_argument("--truth", type=Path, metavar="FILE", help="write the ground truth to this file")
     return parser
 
 
 def _parse(argv: list[str]) -> tuple[argparse.Namespace, Script]:
-    """What is asked for; where a script is named, its `[robot]` stands for the options that are not given."""
+    """Return what is asked for.
+
+    Where a script is named, its `[robot]` stands for the options that are not given.
+    """
     parser = _parser()
     arguments = parser.parse_args(argv)
     if arguments.script is None:
@@ -246,7 +249,7 @@ def _parse(argv: list[str]) -> tuple[argparse.Namespace, Script]:
 
 
 def _drives(words: list[str]) -> dict[str, Path]:
-    """The files of `--drive`, looked for in the working folder and among those that ship."""
+    """Return the files of `--drive`, looked for in the working folder and among those that ship."""
     return personality.choose(words, JOINTS, Path.cwd() / "here")
 
 

@@ -60,7 +60,7 @@ _JOINT = (
 
 
 def _pdo(communication: int, mapping: int, cob_id: int, mapped: tuple[int, ...]) -> Iterator[Write]:
-    """A synchronous PDO by the sequence of CiA 301 §7.5.2.36."""
+    """Yield a synchronous PDO by the sequence of CiA 301 §7.5.2.36."""
     yield Write(communication, 1, _NOT_VALID | cob_id, 4)
     yield Write(mapping, 0, 0, 1)
     for number, value in enumerate(mapped, 1):
@@ -92,7 +92,7 @@ class Commissioning:
         self._next()
 
     def answered(self, frame: Frame) -> None:
-        """A frame of the drive's SDO server; somebody else may use the channel as well."""
+        """Take a frame of the drive's SDO server, which other clients may use as well."""
         if self._asked is not None and frame.data[1:4] == self._asked.multiplexer:
             self._next()
 

@@ -103,7 +103,7 @@ class GaitController(Node):
         self.dictionary.write(*objects.ACTIVITY, bytes([activity]))
 
     def _shape(self) -> Shape:
-        """The gait's shape as the objects say, in SI."""
+        """Return the gait's shape as the objects say, in SI."""
         keys = (objects.STEP_LENGTH, objects.CYCLE_TIME, objects.TOE_HEIGHT, objects.TRUNK_ANGLE)
         return Shape(*(self.dictionary[key].number() / 1000.0 for key in keys))
 
@@ -243,7 +243,7 @@ class GaitController(Node):
         self.generator.step(dt, Activity(self.dictionary[objects.ACTIVITY].number()), self._shape())
 
     def set_points(self) -> list[int]:
-        """What each joint is to follow now (counts)."""
+        """Return what each joint is to follow now (counts)."""
         left = 1.0 - smooth(self._taken_over_s / _TAKE_OVER_S)
         parts = zip(self._joints, self._angles(), self._offsets, self.strays, strict=True)
         return [
@@ -252,7 +252,7 @@ class GaitController(Node):
         ]
 
     def _command_where_they_are(self) -> None:
-        """A drive that moves when nobody leads it is slowed down; only ENABLING brings one up."""
+        """Slow down a drive that moves uncommanded; only ENABLING brings one up."""
         enabling = self.controller_state is ControllerState.ENABLING
         for place, seen in zip(self._led, self._drives, strict=True):
             number = place + 1

@@ -204,7 +204,7 @@ class JointDrive(Node):
         self._show_changes()
 
     def fault(self, code: int) -> None:
-        """The drive, if it has power, sees an error: it reacts as 605Eh says and ends in FAULT."""
+        """Raise an error in a powered drive: it reacts by 605Eh and ends in FAULT."""
         if not self.powered:
             return
         self.emergency(code)

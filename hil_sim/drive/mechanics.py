@@ -52,7 +52,7 @@ class Joint:
         return self.position + self.slipped
 
     def slip(self, radians: float) -> None:
-        """The gear jumps teeth: the joint falls back behind the motor by so much (rad), up to its stop."""
+        """Let the gear jump teeth: the joint falls behind the motor by this (rad), up to its stop."""
         motor, constants = self.motor_position, self.constants
         self.position = min(max(self.position - radians, constants.low_stop), constants.high_stop)
         self.slipped = motor - self.position
@@ -107,7 +107,7 @@ class Joint:
         return self.gravity * math.sin(self.position) + self.cogging * teeth
 
     def _stop_torque(self) -> float:
-        """A stop pushes back and never pulls."""
+        """Return a stop pushes back and never pulls."""
         constants = self.constants
         damping = constants.stop_damping * self.velocity
         if self.position > constants.high_stop:

@@ -128,7 +128,7 @@ class Power:
         self._overdue_s = 0.0
 
     def stopping(self, elapsed_s: float) -> None:
-        """The motor has been slowing down for `elapsed_s` more: see whether it stands."""
+        """Advance the slowing motor by `elapsed_s`, and check whether it stands."""
         if self._servo.motion.done:
             self._overdue_s += elapsed_s
         if self._servo.at_rest or self._overdue_s > _STOP_PATIENCE_S:

@@ -92,7 +92,7 @@ def _drift(site: Site) -> Iterator[None]:
 
 @contextmanager
 def _runaway(site: Site) -> Iterator[None]:
-    """The set-points go away, and come back as fast when it is over."""
+    """Return the set-points go away, and come back as fast when it is over."""
     strays, number, clock = site.robot.controller.strays, list(JOINTS).index(site.device), site.robot.clock
     step = math.radians(site.number("deg_per_s")) * _STRAYING_TICK_NS / 1e9
 

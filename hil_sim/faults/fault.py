@@ -158,7 +158,7 @@ class Fault:
 
 
 def _number(value: object) -> float | None:
-    """A finite number, also from text as people type it (`5`, `0.2`, `0x2310`)."""
+    """Return a finite number, also from text as people type it (`5`, `0.2`, `0x2310`)."""
     if isinstance(value, str):
         try:
             value = int(value, 16) if value[:2].lower() == "0x" else float(value)

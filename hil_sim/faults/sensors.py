@@ -19,7 +19,7 @@ def _share(site: Site) -> object:
 
 
 def _switched(switch: str, value: Callable[[Site], object] = _yes) -> Act:
-    """A fault that is one switch of the sensor."""
+    """Return a fault that sets one switch of the sensor."""
 
     @contextmanager
     def act(site: Site) -> Iterator[None]:
@@ -33,7 +33,7 @@ def _switched(switch: str, value: Callable[[Site], object] = _yes) -> Act:
 
 
 def _on_line(act: Act) -> Act:
-    """The same, where the sensor is on a serial line."""
+    """Return the same, where the sensor is on a serial line."""
 
     def checked(site: Site) -> AbstractContextManager[None]:
         if site.device not in site.robot.sensors.lines:

@@ -28,7 +28,7 @@ def _gait_asymmetry(site: Site) -> Iterator[None]:
 
 @contextmanager
 def _fatigue(site: Site) -> Iterator[None]:
-    """The left leg tires; where it stumbles at last, the trip comes when the foot has dropped."""
+    """Return the left leg tires; where it stumbles at last, the trip comes when the foot has dropped."""
     generator, clock = site.robot.controller.generator, site.robot.clock
     before, began_s = generator.wearer, clock.now_s
 
@@ -45,7 +45,7 @@ def _fatigue(site: Site) -> Iterator[None]:
 
 
 def _falls(pitch: float, roll: float, *, slipping: bool = False) -> Act:
-    """A fall that the wearer gets up from when the fault is over."""
+    """Return a fall from which the wearer gets up when the fault is over."""
 
     @contextmanager
     def act(site: Site) -> Iterator[None]:

@@ -48,7 +48,7 @@ class LegCurves(NamedTuple):
 
 
 def _closed(rows: Sequence[float]) -> Curve:
-    """A curve from values at 0 … 100 %; what its ends differ is spread over the cycle."""
+    """Return a curve from values at 0 … 100 %; what its ends differ is spread over the cycle."""
     gap = rows[-1] - rows[0]
     steps = len(rows) - 1
     return Curve([math.radians(value - gap * index / steps) for index, value in enumerate(rows[:-1])])

@@ -76,7 +76,7 @@ class Generator:
         self._show()
 
     def _show(self) -> None:
-        """What follows from the present state and is asked for again and again."""
+        """Cache values that follow from the present state."""
         left, right, cycle_time, toe_height, trunk_angle, self.asymmetry, *impairment = self._lag.values
         self.shape = Shape((left + right) / 2.0, cycle_time, toe_height, trunk_angle)
         self.impairment = tuple(impairment)  # of left and right leg
@@ -89,7 +89,7 @@ class Generator:
         self.moment += 1
 
     def _notice(self, activity: Activity) -> None:
-        """A stumble or fall that is newly wanted happens at the next occasion, once."""
+        """Schedule a newly requested stumble or fall for the next occasion, once."""
         if activity is not self._activity:
             self._activity = activity
             self._mishap = activity if activity in (Activity.STUMBLE, Activity.FALL) else None
@@ -98,7 +98,7 @@ class Generator:
             self.fall.start(side_of_fall(0.5 if self._source is None else self._source.random()))
 
     def _base(self, activity: Activity) -> Activity:
-        """What the body does apart from stumble and fall."""
+        """Return what the body does apart from stumble and fall."""
         if self.fall.state is not FallState.UPRIGHT or activity is Activity.FALL:
             return Activity.STAND
         return Activity.WALK if activity is Activity.STUMBLE else activity

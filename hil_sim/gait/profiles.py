@@ -21,7 +21,7 @@ def bump(now: float, start: float, top: float, end: float) -> float:
 
 
 def mix(a: Leg, b: Leg, share: float) -> Leg:
-    """`a` where `share` is 0, `b` where it is 1."""
+    """Return `a` for `share` 0, `b` for 1, and blends between."""
     return Leg(
         a.hip + share * (b.hip - a.hip),
         a.knee + share * (b.knee - a.knee),

@@ -100,7 +100,7 @@ def _person(number: int) -> WearerSettings:
 
 
 def _near(source: random.Random, mean: float, deviation: float) -> float:
-    """A normal number, never further than two deviations from the mean."""
+    """Return a normal number, never further than two deviations from the mean."""
     return mean + deviation * min(max(source.gauss(0.0, 1.0), -2.0), 2.0)
 
 

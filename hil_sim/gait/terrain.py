@@ -44,7 +44,10 @@ def _wave(mean_deg: float, swing_deg: float, top: float, phase: float) -> float:
 
 
 def ramp_up(phase: float, step_length: float, leg_length: float) -> Leg:
-    """The foot meets the ground higher: hip and knee are bent more then, the ankle all through stance."""
+    """Return a leg on a ramp upwards, where the foot meets the ground higher.
+
+    Hip and knee are bent more then, the ankle all through stance.
+    """
     pose = level(phase, step_length, leg_length)
     return Leg(
         pose.hip + _wave(7.0, 7.0, 0.95, phase),
@@ -54,7 +57,7 @@ def ramp_up(phase: float, step_length: float, leg_length: float) -> Leg:
 
 
 def ramp_down(phase: float, step_length: float, leg_length: float) -> Leg:
-    """The body is let down over a knee that bends in late stance."""
+    """Return a leg whose knee bends in late stance, lowering the body."""
     pose = level(phase, step_length, leg_length)
     return Leg(
         pose.hip + _wave(-3.0, 3.0, 0.45, phase),

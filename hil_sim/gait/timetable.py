@@ -58,7 +58,7 @@ _LOOPS = {
 
 
 def day(seed: int) -> Iterator[Entry]:
-    """Rounds of everything without end, each in another order, with one stumble and one fall a round."""
+    """Yield endless rounds of all activities in changing order, each with one stumble and one fall."""
     source = random.Random(f"{seed} day")
     yield Entry(Activity.STAND, 3.0)
     while True:

@@ -79,7 +79,7 @@ def level(phase: float, step_length: float, leg_length: float = NOMINAL_LEG_LENG
 
 
 def _between(wanted: float) -> tuple[LegCurves, LegCurves, float]:
-    """The two measured sets whose hip ranges stand around `wanted`, and where between them."""
+    """Return the two measured sets whose hip ranges stand around `wanted`, and where between them."""
     sets = measured()
     pairs = pairwise(sets)
     slower, faster = next((pair for pair in pairs if wanted < pair[1].hip.range), sets[-2:])

@@ -56,12 +56,12 @@ class Joint:
     landed: float = 0.0
 
     def of(self, severity: float) -> "Joint":
-        """The same walk in a person who has so much of it (1: as in the table)."""
+        """Return the same walk in a person who has so much of it (1: as in the table)."""
         scale = 1.0 + severity * (self.scale - 1.0)
         return Joint(scale, severity * self.bent, severity * self.swung, severity * self.landed)
 
     def changed(self, angle: float, standing: float, swinging: float, landing: float) -> float:
-        """The joint's angle (rad), where it would be `angle`; swing and landing from 0 to 1."""
+        """Return the joint's angle (rad), where it would be `angle`; swing and landing from 0 to 1."""
         more = self.bent + self.swung * swinging + self.landed * landing
         return standing + self.scale * (angle - standing) + math.radians(more)
 
@@ -87,7 +87,7 @@ class Limb:
     heel: float = 0.0
 
     def of(self, severity: float) -> "Limb":
-        """The same in a person who has so much of it."""
+        """Return the same in a person who has so much of it."""
         return Limb(
             self.hip.of(severity),
             self.knee.of(severity),
@@ -106,7 +106,7 @@ class Limb:
         return Leg(*(angle + more for angle, more in zip(STANDING, bent, strict=True)))
 
     def changed(self, pose: Leg, phase: float, swinging: float) -> Leg:
-        """The leg that would be `pose` at this phase of its stride, `swinging` from 0 to 1."""
+        """Return the leg that would be `pose` at this phase of its stride, `swinging` from 0 to 1."""
         landing = _landing(phase)
         joints = zip((self.hip, self.knee, self.ankle), pose, STANDING, strict=True)
         return Leg(*(joint.changed(angle, still, swinging, landing) for joint, angle, still in joints))

@@ -142,7 +142,7 @@ class Wearer:
         )
 
     def _step(self, side: int) -> _Contact:
-        """The foot in the present gait; y of the centre of pressure counts outward."""
+        """Return the foot in the present gait; y of the centre of pressure counts outward."""
         generator = self._generator
         speed, share = generator.shape.speed, generator.stance_share(side)
         stance = min(generator.leg_phase(side) / share, 1.0)

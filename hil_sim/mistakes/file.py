@@ -1,51 +1,51 @@
 """Mistakes in the robot's file."""
 
-from hil_sim.mistakes.mistake import Line, Mistake
+from hil_sim.mistakes.mistake import FileKey, Mistake
 
 MISTAKES = {
     "eds_product": Mistake(
         "The left ankle's EDS is that of another product.",
-        [Line("joint.left_ankle", "eds", '"trinamic_tmcm_1270.eds"')],
+        [FileKey("joint.left_ankle", "eds", '"trinamic_tmcm_1270.eds"')],
     ),
     "gear": Mistake(
         "The left knee's gear ratio is half of what it is.",
-        [Line("joint.left_knee", "gear_ratio", "50.0")],
+        [FileKey("joint.left_knee", "gear_ratio", "50.0")],
     ),
     "counts": Mistake(
         "The right hip's encoder is said to count a quarter of what it does.",
-        [Line("joint.right_hip", "counts_per_revolution", "1024")],
+        [FileKey("joint.right_hip", "counts_per_revolution", "1024")],
     ),
     "sign": Mistake(
         "The right knee's direction is that of a motor on the other side.",
-        [Line("joint.right_knee", "direction", "-1")],
+        [FileKey("joint.right_knee", "direction", "-1")],
     ),
     "joints_swapped": Mistake(
         "The knees' node ids are exchanged: left is right.",
-        [Line("joint.left_knee", "node_id", "5"), Line("joint.right_knee", "node_id", "2")],
+        [FileKey("joint.left_knee", "node_id", "5"), FileKey("joint.right_knee", "node_id", "2")],
     ),
     "insoles_swapped": Mistake(
         "The insoles' ports are exchanged: left is right.",
         [
-            Line("insole.left_insole", "port", '"{folder}/right_insole"'),
-            Line("insole.left_insole", "foot", '"left"'),
-            Line("insole.right_insole", "port", '"{folder}/left_insole"'),
-            Line("insole.right_insole", "foot", '"right"'),
+            FileKey("insole.left_insole", "port", '"{folder}/right_insole"'),
+            FileKey("insole.left_insole", "foot", '"left"'),
+            FileKey("insole.right_insole", "port", '"{folder}/left_insole"'),
+            FileKey("insole.right_insole", "foot", '"right"'),
         ],
     ),
     "zero": Mistake(
         "The right hip's zero is 20° off.",
-        [Line("joint.right_hip", "zero_offset", "0.35")],
+        [FileKey("joint.right_hip", "zero_offset", "0.35")],
     ),
     "heartbeat_slow": Mistake(
         "The left hip's heartbeat is waited for shorter than it takes.",
-        [Line("joint.left_hip", "heartbeat_timeout_s", "0.05")],
+        [FileKey("joint.left_hip", "heartbeat_timeout_s", "0.05")],
     ),
     "velocity_unit": Mistake(
         "The left hip's velocity is taken for revolutions a minute.",
-        [Line("joint.left_hip", "velocity_unit", '"rpm"')],
+        [FileKey("joint.left_hip", "velocity_unit", '"rpm"')],
     ),
     "imu_axes": Mistake(
         "The IMU's axes are those of one that hangs head down.",
-        [Line("imu.trunk", "axes", '["x", "-y", "-z"]')],
+        [FileKey("imu.trunk", "axes", '["x", "-y", "-z"]')],
     ),
 }

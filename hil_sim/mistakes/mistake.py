@@ -9,7 +9,7 @@ from hil_sim.exoskeleton import Exoskeleton
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class FileKey:
     """A key of a table of robot.toml, as TOML; `{folder}` in it is the simulator's."""
 
     table: str
@@ -25,19 +25,19 @@ class Mistake:
     """
 
     what: str
-    lines: Sequence[Line] = ()
+    lines: Sequence[FileKey] = ()
     act: Callable[[Exoskeleton], None] | None = None
     computer: Mapping[str, str | None] = field(default_factory=dict)
 
 
-def written(text: str, lines: Sequence[Line], folder: str) -> str:
-    """The file with these lines; raises `SimulatorError` where a table is missing."""
+def written(text: str, lines: Sequence[FileKey], folder: str) -> str:
+    """Return the file with these lines; raises `SimulatorError` where a table is missing."""
     for line in lines:
         text = _with_line(text, line, line.value.replace("{folder}", folder))
     return text
 
 
-def _with_line(text: str, line: Line, value: str) -> str:
+def _with_line(text: str, line: FileKey, value: str) -> str:
     head = re.search(rf"^\[{re.escape(line.table)}\].*\n", text, re.MULTILINE)
     if head is None:
         raise SimulatorError(f"this robot has no [{line.table}], so that mistake cannot be made")

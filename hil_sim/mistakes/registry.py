@@ -11,7 +11,7 @@ MISTAKES: dict[str, Mistake] = {**wires.MISTAKES, **file.MISTAKES, **drives.MIST
 
 
 def chosen(names: Iterable[str]) -> list[Mistake]:
-    """The mistakes of these names; raises `SimulatorError`."""
+    """Return the mistakes of these names; raises `SimulatorError`."""
     wanted = [name for name in names if name != NONE]
     for name in wanted:
         if name not in MISTAKES:

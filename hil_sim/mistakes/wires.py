@@ -7,7 +7,7 @@ from hil_sim.clock import MILLISECOND_NS
 from hil_sim.drive.drive import JointDrive
 from hil_sim.drive.mechanics import Joint, JointConstants
 from hil_sim.exoskeleton import Exoskeleton
-from hil_sim.mistakes.mistake import Line, Mistake
+from hil_sim.mistakes.mistake import FileKey, Mistake
 from hil_sim.node import cob_id, sync
 from hil_sim.node.node import Node
 
@@ -89,7 +89,7 @@ def _flood(robot: Exoskeleton) -> None:
 
 MISTAKES = {
     "bit_rate": Mistake(
-        "The bus is read at half of its bit rate.", [Line("can.main", "bitrate", "500000")], _other_rate
+        "The bus is read at half of its bit rate.", [FileKey("can.main", "bitrate", "500000")], _other_rate
     ),
     "terminator": Mistake("A terminator is missing: one frame in ten is destroyed.", act=_reflections),
     "double_node_id": Mistake("A second drive has the left knee's node id.", act=_twin),

@@ -123,7 +123,7 @@ class Dictionary:
                 entry.default = entry.value = number
 
     def readdress(self, before: Description, after: Description) -> None:
-        """The device has another node id, by which the file gives other defaults."""
+        """Change the node id, on which defaults of the file depend."""
         for entry in self._entries.values():
             old, new = before.variable(*entry.key), after.variable(*entry.key)
             if old is None or new is None or (old.default, old.value) == (new.default, new.value):
@@ -183,5 +183,5 @@ class Dictionary:
         return entry.encode()
 
     def write(self, index: int, subindex: int, data: bytes) -> None:
-        """What an SDO download does; raises `SdoAbort`."""
+        """Write by SDO download; raises `SdoAbort`."""
         self.find_writable(index, subindex).write(data)

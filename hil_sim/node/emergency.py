@@ -71,7 +71,7 @@ class Emergencies:
             dictionary[COB_ID].on_write = cob_id.guard(dictionary[COB_ID])
 
     def forget(self) -> None:
-        """The power was off: no error, no history."""
+        """Clear errors and history at power-on."""
         self._active.clear()
         self._history.clear()
 
@@ -87,7 +87,7 @@ class Emergencies:
             self._inhibited = None
 
     def occurred(self, code: int, vendor: bytes = b"") -> None:
-        """An error begins: register, history and message. `vendor` tells errors of one code apart."""
+        """Begin an error: register, history and message. `vendor` tells errors of one code apart."""
         if (code, vendor) in self._active:
             return
         by_class = _REGISTER_BITS_BY_CLASS.get(code >> 12, 0)
@@ -97,7 +97,7 @@ class Emergencies:
         self._transmit(code, vendor)
 
     def ended(self, code: int, vendor: bytes = b"") -> None:
-        """An error is over: code 0000h, and the register says what is left."""
+        """End an error: code 0000h, with the remaining errors in the register."""
         if self._active.pop((code, vendor), None) is not None:
             self._transmit(0x0000, b"")
 

@@ -39,13 +39,13 @@ class Guarding:
                 dictionary[key].on_written = self._stop_watching
 
     def reset(self) -> None:
-        """The next answer has toggle bit 0, and watching waits for the next request."""
+        """Reset: the next answer has toggle bit 0, and watching waits for the next request."""
         self._toggle = 0
         self._lost = False
         self._stop_watching()
 
     def requested(self, state: int) -> None:
-        """A remote frame asked for the node's state."""
+        """Answer a remote frame for the node's state."""
         self._send(bytes([state | self._toggle]))
         self._toggle ^= _TOGGLE
         self._stop_watching()

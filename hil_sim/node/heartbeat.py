@@ -28,7 +28,7 @@ class HeartbeatProducer:
         return self._timer is not None
 
     def start(self) -> None:
-        """The device has booted; its boot-up message was the first heartbeat."""
+        """Begin after the boot-up message, which was the first heartbeat."""
         self.stop()
         period_ms = self._dictionary.number(PRODUCER)
         if period_ms:
@@ -40,7 +40,7 @@ class HeartbeatProducer:
             self._timer = None
 
     def _written(self) -> None:
-        """A new period begins with a heartbeat."""
+        """Take a write of the period: a new one begins with a heartbeat."""
         self.start()
         if self.running:
             self._send()

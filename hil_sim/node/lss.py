@@ -46,10 +46,10 @@ class Owner(Protocol):
         """Keep both without power; raises `OSError` where it cannot."""
 
     def node_id_given(self) -> None:
-        """An unconfigured device has one now, and may begin to communicate."""
+        """Begin to communicate: an unconfigured device has a node id now."""
 
     def bitrate_changed(self) -> None:
-        """The pending bit rate is to be used from now on."""
+        """Use the pending bit rate from now on."""
 
 
 class Lss:
@@ -80,7 +80,7 @@ class Lss:
         return self.node_id != UNCONFIGURED
 
     def begin(self, node_id: int, bitrate: int) -> None:
-        """The power came, or the device was reset: this is what it has kept."""
+        """Restore the stored values at power-on or reset."""
         self.pending_node_id, self.pending_bitrate = node_id, bitrate
         self.adopt()
 
@@ -94,7 +94,7 @@ class Lss:
         self.node_id, self.bitrate = self.pending_node_id, self.pending_bitrate
 
     def received(self, data: bytes) -> None:
-        """A request of the master; what is none is ignored."""
+        """Take a request of the master; ignore anything else."""
         if len(data) != 8:
             return
         command, number = data[0], int.from_bytes(data[1:5], "little")

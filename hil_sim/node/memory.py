@@ -15,7 +15,7 @@ class Memory(Protocol):
     """The values of objects as they were stored, encoded; `None` where nothing was ever stored."""
 
     def load(self) -> Kept | None:
-        """Raises `SimulatorError` for contents that are none."""
+        """Read the kept memory; raises `SimulatorError` for invalid contents."""
 
     def save(self, kept: Kept) -> None:
         """When it returns, the values are kept; raises `OSError` where they cannot be."""

@@ -134,13 +134,13 @@ class Node:
         """Everything begins anew."""
 
     def _on_booted(self) -> None:
-        """The device has said that it is there."""
+        """Note that the device has sent its boot-up message."""
 
     def _on_state(self, before: NmtState) -> None:
-        """The NMT state has changed."""
+        """Take a changed NMT state."""
 
     def _on_sync(self) -> None:
-        """A SYNC came: RPDOs have taken effect, TPDOs are not yet sampled."""
+        """Take a SYNC: RPDOs have taken effect, TPDOs are not yet sampled."""
 
     def _on_heartbeat(self, node_id: int, state: int) -> None:
         """Another node has booted (`state` 0) or shown its heartbeat."""
@@ -150,7 +150,7 @@ class Node:
         return ()
 
     def _on_communication_lost(self) -> None:
-        """The bus is gone, or a life sign stayed away; the NMT state is still the one before."""
+        """Take the loss of the bus or of a life sign; the NMT state is still the one before."""
 
     # -- for the profile -------------------------------------------------------------------------------
 
@@ -173,7 +173,7 @@ class Node:
         self._emergencies.end_all()
 
     def bus_off(self) -> None:
-        """The device's CAN controller has left the bus: it acts as 1029h and its profile say."""
+        """React to bus off by 1029h and the profile."""
         self._communication_error()
 
     @property
@@ -268,7 +268,7 @@ class Node:
             self.reset_communication()
 
     def reset_communication(self) -> None:
-        """What LSS has left pending becomes active."""
+        """Activate the settings that LSS has left pending."""
         self._boot(COMMUNICATION, BOOT_TIME_NS)
 
     def _enter(self, state: NmtState) -> None:
@@ -312,7 +312,7 @@ class Node:
         self._emergencies.occurred(EMCY_SYNC_LENGTH)
 
     def _synchronise(self, counter: int | None) -> None:
-        """What a SYNC does: received PDOs take effect, then those to send are sampled."""
+        """Process a SYNC: received PDOs take effect, then those to send are sampled."""
         self._emergencies.ended(EMCY_SYNC_LENGTH)
         operational = self.state is NmtState.OPERATIONAL
         if operational:
@@ -334,7 +334,7 @@ class Node:
         self.send(nmt.HEARTBEAT_BASE + self.node_id, data)
 
     def _guard_received(self, frame: Frame) -> None:
-        """A device whose heartbeat runs is not guarded as well (CiA 301 §7.2.8.3)."""
+        """Ignore guarding while the heartbeat runs (CiA 301 §7.2.8.3)."""
         if frame.remote and self._guarding.supported and not self._heartbeat.running:
             self._guarding.requested(self.state)
 

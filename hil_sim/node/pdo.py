@@ -54,7 +54,7 @@ class Tpdo:
         return self.active and self._type in _ON_CHANGE
 
     def start(self) -> None:
-        """The device became operational, or the PDO valid: an event-driven one shows itself once."""
+        """Begin in operational, or when the PDO becomes valid: an event-driven one is sent once."""
         self._syncs = 0
         if self.active and self._type in EVENT_DRIVEN:
             self._transmit()
@@ -74,7 +74,7 @@ class Tpdo:
         self._timer = self._inhibited = None
 
     def synchronise(self, counter: int | None) -> None:
-        """A SYNC came, with the `counter` that it may have."""
+        """Take a SYNC, with its `counter`, if any."""
         if not self.active:
             return
         if self._type == SYNCHRONOUS_REMOTE:
@@ -102,12 +102,12 @@ class Tpdo:
             self._event()
 
     def changed(self, key: Key) -> None:
-        """An object has changed of which the application says so."""
+        """Take a change reported by the application."""
         if self.on_change and key in self.keys:
             self._event()
 
     def requested(self) -> None:
-        """A remote frame asked for it."""
+        """Answer a remote frame."""
         if not (self.active and self._remote):
             return
         if self._type != SYNCHRONOUS_REMOTE:

@@ -114,7 +114,7 @@ class Mapping:
 
 
 def _layout(fields: tuple[Field, ...]) -> struct.Struct | None:
-    """The fields as one struct, `None` where they are not all integers of 1, 2, 4 or 8 bytes."""
+    """Return the fields as one struct, `None` where they are not all integers of 1, 2, 4 or 8 bytes."""
     codes = ""
     for field in fields:
         data_type = None if field.entry is None else field.entry.data_type

@@ -55,7 +55,7 @@ class Pdos:
             self._load_rpdo(number)
 
     def start(self) -> None:
-        """The device became operational."""
+        """Begin in operational."""
         self._running = True
         for tpdo in self._tpdos.values():
             tpdo.start()
@@ -70,17 +70,17 @@ class Pdos:
             rpdo.stop()
 
     def take(self) -> None:
-        """A SYNC came: what has been received takes effect."""
+        """Take a SYNC: received PDOs take effect."""
         for rpdo in self.received:
             rpdo.synchronise()
 
     def synchronise(self, counter: int | None) -> None:
-        """A SYNC came: what is to be sent is sampled."""
+        """Take a SYNC: sample the PDOs to send."""
         for tpdo in self.sent:
             tpdo.synchronise(counter)
 
     def changed(self, key: Key) -> None:
-        """An object has changed of which the application says so."""
+        """Take a change reported by the application."""
         if self._running:
             for tpdo in self.sent:
                 tpdo.changed(key)

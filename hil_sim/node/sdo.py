@@ -68,7 +68,7 @@ class SdoServer:
         return self._initiations[command](request)
 
     def _multiplexer(self, request: bytes) -> bytes:
-        """The index and sub-index that an abort of this request names."""
+        """Return the index and sub-index that an abort of this request names."""
         if self._transfer is not None and (self._transfer.takes(request) or _continues(request)):
             return self._transfer.multiplexer
         return bytes(3) if _continues(request) else request[1:4]
@@ -117,7 +117,7 @@ class SdoServer:
         return b"\x60" + request[1:4] + bytes(4)
 
     def _block_upload(self, request: bytes) -> bytes:
-        """The client says how many segments it takes, and below which length no block is worth it to it."""
+        """Begin a block upload with the client's block size and protocol switch threshold."""
         data, block_size, threshold = self._read(request), request[4], request[5]
         if threshold and len(data) <= threshold:
             return self._upload(request)

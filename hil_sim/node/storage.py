@@ -34,7 +34,7 @@ class Storage:
             self._command(entry)
 
     def load(self) -> None:
-        """The power came: take what memory has kept, or as a DCF has commissioned the device."""
+        """Restore the memory at power-on, or the values of a DCF."""
         kept = self.memory.load()
         self._kept = self._commissioned() if kept is None else kept
 

@@ -149,7 +149,7 @@ class CanLog:
     channel: str | None = None
 
     def __iter__(self) -> Iterator[Recorded]:
-        """Raises `ReplayError`."""
+        """Yield the frames; raises `ReplayError`."""
         waiting: list[tuple[int, int, Recorded]] = []
         newest_ns = None
         for number, (one, where) in enumerate(self._read()):
@@ -217,7 +217,7 @@ def _frame(message: can.Message) -> Frame:
 
 
 def _follow(newest_ns: int, stamp_ns: int, where: str) -> int:
-    """The newest stamp now; raises `ReplayError` where another clock counts from here on."""
+    """Return the newest stamp now; raises `ReplayError` where another clock counts from here on."""
     step_ns = stamp_ns - newest_ns
     if step_ns > _PAUSE_NS or step_ns < -_DISORDER_NS:
         raise ReplayError(

@@ -49,7 +49,7 @@ class RecordedDictionary(Dictionary):
         raise SdoAbort(AbortCode.WRONG_STATE)
 
     def learn(self, key: Key, data: bytes) -> None:
-        """The recording shows the value of an object."""
+        """Take an object's value from the recording."""
         entry = self.get(key)
         if entry is not None:
             with suppress(SdoAbort):  # not of the length that the file says
@@ -92,7 +92,7 @@ class RecordedNode:
                 self._pdos = self._mappings()
 
     def _shown(self, frame: Frame) -> tuple[Key, bytes] | None:
-        """The value of an object that an expedited transfer has read, or written when it is confirmed."""
+        """Return an object's value, read or confirmed as written by an expedited transfer."""
         data = frame.data
         if len(data) != 8:
             return None

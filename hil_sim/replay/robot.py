@@ -9,19 +9,19 @@ from pathlib import Path
 
 from hil_sim.bus.can_bus import CanBus, Frame
 from hil_sim.clock import Clock
-from hil_sim.housing import Housing
 from hil_sim.loop import Loop
 from hil_sim.replay import capture, robot_config
 from hil_sim.replay.can_log import CanLog, ReplayError
 from hil_sim.replay.nodes import SDO_ANSWER, SDO_REQUEST, RecordedNode, seen
 from hil_sim.replay.player import Player, Timed
 from hil_sim.sensors.serial_port import SerialPort
+from hil_sim.simulation_host import SimulationHost
 
 _SDO = {base + node: node for base in (SDO_REQUEST, SDO_ANSWER) for node in range(1, 128)}
 
 
-class ReplayedRobot(Housing):
-    """Plays CAN logs and serial captures, by the names of their ports, in a folder; see `Housing`.
+class ReplayedRobot(SimulationHost):
+    """Plays CAN logs and serial captures, by the names of their ports, in a folder; see `SimulationHost`.
 
     Of several channels in the logs `channel` is played. With `loop` it begins anew at the end, otherwise it
     stops then. Nodes that were recorded and have an EDS in the folder's robot.toml answer SDO (`nodes`).
@@ -98,7 +98,7 @@ class ReplayedRobot(Housing):
             yield stamp_ns, partial(self._ports[name].write, data)
 
     def _play(self, frame: Frame) -> None:
-        """It was arbitrated when it was recorded: here it arrives at its time."""
+        """Deliver the frame at its time: it was arbitrated when recorded."""
         node = None if frame.extended else self.nodes.get(_SDO.get(frame.cob_id, 0))
         if node is None:
             self._bus.deliver(frame, self)

@@ -56,7 +56,7 @@ def _check_name(table: Table, subject: str, glob: str, rules: Collection[str]) -
 
 
 def _check_truth(table: Table, glob: str) -> None:
-    """What can never be so: a word that none of them says, or a limit of what is words."""
+    """Refuse the impossible: an unknown word, or a limit for a text."""
     fitting = fnmatch.filter(names(), glob)
     allowed = {word for name in fitting for word in words(name)}
     if fitting and "is" in table and table.values["is"] not in allowed:
@@ -75,7 +75,7 @@ def _timing(table: Table) -> Timing:
 
 
 def _conditions(table: Table, keys: tuple[str, ...]) -> Iterator[tuple[str, Condition]]:
-    """What a table asks for; `min` and `max` are one condition."""
+    """Yield what a table asks for; `min` and `max` are one condition."""
     given = [key for key in keys if key in table and not (key == "max" and "min" in table)]
     for key in given:
         yield key, _CONDITIONS[key](table, key)

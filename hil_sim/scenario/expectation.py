@@ -177,13 +177,13 @@ class Expectation:
 
 
 def _unseen(series: Sequence[tuple[float, Seen]], end_s: float) -> tuple[float, float] | None:
-    """The first time without a look that is too long for `always`, as of a gateway that answers no more."""
+    """Return the first gap too long for `always`, as of a gateway that stopped answering."""
     times = [*(time_s for time_s, _ in series), end_s]
     return next((gap for gap in pairwise(times) if gap[1] - gap[0] > _UNSEEN_S), None)
 
 
 def _story(series: Sequence[tuple[float, Seen]]) -> str:
-    """What was seen, in words: the range of numbers, or each new word with its time."""
+    """Return what was seen, in words: the range of numbers, or each new word with its time."""
     numbers = [value for _, value in series if isinstance(value, float)]
     span = f"from {series[0][0]:.2f} to {series[-1][0]:.2f} s"
     if len(numbers) == len(series) > 1:

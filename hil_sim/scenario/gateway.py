@@ -94,7 +94,7 @@ class GatewayProcess:
 
 @contextmanager
 def _signals_later() -> Iterator[None]:
-    """What would end this process in the middle does so at the end, when what was begun is known."""
+    """Return what would end this process in the middle does so at the end, when what was begun is known."""
     came: list[int] = []
     ends = (signal.SIGINT, signal.SIGTERM)
     before = {number: signal.signal(number, lambda came_in, _frame: came.append(came_in)) for number in ends}

@@ -114,5 +114,5 @@ def _say(case: ElementTree.Element, kind: str, message: str, text: str) -> None:
 
 
 def _plain(text: str) -> str:
-    """What may stand in XML; what may not is replaced, not left out."""
+    """Return what may stand in XML; what may not is replaced, not left out."""
     return _NOT_IN_XML.sub("\ufffd", text)

@@ -16,7 +16,7 @@ from hil_sim.scenario.expectation import Expectation, Observed, Result, Verdict
 from hil_sim.scenario.gateway import GatewayLink, GatewayProcess
 from hil_sim.scenario.lateness import Lateness
 from hil_sim.scenario.observer import Observer
-from hil_sim.scenario.script import Line, Script
+from hil_sim.scenario.script import Script, ScriptStep
 from hil_sim.scenario.table import ScenarioError
 from hil_sim.scenario.waiting import Waiting
 
@@ -49,7 +49,7 @@ class Outcome:
         return next((verdict.doubt for verdict in self.verdicts if verdict.doubt), "")
 
 
-def schedule(lines: tuple[Line, ...], robot: SimulatedRobot) -> None:
+def schedule(lines: tuple[ScriptStep, ...], robot: SimulatedRobot) -> None:
     """Let what happens to the robot itself happen at its time; what cannot be done then ends the run.
 
     Raises:
@@ -62,7 +62,7 @@ def schedule(lines: tuple[Line, ...], robot: SimulatedRobot) -> None:
         robot.exoskeleton.clock.at(round(line.time_s * SECOND_NS), partial(_obey, robot.operator, line))
 
 
-def _obey(operator: Operator, line: Line) -> None:
+def _obey(operator: Operator, line: ScriptStep) -> None:
     try:
         operator.obey(line.request)
     except SimulatorError as error:
@@ -129,9 +129,9 @@ def _watch(robot: SimulatedRobot, gateway: GatewayProcess) -> Lateness:
 
 
 def _judge(
-    expectation: Expectation, lines: tuple[Line, ...], observed: Observed, lateness: Lateness
+    expectation: Expectation, lines: tuple[ScriptStep, ...], observed: Observed, lateness: Lateness
 ) -> Verdict:
-    """A failure is in doubt where time was lost since the last thing that happened before its window."""
+    """Return the verdict, in doubt if time was lost since the last event before its window."""
     verdict = expectation.judge(observed)
     if verdict.ok:
         return verdict

@@ -33,7 +33,7 @@ NEEDS_LEASE = frozenset({"set"})
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class ScriptStep:
     """One `[[at]]`: what happens at a time (simulated s); `where` is how errors call it."""
 
     where: str
@@ -59,7 +59,7 @@ class Script:
     sensors: SensorChoice = field(default_factory=SensorChoice)
     drives: Mapping[str, Path] = field(default_factory=dict)
     guard: Mapping[str, Any] | None = None  # as robot.toml has it
-    lines: tuple[Line, ...] = ()
+    lines: tuple[ScriptStep, ...] = ()
     expectations: tuple[Expectation, ...] = ()
 
 
@@ -79,13 +79,13 @@ def load(file: Path) -> Script:
 
 
 def examined(file: Path, values: Mapping[str, Any]) -> tuple[Script, list[Mistake]]:
-    """What stands in a file, and everything that is wrong with it, or likely is."""
+    """Return what stands in a file, and everything that is wrong with it, or likely is."""
     mistakes: list[Mistake] = []
     return _Reading(file, mistakes).script(values), mistakes
 
 
 def robot_text(file: Path, values: Mapping[str, Any]) -> str:
-    """The robot's file as a run of this scenario would write it, but for the port of its bus."""
+    """Return the robot's file as a run of this scenario would write it, but for the port of its bus."""
     script, _ = examined(file, values)
     robot = Exoskeleton(sensors=script.sensors, drives=script.drives)
     return robot_file.text(file.parent.resolve(), robot_file.hub_bus(0), robot, script.guard)
@@ -97,7 +97,7 @@ def findings(
     *,
     machine: bool,  # noqa: ARG001 - of robots
 ) -> Iterator[tuple[str, str, str, str]]:
-    """What `gwrms check` says of it: severity, where, key and text."""
+    """Return what `gwrms check` says of it: severity, where, key and text."""
     return ((one.severity, one.where, one.key, one.text) for one in examined(file, tables)[1])
 
 
@@ -109,7 +109,7 @@ class _Reading:
         self._mistakes = mistakes
 
     def script(self, values: Mapping[str, Any]) -> Script:
-        """What can be made of it."""
+        """Return what can be made of it."""
         top = Table("", values, self._mistakes)
         self._check_tables(values)
         robot = self._table("robot", values)
@@ -143,7 +143,7 @@ class _Reading:
         )
 
     def _table(self, key: str, values: Mapping[str, Any]) -> Table:
-        """The table of that name; where it is none, one without anything."""
+        """Return the table of that name; where it is none, one without anything."""
         try:
             return Table(f"[{key}]", values.get(key, {}), self._mistakes)
         except Unusable:
@@ -156,7 +156,7 @@ class _Reading:
                 self._mistakes.append(Mistake(f"[{key}]", "", said))
 
     def _each(self, values: Mapping[str, Any], key: str, read: Callable[[Table], T]) -> Iterator[T]:
-        """What is made of each entry of a list; one that cannot be used does not hide the next."""
+        """Yield what is made of each entry of a list; one that cannot be used does not hide the next."""
         found = values.get(key, [])
         if not isinstance(found, list):
             self._mistakes.append(Mistake(f"[{key}]", "", f"is a list of tables: write [[{key}]]"))
@@ -179,9 +179,9 @@ class _Reading:
             robot.complain("drive", str(error).removeprefix("drive "))
             return {}
 
-    def _line(self, table: Table) -> Line:
+    def _line(self, table: Table) -> ScriptStep:
         request = {key: value for key, value in table.values.items() if key != "time_s"}
-        line = Line(f"{self._file} {table.where}", table.seconds("time_s"), request)
+        line = ScriptStep(f"{self._file} {table.where}", table.seconds("time_s"), request)
         if line.for_gateway is not None:
             table.only(("time_s", line.for_gateway))
             _check_gateway_line(table, line.for_gateway)
@@ -211,7 +211,7 @@ def _check_gateway_line(table: Table, key: str) -> None:
                 table.complain(key, text)
 
 
-def _check_answers(lines: tuple[Line, ...], entries: object, mistakes: list[Mistake]) -> None:
+def _check_answers(lines: tuple[ScriptStep, ...], entries: object, mistakes: list[Mistake]) -> None:
     """Only what this file asks for is answered."""
     asked = {line.for_gateway for line in lines if line.for_gateway is not None}
     for number, entry in enumerate(entries if isinstance(entries, list) else (), 1):

@@ -15,7 +15,10 @@ def shipped() -> tuple[str, ...]:
 
 
 def locate(file: Path) -> Path:
-    """The file, or the scenario that ships by this name; raises `ScenarioError` where there is neither."""
+    """Return the file, or the scenario that ships by this name.
+
+    Raises `ScenarioError` where there is neither.
+    """
     ours = _folder() / f"{file.stem}.toml"
     if file.exists():
         return file

@@ -146,7 +146,7 @@ def meant(word: str, allowed: Iterable[str]) -> str:
 
 
 def unknown(word: str, allowed: Collection[str]) -> str:
-    """The words for something that is none of these."""
+    """Return the words for something that is none of these."""
     return f"{word!r} is not known: {meant(word, allowed)}allowed are {', '.join(allowed)}"
 
 

@@ -32,7 +32,7 @@ class SerialLine:
         self._random = random_source
 
     def send(self, data: bytes) -> None:
-        """The bytes of one cycle."""
+        """Send the bytes of one cycle."""
         port, faults = self.port, self.faults
         if port is None:
             return

@@ -58,7 +58,7 @@ class Sole:
         return self._last
 
     def pressures(self, foot: Foot) -> list[float]:
-        """True pressure of each cell (Pa): the force, spread around the centre of pressure."""
+        """Return the true pressure of each cell (Pa): the force, spread around the centre of pressure."""
         if not foot.force:
             return [0.0] * len(self.cells)
         shares = [cell.area * self._nearness(cell, foot) for cell in self.cells]
@@ -73,7 +73,7 @@ class Sole:
         return math.exp(-0.5 * (x * x + y * y))
 
     def _felt(self, truths: list[float]) -> list[float]:
-        """What the cells make of the true pressures (Pa)."""
+        """Return what the cells make of the true pressures (Pa)."""
         faults, drifted, gauss = self._faults, self._drifted, self._random.gauss
         noises = [gauss(0.0, 1.0) for _ in truths]
         felt = [

@@ -24,7 +24,7 @@ PERIOD_NS = 10 * MILLISECOND_NS  # 100 Hz
 
 
 def _files(package: ModuleType) -> Iterator[tuple[str, ModuleType]]:
-    """The package's modules by the names of what they simulate."""
+    """Yield the package's modules by the names of their devices."""
     for found in pkgutil.iter_modules(package.__path__, f"{package.__name__}."):
         yield found.name.rpartition(".")[2].replace("_", "-"), importlib.import_module(found.name)
 

@@ -4,7 +4,7 @@ _SAMPLES = 10  # of one character: start bit, eight data bits, stop bit, each in
 
 
 def heard_at(data: bytes, sent_baud: int, heard_baud: int) -> bytes:
-    """`data`, sent without pauses as 8N1, as a receiver at `heard_baud` hears it.
+    """Return `data`, sent without pauses as 8N1, as received at `heard_baud`.
 
     As a 16550 does: a falling edge begins a character, a start bit that is high in its middle is noise, and a
     character without a stop bit is passed on, its missing stop bit taken for the next start.

@@ -58,7 +58,7 @@ def evaluate(path: Path, search: Search) -> Outcome:
 
 
 def _late(data: Decisions, minute: dict[int, int]) -> npt.NDArray[np.bool_]:
-    """The decisions of trials after a subject's first minute."""
+    """Return the decisions of trials after a subject's first minute."""
     last = np.array([minute[person] for person in data.subject.tolist()])
     return np.asarray(data.trial > last)
 
@@ -76,7 +76,7 @@ def _minutes(trials: list[ipol.Trial]) -> dict[int, int]:
 
 
 def _minute(trials: list[ipol.Trial], person: int, minute: dict[int, int]) -> Decisions:
-    """What is learned from a person's first minute."""
+    """Return what is learned from a person's first minute."""
     return own_lessons([one for one in trials if one.subject == person and one.number <= minute[person]])
 
 

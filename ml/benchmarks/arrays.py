@@ -39,7 +39,7 @@ class Arrays:
             raise UnusableData(f"{path} is no .npz file of plain arrays: {error}") from error
 
     def of(self, name: str, dimensions: int, rows: int | None = None) -> Array:
-        """The array `name`.
+        """Return the array `name`.
 
         Raises:
             UnusableData: it is not there, or has another shape than asked for.
@@ -81,7 +81,7 @@ class Arrays:
         return samples
 
     def flags(self, name: str, shape: tuple[int, ...]) -> npt.NDArray[np.bool_]:
-        """The array `name` of this shape as yes or no; no everywhere where the file does not say.
+        """Return the array `name` of this shape as yes or no; no everywhere where the file does not say.
 
         Raises:
             UnusableData: it has another shape.

@@ -10,6 +10,7 @@ from ml.benchmarks import (
     danger,
     events,
     fall,
+    impaired_phase,
     ipol_danger,
     phase,
     sim_activity,
@@ -24,6 +25,7 @@ from ml.benchmarks.outcome import Goal, Outcome
 from ml.benchmarks.sim import WHOLE, recipe_of
 from ml.features import Recipe
 from ml.features.falling import FALLING
+from ml.features.foot_rates import PHASES
 from ml.features.gait_context import GAIT_CONTEXT
 from ml.features.gait_events import LEFT_EVENTS
 from ml.features.gait_phase import LEFT_PHASE
@@ -84,6 +86,13 @@ BENCHMARKS: Final = {
             LEFT_EVENTS,
             events.evaluate,
             {"heel_strike_f1": Goal(0.97, stretch=0.99), "toe_off_f1": Goal(0.97, stretch=0.98)},
+        ),
+        Benchmark(
+            "impaired-phase",
+            "where in the stride patients' feet are, by models of healthy people, and of both",
+            PHASES[0],
+            impaired_phase.evaluate,
+            {"healthy_worst_third_adaptation_cut": Goal(0.5)},
         ),
         Benchmark(
             "sisfall-prefall",

@@ -49,7 +49,7 @@ def figures(by_subject: Groups) -> dict[str, float]:
 
 
 def of_rows(covered: Flags, said: Flags, right: Flags, rows: Flags) -> dict[str, float]:
-    """What these decisions show of sets."""
+    """Return what these decisions show of sets."""
     spoken = rows & said
     return {
         "covered": _share(covered[rows]),

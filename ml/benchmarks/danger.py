@@ -1,7 +1,7 @@
 """`sim-danger`: dangers foreseen on simulated wearers never seen, and what that costs in false alarms."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -10,10 +10,18 @@ import numpy.typing as npt
 
 from ml.benchmarks.danger_data import SUDDEN, WALKS, Seen, read
 from ml.benchmarks.outcome import Outcome
-from ml.danger.budget import BLOCK_S, BUDGETS, rate_interval, rule_of_three, share_interval, thresholds
+from ml.danger.budget import (
+    BLOCK_S,
+    BUDGETS,
+    extrapolated,
+    rate_interval,
+    rule_of_three,
+    share_interval,
+    thresholds,
+)
 from ml.danger.combine import Calibration, calibrated, evidence, fit, load, tails
 from ml.danger.detector import DETECTORS
-from ml.danger.levels import Level, Levels
+from ml.danger.levels import Level, Levels, held
 from ml.danger.now import CHANNELS
 from ml.features.recipe import Features, Recipe
 from ml.features.windows import Samples
@@ -30,7 +38,8 @@ WHY: Final = (
     " (sim-danger) or by those that ship (sim-danger-shipped,"
     " learned from 301-318 of seed 23 and 401-410 of 24)."
     " Foreseen: advice at least 0.3 s before harm in the simulator's truth. …_low and …_high: 95 % intervals;"
-    " stops_per_100_h_upper is the one-sided 95 % bound (3 / hours where none was seen)."
+    " stops_per_100_h_upper is the one-sided 95 % bound (3 / hours where none was seen);"
+    " …_extrapolated what an exponential tail of this recording's own healthy blocks makes of it."
 )
 
 
@@ -109,15 +118,16 @@ def _counts(one: Seen) -> Floats:
 
 
 def _foreseeable(one: Seen) -> set[float]:
-    """The numbers of dangers that something shows before."""
+    """Return the numbers of dangers that something shows before."""
     return {1.0 + at for at, name in enumerate(one.names) if name not in SUDDEN}
 
 
 def _out_of_fold(seen: Sequence[Seen]) -> list[Floats]:
-    odds = []
-    for at, one in enumerate(seen):
-        others = [other for number, other in enumerate(seen) if number % FOLDS != at % FOLDS]
-        odds.append(Calibration(DETECTORS, *_fit(others or seen), (), (), {}, {}, "").log_odds(one.above))
+    odds: list[Floats] = [np.empty(0)] * len(seen)
+    for fold in range(min(FOLDS, len(seen))):
+        others = [one for at, one in enumerate(seen) if at % FOLDS != fold]
+        known = Calibration(DETECTORS, *_fit(others or seen), (), (), {}, {}, "")
+        odds[fold::FOLDS] = [known.log_odds(one.above) for one in seen[fold::FOLDS]]
     return odds
 
 
@@ -128,10 +138,10 @@ def walking(one: Seen) -> Flags:
 
 
 def _maxima(one: Seen, odds: Floats) -> Floats:
-    """The largest odds of each block of healthy walking."""
+    """Return the highest threshold that each block of healthy walking would have reached."""
     rows = walking(one)
     block = (one.at_s[rows] // BLOCK_S).astype(np.int_)
-    said = np.nan_to_num(odds[rows])
+    said = held(np.nan_to_num(odds))[rows]
     return np.array([said[block == number].max() for number in np.unique(block)])
 
 
@@ -140,7 +150,7 @@ def _hours(seen: Sequence[Seen]) -> float:
 
 
 def judge(one: Seen, calibration: Calibration) -> Judged:
-    """What was said of a wearer, moment by moment; after harm the levels begin anew."""
+    """Return what was said of a wearer, moment by moment; after harm the levels begin anew."""
     odds = calibration.log_odds(one.above)
     levels, level = Levels(calibration.by_level), np.zeros(len(odds), dtype=np.int_)
     over = False
@@ -178,7 +188,7 @@ def false_alarms(judged: Judged, least: Level, rows: Flags) -> int:
 
 
 def _looked_at(windows: Samples) -> Features:
-    """What a robot's channels are: the detectors make their own of them, row by row."""
+    """Return what a robot's channels are: the detectors make their own of them, row by row."""
     return windows[:, :, -1].astype(np.float32)
 
 
@@ -192,9 +202,12 @@ def evaluate(path: Path, search: bool) -> Outcome:  # noqa: ARG001 - there is no
 
 
 def evaluate_shipped(path: Path, search: bool) -> Outcome:  # noqa: ARG001 - there is nothing to choose
-    """The calibration that ships, on wearers from whom it was not learned."""
-    calibration = load()
-    return outcome([judge(one, calibration) for one in read(path)])
+    """Judge the calibration that ships, on wearers from whom it was not learned."""
+    calibration, seen = load(), read(path)
+    found = outcome([judge(one, calibration) for one in seen])
+    maxima = np.concatenate([_maxima(one, calibration.log_odds(one.above)) for one in seen])
+    stops = 100.0 * extrapolated(maxima, _hours(seen), calibration.by_level[Level.STOP])
+    return replace(found, figures={**found.figures, "stops_per_100_h_extrapolated": stops})
 
 
 def cross_judged(seen: Sequence[Seen]) -> list[Judged]:
@@ -236,7 +249,7 @@ def outcome(judged: Sequence[Judged]) -> Outcome:
 
 
 def of_danger(found: Sequence[Event]) -> dict[str, float]:
-    """The share of these events that was foreseen, with its interval."""
+    """Return the share of these events that was foreseen, with its interval."""
     leads = [event.lead_s for event in found if event.lead_s is not None]
     low, high = share_interval(sum(event.foreseen for event in found), len(found))
     return {
@@ -272,7 +285,7 @@ def per_hour(judged: Sequence[Judged], level: Level, name: str, rows: Sequence[F
 
 
 def shares(name: str, flags: Sequence[bool]) -> dict[str, float]:
-    """A share with its interval."""
+    """Return a share with its interval."""
     low, high = share_interval(sum(flags), len(flags)) if flags else (float("nan"), float("nan"))
     return {name: _mean(flags), f"{name}_low": low, f"{name}_high": high}
 

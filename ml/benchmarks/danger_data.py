@@ -62,7 +62,7 @@ class Seen:
 
 
 def read(path: Path) -> list[Seen]:
-    """What the detectors see of a file of `gwrms sim-record --scenario dangers`.
+    """Return what the detectors see of a file of `gwrms sim-record --scenario dangers`.
 
     Raises:
         UnusableData: it is no such file, or damaged.
@@ -108,7 +108,7 @@ def _seen(head: _Head, rows: list[list[Any]]) -> Seen:
 
 
 def watched(at_s: Floats, values: Floats, danger: Floats) -> Floats:
-    """What each detector says, (n, detectors): a danger is met with what was learned before it.
+    """Return what each detector says, (n, detectors): a danger is met with what was learned before it.
 
     What comes after harm, of a wearer who lay on the ground, is learned by nobody.
     """

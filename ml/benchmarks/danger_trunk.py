@@ -71,7 +71,7 @@ class Person:
         return cls(subject, Watch(calibration))
 
     def take(self, rows: Floats, rate_hz: float, label: npt.NDArray[np.str_]) -> Judged:
-        """What is said of the next recording, at 25 moments a second; a `label` a row."""
+        """Return what is said of the next recording, at 25 moments a second; a `label` a row."""
         begin_s = self.at_s + PAUSE_S
         self.at_s = begin_s + len(rows) / rate_hz
         found = [
@@ -92,7 +92,7 @@ class Person:
         return Judged(seen, np.array(numbers), np.array([int(verdict.level) for _, verdict in found]))
 
     def again(self) -> "Person":
-        """The same person, so far known, to meet something that nobody is to learn from."""
+        """Return the same person, so far known, to meet something that nobody is to learn from."""
         return copy.deepcopy(self)
 
 

@@ -126,7 +126,7 @@ def _fitted(feet: Sequence[Foot], settings: EventSettings) -> EventModel:
 
 
 def _counted(model: EventModel, foot: Foot, share: float) -> Iterator[Key]:
-    """A key for each event: Counter counts them."""
+    """Yield a key for each event: Counter counts them."""
     heights = model.heights(foot.features)
     for kind, true, height in zip(KINDS, foot.true, heights.T, strict=True):
         found = model.events(foot.at, height)

@@ -147,7 +147,10 @@ def _fitted(data: Decisions, train: folds.Rows, settings: FallSettings) -> FallD
 def _lossy_alarms(
     model: FallDetector, recordings: list[sisfall.Recording], data: Decisions, rows: folds.Rows, share: float
 ) -> npt.NDArray[np.bool_]:
-    """The alarms at `rows` where so many packets are lost; recording by recording, to need little memory."""
+    """Return the alarms at `rows` where so many packets are lost.
+
+    Recording by recording, to need little memory.
+    """
     number = data.recording[rows]
     alarms = np.zeros(len(rows), dtype=bool)
     for one in np.unique(number).tolist():

@@ -22,7 +22,7 @@ TOGETHER: Final = 3  # folds computed at a time: two cores stay busy where the f
 
 
 def one_left_out(groups: npt.NDArray[Any]) -> Iterator[Split]:
-    """A fold for each group."""
+    """Yield a fold for each group."""
     for group in np.unique(groups):
         yield np.flatnonzero(groups != group), np.flatnonzero(groups == group)
 
@@ -33,7 +33,10 @@ def grouped(groups: npt.NDArray[Any], count: int) -> Iterator[Split]:
 
 
 def sharing(windows: npt.NDArray[np.float64]) -> npt.NDArray[np.intp]:
-    """A number for each window (n, rows, channels): equal where they share a row, also through others."""
+    """Return a number for each window (n, rows, channels).
+
+    Equal where they share a row, also through others.
+    """
     count, rows, channels = windows.shape
     _, number = np.unique(windows.reshape(count * rows, channels), axis=0, return_inverse=True)
     pairs = (np.repeat(np.arange(count), rows), count + number.ravel())

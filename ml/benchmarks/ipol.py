@@ -41,7 +41,7 @@ class Trial:
 
 
 def read(path: Path) -> list[Trial]:
-    """The file's trials, subject by subject, in their order.
+    """Return the file's trials, subject by subject, in their order.
 
     Raises:
         UnusableData: it is not such a file, or has samples that cannot be.
@@ -90,7 +90,7 @@ def _without(
 
 
 def lossy(trials: Sequence[Trial], share: float) -> list[Trial]:
-    """The same walks with so many more of each sensor's packets lost; the first of each is there."""
+    """Return the same walks with so many more of each sensor's packets lost; the first of each is there."""
     made = []
     for number, one in enumerate(trials):
         samples = losses.lossy(one.samples, SENSORS, share, number)
@@ -100,7 +100,7 @@ def lossy(trials: Sequence[Trial], share: float) -> list[Trial]:
 
 
 def stretched(trial: Trial, factor: float) -> Trial:
-    """The same walk as somebody `factor` times as slow would have walked it."""
+    """Return the same walk as somebody `factor` times as slow would have walked it."""
     rows = np.arange(int(len(trial.samples) * factor)) / factor
     whole = np.arange(len(trial.samples))
     filled = mended(trial.samples.T)
@@ -113,14 +113,16 @@ def stretched(trial: Trial, factor: float) -> Trial:
 
 
 def strikes(in_air: npt.NDArray[np.bool_]) -> npt.NDArray[np.intp]:
-    """The rows at which the foot is first on the ground again."""
+    """Return the rows at which the foot is first on the ground again."""
     return np.flatnonzero(in_air[:-1] & ~in_air[1:]) + 1
 
 
-def phase(strikes: npt.NDArray[np.intp], rows: int) -> npt.NDArray[np.float64]:
+def phase(
+    strikes: npt.NDArray[np.intp], rows: int, stride_s: tuple[float, float] = STRIDE_S
+) -> npt.NDArray[np.float64]:
     """Each row's gait phase: 0 at a heel strike, linear to the next one; NaN outside strides."""
     result = np.full(rows, np.nan)
-    shortest, longest = (seconds * RATE_HZ for seconds in STRIDE_S)
+    shortest, longest = (seconds * RATE_HZ for seconds in stride_s)
     for begin, end in itertools.pairwise(strikes):
         if shortest <= end - begin <= longest:
             result[begin:end] = np.arange(end - begin) / (end - begin)

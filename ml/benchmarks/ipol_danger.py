@@ -58,7 +58,7 @@ def _judged(trials: Sequence[ipol.Trial], *, feet: bool) -> Iterator[Judged]:
 
 
 def rows(trial: ipol.Trial, *, feet: bool) -> Floats:
-    """The trial as rows of `CHANNELS`; with `feet`, as insoles would tell of it."""
+    """Return the trial as rows of `CHANNELS`; with `feet`, as insoles would tell of it."""
     back = trial.samples[:, :6]
     found = danger_trunk.channels(danger_trunk.upright(back, back[: int(UPRIGHT_S * RATE_HZ)], AXES), RATE_HZ)
     if feet:

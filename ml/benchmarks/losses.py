@@ -22,5 +22,5 @@ def lossy(samples: Floats, sensors: Sequence[int], share: float, seed: int) -> F
 
 
 def at(figure: str, share: float) -> str:
-    """The key of a figure where so many packets are lost."""
+    """Return the key of a figure where so many packets are lost."""
     return f"{figure}_{100 * share:.0f}_percent_lost"

@@ -24,7 +24,7 @@ def f1_by_class(counts: Integers) -> Floats:
 
 
 def macro_f1(truth: Integers, predicted: Integers, classes: int) -> float:
-    """The mean F1 over the classes that are there or were predicted."""
+    """Return the mean F1 over the classes that are there or were predicted."""
     return float(np.nanmean(f1_by_class(confusion(truth, predicted, classes))))
 
 
@@ -44,7 +44,7 @@ def matches(true: Integers, found: Integers, within: int) -> int:
 
 
 def circular_error(phase: Floats, truth: Floats) -> Floats:
-    """The shorter way round from `truth` to `phase`, both in cycles: −0.5 up to 0.5."""
+    """Return the shorter way round from `truth` to `phase`, both in cycles: −0.5 up to 0.5."""
     error: Floats = (phase - truth + 0.5) % 1.0 - 0.5
     return error
 

@@ -102,7 +102,7 @@ def _outcome(data: Decisions, by_share: Errors, settings: str) -> Outcome:
 
 
 def percent(errors: npt.NDArray[np.float64]) -> float:
-    """The RMS error in percent of the cycle; NaN without any."""
+    """Return the RMS error in percent of the cycle; NaN without any."""
     return 100.0 * metrics.rms(errors) if len(errors) else float("nan")
 
 

@@ -21,7 +21,10 @@ Table = Sequence[tuple[float, float, int]]
 
 
 def drawn(table: Table) -> str:
-    """A picture of what was said, by tenths, against what came true; larger points are more moments."""
+    """Return a picture of what was said, by tenths, against what came true.
+
+    Larger points are more moments.
+    """
     most = max(count for *_, count in table)
     way = "L".join(f"{_x(said):.1f} {_y(true):.1f}" for said, true, _ in table)
     shapes = [

@@ -21,7 +21,7 @@ BLUE, DARK = "#2a6fb0", "#1b1f24"
 
 
 def page(benchmark: Benchmark, outcome: Outcome, source: str) -> str:
-    """The whole document."""
+    """Return the whole document."""
     title = html.escape(f"gwrms evaluate: {benchmark.name}")
     return "\n".join(
         [
@@ -40,7 +40,7 @@ def page(benchmark: Benchmark, outcome: Outcome, source: str) -> str:
 
 
 def number(value: float) -> str:
-    """A figure as people read it."""
+    """Return a figure as people read it."""
     if math.isnan(value):
         return "–"
     return f"{value:.0f}" if abs(value) >= 100 or (value == int(value) and abs(value) > 1) else f"{value:.3g}"

@@ -21,7 +21,7 @@ def chosen(
     search: Search,
     score: Callable[[S, Rows, Rows], float],
 ) -> S:
-    """The fixed settings, or those of the grid with the best mean score over inner folds of whole groups.
+    """Return fixed settings, or the grid's best by mean score over inner folds of whole groups.
 
     `score(settings, train, judge)` gets rows into `groups`; more is better.
     """

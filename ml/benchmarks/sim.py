@@ -18,7 +18,7 @@ from ml.features.recipe import Recipe
 from ml.robot.groups import GROUPS, present, unit
 from ml.robot.task import Task
 from ml.training import simulated
-from ml.training.simulated import Examples, Session
+from ml.training.simulated import Examples, SimulatedSession
 
 FOLDS: Final = 3
 MOST: Final = 24_000  # decisions that are learned from and judged: more say no more
@@ -54,8 +54,11 @@ HIPS: Final = Variant("only_hips_", ("hips",))
 HIPS_TRUNK: Final = Variant("only_hips_trunk_", ("hips", "trunk"))
 
 
-def people(path: Path) -> list[Session]:
-    """The sessions of a file; raises `UnusableData` where they are those of fewer than three people."""
+def people(path: Path) -> list[SimulatedSession]:
+    """Return the sessions of a file.
+
+    Raises `UnusableData` where they are those of fewer than three people.
+    """
     sessions = simulated.read(path)
     count = len({session.subject for session in sessions})
     if count < FOLDS:
@@ -65,39 +68,39 @@ def people(path: Path) -> list[Session]:
     return sessions
 
 
-def robot(sessions: Sequence[Session], variants: Sequence[Variant]) -> tuple[Variant, list[Variant]]:
-    """The robot with every sensor that all sessions have, and those of `variants` that lack some of them."""
+def robot(sessions: Sequence[SimulatedSession], variants: Sequence[Variant]) -> tuple[Variant, list[Variant]]:
+    """Return the robot with all common sensors, and those of `variants` that lack some."""
     channels = set(sessions[0].channels).intersection(*(session.channels for session in sessions))
     whole = replace(WHOLE, groups=present(channels))
     return whole, [one for one in variants if set(one.groups) < set(whole.groups)]
 
 
 def by_walks(seen: Examples, figures: Callable[[Flags], dict[str, float]]) -> dict[str, dict[str, float]]:
-    """The figures of the rows of each walk; none where all walk alike."""
+    """Return the figures of the rows of each walk; none where all walk alike."""
     names = np.unique(seen.walks)
     return {str(one): figures(seen.walks == one) for one in names} if len(names) > 1 else {}
 
 
 def recipe_of(task: Task, variant: Variant) -> Recipe:
-    """The recipe of a robot with these sensors."""
+    """Return the recipe of a robot with these sensors."""
     recipe = task.recipe({channel for group in variant.groups for channel in GROUPS[group]})
     if recipe is None:
         raise UnusableData(f"{task.name} cannot be told from {', '.join(variant.groups)}")
     return recipe
 
 
-def step_of(recipe: Recipe, sessions: Sequence[Session], least: int) -> int:
+def step_of(recipe: Recipe, sessions: Sequence[SimulatedSession], least: int) -> int:
     """Grid samples between decisions, at least `least`, so that there are at most `MOST`."""
     seconds = sum(np.ptp(session.stamps_ns) / 1e9 for session in sessions)
     return max(least, math.ceil(seconds * recipe.rate_hz / MOST))
 
 
-def disturbed(sessions: Sequence[Session]) -> list[Session]:
-    """The same people, with sensors that have offsets, noise and delays of their own."""
+def disturbed(sessions: Sequence[SimulatedSession]) -> list[SimulatedSession]:
+    """Return the same people, with sensors that have offsets, noise and delays of their own."""
     return [_disturbed(session, number) for number, session in enumerate(sessions)]
 
 
-def _disturbed(session: Session, number: int) -> Session:
+def _disturbed(session: SimulatedSession, number: int) -> SimulatedSession:
     random = np.random.default_rng(number)
     values = session.values.copy()
     for column, channel in enumerate(session.channels):
@@ -113,7 +116,7 @@ def _disturbed(session: Session, number: int) -> Session:
 _USED: Final = frozenset(channel for group in GROUPS.values() for channel in group)
 
 
-def examples_of(task: Task, variant: Variant, sessions: list[Session], least: int) -> Examples:
+def examples_of(task: Task, variant: Variant, sessions: list[SimulatedSession], least: int) -> Examples:
     """Decisions of all people, as this robot's sensors have them."""
     recipe = recipe_of(task, variant)
     seen = disturbed(sessions) if variant.noisy else sessions

@@ -26,7 +26,7 @@ from ml.benchmarks.sim import (
     recipe_of,
     robot,
 )
-from ml.registry.judged import calibrated
+from ml.registry.classifier_scores import calibrated
 from ml.robot.learn import learn
 from ml.robot.learned import ABNORMAL_FROM, NONE
 from ml.robot.task import ACTIVITY
@@ -64,7 +64,7 @@ class Judged:
         return metrics.macro_f1(self.truth[rows], self.likeliest[rows], len(self.classes))
 
     def sets(self, rows: npt.NDArray[np.bool_]) -> dict[str, float]:
-        """What these rows show of conformal sets."""
+        """Return what these rows show of conformal sets."""
         right = self.likeliest == self.truth
         return coverage.of_rows(self.covered, self.label != NONE, right, rows & self.known)
 

@@ -26,7 +26,7 @@ from ml.benchmarks.sim import (
     recipe_of,
     robot,
 )
-from ml.registry.judged import calibrated
+from ml.registry.classifier_scores import calibrated
 from ml.robot import learn
 from ml.robot.learned import NONE
 from ml.robot.task import GAIT_PHASE, SIDES

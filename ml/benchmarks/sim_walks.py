@@ -27,7 +27,7 @@ from ml.robot.learn import WITHIN
 from ml.robot.learned import ABNORMAL_FROM, NONE, Learned
 from ml.robot.task import ACTIVITY, GAIT_PHASE, SIDES, Task
 from ml.training.adapting import taught
-from ml.training.simulated import Session, examples, read, stepping
+from ml.training.simulated import SimulatedSession, examples, read, stepping
 
 MINUTE_NS: Final = 60_000_000_000  # of a recording, whatever its wearer does in it
 LEAST_LATER: Final = 100  # decisions in steps, to judge an adapted model by
@@ -82,8 +82,8 @@ def evaluate(path: Path, search: Search) -> Outcome:  # noqa: ARG001 - there is 
     return Outcome(figures | _adaptation(found), people, groups, "walks", settings=settings, notes=(WHY,))
 
 
-def _shipped(registry: Registry, task: Task, sessions: Sequence[Session]) -> Learned:
-    """The model of a robot with every sensor.
+def _shipped(registry: Registry, task: Task, sessions: Sequence[SimulatedSession]) -> Learned:
+    """Return the model of a robot with every sensor.
 
     Raises:
         UnusableData: a session lacks a sensor, or its wearer is one whom the model has learned from.
@@ -97,7 +97,7 @@ def _shipped(registry: Registry, task: Task, sessions: Sequence[Session]) -> Lea
     return Learned.restored(state)
 
 
-def _check_people(card: Card, sessions: Sequence[Session]) -> None:
+def _check_people(card: Card, sessions: Sequence[SimulatedSession]) -> None:
     known = {name.split("-")[2] for name in (*card.learned, *card.held_out)}  # sim-SEED-PERSON[-WALKS]
     both = sorted({session.subject for session in sessions} & known, key=int)
     if both:
@@ -107,7 +107,7 @@ def _check_people(card: Card, sessions: Sequence[Session]) -> None:
         )
 
 
-def _found(session: Session, activity: Learned, phase: Learned) -> Found:
+def _found(session: SimulatedSession, activity: Learned, phase: Learned) -> Found:
     doing = examples(ACTIVITY, activity.recipe, [session], STEPS["activity"])
     names = np.array([ACTIVITY.fold.get(label, "") for label in doing.label])
     rows = np.isin(names, activity.classes)

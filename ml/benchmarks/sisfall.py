@@ -26,7 +26,7 @@ class Recording:
 
 
 def read(path: Path) -> list[Recording]:
-    """The file's recordings.
+    """Return the file's recordings.
 
     Raises:
         UnusableData: it is not such a file, or has samples that cannot be.

@@ -59,7 +59,10 @@ def evaluate(path: Path, search: bool) -> Outcome:  # noqa: ARG001 - there is no
 
 
 def watched(own: Sequence[sisfall.Recording], calibration: Calibration) -> Iterator[Watched]:
-    """What is said of one person's recordings, who is known by his walking; nothing where he has none."""
+    """Yield what is said of one person's recordings, who is known by his walking.
+
+    Nothing where he has none.
+    """
     known = sorted((one for one in own if one.activity in KNOWN), key=lambda one: one.activity)
     if not known:
         return
@@ -85,7 +88,10 @@ def _taken(person: Person, one: sisfall.Recording, walking: sisfall.Recording) -
 
 
 def fallen(judged: Judged, impact_s: float) -> Judged:
-    """The same with a fall as a danger that does harm at its impact; advice that stood before it is none."""
+    """Return the same with a fall as a danger that does harm at its impact.
+
+    Advice that stood before it is none.
+    """
     comes = judged.seen.at_s > impact_s - FALL_S
     danger, first = np.where(comes, 1.0, HEALTHY), int(np.argmax(comes))
     danger[[0, -1]] = HEALTHY, 1.5  # however short it is, it begins and ends

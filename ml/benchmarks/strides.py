@@ -47,12 +47,12 @@ class Decisions:
 
 
 def lessons(trials: Sequence[ipol.Trial]) -> Decisions:
-    """What is learned from: every trial as it was, and as slower and faster people would have walked it."""
+    """Return what is learned from: every trial, and each as if somebody slower or faster had walked it."""
     return _joined(decisions(trials), decisions(_paced(trials, PACES), PACES_STEP))
 
 
 def own_lessons(trials: Sequence[ipol.Trial]) -> Decisions:
-    """What is learned from one wearer's trials."""
+    """Return what is learned from one wearer's trials."""
     return _joined(_decisions(trials, OWN_STEP), _decisions(_paced(trials, OWN_PACES), 2 * OWN_STEP))
 
 
@@ -74,7 +74,7 @@ def _decisions(trials: Sequence[ipol.Trial], step: int) -> Decisions:
     if not parts:
         raise UnusableData(TOO_FEW)
     columns: list[Any] = [np.concatenate(column) for column in zip(*parts, strict=True)]
-    columns[2] = _apart([part[2] for part in parts])
+    columns[2] = apart([part[2] for part in parts])
     return Decisions(*columns)
 
 
@@ -85,11 +85,11 @@ def _paced(trials: Sequence[ipol.Trial], paces: Sequence[float]) -> list[ipol.Tr
 
 def _joined(*made: Decisions) -> Decisions:
     columns = {field.name: [getattr(one, field.name) for one in made] for field in fields(Decisions)}
-    stride = _apart(columns.pop("stride"))
+    stride = apart(columns.pop("stride"))
     return Decisions(**{name: np.concatenate(column) for name, column in columns.items()}, stride=stride)
 
 
-def _apart(numbers: Sequence[npt.NDArray[np.int_]]) -> npt.NDArray[np.int_]:
+def apart(numbers: Sequence[npt.NDArray[np.int_]]) -> npt.NDArray[np.int_]:
     """Numbers counted on from list to list, so that no two lists share one."""
     sizes = [int(own.max()) + 1 for own in numbers]
     offsets = np.cumsum([0, *sizes[:-1]])

@@ -17,7 +17,7 @@ from ml.danger.detector import DETECTORS, Detector
 from ml.danger.drift import Drift
 from ml.danger.levels import Level, Levels
 from ml.danger.memory import Memory, kinds
-from ml.danger.now import CHANNELS, Now
+from ml.danger.now import CHANNELS, Now, or_zero
 from ml.danger.rhythm import Rhythm
 from ml.danger.strides import Strides
 from ml.danger.support import Support
@@ -63,7 +63,7 @@ class Verdict:
 
 
 def detectors(memory: Memory) -> tuple[Detector, ...]:
-    """New ones, for one robot, in the order of `DETECTORS`."""
+    """Return new ones, for one robot, in the order of `DETECTORS`."""
     first = (Tracking(), Torque(), Strides(), Support(), Balance(), Rhythm(), Agreement(), Drift(), Creep())
     return *first, *kinds(memory)
 
@@ -102,8 +102,8 @@ class Evidence:
         return above
 
     def why(self, above: Floats) -> tuple[str, ...]:
-        """The reasons of the last moment, the worst first."""
-        order = np.argsort(-np.nan_to_num(above))[:TOLD].tolist()
+        """Return the reasons of the last moment, the worst first."""
+        order = np.argsort(-or_zero(above))[:TOLD].tolist()
         return tuple(self._words(at) for at in order if above[at] >= TELLING)
 
     def _words(self, at: int) -> str:

@@ -27,7 +27,10 @@ def moments(signals: Samples, length: int) -> Samples:
 
 
 def deviation(signals: Samples, mean: Samples) -> Samples:
-    """The standard deviation over the last axis, of which the mean is known: numpy would compute it again."""
+    """Return the standard deviation over the last axis, of which the mean is known.
+
+    Numpy would compute it again.
+    """
     apart = signals - mean
     np.multiply(apart, apart, out=apart)
     spread: Samples = np.sqrt(apart.mean(axis=-1))

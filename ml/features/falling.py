@@ -102,7 +102,7 @@ def _angle(one: Samples, other: Samples) -> Samples:
 
 
 def _tipping(acceleration: Samples, spin: Samples, upright: Samples) -> Samples:
-    """The tilt that the gyroscope has seen since the window's beginning, how fast it grew, and the lift."""
+    """Return the gyroscope's tilt since the window's start, its rate of growth, and the lift."""
     rates = spin[..., TILT_FROM:].reshape(*spin.shape[:2], -1, STRETCH).mean(axis=-1)
     verticals = _turned(upright, rates.transpose(0, 2, 1) * (-STRETCH / RATE_HZ))
     tilts = _angle(_direction(verticals), upright[:, None])
@@ -112,7 +112,7 @@ def _tipping(acceleration: Samples, spin: Samples, upright: Samples) -> Samples:
 
 
 def _turned(vector: Samples, rotations: Samples) -> Samples:
-    """A vector (n, 3) after each of rotations (n, steps, 3) about an axis by its length, rad (Rodrigues)."""
+    """Return vectors (n, 3) after rotations (n, steps, 3) about an axis by its length, rad (Rodrigues)."""
     angle = _long(rotations)[..., None]
     axis = rotations / np.maximum(angle, TINY)
     next_axis, last_axis = axis[..., NEXT], axis[..., LAST]
@@ -128,7 +128,7 @@ def _turned(vector: Samples, rotations: Samples) -> Samples:
 
 
 def moving(values: Features) -> npt.NDArray[np.bool_]:
-    """The rows of features in which somebody moves: his weight changes, or his waist turns."""
+    """Return the rows of features in which somebody moves: his weight changes, or his waist turns."""
     at = LENGTHS.index(25) * PER_LENGTH
     weight_deviation, mean_turning = values[:, at + 3], values[:, at + 4]
     return np.asarray((weight_deviation > MOVING) | (mean_turning > MOVING))

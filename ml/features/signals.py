@@ -20,14 +20,17 @@ def length(vectors: Samples) -> Samples:
 
 
 def up(acceleration: Samples) -> Samples:
-    """The vertical (n, 3, 1) in the sensor's frame: the mean specific force over the window points up."""
+    """Return the vertical (n, 3, 1) in the sensor's frame.
+
+    The mean specific force over the window points up.
+    """
     mean = acceleration.mean(axis=-1, keepdims=True)
     vertical: Samples = mean / np.maximum(np.sqrt((mean * mean).sum(axis=1, keepdims=True)), TINY)
     return vertical
 
 
 def along(vectors: Samples, axis: Samples) -> Samples:
-    """The part of (n, 3, samples) along unit vectors (n, 3, 1): (n, samples)."""
+    """Return the part of (n, 3, samples) along unit vectors (n, 3, 1): (n, samples)."""
     return _dot(vectors, axis)
 
 

@@ -24,7 +24,7 @@ class FeatureStream:
         self._next = (self._next + 1) % length
 
     def window(self) -> Samples:
-        """The window (1, channels, look-back) as it is now; those of several robots can be stacked.
+        """Return the window (1, channels, look-back) as it is now; those of several robots can be stacked.
 
         Raises:
             ValueError: no sample has come yet.

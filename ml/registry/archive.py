@@ -83,7 +83,7 @@ _TYPES: Final = sorted(set().union(*ALLOWED.values()))
 
 
 def dump(state: dict[str, Any]) -> bytes:
-    """A model's state, plain values, numpy arrays and fitted scikit-learn objects, as a file's content.
+    """Return a model's state (values, arrays, fitted scikit-learn objects) as a file's content.
 
     Equal states give equal bytes. Random generators, which only learning needs, are left out.
 
@@ -99,7 +99,7 @@ def dump(state: dict[str, Any]) -> bytes:
 
 
 def load(data: bytes) -> dict[str, Any]:
-    """The state in a file's content.
+    """Return the state in a file's content.
 
     Raises:
         UnusableModel: it is damaged, too large, of another kind or version, or holds a type that is not
@@ -122,7 +122,7 @@ def load(data: bytes) -> dict[str, Any]:
 
 
 def _written_anew(data: bytes) -> bytes:
-    """The same content, of which every part is known; raises `UnusableModel`."""
+    """Return the same content, of which every part is known; raises `UnusableModel`."""
     if len(data) > MAX_BYTES:
         raise UnusableModel(f"it has {len(data)} bytes; a model has at most {MAX_BYTES}")
     if data[:1] == b"\x80":
@@ -239,7 +239,7 @@ def _check_array(data: bytes) -> None:
 
 
 def _this_version(node: dict[str, Any]) -> dict[str, Any]:
-    """A part's version of scikit-learn as the one that runs, where both understand it alike."""
+    """Return a part's version of scikit-learn as the one that runs, where both understand it alike."""
     made, here = str(json.loads(node["content"])), str(sklearn.__version__)
     if made.split(".")[:2] != here.split(".")[:2]:
         raise UnusableModel(

@@ -16,7 +16,7 @@ FORMAT: Final = 1
 _NOT_CONTENT: Final = ("id", "made")  # two that learned the same have the same model, whenever that was
 
 
-class Source(Enum):
+class DataSource(Enum):
     """Where its examples come from."""
 
     RECORDED = "recorded"
@@ -74,7 +74,7 @@ class Card(Struct, frozen=True, kw_only=True):
     units: dict[str, str]  # of each channel
     ranges: dict[str, tuple[float, float]] = {}  # of each channel, from its 0.1 % to its 99.9 % quantile
     features_hash: str  # of the code that makes its features
-    source: Source
+    source: DataSource
     seed: int
     made: datetime
     versions: dict[str, str]  # of what learned it: python, scikit-learn, numpy, skops
@@ -91,7 +91,7 @@ class Card(Struct, frozen=True, kw_only=True):
 
 
 def content_id(card: Card) -> str:
-    """The name of a model with these files and this card, but for when it was made."""
+    """Return the name of a model with these files and this card, but for when it was made."""
     return f"{card.task}-{digest(card)[:12]}"
 
 
@@ -108,7 +108,7 @@ def encoded(card: Card) -> bytes:
 
 
 def decoded(data: bytes) -> Card:
-    """The card in a `model.json`.
+    """Return the card in a `model.json`.
 
     Raises:
         UnusableModel: it is none, or not the one that was published.
@@ -154,7 +154,7 @@ def age_days(card: Card, now: datetime | None = None) -> float:
 
 
 def checked_name(name: str, what: str) -> str:
-    """A name that may stand in a path; raises `UnusableModel` where it may not."""
+    """Return a name that may stand in a path; raises `UnusableModel` where it may not."""
     if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_.-]*", name):
         raise UnusableModel(f"{name!r} is no name of a {what}")
     return name

@@ -37,7 +37,7 @@ def versions() -> dict[str, str]:
 
 
 def _modules(name: str, seen: set[str]) -> set[str]:
-    """A module, those of ours that it imports, and so on."""
+    """Return a module, those of ours that it imports, and so on."""
     seen.add(name)
     for found in _imports(name) - seen:
         _modules(found, seen)
@@ -61,7 +61,10 @@ def _tree(name: str) -> ast.Module:
 
 
 def _said(node: Any) -> Iterator[str]:
-    """What the code says, the same in every version of Python: without places, docstrings and what is not."""
+    """Yield what the code says, the same in every version of Python.
+
+    Without places, docstrings and what is not.
+    """
     if isinstance(node, ast.AST):
         yield type(node).__name__
         for field, value in ast.iter_fields(node):

@@ -27,7 +27,7 @@ _SPREAD: Final = 2.0  # standard deviations of those rows: some features lie whe
 
 
 def exported(learned: Learned) -> bytes:
-    """The model as ONNX, after both have judged the same rows.
+    """Return the model as ONNX, after both have judged the same rows.
 
     Raises:
         UnusableModel: the extra `onnx` is not installed, or the two differ.
@@ -46,7 +46,7 @@ def exported(learned: Learned) -> bytes:
 
 
 def said(data: bytes, features: Features) -> dict[str, Any]:
-    """What the file says, by ONNX Runtime."""
+    """Return what the file says, by ONNX Runtime."""
     import onnxruntime
 
     session = onnxruntime.InferenceSession(data, providers=["CPUExecutionProvider"])

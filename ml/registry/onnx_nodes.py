@@ -40,7 +40,7 @@ def on_circle(graph: Any, length: Floats, trust: Floats) -> None:
 
 
 def _phases(graph: Any) -> None:
-    """The angle of each pointer, in cycles from 0 up to 1."""
+    """Add nodes for the angle of each pointer, in cycles from 0 up to 1."""
     _add(graph, "Div", ["sine", "cosine"], "tangent")
     _add(graph, "Cast", ["tangent"], "single tangent", to=_float())  # ONNX Runtime has no other Atan
     _add(graph, "Atan", ["single tangent"], "single angle")
@@ -56,7 +56,7 @@ def _phases(graph: Any) -> None:
 
 
 def _interpolated(graph: Any, knots: Floats, values: Floats) -> None:
-    """The first value, and of each piece between two knots as much of its rise as was passed."""
+    """Add nodes for a piecewise linear function between knots."""
     widths = np.diff(knots)
     _add(graph, "Sub", ["shorter", _constant(graph, "knots", knots[:-1])], "beyond")
     _add(graph, "Max", ["beyond", "zero"], "entered")

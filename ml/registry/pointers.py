@@ -44,7 +44,7 @@ class Pointer(Struct, frozen=True):
     signature: str = ""
 
     def message(self, task: str, robot: str) -> bytes:
-        """What is signed."""
+        """Return what is signed."""
         bare = msgspec.structs.replace(self, certificate="", signature="")
         return _KIND + msgspec.json.encode([task, robot, bare])
 
@@ -78,7 +78,7 @@ class Pointers:
         return [self._read(number) for number in range(1, self._last() + 1)]
 
     def newest(self) -> Pointer | None:
-        """What holds now; None where nobody has said anything yet."""
+        """Return what holds now; None where nobody has said anything yet."""
         last = self._last()
         return self._read(last) if last else None
 
@@ -108,7 +108,7 @@ class Pointers:
         raise UnusableModel(f"{self._whose}: {ATTEMPTS} times somebody else was faster")
 
     def target(self) -> Target:
-        """What a rollback would go back to now.
+        """Return what a rollback would go back to now.
 
         Raises:
             UnusableModel: nothing was before.

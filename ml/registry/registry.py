@@ -74,7 +74,7 @@ class Registry:
         return card.id
 
     def entries(self, task: str | None = None) -> list[Card]:
-        """The models that can be looked at, oldest first, those that come with GWRMS before them."""
+        """Return the models that can be looked at, oldest first, those that come with GWRMS before them."""
         cards = [card for card in map(self._card, self._ids()) if isinstance(card, Card)]
         shipped = self.shipped()
         cards = [card for card in cards if task in (None, card.task)]
@@ -87,7 +87,7 @@ class Registry:
         }
 
     def card(self, model: str) -> Card:
-        """What is known of a model.
+        """Return what is known of a model.
 
         Raises:
             UnusableModel: it is not there, or its card is damaged.
@@ -98,7 +98,7 @@ class Registry:
         return self._known[model]
 
     def load(self, model: str) -> tuple[Card, dict[str, Any]]:
-        """A model, of which everything was verified: files, types, versions, the code of its features.
+        """Return a model, of which everything was verified: files, types, versions, the code of its features.
 
         Raises:
             UnusableModel: something is not as it must be; the message says what.
@@ -127,23 +127,23 @@ class Registry:
         raise UnusableModel(f"{model}: there is no {name} of it in {self.url} (gwrms models ls lists models)")
 
     def files(self, model: str) -> list[Object]:
-        """A model's files in the store as it lists them: other ones when something is written anew."""
+        """Return a model's files in the store as it lists them: other ones when something is written anew."""
         found = self._objects.listing(f"{FOLDER}/{checked_name(model, 'model')}")
         return sorted(found, key=lambda each: each.path)
 
     def shipped(self) -> frozenset[str]:
-        """The models that come with GWRMS and that nobody has promoted."""
+        """Return the models that come with GWRMS and that nobody has promoted."""
         return frozenset(_ids(self._shipped)) - frozenset(_ids(self._objects))
 
     # --- which one serves
 
     def serving(self, task: str, robot: str = "", channels: Set[str] | None = None) -> str | None:
-        """The model that serves a robot, as `served_to`."""
+        """Return the model that serves a robot, as `served_to`."""
         found = self.served_to(task, robot, channels)
         return None if found is None else found.model
 
     def served_to(self, task: str, robot: str = "", channels: Set[str] | None = None) -> Serving | None:
-        """What serves a robot: promoted for it, else for all, else one that comes with GWRMS.
+        """Return what serves a robot: promoted for it, else for all, else one that comes with GWRMS.
 
         With `channels` only a model that needs no other; without them, none that comes with GWRMS.
 
@@ -190,7 +190,7 @@ class Registry:
         return done
 
     def promotable(self, model: str, robot: str = "") -> Card:
-        """The card of a model that may be promoted.
+        """Return the card of a model that may be promoted.
 
         Raises:
             UnusableModel: it cannot be loaded, or was adapted to another robot.
@@ -224,7 +224,7 @@ class Registry:
         return self._pointers(task, robot).roll_back(target, who, why, content)
 
     def before(self, task: str, robot: str = "") -> str:
-        """The model that a rollback leads to, or none ("").
+        """Return the model that a rollback leads to, or none ("").
 
         Raises:
             UnusableModel: nothing was before, or that model cannot be loaded any more.
@@ -233,11 +233,11 @@ class Registry:
         return self._target(task, robot).model
 
     def history(self, task: str, robot: str = "") -> list[Pointer]:
-        """What has served, oldest first; raises `UnusableModel` where a part of that is damaged."""
+        """Return what has served, oldest first; raises `UnusableModel` where a part of that is damaged."""
         return Pointers(self._objects, task, robot).history()
 
     def served(self) -> Iterator[tuple[str, str, Pointer]]:
-        """What was promoted and serves now: tasks, robots ("" for all), pointers."""
+        """Yield what was promoted and serves now: tasks, robots ("" for all), pointers."""
         folders = {name.rpartition("/")[0] for name in self._objects.names(SERVING)}
         for folder in sorted(folders):
             task, robot = folder.split("/")[-2:]

@@ -30,7 +30,7 @@ _NUMBERS: Final = ("threshold", "near", "out")
 
 
 def check(state: Mapping[str, Any]) -> None:
-    """Raises `UnusableModel` for a state that `Learned` could not judge with."""
+    """Check a state; raises `UnusableModel` for one that `Learned` cannot use."""
     _all_there(state, KEYS, "the model")
     task = TASKS.get(state["task"])
     if task is None:

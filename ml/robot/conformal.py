@@ -38,7 +38,7 @@ class Promise:
 
 
 def promised(above: Floats, sure: Floats, group: npt.NDArray[Any]) -> Promise:
-    """What can be promised of n decisions about left-out people.
+    """Return what can be promised of n decisions about left-out people.
 
     `above` (n,) is what was thought likelier than the truth, as `passed_over` gives it, `group` (n,) whose
     decision it is: k people. Nobody can promise anything to more than k in k + 1 new ones. `sure` (m,) is the
@@ -53,7 +53,7 @@ def promised(above: Floats, sure: Floats, group: npt.NDArray[Any]) -> Promise:
 
 
 def reach(values: Floats, group: npt.NDArray[Any]) -> float:
-    """What `COVERED` of a new wearer's values keep within, with the probability `WEARERS`, by other people's.
+    """Return the bound for `COVERED` of a new wearer's values, with probability `WEARERS`.
 
     `values` (n,) are of k people, `group` (n,). Of few people it is what the worst one's keep within, which
     holds with the probability k / (k + 1) alone.

@@ -40,7 +40,7 @@ UNITS: Final[Mapping[str, str]] = MappingProxyType(
 
 
 def present(channels: Set[str]) -> tuple[str, ...]:
-    """The groups of which a robot with these channels has every channel."""
+    """Return the groups of which a robot with these channels has every channel."""
     return tuple(name for name, needed in GROUPS.items() if channels >= set(needed))
 
 

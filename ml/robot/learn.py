@@ -61,7 +61,7 @@ def learn(
     seed: int = 0,
     told: Tell = untold,
 ) -> Learned:
-    """A model for `task` from rows of features.
+    """Return a model for `task` from rows of features.
 
     `truth`: (n,) names of classes; for gait_phase (n, 2) phases of the left and the right leg, NaN where the
     legs do not step. Rows of classes that the recipe's sensors cannot tell are left out. `group` (n,): whose
@@ -170,7 +170,10 @@ def _parts(features: Features, targets: npt.NDArray[Any], network: Any, seed: in
 
 
 def _columns(network: Any, found: Rows, columns: int) -> Floats:
-    """A classifier's scores in every class's column: those that it has not met are out of the question."""
+    """Return a classifier's scores in every class's column.
+
+    Those that it has not met are out of the question.
+    """
     if not hasattr(network, "classes_"):
         return found.astype(np.float64)
     every = np.full((len(found), columns), -30.0)
@@ -189,7 +192,7 @@ def _regressor(task: Task, seed: int) -> Any:
 
 
 def _temperature(unseen: Floats, targets: npt.NDArray[np.int_]) -> float:
-    """That under which the truth of left-out people is the least surprising."""
+    """Return the temperature that makes the truth of left-out people most likely."""
     rows = np.arange(len(targets))
     surprise = [
         -np.log(np.maximum(softmax(unseen / one)[rows, targets], 1e-12)).mean() for one in TEMPERATURES

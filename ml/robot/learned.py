@@ -69,7 +69,7 @@ class Learned:
 
     @classmethod
     def restored(cls, state: Mapping[str, Any]) -> "Learned":
-        """What `state` says; raises `UnusableModel` where that is no model of ours."""
+        """Return what `state` says; raises `UnusableModel` where that is no model of ours."""
         from ml.robot.checks import check  # brings scikit-learn, whose objects these are
 
         check(state)
@@ -91,7 +91,7 @@ class Learned:
         return Verdicts(probabilities, self._labels(probabilities), unlike, values)
 
     def together(self, probabilities: Floats) -> npt.NDArray[np.bool_]:
-        """The classes (n, classes) of which one is true, as far as the model's promise goes."""
+        """Return the classes (n, classes) of which one is true, as far as the model's promise goes."""
         return together(probabilities, self.numbers["threshold"])
 
     def _labels(self, probabilities: Floats) -> npt.NDArray[np.int_]:

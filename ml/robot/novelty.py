@@ -49,7 +49,10 @@ def distances(parts: Parts, inputs: Rows) -> tuple[Floats, Floats]:
 
 
 def limits(held_out: tuple[Floats, Floats]) -> dict[str, float]:
-    """What nearly all rows of people that were not learned from keep within: the numbers for `score`."""
+    """Return what nearly all rows of people that were not learned from keep within.
+
+    The numbers for `score`.
+    """
     near, out = (float(np.quantile(one, WITHIN)) for one in held_out)
     return {"near": max(near, 1e-6), "out": max(out, 1e-6)}
 

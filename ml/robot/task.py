@@ -44,12 +44,12 @@ class Task:
     support: Mapping[str, Support]
 
     def recipe(self, channels: Set[str]) -> Recipe | None:
-        """The richest recipe that these channels allow; None where this robot cannot."""
+        """Return the richest recipe that these channels allow; None where this robot cannot."""
         groups = [group for group in present(channels) if group in BLOCKS[self.name]]
         return self._recipe(groups) if self._classes(groups) else None
 
     def classes(self, recipe: Recipe) -> tuple[str, ...]:
-        """The classes that the recipe's sensors can tell.
+        """Return the classes that the recipe's sensors can tell.
 
         Raises:
             UnusableModel: the recipe is none of this task's.
@@ -58,7 +58,7 @@ class Task:
         return self._classes(self._groups(recipe.name))
 
     def named(self, name: str) -> Recipe:
-        """The recipe of this name; raises `UnusableModel` where there is none."""
+        """Return the recipe of this name; raises `UnusableModel` where there is none."""
         return self._recipe(self._groups(name))
 
     def _groups(self, name: str) -> tuple[str, ...]:
@@ -153,7 +153,10 @@ TASKS: Final[Mapping[str, Task]] = MappingProxyType(
 
 
 def recipe_named(name: str) -> Recipe:
-    """The recipe of this name, as "activity/hips+knees+trunk"; raises `UnusableModel` where there is none."""
+    """Return the recipe of this name, as "activity/hips+knees+trunk".
+
+    Raises `UnusableModel` where there is none.
+    """
     task = TASKS.get(name.partition("/")[0])
     if task is None:
         raise UnusableModel(f"{name!r} is no recipe of a robot's own models: those of {', '.join(TASKS)} are")

@@ -70,7 +70,7 @@ class Grid:
         return held[0][1] if there else None
 
     def _after_gap(self, grid_ns: int, settled_ns: int) -> int:
-        """The first point after this one at which no channel is known to be missing."""
+        """Return the first point after this one at which no channel is known to be missing."""
         later_ns = grid_ns + self._period_ns
         for held in self._held:
             if self._value(held, grid_ns) is None:
@@ -80,7 +80,7 @@ class Grid:
 
 
 def on_grid(recipe: Recipe, stamps_ns: Stamps, values: Samples) -> list[Piece]:
-    """What `Grid` gives for a whole recording: pieces without a gap, in time's order.
+    """Return what `Grid` gives for a whole recording: pieces without a gap, in time's order.
 
     `values` (rows, channels) are in the order of the recipe's channels; what is not finite is missing. Rows
     may come in any order.
@@ -117,5 +117,5 @@ def _points(stamps_ns: Stamps, period: int, settled_ns: int) -> Stamps:
 
 
 def _up(stamp_ns: int, period: int) -> int:
-    """The first grid point that is not before this."""
+    """Return the first grid point that is not before this."""
     return -(-stamp_ns // period) * period

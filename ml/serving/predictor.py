@@ -79,7 +79,7 @@ class Windows:
 
 
 def judged(model: str, learned: Learned, windows: Sequence[Window]) -> list[Prediction]:
-    """A prediction for each window, of whichever robot; judged together."""
+    """Return a prediction for each window, of whichever robot; judged together."""
     if not windows:
         return []
     samples = np.concatenate([window.samples for window in windows])
@@ -91,7 +91,7 @@ def judged(model: str, learned: Learned, windows: Sequence[Window]) -> list[Pred
 def replayed(
     model: str, learned: Learned, stamps_ns: Stamps, values: Samples, every_ns: int
 ) -> list[Prediction]:
-    """The predictions that there were, or would have been, of a recording.
+    """Return the predictions that there were, or would have been, of a recording.
 
     `stamps_ns` (rows,) and `values` (rows, channels in the recipe's order, NaN: missing), of one boot.
     """

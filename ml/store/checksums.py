@@ -81,7 +81,7 @@ def _mixed(each: Sums) -> Sums:
 
 @functools.lru_cache(10_000)
 def _constants(name: str) -> tuple[np.uint64, np.uint64]:
-    """A column's factor, which is odd, and what each of its values that is there adds."""
+    """Return a column's factor, which is odd, and what each of its values that is there adds."""
     factor, term = (_digest(f"{part} {name}".encode()) for part in ("factor", "term"))
     return np.uint64(factor | 1), np.uint64(term)
 

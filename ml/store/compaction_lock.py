@@ -88,7 +88,7 @@ def _busy(store: Store, location: str, path: str) -> StoreError:
 
 
 def _claim(store: Store, path: str) -> Claim | None:
-    """What an object claims; one that cannot be read counts as long as any, since it was written."""
+    """Return what an object claims; one that cannot be read counts as long as any, since it was written."""
     data = store.objects.read(path)
     if data is None:
         return None

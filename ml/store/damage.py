@@ -77,7 +77,7 @@ def _decoded(store: Store, file: DataFile) -> int:
 
 
 def _problem(store: Store, file: DataFile, found: Object) -> str | None:
-    """What is wrong with its content, of which a copy is made first: no network makes that fail."""
+    """Return what is wrong with its content, of which a copy is made first: no network makes that fail."""
     with tempfile.NamedTemporaryFile(prefix="gwrms-") as copy:
         for piece in store.objects.pieces(found):
             copy.write(piece)

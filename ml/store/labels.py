@@ -31,7 +31,7 @@ WEARER: Final = "wearer "  # before a name: who wore the robot
 REGRESSION: Final = "regression set"  # of a session: no model learns from it, each is judged by it
 
 
-class Source(Enum):
+class LabelSource(Enum):
     """Who says so, the most trusted first."""
 
     PERSON = "person"
@@ -49,10 +49,10 @@ class Label(Struct, frozen=True, order=True):
     ended_utc_ns: int
     label: str
     author: str
-    source: Source = Source.PERSON
+    source: LabelSource = LabelSource.PERSON
 
     def __post_init__(self) -> None:
-        """Times as the store keeps them."""
+        """Round times to the store's resolution."""
         for name in ("began_utc_ns", "ended_utc_ns"):
             force_setattr(self, name, getattr(self, name) // US_NS * US_NS)
 
@@ -89,11 +89,11 @@ class Label(Struct, frozen=True, order=True):
         }
 
 
-def _source(row: Mapping[str, Any]) -> Source:
+def _source(row: Mapping[str, Any]) -> LabelSource:
     try:
-        return Source(row["source"])
+        return LabelSource(row["source"])
     except ValueError:
-        known = ", ".join(source.value for source in Source)
+        known = ", ".join(source.value for source in LabelSource)
         raise StoreError(
             f"the label {row['label']!r} of session {row['session']} of {row['robot']} has the source "
             f"{row['source']!r}; known are {known}: correct it with the program that wrote it"

@@ -23,7 +23,7 @@ def private_folder(folder: Path) -> None:
 
 
 def closed_folder(folder: Path) -> None:
-    """The same, and one that is there and ours is closed to others."""
+    """Make the folder, and close an existing one of ours to others."""
     private_folder(folder)
     found = folder.stat()
     if found.st_uid == os.geteuid() and stat.S_IMODE(found.st_mode) & _OTHERS:

@@ -90,7 +90,7 @@ def _holding(labels: duckdb.DuckDBPyRelation) -> duckdb.DuckDBPyRelation:
 
 
 def _run(connection: duckdb.DuckDBPyConnection, work: Callable[[], Found]) -> Found:
-    """What may take long, in a thread, so that Ctrl-C ends it."""
+    """Return what may take long, in a thread, so that Ctrl-C ends it."""
     outcome: Future[Found] = Future()
     thread = threading.Thread(target=_settle, args=(outcome, work), name="query")
     try:
@@ -125,7 +125,7 @@ def _found(connection: duckdb.DuckDBPyConnection, sql: str) -> pa.RecordBatchRea
 
 
 def _asked(sql: str) -> list[str]:
-    """The tables whose names are in the text, or all: a table that is not opened costs nothing."""
+    """Return the tables whose names are in the text, or all: a table that is not opened costs nothing."""
     words = {word.lower() for word in re.findall(r"\w+", sql)}
     return [name for name in TABLES if name in words] or list(TABLES)
 

@@ -41,7 +41,7 @@ class Piece(NamedTuple):
     rows: int
 
 
-class Source(NamedTuple):
+class TelemetrySource(NamedTuple):
     """A place with telemetry of a session: what is there, and what may have rows with such stamps."""
 
     pieces: Sequence[Piece]
@@ -230,16 +230,16 @@ def telemetry(
             yield from merged([stored(store, session)], names, begin, end)
 
 
-def stored(store: Store, session: Session) -> Source:
+def stored(store: Store, session: Session) -> TelemetrySource:
     """Return the session's telemetry in the store, for `merged`."""
     files = _files(store, session)
     rows = _of_session(store, session)
     pieces = [Piece(each.first, each.last, each.first_ns, each.last_ns, each.rows) for each in files]
-    return Source(pieces, lambda _begin, _end: rows)
+    return TelemetrySource(pieces, lambda _begin, _end: rows)
 
 
 def merged(
-    sources: Sequence[Source],
+    sources: Sequence[TelemetrySource],
     names: Sequence[str],
     begin: datetime | None = None,
     end: datetime | None = None,

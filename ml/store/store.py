@@ -245,7 +245,7 @@ class Store:
         self._lasting[table] = newest
 
     def _about(self, wanted: About) -> About:
-        """What the store is; a new one is probed first."""
+        """Return what the store is; a new one is probed first."""
         data = self.objects.read(ABOUT)
         if data is None:
             if self.folder is None and wanted.several_writers:
@@ -300,7 +300,10 @@ class Store:
         return delta
 
     def _files(self, table: Table, location: str, batches: Iterator[pa.RecordBatch]) -> list[AddAction]:
-        """New files with these rows, in a folder already synchronised: a log never names what may vanish."""
+        """Return new files with these rows, in a folder already synchronised.
+
+        A log never names what may vanish.
+        """
         files = writing.write(self.objects, table, location, batches)
         if self.folder is not None:
             durable.synchronise(self.folder / location / file.path for file in files)

@@ -125,7 +125,7 @@ def _end(table: Path) -> Iterator[Torn]:
 
 
 def _unread(table: Path) -> Iterator[Torn]:
-    """An entry at the end of which files cannot be read: not every commit's files last before they are named.
+    """Yield newest entries with unreadable files: these may be named before they are durable.
 
     Those that they were made of are still there.
     """
@@ -141,7 +141,7 @@ def _unread(table: Path) -> Iterator[Torn]:
 
 
 def _checkpoint(table: Path) -> Iterator[Torn]:
-    """The newest one: where it is cut off, or of a version that the log does not have (any more)."""
+    """Yield the newest one: where it is cut off, or of a version that the log does not have (any more)."""
     file = max((table / durable.LOG).glob(_CHECKPOINTS), default=None)
     if file is not None:
         try:
@@ -154,7 +154,7 @@ def _checkpoint(table: Path) -> Iterator[Torn]:
 
 
 def _unsure(table: Path) -> Iterator[Torn]:
-    """The newest checkpoint, where nobody knows that it lasts and all that it says is in the log, too."""
+    """Yield the newest checkpoint, if it may not be durable and the log has its content."""
     file = max((table / durable.LOG).glob(_CHECKPOINTS), default=None)
     lasting, _ = _ends(table)
     if file is None or durable.is_marked(file) or not _is_marked(lasting):
@@ -187,7 +187,7 @@ def _earlier(table: Path) -> Iterator[Torn]:
 
 
 def _beginning(table: Path) -> Iterator[Torn]:
-    """The entry before the oldest one, where that has none before it, and no checkpoint stands for them."""
+    """Yield the entry missing before the oldest one, if no checkpoint stands for it."""
     oldest = min(map(_version, _entries(table)), default=0)
     checkpoints = (table / durable.LOG).glob(_CHECKPOINTS)
     if oldest and not any(_version(file) >= oldest - 1 for file in checkpoints):
@@ -198,7 +198,7 @@ def _beginning(table: Path) -> Iterator[Torn]:
 
 
 def _ends(table: Path) -> tuple[list[Path], list[Path]]:
-    """The log up to the newest mark, and what comes after it.
+    """Return the log up to the newest mark, and what comes after it.
 
     Without a mark anywhere the newest entry may be no power cut's loss, nor what it does not build on.
     """

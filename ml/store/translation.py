@@ -37,6 +37,7 @@ _REASONS: Final = (
 _GONE: Final = re.compile(
     r"Failed to open local file '([^']+)'.*No such file|Path does not exist '([^']+)'", re.S
 )
+_OS_ERROR: Final = re.compile(r"([A-Z][^:()\[\]]*) \(os error \d+\)|\[Errno \d+\] ([^:\[\]]+)")
 _LONGEST: Final = 300
 _ADVICE: Final = {
     StoreRefused: "check AWS_PROFILE, or AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY, and what they may do",
@@ -88,12 +89,13 @@ def _kind(error: Exception) -> type[StoreError]:
 
 
 def _reason(error: Exception) -> str:
-    """The error in few words; what a server answered is reduced to its code."""
+    """Return the error in few words; what a server answered is reduced to its code."""
     text = str(error)
     if gone := _GONE.search(text):
         return f"{gone[1] or gone[2]} is not there"
     found = [next(filter(None, groups)) for groups in _CODE.findall(text)]
     found = found or [reason for reason in _REASONS if reason in text]
+    found = found or [next(filter(None, groups)).strip() for groups in _OS_ERROR.findall(text)]
     if not found and not _ANSWERED.search(text):
         line = _COLOUR.sub("", text).strip().partition("\n")[0]
         found = [textwrap.shorten(line, _LONGEST, placeholder=" …")]

@@ -96,7 +96,7 @@ def _gone(location: str, delta: DeltaTable, there: Set[str]) -> int:
 
 
 def _can_be_pinned(store: Store, location: str, there: Set[str]) -> str:
-    """The newest versions that are whole, in words."""
+    """Return the newest versions that are whole, in words."""
     newest = store.table(location).version()
     back = range(newest, max(newest - LOOKED_BACK, -1), -1)
     whole = list(itertools.takewhile(lambda each: _whole(store, location, each, there), back))

@@ -31,7 +31,7 @@ Partition = Mapping[str, str]  # column → value
 def write(
     objects: Objects, table: Table, location: str, batches: Iterator[pa.RecordBatch]
 ) -> list[AddAction]:
-    """New files with these rows, for a commit to name; before that nobody reads them.
+    """Return new files with these rows, for a commit to name; before that nobody reads them.
 
     Raises:
         ValueError: a batch has rows of several partitions.
@@ -52,7 +52,7 @@ def write(
 
 
 def _portions(table: Table, batches: Iterator[pa.RecordBatch]) -> Iterator[tuple[Partition, pa.Table]]:
-    """What follows each other in one partition, as much as a file holds."""
+    """Yield what follows each other in one partition, as much as a file holds."""
     filled = (batch for batch in batches if batch.num_rows)
     for partition, alike in itertools.groupby(filled, lambda batch: _partition(table, batch)):
         portion: list[pa.RecordBatch] = []
@@ -118,5 +118,5 @@ def _statistics(rows: pa.Table) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """Times as the format has them in a log: milliseconds, rounded downwards."""
+    """Return times as the format has them in a log: milliseconds, rounded downwards."""
     return f"{value:%Y-%m-%dT%H:%M:%S.%f}"[:-3] + "Z" if isinstance(value, datetime) else value

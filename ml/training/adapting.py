@@ -56,7 +56,7 @@ def divided(parts: Sequence[Part], minute_s: float = MINUTE_S) -> Divided:
 
 
 def adapted(base: Learned, parts: Sequence[Part], seed: int = 0) -> Learned:
-    """A copy that has also learned from these decisions; how far it trusts itself stays as it was."""
+    """Return a copy that has also learned from these decisions; how far it trusts itself stays as it was."""
     features = np.concatenate([each.features for each in parts])
     return taught(base, features, np.concatenate([each.truth for each in parts]), seed)
 
@@ -64,7 +64,7 @@ def adapted(base: Learned, parts: Sequence[Part], seed: int = 0) -> Learned:
 def taught(
     base: Learned, features: Features, phases: Samples, seed: int = 0, told: Callable[[], None] = lambda: None
 ) -> Learned:
-    """The same, of a row of features and of phases (n, 2) for each decision.
+    """Return the same, of a row of features and of phases (n, 2) for each decision.
 
     `told` is called every few milliseconds, so that who learns in a thread can let others work.
     """

@@ -14,7 +14,7 @@ HELD_OUT_SHARE: Final = 0.25  # of wearers, or sessions, where nobody says which
 
 
 def recipe_for(task: Task, channels: Sequence[Set[str]]) -> Recipe:
-    """The richest recipe that at least half of the sessions have the channels for; `channels` are theirs.
+    """Return the richest recipe whose `channels` at least half of the sessions have.
 
     Raises:
         UnusableData: no session has enough.
@@ -39,7 +39,7 @@ def judging(parts: Sequence[Part]) -> list[Part]:
 
 
 def held_out(groups: Iterable[str], wanted: Sequence[str] = (), others: int = 0) -> frozenset[str]:
-    """The wearers, or sessions, that judge: those that are wanted, else a quarter by a hash of their names.
+    """Return the judging wearers or sessions: as requested, else a quarter by a hash of their names.
 
     So somebody who is held out once stays so, however much is recorded later. `others` are sessions that
     only teach.

@@ -22,7 +22,7 @@ from ml.robot.learned import ABNORMAL_FROM, NONE, Learned
 from ml.robot.task import TASKS, recipe_named
 from ml.serving.grid import on_grid
 from ml.store import NoSuchTable, Store
-from ml.store.labels import REGRESSION, Label, Source, holding, person, wearer
+from ml.store.labels import REGRESSION, Label, LabelSource, holding, person, wearer
 from ml.store.sessions import newest
 from ml.store.tables import LABELS, SESSIONS, TELEMETRY, Table
 from ml.store.translation import translated
@@ -68,7 +68,7 @@ class Part:
     named: bool = True  # whether somebody has said who the wearer was
 
     def of(self, rows: npt.NDArray[Any]) -> "Part":
-        """Some of its decisions."""
+        """Return some of its decisions."""
         return Part(
             self.ask,
             self.group,
@@ -91,7 +91,7 @@ class LeftOut:
 
 
 def part(ask: Ask) -> Part | LeftOut:
-    """The session's decisions.
+    """Return the session's decisions.
 
     Raises:
         StoreError: the store cannot be read.
@@ -236,7 +236,7 @@ def _teach(ask: Ask, store: Store, known: tuple[npt.NDArray[Any], Names], stamps
     _, mine, its = np.intersect1d(stamps_ns, its_stamps_ns[sure], return_indices=True)
     free = source[mine] == NOBODY
     truth[mine[free]] = np.array(teacher.classes)[verdicts.label[sure][its[free]]]
-    source[mine[free]] = Source.PSEUDO.value
+    source[mine[free]] = LabelSource.PSEUDO.value
 
 
 # --- tables
@@ -259,7 +259,7 @@ def _rows(store: Store, table: Table, ask: Ask) -> list[dict[str, Any]]:
 
 
 def versions(store: Store, robots: Sequence[str]) -> dict[str, int]:
-    """The versions of now, of all tables that are needed for these robots' sessions, by location."""
+    """Return the versions of now, of all tables that are needed for these robots' sessions, by location."""
     shards = store.about.shards
     wanted = {*(TELEMETRY.location(robot, shards) for robot in robots), SESSIONS.name, LABELS.name}
     found: dict[str, int] = {}

@@ -15,7 +15,7 @@ PATIENCE_S = 30  # for a cluster to answer
 
 
 def extract(asks: Sequence[Ask], cluster: str = "", told: Tell = untold) -> list[Part | LeftOut]:
-    """A result for each that is asked for, in this order; `cluster` is a Dask scheduler's address.
+    """Return a result for each that is asked for, in this order; `cluster` is a Dask scheduler's address.
 
     `told` hears of each session that is read here.
 

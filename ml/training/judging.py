@@ -15,10 +15,10 @@ import numpy.typing as npt
 from msgspec.structs import replace
 
 from ml.registry.card import Metrics
-from ml.registry.judged import calibrated, judged
+from ml.registry.classifier_scores import calibrated, judged
 from ml.robot.learned import ABNORMAL_FROM, NONE, Learned, Verdicts
 from ml.robot.task import Task
-from ml.store.labels import Source
+from ml.store.labels import LabelSource
 from ml.training.dataset import Part
 
 FEW: Final = 20  # decisions; a class or person with fewer is no reason
@@ -70,8 +70,9 @@ def decide(task: Task, held_out: Judged, regression: Judged | None) -> Decision:
         return _without_serving(task, held_out, figure)
     old = held_out.serving.figures[figure]
     gain = new - old if task.fold else old - new
+    ours, its = _percents(task, new, old)
     reasons = [
-        f"{figure} on {held_out.name}: {new:.4g}, the serving model's {old:.4g}"
+        f"{figure} on {held_out.name}: {ours}, the serving model's {its}"
         + ("" if gain > 0 else ": not better")
     ]
     losses = [loss for each in (held_out, regression) if each is not None for loss in _losses(task, each)]
@@ -82,8 +83,9 @@ def _without_serving(task: Task, held_out: Judged, figure: str) -> Decision:
     """Nothing serves: so it must be better than saying always the same."""
     new, idle = held_out.new.figures[figure], held_out.new.figures["idle"]
     better = new > idle if task.fold else new < idle
+    ours, its = _percents(task, new, idle)
     told = (
-        f"{figure} on {held_out.name}: {new:.4g}; saying always the same has {idle:.4g}; "
+        f"{figure} on {held_out.name}: {ours}; saying always the same has {its}; "
         "no model that was promoted serves yet"
     )
     return Decision(better, (told,))
@@ -97,15 +99,30 @@ def _losses(task: Task, found: Judged) -> Iterator[str]:
     for name, score in old.per_class.items():
         lost = score.f1 - new.per_class[name].f1
         if score.support >= FEW and lost > MOST_LOST:
-            yield f"much worse in the {found.name}: F1 of {name} falls by {lost:.3f}"
+            yield f"much worse in the {found.name}: F1 of {name} falls by {100 * lost:.1f} points"
     for who, before in old.per_subject.items():
         lost = before - new.per_subject[who] if task.fold else new.per_subject[who] - before
         if found.people[who] >= FEW and lost > (MOST_LOST if task.fold else MOST_LOST_PERCENT):
-            yield f"much worse in the {found.name}: {who} loses {lost:.3g}{'' if task.fold else ' %'}"
+            yield f"much worse in the {found.name}: {who} loses {_points(task, lost)}"
     for name, most in (("calibration_error", MOST_LOST), ("abstained", MOST_ABSTAINED)):
         lost = _figure(new, name) - _figure(old, name)
         if lost > most:
-            yield f"much worse in the {found.name}: {name} rises by {lost:.3f}"
+            yield f"much worse in the {found.name}: {name} rises by {100 * lost:.1f} points"
+
+
+def _percents(task: Task, *figures: float) -> list[str]:
+    """As tables show them, `95.2 %`; with more digits where else they would look alike."""
+    scale = 100.0 if task.fold else 1.0  # an error of the stride is in percent already
+    for digits in range(1, 4):
+        told = [f"{scale * figure:.{digits}f} %" for figure in figures]
+        if len(set(told)) == len(set(figures)):
+            break
+    return told
+
+
+def _points(task: Task, lost: float) -> str:
+    """How much is lost, on the same scale."""
+    return f"{100 * lost if task.fold else lost:.1f} points"
 
 
 def _figure(metrics: Metrics, name: str) -> float:
@@ -116,12 +133,12 @@ def _figure(metrics: Metrics, name: str) -> float:
 
 
 def _by_people(part: Part) -> Part:
-    """What people, the simulator or sensors say: nobody is judged by what a model said."""
-    return part.of(part.source != Source.PSEUDO.value)
+    """Return what people, the simulator or sensors say: nobody is judged by what a model said."""
+    return part.of(part.source != LabelSource.PSEUDO.value)
 
 
 def _common(parts: Sequence[Part], its: Sequence[Part]) -> tuple[list[Part], list[Part]]:
-    """The decisions, session by session, that both have features for."""
+    """Return the decisions, session by session, that both have features for."""
     others = {(each.ask.robot, each.ask.session): _by_people(each) for each in its}
     mine, theirs = [], []
     for each in parts:
@@ -141,7 +158,7 @@ def _people(parts: Sequence[Part]) -> dict[str, int]:
 
 
 def _classes(new: Learned, parts: Sequence[Part], serving: Learned | None) -> tuple[str, ...]:
-    """The new model's, and then those that it does not know, but the other one or somebody does."""
+    """Return the new model's, and then those that it does not know, but the other one or somebody does."""
     others = {str(name) for each in parts if new.task.fold for name in np.unique(each.truth)}
     others |= set(() if serving is None else serving.classes)
     return (*new.classes, *sorted(others - set(new.classes)))
@@ -173,7 +190,10 @@ def _in_sets(
 
 
 def _coverage(learned: Learned, covered: npt.NDArray[np.bool_], people: npt.NDArray[Any]) -> dict[str, float]:
-    """The share of decisions, and of the worst person's, whose truth is within; beside what is promised."""
+    """Return the share of decisions, and of the worst person's, whose truth is within.
+
+    Beside what is promised.
+    """
     found = {
         "covered": float(covered.mean()),
         "worst_subject_covered": min(float(covered[people == one].mean()) for one in np.unique(people)),
@@ -185,7 +205,7 @@ def _coverage(learned: Learned, covered: npt.NDArray[np.bool_], people: npt.NDAr
 
 
 def _label(verdicts: Sequence[Verdicts]) -> npt.NDArray[np.int_]:
-    """What is said: nothing of what it does not know."""
+    """Return what is said: nothing of what it does not know."""
     return np.concatenate([np.where(one.novelty < ABNORMAL_FROM, one.label, NONE) for one in verdicts])
 
 
@@ -196,7 +216,7 @@ def _of_classes(
     verdicts: Sequence[Verdicts],
     people: npt.NDArray[Any],
 ) -> Metrics:
-    """A class that the model does not know is one that it never says."""
+    """Return its probabilities of these classes; a class that the model does not know, it never says."""
     place = np.array([*(every.index(name) for name in known), NONE])
     probabilities = np.zeros((len(truth), len(every)))
     probabilities[:, place[:-1]] = np.concatenate([one.probabilities for one in verdicts])

@@ -63,7 +63,7 @@ class Material:
         return parts, [each for each in found if isinstance(each, LeftOut)]
 
     def of(self, parts: Sequence[Part]) -> "Material":
-        """The sessions of these parts alone."""
+        """Return the sessions of these parts alone."""
         wanted = {(each.ask.robot, each.ask.session) for each in parts}
         chosen = [each for each in self.sessions if (each.robot, each.session) in wanted]
         return replace(self, sessions=chosen)
@@ -76,7 +76,7 @@ class Material:
         ]
 
     def tables(self) -> tuple[TableVersion, ...]:
-        """What a model is made from, for ever."""
+        """Return what a model is made from, for ever."""
         shards = self.store.about.shards
         wanted = {LABELS.name, SESSIONS.name}
         wanted |= {TELEMETRY.location(each.robot, shards) for each in self.sessions}
@@ -88,7 +88,7 @@ class Material:
 
 
 def material(url: str, wish: Wish, cluster: str = "", told: Tell = untold) -> Material:
-    """What the store has for a wish, at the versions of now.
+    """Return what the store has for a wish, at the versions of now.
 
     Raises:
         UnusableData: nothing.

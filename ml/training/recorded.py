@@ -38,7 +38,7 @@ class Recorded:
 def recorded(
     store: Store, robot: str, session: str, channels: Sequence[str], version: int | None = None
 ) -> Recorded:
-    """The session's rows with these channels, whatever is null in them.
+    """Return the session's rows with these channels, whatever is null in them.
 
     Raises:
         NoSuchTable: there is no such version.

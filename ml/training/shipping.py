@@ -16,16 +16,16 @@ import numpy.typing as npt
 from threadpoolctl import threadpool_limits
 
 from ml.features.recipe import Recipe
-from ml.registry.card import Card, Source
+from ml.registry.card import Card, DataSource
 from ml.registry.code import features_hash, versions
 from ml.registry.registry import SHIPPED, Registry
 from ml.robot.groups import unit
 from ml.robot.learn import learn
 from ml.robot.task import TASKS, Task
-from ml.store.labels import Source as Said
+from ml.store.labels import LabelSource
 from ml.training.dataset import RANGE, Ask, Part
 from ml.training.judging import judge
-from ml.training.simulated import Session, examples, read, stepping
+from ml.training.simulated import SimulatedSession, examples, read, stepping
 
 SEED: Final = 0
 HELD_OUT: Final = 4  # one person in so many of those who walk alike
@@ -60,7 +60,7 @@ def ship(recording: Path, folder: Path = SHIPPED) -> list[Shipped]:
         return [_ship(registry, task, sessions) for task in TASKS.values()]
 
 
-def held_out(sessions: Sequence[Session]) -> set[str]:
+def held_out(sessions: Sequence[SimulatedSession]) -> set[str]:
     """Whom no model learns from; whoever also walks in another way is left out of that, too."""
     by_walks: dict[str, set[str]] = {}
     for session in sessions:
@@ -68,7 +68,7 @@ def held_out(sessions: Sequence[Session]) -> set[str]:
     return {one for alike in by_walks.values() for one in sorted(alike, key=int)[HELD_OUT - 1 :: HELD_OUT]}
 
 
-def _ship(registry: Registry, task: Task, sessions: Sequence[Session]) -> Shipped:
+def _ship(registry: Registry, task: Task, sessions: Sequence[SimulatedSession]) -> Shipped:
     recipe = task.recipe(frozenset(sessions[0].channels))
     if recipe is None:
         raise ValueError(f"no recipe of {task.name} for {', '.join(sessions[0].channels)}")
@@ -93,7 +93,7 @@ def _ship(registry: Registry, task: Task, sessions: Sequence[Session]) -> Shippe
         units={name: unit(name) for name in recipe.channels},
         ranges=_ranges(recipe, lessons),
         features_hash=features_hash(recipe),
-        source=Source.SIMULATED,
+        source=DataSource.SIMULATED,
         seed=SEED,
         made=datetime.now(UTC),
         versions=versions(),
@@ -105,7 +105,7 @@ def _ship(registry: Registry, task: Task, sessions: Sequence[Session]) -> Shippe
     return Shipped(registry.publish(learned.state(), card), dict(metrics.figures))
 
 
-def _part(task: Task, recipe: Recipe, session: Session) -> Part:
+def _part(task: Task, recipe: Recipe, session: SimulatedSession) -> Part:
     """One simulated session as decisions, like those of a recorded one."""
     found = examples(task, recipe, [session], STEPS[task.name])
     truth: npt.NDArray[Any]
@@ -120,7 +120,7 @@ def _part(task: Task, recipe: Recipe, session: Session) -> Part:
         False,
         found.features,
         truth,
-        np.full(len(truth), Said.SIMULATOR.value),
+        np.full(len(truth), LabelSource.SIMULATOR.value),
         found.time_ns,
         np.quantile(session.of(recipe.channels), RANGE, axis=0).T,
     )
@@ -128,7 +128,7 @@ def _part(task: Task, recipe: Recipe, session: Session) -> Part:
 
 
 def _thinned(part: Part) -> Part:
-    """What is learned from: of falling's many steady decisions a few."""
+    """Return what is learned from: of falling's many steady decisions a few."""
     steady = part.truth == "steady" if part.truth.ndim == 1 else np.zeros(len(part.truth), dtype=bool)
     return part.of(~steady | (np.arange(len(part.truth)) % STEADY_SHARE == 0))
 

@@ -24,7 +24,7 @@ ORDINARY: Final = "ordinary"  # the walks of recordings that do not say whose th
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Session:
+class SimulatedSession:
     """One wearer's recording: a row for each cycle of the sensors; NaN where a channel has no value."""
 
     name: str
@@ -37,7 +37,7 @@ class Session:
     walks: str = ORDINARY  # how the wearer walks, as `gwrms sim-record --walks`
 
     def of(self, channels: tuple[str, ...]) -> Floats:
-        """The values of these channels, in this order."""
+        """Return the values of these channels, in this order."""
         return self.values[:, [self.channels.index(name) for name in channels]]
 
 
@@ -68,7 +68,7 @@ _ROW: Final = msgspec.json.Decoder(list[Any])
 _HEAD: Final = msgspec.json.Decoder(_Head)
 
 
-def read(path: Path) -> list[Session]:
+def read(path: Path) -> list[SimulatedSession]:
     """Every session of a file.
 
     Raises:
@@ -91,8 +91,8 @@ def read(path: Path) -> list[Session]:
     return sessions
 
 
-def examples(task: Task, recipe: Recipe, sessions: list[Session], step: int) -> Examples:
-    """A decision every `step` samples of the recipe's grid, each on a full window.
+def examples(task: Task, recipe: Recipe, sessions: list[SimulatedSession], step: int) -> Examples:
+    """Return a decision every `step` samples of the recipe's grid, each on a full window.
 
     Raises:
         UnusableData: a session lacks a channel, or all are shorter than the recipe's look-back.
@@ -106,7 +106,7 @@ def examples(task: Task, recipe: Recipe, sessions: list[Session], step: int) -> 
 
 
 def stepping(label: npt.NDArray[np.str_], phase: Floats) -> tuple[Floats, npt.NDArray[np.bool_]]:
-    """What gait_phase learns: phases (n, 2), NaN where nobody steps; and the rows of which it is known.
+    """Return the targets of gait_phase: phases (n, 2), NaN without steps; and the known rows.
 
     Between standing and walking, falling and getting up nobody can say.
     """
@@ -129,14 +129,14 @@ def _blocks(file: BinaryIO) -> Iterator[tuple[bytes, list[list[Any]]]]:
         yield head, rows
 
 
-def _session(line: bytes, rows: list[list[Any]]) -> Session:
+def _session(line: bytes, rows: list[list[Any]]) -> SimulatedSession:
     head = _HEAD.decode(line)
     if tuple(head.columns[: len(TRUTH)]) != TRUTH:
         raise ValueError(f"the columns of session {head.session} do not begin with {', '.join(TRUTH)}")
     if {len(row) for row in rows} - {len(head.columns)}:
         raise ValueError(f"a line of session {head.session} has not the {len(head.columns)} columns")
     numbers = np.array([[*row[2:]] for row in rows], dtype=np.float64).reshape(len(rows), -1)
-    return Session(
+    return SimulatedSession(
         head.session,
         str(head.subject),
         tuple(head.columns[len(TRUTH) :]),
@@ -148,7 +148,7 @@ def _session(line: bytes, rows: list[list[Any]]) -> Session:
     )
 
 
-def _decisions(task: Task, recipe: Recipe, session: Session, step: int) -> Iterator[tuple[Any, ...]]:
+def _decisions(task: Task, recipe: Recipe, session: SimulatedSession, step: int) -> Iterator[tuple[Any, ...]]:
     missing = set(recipe.channels) - set(session.channels)
     if missing:
         raise UnusableData(f"session {session.name} has no {', '.join(sorted(missing))}")

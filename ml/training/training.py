@@ -16,8 +16,7 @@ from threadpoolctl import threadpool_limits
 from ml.errors import UnusableData, UnusableModel
 from ml.features.recipe import Recipe
 from ml.progress import Tell, untold
-from ml.registry.card import Card, Metrics
-from ml.registry.card import Source as Origin
+from ml.registry.card import Card, DataSource, Metrics
 from ml.registry.code import features_hash
 from ml.registry.code import versions as library_versions
 from ml.registry.registry import Registry
@@ -25,7 +24,7 @@ from ml.robot.groups import unit
 from ml.robot.learn import LEAST_ROWS, learn
 from ml.robot.learned import Learned
 from ml.robot.task import Task
-from ml.store.labels import Source
+from ml.store.labels import LabelSource
 from ml.training.adapting import adapted, divided
 from ml.training.choosing import held_out, judging, recipe_for, split
 from ml.training.dataset import LeftOut, Part
@@ -81,7 +80,9 @@ def _general(registry: Registry, found: Material, wish: Wish) -> Trained:
     parts, left_out = found.parts(recipe, *_teacher(wish, serving))
     if not parts:
         raise UnusableData("no session can be learned from; " + "; ".join(map(told, left_out)))
-    labelled = [each for each in parts if not each.regression and (each.source != Source.PSEUDO.value).any()]
+    labelled = [
+        each for each in parts if not each.regression and (each.source != LabelSource.PSEUDO.value).any()
+    ]
     able = judging(labelled)
     held = held_out((each.group for each in able), wish.held_out, len(labelled) - len(able))
     lessons, judges, regression = split(parts, held)
@@ -155,7 +156,7 @@ def _loaded(registry: Registry, name: str) -> _Model:
 
 
 def _serving(registry: Registry, task: Task, robot: str, recipe: Recipe) -> _Model | None:
-    """The model that serves robots with these sensors."""
+    """Return the model that serves robots with these sensors."""
     name = registry.serving(task.name, robot, set(recipe.channels))
     return None if name is None else _loaded(registry, name)
 
@@ -171,7 +172,7 @@ def _teacher(wish: Wish, serving: _Model | None) -> tuple[str, float]:
 def _its_parts(
     found: Material, serving: _Model | None, recipe: Recipe, judges: Sequence[Part]
 ) -> Sequence[Part]:
-    """The same sessions with the features of the serving model."""
+    """Return the same sessions with the features of the serving model."""
     if serving is None or serving.learned.recipe.name == recipe.name:
         return judges
     return found.of(judges).parts(serving.learned.recipe)[0]
@@ -192,7 +193,7 @@ def _enough(task: Task, lessons: Sequence[Part]) -> tuple[list[Part], list[str]]
 
 
 def _unnamed(sessions: int) -> list[str]:
-    """What is to be known of sessions whose wearer may be any of those who judge."""
+    """Return what is to be known of sessions whose wearer may be any of those who judge."""
     if not sessions:
         return []
     remark = (
@@ -247,15 +248,15 @@ def _sessions(parts: Sequence[Part]) -> tuple[str, ...]:
     return tuple(sorted({each.ask.session for each in parts}))
 
 
-def _origin(rows: Mapping[str, int]) -> Origin:
-    simulated = rows.get(Source.SIMULATOR.value, 0)
+def _origin(rows: Mapping[str, int]) -> DataSource:
+    simulated = rows.get(LabelSource.SIMULATOR.value, 0)
     if not simulated:
-        return Origin.RECORDED
-    return Origin.SIMULATED if simulated == sum(rows.values()) else Origin.MIXED
+        return DataSource.RECORDED
+    return DataSource.SIMULATED if simulated == sum(rows.values()) else DataSource.MIXED
 
 
-def _both(one: Origin, other: Origin) -> Origin:
-    return one if one is other else Origin.MIXED
+def _both(one: DataSource, other: DataSource) -> DataSource:
+    return one if one is other else DataSource.MIXED
 
 
 def _of_its_classes(metrics: Metrics, classes: Sequence[str]) -> Metrics:

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ml.features.windows import Samples
-from ml.store.labels import ACTIVITIES, Source
+from ml.store.labels import ACTIVITIES, LabelSource
 
 Instants = npt.NDArray[np.int64]
 Names = npt.NDArray[np.str_]
@@ -32,13 +32,13 @@ class Said:
     begin_ns: int
     end_ns: int
     label: str
-    source: Source
+    source: LabelSource
 
 
 def activities(said: Sequence[Said], at_ns: Instants) -> tuple[Names, Names]:
     """Of instants (n,) in their order: the activity, and which source says so; NOBODY where none does."""
     names, sources = np.full(len(at_ns), NOBODY, _NAME), np.full(len(at_ns), NOBODY, "U16")
-    for source in Source:
+    for source in LabelSource:
         own, told = _of_source([each for each in said if each.source is source], at_ns)
         new = told & (sources == NOBODY)
         names[new], sources[new] = own[new], source.value
@@ -68,17 +68,17 @@ def phases(said: Sequence[Said], at_ns: Instants) -> tuple[Samples, Names]:
     names, sources = activities(said, at_ns)
     steps = ~np.isnan(found).any(axis=1) & ~np.isin(names, LOST)
     still = np.isnan(found).all(axis=1) & np.isin(names, STILL)
-    least_trusted = max(by, key=list(Source).index).value
+    least_trusted = max(by, key=list(LabelSource).index).value
     return found, np.where(steps, least_trusted, np.where(still, sources, NOBODY))
 
 
-def _leg(said: Sequence[Said], strike: str, at_ns: Instants) -> tuple[npt.NDArray[np.float64], Source]:
+def _leg(said: Sequence[Said], strike: str, at_ns: Instants) -> tuple[npt.NDArray[np.float64], LabelSource]:
     """By the most trusted source that has seen two strikes."""
-    for source in Source:
+    for source in LabelSource:
         strikes = np.unique([e.begin_ns for e in said if e.label == strike and e.source is source])
         if len(strikes) > 1:
             return _between(strikes.astype(np.int64), at_ns), source
-    return np.full(len(at_ns), np.nan), Source.PERSON
+    return np.full(len(at_ns), np.nan), LabelSource.PERSON
 
 
 def _between(strikes_ns: Instants, at_ns: Instants) -> npt.NDArray[np.float64]:

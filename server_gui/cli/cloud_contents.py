@@ -32,7 +32,7 @@ COLUMNS = ("FILES", "ROWS", "SIZE", "FROM (UTC)", "TO")
 
 def ls(argv: list[str]) -> int:
     """Run `gwrms cloud ls`."""
-    made = parser("cloud ls", "The store's tables, or with --path the files below one.")
+    made = parser("cloud ls", "List the store's tables, or with --path the files below one.")
     add_url(made, "url")
     made.add_argument("--path", metavar="PATH", help="as in telemetry/000/robot=exo-01")
     arguments = made.parse_args(argv)
@@ -47,7 +47,7 @@ def ls(argv: list[str]) -> int:
 
 def du(argv: list[str]) -> int:
     """Run `gwrms cloud du`."""
-    made = parser("cloud du", "Space used in the store, by tables and robots.")
+    made = parser("cloud du", "Show the space used in the store, by tables and robots.")
     add_url(made, "url")
     arguments = made.parse_args(argv)
     store = reach(arguments)
@@ -68,9 +68,9 @@ def verify(argv: list[str]) -> int:
     made = parser("cloud verify", VERIFY, VERIFY_EPILOG)
     add_url(made, "url")
     how = made.add_mutually_exclusive_group()
-    how.add_argument("--quick", action="store_true", help="count the rows, and compare no values")
-    how.add_argument("--deep", action="store_true", help="read every value, also of what has no receipt here")
-    made.add_argument("--quiet", action="store_true", help="say nothing where it is whole, as for cron")
+    how.add_argument("--quick", action="store_true", help="count the rows only, without comparing values")
+    how.add_argument("--deep", action="store_true", help="read every value, even without a receipt here")
+    made.add_argument("--quiet", action="store_true", help="print nothing if the store is whole, as for cron")
     arguments = made.parse_args(argv)
     try:
         return _verify(arguments)

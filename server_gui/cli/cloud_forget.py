@@ -46,13 +46,15 @@ def forget(argv: list[str]) -> int:
     """Run `gwrms cloud forget`."""
     made = parser("cloud forget", WHAT, EPILOG)
     add_url(made)
-    made.add_argument("--wearer", required=True, metavar="ID", help="who is to be forgotten")
-    made.add_argument("--dry-run", action="store_true", help="say what would be removed, and do nothing")
-    made.add_argument("--unpin", action="store_true", help="let go of versions that models name")
+    made.add_argument("--wearer", required=True, metavar="ID", help="the wearer to forget")
+    made.add_argument("--dry-run", action="store_true", help="only show what would be removed")
+    made.add_argument("--unpin", action="store_true", help="release versions that models name")
     made.add_argument(
-        "--alone", action="store_true", help="no other server runs: for a store that keeps no two apart"
+        "--alone",
+        action="store_true",
+        help="confirm that no other server runs, for a store without conditional writes",
     )
-    made.add_argument("--yes", action="store_true", help="do not ask")
+    made.add_argument("--yes", action="store_true", help="do not ask for confirmation")
     arguments = made.parse_args(argv)
     try:
         return _forget(arguments)
@@ -105,7 +107,7 @@ def _question(store: Store, known: Plan) -> str:
 
 
 def _say(arguments: argparse.Namespace, known: Plan) -> None:
-    """What there is of them."""
+    """Print their data."""
     if arguments.json:
         return
     if not known.sessions:
@@ -124,7 +126,7 @@ def _say(arguments: argparse.Namespace, known: Plan) -> None:
 
 
 def _not_reached(known: Plan) -> Iterator[str]:
-    """What nobody here can look into."""
+    """Yield what nobody here can look into."""
     if known.others:
         yield (
             f"not looked into: the spools of other computers that write to this store "
@@ -163,5 +165,5 @@ def _tell(arguments: argparse.Namespace, known: Plan, left: Sequence[str]) -> in
 
 
 def _moved(known: Plan) -> list[str]:
-    """What was exported and is there no more: removed, or somewhere else with all its rows."""
+    """Return what was exported and is there no more: removed, or somewhere else with all its rows."""
     return [each.place for each in known.exported if each.state is State.GONE]

@@ -39,9 +39,9 @@ def compact(argv: list[str]) -> int:
 def retain(argv: list[str]) -> int:
     """Run `gwrms cloud retain`."""
     made = _parser("retain", "Remove rows that are older than so many days.", RETAIN_EPILOG)
-    made.add_argument("--days", type=_days, required=True, metavar="N", help="how old rows may become")
-    made.add_argument("--table", action="append", choices=TABLES, help="of this table; repeat for more")
-    made.add_argument("--yes", action="store_true", help="do not ask")
+    made.add_argument("--days", type=_days, required=True, metavar="N", help="the greatest age of rows")
+    made.add_argument("--table", action="append", choices=TABLES, help="only this table; repeatable")
+    made.add_argument("--yes", action="store_true", help="do not ask for confirmation")
     arguments = made.parse_args(argv)
     store = _writable(arguments)
     tables = [TABLES[name] for name in arguments.table or (TELEMETRY.name, RESOURCES.name)]
@@ -86,9 +86,11 @@ def vacuum(argv: list[str]) -> int:
 def _parser(command: str, what: str, epilog: str) -> argparse.ArgumentParser:
     made = parser(f"cloud {command}", what, epilog)
     add_url(made, "url")
-    made.add_argument("--dry-run", action="store_true", help="say what would be done, and do nothing")
+    made.add_argument("--dry-run", action="store_true", help="only show what would be done")
     made.add_argument(
-        "--alone", action="store_true", help="no server runs: for a store that keeps no two writers apart"
+        "--alone",
+        action="store_true",
+        help="confirm that no server runs, for a store without conditional writes",
     )
     return made
 

@@ -43,12 +43,14 @@ def mend(argv: list[str]) -> int:
     """Run `gwrms cloud mend`."""
     made = parser("cloud mend", WHAT, EPILOG)
     add_url(made, "url")
-    made.add_argument("--dry-run", action="store_true", help="say what would be done, and do nothing")
+    made.add_argument("--dry-run", action="store_true", help="only show what would be done")
     made.add_argument(
-        "--alone", action="store_true", help="no other server runs: for a store that keeps no two apart"
+        "--alone",
+        action="store_true",
+        help="confirm that no other server runs, for a store without conditional writes",
     )
-    made.add_argument("--accept-loss", action="store_true", help="then count what is there as what was sent")
-    made.add_argument("--yes", action="store_true", help="do not ask")
+    made.add_argument("--accept-loss", action="store_true", help="accept the present rows as complete")
+    made.add_argument("--yes", action="store_true", help="do not ask for confirmation")
     arguments = made.parse_args(argv)
     try:
         return _mend(arguments)
@@ -87,7 +89,7 @@ def _question(plan: mending.Plan) -> str:
 
 
 def _store(arguments: argparse.Namespace, folder: Path) -> Again:
-    """The store to mend; made anew where batches went to one that is no more."""
+    """Return the store to mend; made anew where batches went to one that is no more."""
     wanted, settings = url(arguments), load(arguments.config).store
     try:
         store = Again.existing(wanted)
@@ -106,7 +108,7 @@ def _store(arguments: argparse.Namespace, folder: Path) -> Again:
 
 
 def _check_shards(wanted: str, shards: int) -> None:
-    """That what says how many there are is made anew as it was."""
+    """Check that the number of shards is known before `store.json` is written again."""
     there = {name.split("/")[1] for name in Objects(wanted).names(TELEMETRY.name)}
     if len(there) > shards:
         raise StoreError(

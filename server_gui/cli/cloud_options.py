@@ -29,12 +29,12 @@ def parser(command: str, what: str, epilog: str = "") -> argparse.ArgumentParser
         allow_abbrev=False,
     )
     made.add_argument("--config", type=Path, metavar="FILE", help="the server's file, which names the store")
-    made.add_argument("--json", action="store_true", help="for machines")
+    made.add_argument("--json", action="store_true", help="for programs")
     return made
 
 
 def add_url(made: argparse.ArgumentParser, name: str = "--url") -> None:
-    """The argument that names another store than the server's file does."""
+    """Add the argument for a store other than that of the server's file."""
     made.add_argument(
         name,
         nargs="?",
@@ -104,7 +104,7 @@ def when(time: datetime | None) -> str:
 
 @contextlib.contextmanager
 def progress(what: str, total: int, *, bytes_: bool = False) -> Iterator[Advance]:
-    """A bar on stderr that goes on with each call, where that is a terminal."""
+    """Return a bar on stderr that goes on with each call, where that is a terminal."""
     if not sys.stderr.isatty():
         yield lambda _: None
         return

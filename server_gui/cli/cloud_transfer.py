@@ -14,7 +14,7 @@ from ml.store.sessions import Session
 from ml.store.store import Store
 from ml.store.url import checked_url
 from server_gui.cli.cloud_options import add_url, parser, progress, reach, url
-from server_gui.core.cloud import exports, moved_store, partial_copy, spool_upload, transfer
+from server_gui.core.cloud import exports, partial_copy, relocated_store, spool_upload, transfer
 from server_gui.core.fleet.control_socket import NobodyCollects, ask, why_not_uploaded
 from server_gui.core.recording.errors import SpoolUnusable
 from server_gui.core.recording.receipts import RECEIPTS
@@ -42,7 +42,7 @@ examples
 
 def upload(argv: list[str]) -> int:
     """Run `gwrms cloud upload`."""
-    made = parser("cloud upload", "What waits in the spool, now; or a whole store.", UPLOAD_EPILOG)
+    made = parser("cloud upload", "Upload pending data of the spool, or copy a whole store.", UPLOAD_EPILOG)
     add_url(made, "url")
     made.add_argument("--from", dest="source", metavar="URL", help="the store to copy")
     arguments = made.parse_args(argv)
@@ -76,13 +76,13 @@ def upload(argv: list[str]) -> int:
 
 
 def _note(arguments: argparse.Namespace) -> None:
-    """The spool's receipts say from now on that its batches are in the copy too, so that this is missed."""
+    """Note in the spool's receipts that its batches are in the copy too, so that a loss is noticed."""
     folder = load(arguments.config).recorder.spool
     if not (folder / RECEIPTS).exists():
         return
     try:
         with Spool(folder) as spool:
-            moved_store.note(spool, Store.existing(url(arguments)))
+            relocated_store.note(spool, Store.existing(url(arguments)))
     except SpoolUnusable as error:
         warn("cloud", f"that batches of this computer are in the copy is not noted in its spool: {error}")
 
@@ -110,11 +110,15 @@ def _empty(folder: Path, arguments: argparse.Namespace) -> int:
 
 def download(argv: list[str]) -> int:
     """Run `gwrms cloud download`."""
-    made = parser("cloud download", "A store, or some of it, into a folder: a store too.", DOWNLOAD_EPILOG)
+    made = parser(
+        "cloud download",
+        "Download a store, or a part of it, to a folder, which is a store too.",
+        DOWNLOAD_EPILOG,
+    )
     add_url(made, "url")
     made.add_argument("--out", type=Path, required=True, metavar="FOLDER", help="where to")
-    made.add_argument("--robot", action="append", metavar="GLOB", help="these alone; repeat for more")
-    made.add_argument("--session", action="append", metavar="NAME", help="these alone; repeat for more")
+    made.add_argument("--robot", action="append", metavar="GLOB", help="only these; repeatable")
+    made.add_argument("--session", action="append", metavar="NAME", help="only these; repeatable")
     arguments = made.parse_args(argv)
     target = arguments.out.absolute().as_uri()
     if arguments.robot is None and arguments.session is None:
@@ -123,7 +127,7 @@ def download(argv: list[str]) -> int:
 
 
 def _copy(source: str, target: str, arguments: argparse.Namespace) -> int:
-    """A whole store."""
+    """Return a whole store."""
     store = Store.existing(source)
     from_, to = store.objects, transfer.open_target(store, target)
     exports.note_copy(target)
@@ -154,7 +158,7 @@ def _copy_parts(source: Store, target: Store, arguments: argparse.Namespace) -> 
 
 
 def _chosen(source: Store, arguments: argparse.Namespace) -> tuple[Sequence[Session], set[str]]:
-    """The sessions that are wanted, and the robots of which everything is."""
+    """Return the sessions that are wanted, and the robots of which everything is."""
     globs = arguments.robot or ("*",)
     known = [
         session

@@ -16,7 +16,7 @@ example
 def witnesses(argv: list[str]) -> int:
     """Run `gwrms cloud witnesses`."""
     made = parser(
-        "cloud witnesses", "What this desk has seen of a robot's journal, signed by the robot.", EPILOG
+        "cloud witnesses", "Print this desk's witnesses of a robot's journal, signed by the robot.", EPILOG
     )
     made.add_argument("robot", metavar="ROBOT", help="its name in the store")
     add_url(made)

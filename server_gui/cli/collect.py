@@ -14,9 +14,9 @@ import msgspec
 
 from gateway.amounts import NONE, age, size
 from gateway.cli.text import say, table, warn
-from gateway.plain import json_plain, plain
+from gateway.plain_text import json_plain, plain
 from ml.store.private import private_files
-from server_gui.cli.worn import add_worn, worn
+from server_gui.cli.wearer_notes import add_worn, worn
 from server_gui.core.fleet.collector import Collector, CollectorReport
 from server_gui.core.fleet.control_socket import ask, why_not_uploaded
 from server_gui.core.fleet.link_statistics import LinkReport
@@ -24,7 +24,7 @@ from server_gui.core.prediction.state import WITHIN_DAYS, Figures, PredictingSta
 from server_gui.core.recording.records import Worn
 from server_gui.core.settings.server_file import ServerSettings, SettingsError, add_robots, default_file, load
 from server_gui.core.threads.supervision import BEAT_S
-from server_gui.processes.ending import Ended, Ending
+from server_gui.processes.shutdown_signals import ShutdownRequested, ShutdownSignals
 
 log = logging.getLogger(__name__)
 
@@ -113,7 +113,7 @@ def _collect(settings: ServerSettings, operator: str, notes: str, worn: Worn) ->
     _log_to_stderr()
     gc.freeze()  # what was loaded so far lives as long as the process, and there is much of it
     collecting = Collector(settings, operator, notes, worn=worn)
-    with Ending() as ending, contextlib.suppress(Ended), collecting as collector:
+    with ShutdownSignals() as ending, contextlib.suppress(ShutdownRequested), collecting as collector:
         names = ", ".join(settings.robots)
         log.info("recording %s into %s, for the store %s", names, settings.recorder.spool, settings.store.url)
         while True:
@@ -131,7 +131,7 @@ def _collect(settings: ServerSettings, operator: str, notes: str, worn: Worn) ->
 
 
 def _log_to_stderr() -> None:
-    """A line each; in systemd's journal without the time, which it has itself."""
+    """Log lines; in systemd's journal without the time, which it adds itself."""
     time = "" if "JOURNAL_STREAM" in os.environ else "%(asctime)s "
     logging.basicConfig(level=logging.WARNING)
     for handler in logging.getLogger().handlers:
@@ -188,7 +188,7 @@ def _batches(count: int) -> str:
 
 
 def _predicted(state: PredictingState | None) -> list[str]:
-    """What models say of the robots, and what is wrong with models."""
+    """Return what models say of the robots, and what is wrong with models."""
     if state is None:
         return ["prediction is off\n"]
     rows = [
@@ -251,7 +251,7 @@ def _instant(utc_s: float) -> str:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="gwrms collect",
-        description="Record every robot, whole, into the store; and ask how that goes.",
+        description="Record all robots into the store; show the status of the running collector.",
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
@@ -263,19 +263,21 @@ def _parser() -> argparse.ArgumentParser:
         action="append",
         default=[],
         metavar="NAME=HOST:PORT",
-        help="a robot beside those of the file; again for another one",
+        help="a robot in addition to those of the file; repeatable",
     )
-    parser.add_argument("--operator", default="", metavar="WHO", help="who records; kept with the sessions")
+    parser.add_argument(
+        "--operator", default="", metavar="WHO", help="operator's name; kept with the sessions"
+    )
     parser.add_argument("--notes", default="", metavar="TEXT", help="kept with the sessions")
     add_worn(parser)
     asking = parser.add_mutually_exclusive_group()
-    asking.add_argument("--status", action="store_true", help="ask the collector that runs how it goes")
-    asking.add_argument("--upload", action="store_true", help="tell it to upload what waits, now")
-    asking.add_argument(
-        "--mark", metavar="TEXT", help="tell it to mark this instant in every robot's recording"
-    )
+    asking.add_argument("--status", action="store_true", help="show the status of the running collector")
+    asking.add_argument("--upload", action="store_true", help="make it upload pending data now")
+    asking.add_argument("--mark", metavar="TEXT", help="mark this instant in every robot's recording")
     asking.add_argument("--unit", action="store_true", help="print a systemd unit for this installation")
-    parser.add_argument("--json", action="store_true", help="with --status: one JSON object, for machines")
+    parser.add_argument(
+        "--json", action="store_true", help="with --status: print one JSON object, for programs"
+    )
     return parser
 
 

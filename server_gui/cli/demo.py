@@ -47,16 +47,18 @@ def demo(argv: list[str]) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="gwrms demo",
-        description="A simulated exoskeleton, its gateway and a live view, with one command.\n"
+        description="Start a simulated exoskeleton, its gateway and a live view.\n"
         "Simulator and gateway are processes of their own; all three end together.",
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
     parser.add_argument(
-        "--headless", action="store_true", help="no screen: a line a second, at last a table of what was seen"
+        "--headless",
+        action="store_true",
+        help="no screen: print a line per second, and a summary table at the end",
     )
-    parser.add_argument("--terminal", action="store_true", help="in the terminal, display or not")
+    parser.add_argument("--terminal", action="store_true", help="use the terminal even with a display")
     parser.add_argument("--seconds", type=_seconds, metavar="N", help="end after N seconds")
     parser.add_argument(
         "--dir", type=Path, help="keep the simulated robot's files here (default: a temporary folder)"

@@ -53,9 +53,9 @@ def main(argv: list[str]) -> int:
 
 def ls(argv: list[str]) -> int:
     """List them."""
-    made = parser("edits", "What each edit of a robot's parameters did to the walk.", EPILOG)
+    made = parser("edits", "Show the effect of each parameter edit on the walk.", EPILOG)
     made.add_argument(
-        "--robot", action="append", default=[], metavar="NAME", help="of this robot (again: more)"
+        "--robot", action="append", default=[], metavar="NAME", help="only this robot's edits (repeatable)"
     )
     arguments = made.parse_args(argv)
     found = _read(arguments)
@@ -74,8 +74,8 @@ def ls(argv: list[str]) -> int:
 
 def show(argv: list[str]) -> int:
     """Show one."""
-    made = parser("edits show", "Everything that is known of one edit.")
-    made.add_argument("id", metavar="ID", help="of gwrms edits; may be cut off where it is unique")
+    made = parser("edits show", "Show all data on one edit.")
+    made.add_argument("id", metavar="ID", help="id from gwrms edits; may be abbreviated")
     arguments = made.parse_args(argv)
     found = _read(arguments)
     if found is None:

@@ -84,22 +84,28 @@ def _finite(figures: Mapping[str, float]) -> dict[str, float | None]:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="gwrms evaluate",
-        description="How well predictions hold for people, real or simulated, whom no model has seen.",
+        description="Evaluate predictions on people, real or simulated, whom no model has seen.",
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
     parser.add_argument(
-        "--benchmark", required=True, choices=BENCHMARKS, metavar="NAME", help="one of those below"
+        "--benchmark",
+        required=True,
+        choices=BENCHMARKS,
+        metavar="NAME",
+        help="a benchmark from the list below",
     )
     parser.add_argument("--data", required=True, type=Path, metavar="FILE", help="the recordings")
     parser.add_argument(
-        "--json", action="store_true", help="the figures, of groups too, as one JSON object, in the last line"
+        "--json",
+        action="store_true",
+        help="print the figures, including groups, as a JSON object in the last line",
     )
     parser.add_argument(
         "--report", type=Path, metavar="FILE.html", help="also write a page with tables and pictures"
     )
     parser.add_argument(
-        "--search", action="store_true", help="choose the settings again, by training subjects alone"
+        "--search", action="store_true", help="tune the settings again, on training subjects only"
     )
     return parser

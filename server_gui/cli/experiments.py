@@ -45,7 +45,7 @@ from server_gui.core.fleet.collector import CollectorReport
 from server_gui.core.fleet.control_socket import NobodyCollects, ask
 from server_gui.core.follow.feed import FollowSettings
 from server_gui.core.settings.server_file import load
-from server_gui.processes.ending import Ended, Ending
+from server_gui.processes.shutdown_signals import ShutdownRequested, ShutdownSignals
 from server_gui.terminal.followed_robot import FollowedRobot
 
 BEAT_S: Final = 0.1
@@ -83,9 +83,11 @@ Planner = Callable[[ParameterInfo, float, Unit, Description], Plan]
 
 def ab_main(argv: list[str]) -> int:
     """Run `gwrms ab`."""
-    made = parser("ab", "Try two values of a parameter against each other while somebody walks.", AB)
+    made = parser("ab", "Compare two values of a parameter during a walk.", AB)
     made.add_argument("name", metavar="NAME", help="the parameter, as in left_knee.position_gain")
-    made.add_argument("values", metavar="VALUE", nargs=2, help="A and B, in its own unit or another: 3deg")
+    made.add_argument(
+        "values", metavar="VALUE", nargs=2, help="values A and B, in its own unit or another: 3deg"
+    )
     made.add_argument(
         "--pairs",
         type=_whole(FEWEST_PAIRS, MOST_PAIRS),
@@ -93,7 +95,7 @@ def ab_main(argv: list[str]) -> int:
         metavar="N",
         help=f"of A and B, {FEWEST_PAIRS} to {MOST_PAIRS} (default {USUAL_PAIRS})",
     )
-    made.add_argument("--seed", type=int, metavar="N", help="of the order (default: another each time)")
+    made.add_argument("--seed", type=int, metavar="N", help="seed of the order (default: random)")
     _add_shared(made)
     arguments = made.parse_args(_spaced(argv))
 
@@ -108,11 +110,11 @@ def ab_main(argv: list[str]) -> int:
 
 def sweep_main(argv: list[str]) -> int:
     """Run `gwrms sweep`."""
-    made = parser("sweep", "Try values of a parameter upwards, in small steps, while you watch.", SWEEP)
+    made = parser("sweep", "Raise a parameter in small steps, while you watch.", SWEEP)
     made.add_argument("name", metavar="NAME", help="the parameter, as in left_knee.position_gain")
     made.add_argument("first", metavar="FROM", help="first value, in its own unit or another: 3deg")
     made.add_argument("last", metavar="TO", help="last value, above FROM")
-    made.add_argument("step", metavar="STEP", help="between two values")
+    made.add_argument("step", metavar="STEP", help="step between two values")
     _add_shared(made)
     arguments = made.parse_args(_spaced(argv))
 
@@ -141,10 +143,14 @@ def _add_shared(made: argparse.ArgumentParser) -> None:
         metavar="N",
         help=f"gait cycles left out after each change (default {USUAL_TRANSIENT})",
     )
-    made.add_argument("--seconds", type=_positive, metavar="S", help="hold each value for so long instead")
-    made.add_argument("--most-error", type=_positive, metavar="RAD", help="tracking error that ends it")
-    made.add_argument("--most-current", type=_positive, metavar="A", help="current that ends it")
-    made.add_argument("--config", type=Path, metavar="FILE", help="the server's file: where it is kept")
+    made.add_argument(
+        "--seconds", type=_positive, metavar="S", help="hold each value for so long, instead of cycles"
+    )
+    made.add_argument("--most-error", type=_positive, metavar="RAD", help="end at this tracking error")
+    made.add_argument("--most-current", type=_positive, metavar="A", help="end at this current")
+    made.add_argument(
+        "--config", type=Path, metavar="FILE", help="the server's file, for the place of the result"
+    )
 
 
 def _spaced(argv: list[str]) -> list[str]:
@@ -198,7 +204,7 @@ def _run(command: str, arguments: argparse.Namespace, planned: Planner) -> int:
     following = FollowSettings(
         f"gwrms {command}", ("*",), (plan.name,), rate_hz=RATE_HZ, journal_s=1.0, buses_s=2.0
     )
-    with Ending() as ending_, FollowedRobot(arguments.robot, following) as followed:
+    with ShutdownSignals() as ending_, FollowedRobot(arguments.robot, following) as followed:
         try:
             run = _begin(plan, followed, ending_)
         except BadPlan as error:
@@ -234,7 +240,7 @@ def _plan(command: str, arguments: argparse.Namespace, planned: Planner) -> tupl
 
 
 def _held(robot: Robot, name: str) -> float:
-    """What the device holds; one that has been asked nothing for a while may not have answered yet."""
+    """Return what the device holds; one that has been asked nothing for a while may not have answered yet."""
     until_s = time.monotonic() + REACH_S
     while True:
         held = robot.read(name).values[name]
@@ -245,7 +251,7 @@ def _held(robot: Robot, name: str) -> float:
         time.sleep(BEAT_S)
 
 
-def _begin(plan: Plan, followed: FollowedRobot, ending_: Ending) -> Run:
+def _begin(plan: Plan, followed: FollowedRobot, ending_: ShutdownSignals) -> Run:
     until_s = time.monotonic() + REACH_S
     while True:
         followed.update()
@@ -258,14 +264,16 @@ def _begin(plan: Plan, followed: FollowedRobot, ending_: Ending) -> Run:
         time.sleep(BEAT_S)
 
 
-def _follow(run: Run, followed: FollowedRobot, ending_: Ending, arguments: argparse.Namespace) -> None:
+def _follow(
+    run: Run, followed: FollowedRobot, ending_: ShutdownSignals, arguments: argparse.Namespace
+) -> None:
     """Until it is over; whoever asks to end it waits for what is read back."""
     said = ""
     while not run.is_over:
         followed.update()
         try:
             ending_.check()
-        except Ended as ended:
+        except ShutdownRequested as ended:
             run.halt(str(ended))
         if _is_watched(run):
             run.beat()
@@ -340,7 +348,10 @@ def _keep(told: Told, arguments: argparse.Namespace, command: str) -> None:
 
 
 def _recording(spool: Path, calls_itself: str) -> tuple[str, str]:
-    """What the robot is called where it is recorded, and the recording; as it calls itself, and none."""
+    """Return what the robot is called where it is recorded, and the recording.
+
+    As it calls itself, and none.
+    """
     try:
         report = msgspec.json.decode(ask(spool, "status"), type=CollectorReport)
     except (NobodyCollects, ClientError, msgspec.DecodeError):

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from ml.store.private import private_files
-from server_gui.cli.worn import add_worn, worn
+from server_gui.cli.wearer_notes import add_worn, worn
 from server_gui.core.settings.server_file import add_robots, default_file, load, name_of
 from server_gui.qt_needs import check, prefer_x
 
@@ -46,7 +46,7 @@ def main(argv: list[str]) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="gwrms gui",
-        description="The window: robots live, their parameters changed safely, STOP always in sight.",
+        description="Open the window: monitor robots live, change parameters safely, STOP always in sight.",
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
@@ -57,14 +57,16 @@ def _parser() -> argparse.ArgumentParser:
         default=[],
         type=_robot,
         metavar="[NAME=]HOST:PORT",
-        help="a robot's gateway; may be given more than once",
+        help="a robot's gateway; repeatable",
     )
     parser.add_argument("--config", type=Path, metavar="FILE", help="the server's file")
-    parser.add_argument("--no-record", action="store_true", help="only show what comes, keep nothing")
-    parser.add_argument("--operator", default="", metavar="WHO", help="who records; kept with the sessions")
+    parser.add_argument("--no-record", action="store_true", help="do not record")
+    parser.add_argument(
+        "--operator", default="", metavar="WHO", help="operator's name; kept with the sessions"
+    )
     parser.add_argument("--notes", default="", metavar="TEXT", help="kept with the sessions")
     add_worn(parser)
-    parser.add_argument("--look", choices=("dark", "light"), help="colours; kept for the next time")
+    parser.add_argument("--look", choices=("dark", "light"), help="colours; remembered")
     parser.add_argument(
         "--scale", type=int, choices=range(80, 201), metavar="80…200", help="size of all text, %%"
     )

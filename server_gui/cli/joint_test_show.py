@@ -22,19 +22,23 @@ def main(argv: list[str]) -> int:
     """Run `gwrms joint-test show`."""
     parser = argparse.ArgumentParser(
         prog="gwrms joint-test show",
-        description="What a test of a joint has measured.",
+        description="Show the results of a joint test.",
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
-    parser.add_argument("file", type=Path, metavar="FILE", help="of gwrms joint-test step, chirp, …")
+    parser.add_argument(
+        "file", type=Path, metavar="FILE", help="recording of gwrms joint-test step, chirp, …"
+    )
     parser.add_argument(
         "--compare",
         type=Path,
         metavar="FILE",
-        help="with this one (default: the last one beside it)",
+        help="compare with this one (default: the last one beside it)",
     )
-    parser.add_argument("--json", action="store_true", help="all of it, with the curves, as one JSON object")
+    parser.add_argument(
+        "--json", action="store_true", help="print everything, with curves, as one JSON object"
+    )
     options = parser.parse_args(argv)
     try:
         shown = analysed(options.file)

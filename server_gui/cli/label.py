@@ -1,4 +1,4 @@
-"""`gwrms label`: what robot and wearer did in a recorded session, for people and for models to learn from."""
+"""`gwrms label`: label the activities in a recorded session, for people and for models to learn from."""
 
 import argparse
 from collections.abc import Sequence
@@ -64,7 +64,7 @@ def main(argv: list[str]) -> int:
 def _wanted(
     made: argparse.ArgumentParser, settings: ServerSettings, session: Session, arguments: argparse.Namespace
 ) -> Sequence[Label]:
-    """What is to be kept or taken back."""
+    """Return what is to be kept or taken back."""
     if arguments.file is not None:
         return from_table(
             session, arguments.file, arguments.author, lambda text: absolute(session, _time(text))
@@ -80,7 +80,7 @@ def _wanted(
     end = absolute(session, arguments.end) or begin
     if arguments.label is None or begin is None or end is None:
         made.error(
-            "say LABEL and --from, or one of --file, --truth, --gait-events, --wearer, --regression, --ls"
+            "give LABEL and --from, or one of --file, --truth, --gait-events, --wearer, --regression, --ls"
         )
     return [_label(session, arguments.label, utc_ns(begin), utc_ns(end), arguments)]
 
@@ -139,23 +139,21 @@ def _length(label: Label) -> str:
 
 
 def _parser() -> argparse.ArgumentParser:
-    made = parser("label", "What robot and wearer did in a recorded session.", EPILOG)
-    made.add_argument("session", metavar="SESSION", help="its name, or how that alone begins")
-    made.add_argument("label", metavar="LABEL", nargs="?", help="what they did")
-    made.add_argument("--robot", metavar="NAME", help="where sessions of two robots have one name")
-    made.add_argument("--from", dest="begin", type=instant_or_seconds, metavar="TIME", help="since when")
-    made.add_argument("--to", dest="end", type=instant_or_seconds, metavar="TIME", help="until when")
-    made.add_argument(
-        "--author", default=user_name(), metavar="WHO", help="who says so (default: %(default)s)"
-    )
+    made = parser("label", "Label the activities in a recorded session.", EPILOG)
+    made.add_argument("session", metavar="SESSION", help="its name, which may be abbreviated")
+    made.add_argument("label", metavar="LABEL", nargs="?", help="the activity")
+    made.add_argument("--robot", metavar="NAME", help="needed if sessions of two robots have one name")
+    made.add_argument("--from", dest="begin", type=instant_or_seconds, metavar="TIME", help="beginning")
+    made.add_argument("--to", dest="end", type=instant_or_seconds, metavar="TIME", help="end")
+    made.add_argument("--author", default=user_name(), metavar="WHO", help="author (default: %(default)s)")
     others = made.add_mutually_exclusive_group()
-    others.add_argument("--file", type=Path, metavar="FILE.csv", help="many labels: from,to,label")
-    others.add_argument("--truth", type=Path, metavar="FILE.jsonl", help="what a simulated wearer did")
-    others.add_argument("--gait-events", action="store_true", help="steps that the recording itself shows")
-    others.add_argument("--wearer", metavar="NAME", help="who wore the robot, all the time")
+    others.add_argument("--file", type=Path, metavar="FILE.csv", help="a file of labels: from,to,label")
+    others.add_argument("--truth", type=Path, metavar="FILE.jsonl", help="truth of a simulated wearer")
+    others.add_argument("--gait-events", action="store_true", help="label the steps found in the recording")
+    others.add_argument("--wearer", metavar="NAME", help="the wearer of the whole session")
     others.add_argument(
-        "--regression", action="store_true", help="never learn from this session, judge every model by it"
+        "--regression", action="store_true", help="use this session to judge every model, never to learn from"
     )
-    others.add_argument("--ls", action="store_true", help="show the labels that hold")
-    made.add_argument("--remove", action="store_true", help="take back what is named instead of keeping it")
+    others.add_argument("--ls", action="store_true", help="list the valid labels")
+    made.add_argument("--remove", action="store_true", help="remove the named label")
     return made

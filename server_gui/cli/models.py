@@ -60,7 +60,7 @@ def main(argv: list[str]) -> int:
 
 def ls(argv: list[str]) -> int:
     """Run `gwrms models ls`."""
-    made = _parser("ls", "Every model, oldest first, and which robots it serves.")
+    made = _parser("ls", "List all models, oldest first, and the robots that they serve.")
     made.add_argument("--task", choices=TASKS, help="these alone")
     arguments = made.parse_args(argv)
     registry = _registry(arguments)
@@ -99,8 +99,8 @@ def _fields(card: Card, serving: Serving) -> dict[str, Any]:
 
 def show(argv: list[str]) -> int:
     """Run `gwrms models show`."""
-    made = _parser("show", "What is known of a model. Exit status 1: it cannot serve here.")
-    made.add_argument("model", metavar="MODEL", help="its name, or how that alone begins")
+    made = _parser("show", "Show a model's card. Exit status 1: it cannot serve here.")
+    made.add_argument("model", metavar="MODEL", help="its name, which may be abbreviated")
     arguments = made.parse_args(argv)
     registry = _registry(arguments)
     card = registry.card(_named(registry, arguments.model))
@@ -117,9 +117,11 @@ def show(argv: list[str]) -> int:
 def promote(argv: list[str]) -> int:
     """Run `gwrms models promote`."""
     made = _parser("promote", "Let a model serve.", PROMOTE_EPILOG)
-    made.add_argument("model", metavar="MODEL", help="its name, or how that alone begins")
+    made.add_argument("model", metavar="MODEL", help="its name, which may be abbreviated")
     made.add_argument(
-        "--instead-of", metavar="MODEL", help=f"only while this one serves; {NOTHING}: only while none does"
+        "--instead-of",
+        metavar="MODEL",
+        help=f"promote only while this one serves; {NOTHING}: while none does",
     )
     _add_who(made, "this robot alone")
     arguments = made.parse_args(argv)
@@ -137,7 +139,7 @@ def promote(argv: list[str]) -> int:
 
 def rollback(argv: list[str]) -> int:
     """Run `gwrms models rollback`."""
-    made = _parser("rollback", "Let that serve which did before.", ROLLBACK_EPILOG)
+    made = _parser("rollback", "Return to the model that served before.", ROLLBACK_EPILOG)
     made.add_argument("task", choices=TASKS)
     _add_who(made, "this robot's own model")
     arguments = made.parse_args(argv)
@@ -163,9 +165,11 @@ def _tell(arguments: argparse.Namespace, task: str, now: Pointer) -> int:
 
 def history(argv: list[str]) -> int:
     """Run `gwrms models history`."""
-    made = _parser("history", "What has served, newest last.")
+    made = _parser("history", "Show which models have served, newest last.")
     made.add_argument("task", choices=TASKS)
-    made.add_argument("--robot", default="", metavar="NAME", help="its own models (default: those for all)")
+    made.add_argument(
+        "--robot", default="", metavar="NAME", help="this robot's own models (default: those for all)"
+    )
     arguments = made.parse_args(argv)
     found = _registry(arguments).history(arguments.task, arguments.robot)
     if arguments.json:
@@ -183,7 +187,7 @@ def _by(now: Pointer) -> str:
 def key(argv: list[str]) -> int:
     """Run `gwrms models key`."""
     made = parser(
-        "models key", "This desk's key, made where there is none: a line for [promoters].", KEY_EPILOG
+        "models key", "Print this desk's key, as a line for [promoters]; create it if necessary.", KEY_EPILOG
     )
     arguments = made.parse_args(argv)
     name, fingerprint = own_line()
@@ -196,9 +200,13 @@ def key(argv: list[str]) -> int:
 
 def export(argv: list[str]) -> int:
     """Run `gwrms models export`."""
-    made = _parser("export", "A model as ONNX; both judge the same rows before the file is written.")
-    made.add_argument("model", metavar="MODEL", help="its name, or how that alone begins")
-    made.add_argument("--onnx", type=Path, required=True, metavar="FILE", help="where to; replaced if there")
+    made = _parser(
+        "export", "Export a model as ONNX; both are compared on the same rows before the file is written."
+    )
+    made.add_argument("model", metavar="MODEL", help="its name, which may be abbreviated")
+    made.add_argument(
+        "--onnx", type=Path, required=True, metavar="FILE", help="output file; replaced if it exists"
+    )
     arguments = made.parse_args(argv)
     registry = _registry(arguments)
     card, state = registry.load(_named(registry, arguments.model))
@@ -232,8 +240,8 @@ def _parser(command: str, what: str, epilog: str = "") -> argparse.ArgumentParse
 
 def _add_who(made: argparse.ArgumentParser, whose: str) -> None:
     made.add_argument("--robot", default="", metavar="NAME", help=f"{whose} (default: that for every robot)")
-    made.add_argument("--who", default=user_name(), metavar="WHO", help="who says so (default: %(default)s)")
-    made.add_argument("--why", default="", metavar="TEXT", help="kept in the history")
+    made.add_argument("--who", default=user_name(), metavar="WHO", help="author (default: %(default)s)")
+    made.add_argument("--why", default="", metavar="TEXT", help="reason, kept in the history")
 
 
 def _registry(arguments: argparse.Namespace) -> Registry:
@@ -241,7 +249,7 @@ def _registry(arguments: argparse.Namespace) -> Registry:
 
 
 def _named(registry: Registry, text: str) -> str:
-    """The one model whose name this is, or begins so.
+    """Return the one model whose name this is, or begins so.
 
     Raises:
         UnusableModel: there is none, or there are several.

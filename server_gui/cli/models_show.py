@@ -49,7 +49,7 @@ def _sessions(names: Sequence[str]) -> str:
 
 
 def _judged(classes: Sequence[str], metrics: Metrics) -> Iterator[str]:
-    """The tables that there are."""
+    """Yield the tables that there are."""
     if metrics.figures:
         rows = [(name, f"{value:.4g}") for name, value in metrics.figures.items()]
         yield table(("ON DATA NEVER SEEN", ""), rows, (1,))

@@ -179,7 +179,7 @@ class _Screen:
 def _parser() -> argparse.ArgumentParser:
     made = argparse.ArgumentParser(
         prog="gwrms plot",
-        description="Channels over time, live, until q, or Ctrl-C.",
+        description="Plot channels live, until q or Ctrl-C.",
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
@@ -188,6 +188,6 @@ def _parser() -> argparse.ArgumentParser:
     made.add_argument(
         "channels", metavar="CHANNEL", nargs="+", help="names, globs, or a component: all of its channels"
     )
-    made.add_argument("--terminal", action="store_true", help="in the terminal, display or not")
+    made.add_argument("--terminal", action="store_true", help="use the terminal even with a display")
     made.add_argument("--seconds", type=seconds, metavar="N", help="end after N seconds")
     return made

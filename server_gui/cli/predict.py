@@ -28,7 +28,7 @@ from server_gui.core.prediction.rehearsals import BENCHMARKS
 from server_gui.core.prediction.replay import Replayed, replay
 from server_gui.core.settings.prediction import DANGER
 from server_gui.core.settings.server_file import ServerSettings, SettingsError, add_robots, load, name_of
-from server_gui.processes.ending import Ended, Ending
+from server_gui.processes.shutdown_signals import ShutdownRequested, ShutdownSignals
 from server_gui.terminal.predictions import link, replay_told, told
 
 LOOK_S: Final = 0.25  # a look at what has come waits at most so long
@@ -73,7 +73,7 @@ def main(argv: list[str]) -> int:
 
 
 def _settings(arguments: argparse.Namespace) -> ServerSettings:
-    """The server's file, with another store where one is named; here prediction is always on."""
+    """Return the server's file, with another store where one is named; here prediction is always on."""
     settings = load(arguments.config)
     replace = msgspec.structs.replace
     store = replace(settings.store, url=arguments.url) if arguments.url else settings.store
@@ -117,8 +117,8 @@ def _live(settings: ServerSettings, robots: Mapping[str, Address], arguments: ar
     until_s = math.inf if arguments.seconds is None else time.monotonic() + arguments.seconds
     predicted = False
     with (
-        Ending() as ending,
-        contextlib.suppress(Ended),
+        ShutdownSignals() as ending,
+        contextlib.suppress(ShutdownRequested),
         Live(settings, robots) as live,
         _shown(arguments) as show,
     ):
@@ -174,7 +174,7 @@ def _show_json(_live: Live, news: Sequence[PredictionNews]) -> None:
 
 
 def _show_new(news: Sequence[PredictionNews], said: dict[tuple[str, str], str]) -> None:
-    """A line for each change."""
+    """Print a line for each change."""
     for one in news:
         match one:
             case Predicted(prediction=prediction):
@@ -241,7 +241,7 @@ def _sessions(settings: ServerSettings, arguments: argparse.Namespace) -> int:
 
 
 def _say_replayed(session: Session, found: Sequence[Replayed]) -> None:
-    """A line a decision, then one a task."""
+    """Print a line per decision, then one per task."""
     whose = {"robot": session.robot, "session": session.session}
     for one in found:
         for prediction, utc_ns in zip(one.predictions, one.utc_ns, strict=True):
@@ -256,33 +256,35 @@ def _say_replayed(session: Session, found: Sequence[Replayed]) -> None:
 
 
 def _parser() -> argparse.ArgumentParser:
-    made = parser("predict", "What robot and wearer are doing, and how far to believe that.", EPILOG)
+    made = parser(
+        "predict", "Predict the activity of robot and wearer, with the trust in the models.", EPILOG
+    )
     made.add_argument(
         "--robot",
         action="append",
         default=[],
         metavar="NAME|[NAME=]HOST:PORT",
-        help="live: a robot of the server's file, or where one is; repeat for more",
+        help="live: a robot of the server's file, or its address; repeatable",
     )
-    made.add_argument("--seconds", type=seconds, metavar="N", help="live: end after so long")
+    made.add_argument("--seconds", type=seconds, metavar="N", help="live: duration")
     made.add_argument(
         "--session",
         action="append",
         default=[],
         metavar="SESSION",
-        help="over a recording: its name, or how that alone begins; repeat for more",
+        help="over a recording: its name, which may be abbreviated; repeatable",
     )
     made.add_argument(
         "--model",
         action="append",
         default=[],
         metavar="ID",
-        help="over a recording: this instead of the serving one; repeat for more",
+        help="over a recording: use this model instead of the serving one; repeatable",
     )
     made.add_argument(
         "--rules",
         action="store_true",
-        help="over recordings: what the rules of the server's file would have done",
+        help="over recordings: rehearse the rules of the server's file",
     )
     made.add_argument(
         "--benchmark", choices=BENCHMARKS, metavar="NAME", help=f"with --rules: {', '.join(BENCHMARKS)}"

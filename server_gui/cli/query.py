@@ -1,4 +1,4 @@
-"""`gwrms query`: SQL over everything recorded."""
+"""`gwrms query`: run SQL over all recordings."""
 
 import itertools
 import sys
@@ -12,7 +12,7 @@ import pyarrow.csv
 
 from gateway.amounts import NONE
 from gateway.cli.text import say, table, warn
-from gateway.plain import json_plain
+from gateway.plain_text import json_plain
 from ml.store.private import private_files
 from ml.store.query import Result, query
 from server_gui.cli.cloud_options import add_url, parser, reach
@@ -44,10 +44,10 @@ Only reading: no other statement, no file outside the store. Times are UTC."""
 def main(argv: list[str]) -> int:
     """Run `gwrms query`."""
     private_files()
-    made = parser("query", "SQL over the store's tables.", EPILOG)
+    made = parser("query", "Run SQL over the store's tables.", EPILOG)
     made.add_argument("sql", metavar="SELECT…", help="one statement, in DuckDB's SQL; - reads it from stdin")
     made.add_argument("--csv", action="store_true", help="CSV, every row")
-    made.add_argument("--robot", metavar="NAME", help="this robot's rows alone: opens its shard alone")
+    made.add_argument("--robot", metavar="NAME", help="only this robot's rows: opens its shard only")
     add_url(made)
     arguments = made.parse_args(argv)
     sql = sys.stdin.read() if arguments.sql == "-" else arguments.sql

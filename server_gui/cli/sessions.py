@@ -31,13 +31,11 @@ from server_gui.cli.sessions_changed import changed
 from server_gui.cli.sessions_gait import gait
 from server_gui.cli.sessions_resources import compare, resources
 from server_gui.core.cloud import exports
-from server_gui.core.cloud.changed import DIGITS
-from server_gui.core.cloud.mcap import write_mcap
+from server_gui.core.cloud.actions import FORMATS
+from server_gui.core.cloud.configuration_changes import DIGITS
 from server_gui.core.cloud.recordings import Recorded, Recordings
 from server_gui.core.cloud.selection import Choice, choose
-from server_gui.core.cloud.tabular import write_csv, write_parquet
 
-FORMATS: Final = {"csv": write_csv, "parquet": write_parquet, "mcap": write_mcap}
 HEADER: Final = ("SESSION", "ROBOT", "BEGAN (UTC)", "LENGTH", "ROWS", "SIZE", "", "OPERATOR", "NOTES")
 USAGE: Final = """usage: gwrms sessions COMMAND …
 
@@ -69,8 +67,8 @@ def main(argv: list[str]) -> int:
 
 def ls(argv: list[str]) -> int:
     """Run `gwrms sessions ls`."""
-    made = parser("sessions ls", "Every session, oldest first.")
-    made.add_argument("--robot", default="*", metavar="GLOB", help="of these robots")
+    made = parser("sessions ls", "List all sessions, oldest first.")
+    made.add_argument("--robot", default="*", metavar="GLOB", help="only these robots")
     _add_times(made, instant, "as ISO 8601 writes it, UTC")
     add_url(made)
     arguments = made.parse_args(argv)
@@ -136,7 +134,7 @@ def _fields(session: Session) -> dict[str, Any]:
 
 def show(argv: list[str]) -> int:
     """Run `gwrms sessions show`."""
-    made = parser("sessions show", "What is known of a session, its channels, and what happened in it.")
+    made = parser("sessions show", "Show a session's metadata, channels and events.")
     _add_session(made)
     arguments = made.parse_args(argv)
     known = recordings("sessions", arguments)
@@ -188,7 +186,7 @@ def _told(
 
 
 def _value(value: object) -> str:
-    """A parameter's, as what changed between sessions is told; whole numbers keep all their digits."""
+    """Return a parameter's, as what changed between sessions is told; whole numbers keep all their digits."""
     rounds = isinstance(value, float) and not value.is_integer()
     return f"{value:.{DIGITS}g}" if rounds else str(value)
 
@@ -229,14 +227,14 @@ examples
 
 def export(argv: list[str]) -> int:
     """Run `gwrms sessions export`."""
-    made = parser("sessions export", "A session, or a part of it, as a file.", EXPORT_EPILOG)
+    made = parser("sessions export", "Export a session, or a part of it, to a file.", EXPORT_EPILOG)
     _add_session(made)
     made.add_argument(
-        "--out", type=Path, required=True, metavar="FILE", help="where to; replaced if it is there"
+        "--out", type=Path, required=True, metavar="FILE", help="output file; replaced if it exists"
     )
-    made.add_argument("--format", choices=FORMATS, help="default: what FILE ends with")
+    made.add_argument("--format", choices=FORMATS, help="default: by the ending of FILE")
     made.add_argument(
-        "--channels", action="append", metavar="GLOB", help="these only; repeat for more (default: all)"
+        "--channels", action="append", metavar="GLOB", help="only these; repeatable (default: all)"
     )
     _add_times(made, instant_or_seconds, "a time (UTC), or seconds since the session's first sample")
     arguments = made.parse_args(argv)
@@ -271,7 +269,7 @@ def _counted(tables: Iterable[pa.Table], advance: Advance) -> Iterator[pa.Table]
 
 
 def _add_session(made: argparse.ArgumentParser) -> None:
-    made.add_argument("session", metavar="SESSION", help="its name, or how that alone begins")
+    made.add_argument("session", metavar="SESSION", help="its name, which may be abbreviated")
     add_url(made)
 
 

@@ -9,8 +9,8 @@ from gateway.cli.text import say, say_json, table
 from ml.store.sessions import Session
 from server_gui.cli.cloud_options import add_url, parser, progress, recordings
 from server_gui.cli.edits import COLUMNS, metric_row
-from server_gui.core.cloud.changed import Changes, Difference, Told, changes, not_known
-from server_gui.core.cloud.moved import moved, walk
+from server_gui.core.cloud.configuration_changes import Changes, Difference, Told, changes, not_known
+from server_gui.core.cloud.metric_changes import moved, walk
 from server_gui.core.evidence.comparison import Evidence, Word
 
 EPILOG = """First what was otherwise when the session AFTER began: wearer, parameters, calibration, firmware,
@@ -29,11 +29,13 @@ HEADER = ("WHAT CHANGED", "", "BEFORE", "AFTER")
 def changed(argv: list[str]) -> int:
     """Run `gwrms sessions changed`."""
     made = parser(
-        "sessions changed", "What changed from one session to another, and what moved with it.", EPILOG
+        "sessions changed", "Show what changed between two sessions, and what moved with it.", EPILOG
     )
-    made.add_argument("before", metavar="BEFORE", help="the session in which it worked; how its name begins")
+    made.add_argument(
+        "before", metavar="BEFORE", help="the session in which it worked; its name, which may be abbreviated"
+    )
     made.add_argument("after", metavar="AFTER", help="the other one")
-    made.add_argument("--facts", action="store_true", help="only what changed: no telemetry is read")
+    made.add_argument("--facts", action="store_true", help="show only what changed; reads no telemetry")
     add_url(made)
     arguments = made.parse_args(argv)
     known = recordings("sessions", arguments)

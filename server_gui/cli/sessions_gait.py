@@ -32,9 +32,9 @@ LEGS = ("LEG", "STRIDES", "STRIDE", "STEP", "STANCE", "SWING", "VARIABILITY")
 def gait(argv: list[str]) -> int:
     """Run `gwrms sessions gait`."""
     made = parser(
-        "sessions gait", "Cadence, step times, symmetry and ranges of motion of a recording.", EPILOG
+        "sessions gait", "Show cadence, step times, symmetry and ranges of motion of a recording.", EPILOG
     )
-    made.add_argument("session", metavar="SESSION", help="its name, or how that alone begins")
+    made.add_argument("session", metavar="SESSION", help="its name, which may be abbreviated")
     meaning = "a time (UTC), or seconds since the session's first sample"
     made.add_argument("--from", dest="begin", type=instant_or_seconds, metavar="TIME", help=meaning)
     made.add_argument("--to", dest="end", type=instant_or_seconds, metavar="TIME", help=meaning)

@@ -30,11 +30,11 @@ def resources(argv: list[str]) -> int:
     """Run `gwrms sessions resources`."""
     made = parser(
         "sessions resources",
-        "Resources that each program on the robot's computer used, and memory leaks.",
+        "Show the resources used by each program on the robot's computer, and memory leaks.",
         RESOURCES_EPILOG,
     )
-    made.add_argument("session", metavar="SESSION", help="its name, or how that alone begins")
-    made.add_argument("--all", action="store_true", help="also those that never used anything")
+    made.add_argument("session", metavar="SESSION", help="its name, which may be abbreviated")
+    made.add_argument("--all", action="store_true", help="include programs that used nothing")
     add_url(made)
     arguments = made.parse_args(argv)
     known = recordings("sessions", arguments)
@@ -53,10 +53,12 @@ def resources(argv: list[str]) -> int:
 def compare(argv: list[str]) -> int:
     """Run `gwrms sessions compare`."""
     made = parser(
-        "sessions compare", "Which programs take more in sessions than in earlier ones.", COMPARE_EPILOG
+        "sessions compare", "Find programs that use more resources than in earlier sessions.", COMPARE_EPILOG
     )
-    made.add_argument("before", metavar="BEFORE[,…]", help="sessions, each by how its name begins")
-    made.add_argument("after", metavar="AFTER[,…]", help="likewise, of another version")
+    made.add_argument(
+        "before", metavar="BEFORE[,…]", help="sessions by their names, which may be abbreviated"
+    )
+    made.add_argument("after", metavar="AFTER[,…]", help="the same, of another version")
     add_url(made)
     arguments = made.parse_args(argv)
     known = recordings("sessions", arguments)
@@ -75,7 +77,7 @@ def _use(known: Recordings, name: str) -> SessionUse:
 
 
 def _version(session: Session) -> str:
-    """What a session's software is called: the gateway's version, else its own name."""
+    """Return what a session's software is called: the gateway's version, else its own name."""
     known = session.versions.get("gateway")
     return f"gateway {known}" if known else session.session
 

@@ -42,7 +42,7 @@ def main(argv: list[str]) -> int:
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         sys.stderr.write("gwrms top: this is no terminal; gwrms watch and gwrms describe need none\n")
         return 1
-    from server_gui.processes.ending import Ended, Ending
+    from server_gui.processes.shutdown_signals import ShutdownRequested, ShutdownSignals
     from server_gui.terminal.controls import Controls
     from server_gui.terminal.dashboard import Dashboard
     from server_gui.terminal.followed_robot import EVERY_PARAMETER, FollowedRobot
@@ -52,7 +52,7 @@ def main(argv: list[str]) -> int:
     ends_s = math.inf if arguments.seconds is None else time.monotonic() + arguments.seconds
     followed_robot = FollowedRobot(arguments.robot, EVERY_PARAMETER, foresees=_foresees(settings))
     learned = None if settings is None else Learned(settings.recorder.spool)
-    with Ending() as ending, followed_robot as followed, learned or contextlib.nullcontext():
+    with ShutdownSignals() as ending, followed_robot as followed, learned or contextlib.nullcontext():
 
         def tick() -> bool:
             ending.check()
@@ -63,14 +63,14 @@ def main(argv: list[str]) -> int:
 
         try:
             Dashboard(followed.station, Controls(followed.station), str(arguments.robot)).run(tick)
-        except Ended as ended:
+        except ShutdownRequested as ended:
             _tell(followed.station.stopping)
             return ended.status
         return _tell(followed.station.stopping)
 
 
 def _settings() -> "ServerSettings | None":
-    """What the server's file says; one that cannot be read hinders nobody."""
+    """Return what the server's file says; one that cannot be read hinders nobody."""
     from server_gui.core.settings.server_file import SettingsError, load
 
     try:
@@ -97,7 +97,7 @@ def _tell(stopping: StopProgress) -> int:
 def _parser() -> argparse.ArgumentParser:
     made = argparse.ArgumentParser(
         prog="gwrms top",
-        description="One robot in the terminal, live: its joints, feet, trunk, parameters and computer.",
+        description="Show one robot live in the terminal: joints, feet, trunk, parameters and computer.",
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,

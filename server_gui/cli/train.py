@@ -72,7 +72,7 @@ def main(argv: list[str]) -> int:
 
 
 def _trained(registry: Registry, wish: Wish, arguments: argparse.Namespace) -> "Trained":
-    """What came of it; says what it does first, for even loading what learns takes its seconds."""
+    """Return what came of it; says what it does first, for even loading what learns takes its seconds."""
     tell = _teller(arguments)
     if not arguments.json:
         warn("train", f"{wish.task}, from the sessions and labels of {registry.url}")
@@ -82,7 +82,7 @@ def _trained(registry: Registry, wish: Wish, arguments: argparse.Namespace) -> "
 
 
 def _teller(arguments: argparse.Namespace) -> Tell:
-    """What tells how far it is: for machines in lines of JSON before the answer."""
+    """Return what tells how far it is: for machines in lines of JSON before the answer."""
     if arguments.json:
         if not arguments.progress:
             return untold
@@ -153,7 +153,7 @@ def _figures(judged: Judged) -> Iterator[tuple[str, str, str]]:
 
 
 def _flat(metrics: Metrics) -> Mapping[str, float]:
-    """The figures that people ask for, then classes and people."""
+    """Return the figures that people ask for, then classes and people."""
     found: dict[str, float] = {name: metrics.figures[name] for name in FIGURES if name in metrics.figures}
     if metrics.calibration_error is not None:
         found["calibration_error"] = metrics.calibration_error
@@ -178,21 +178,21 @@ def _answer(model: str, trained: "Trained", overtaken: str, *, promoted: bool) -
 
 
 def _parser() -> argparse.ArgumentParser:
-    made = parser("train", "A model from recorded sessions and their labels.", EPILOG)
+    made = parser("train", "Train a model on labelled sessions.", EPILOG)
     made.add_argument("task", choices=TASKS, metavar="TASK", help=f"what it predicts: {', '.join(TASKS)}")
     add_url(made)
-    made.add_argument("--robot", default="", metavar="NAME", help="learn from it alone, and serve it alone")
     made.add_argument(
-        "--session", action="append", default=[], metavar="NAME", help="these alone; repeat for more"
+        "--robot", default="", metavar="NAME", help="learn from this robot only, and serve only it"
     )
+    made.add_argument("--session", action="append", default=[], metavar="NAME", help="only these; repeatable")
     made.add_argument(
         "--held-out",
         action="append",
         default=[],
         metavar="WHO",
-        help="wearers, or sessions, to be judged by; repeat for more",
+        help="wearers, or sessions, to judge by; repeatable",
     )
-    made.add_argument("--promote", action="store_true", help="let it serve, if it is better")
+    made.add_argument("--promote", action="store_true", help="promote it if it is better")
     made.add_argument(
         "--pseudo-labels",
         type=_probability,
@@ -201,9 +201,9 @@ def _parser() -> argparse.ArgumentParser:
         "says anything",
     )
     made.add_argument(
-        "--adapt-from", default="", metavar="MODEL", help="teach this one a wearer's gait (gait_phase)"
+        "--adapt-from", default="", metavar="MODEL", help="adapt this model to a wearer's gait (gait_phase)"
     )
-    made.add_argument("--progress", action="store_true", help="say how far it is, a line a step")
+    made.add_argument("--progress", action="store_true", help="print the progress, a line per step")
     made.add_argument("--cluster", default="", metavar="ADDRESS", help="a Dask scheduler, for many sessions")
     return made
 

@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import Final
 
 from server_gui.processes.children import Child
-from server_gui.processes.own_robot import OwnRobot, Running
+from server_gui.processes.demo_robot import DemoRobot, Running
 from server_gui.processes.simulated import START_S, Part, address_in
 
 
-class FileGateway(OwnRobot):
+class FileGateway(DemoRobot):
     """Of a robot that is there: nothing is simulated."""
 
     name: Final = "gateway"

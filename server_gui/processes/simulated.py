@@ -53,7 +53,7 @@ def simulated_robot(
 
 
 def _config_in(line: str) -> str | None:
-    """The simulator says `{"ready": true, "config": …}`."""
+    """Parse the simulator's first line, `{"ready": true, "config": …}`."""
     try:
         said = json.loads(line)
     except ValueError:
@@ -62,6 +62,6 @@ def _config_in(line: str) -> str | None:
 
 
 def address_in(line: str) -> Address | None:
-    """The gateway says `listening on HOST:PORT`."""
+    """Parse the gateway's first line, `listening on HOST:PORT`."""
     said = re.fullmatch(r"listening on (\S+)", line.strip())
     return Address.parse(said[1]) if said else None

@@ -30,7 +30,7 @@ def draw(
 def _dots(
     samples: Sequence[Sample], begin_s: float, end_s: float, low: float, high: float, size: tuple[int, int]
 ) -> Iterator[tuple[int, int]]:
-    """The dots of the curve, joined up and down between two columns that follow each other."""
+    """Yield the dots of the curve, joined up and down between two columns that follow each other."""
     width, height = size
     before: tuple[int, int] | None = None
     for time_s, value in samples:

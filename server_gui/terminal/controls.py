@@ -90,7 +90,7 @@ class Controls:
             self._does[key]()
 
     def _refused(self, key: Key) -> str:
-        """Moving about, ending and a STOP are nothing that anybody may not do."""
+        """Return why a key's action is not allowed; navigation, quitting and STOP always are."""
         if key in (Key.LEFT, Key.RIGHT):
             return self.no_change
         return self.no_reset if key is Key.RESET else ""

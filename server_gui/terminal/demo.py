@@ -17,10 +17,10 @@ import msgspec
 
 from gateway.client import Address
 from server_gui.core.desk.first_steps import FirstSteps, Step
-from server_gui.processes.ending import Ended, Ending
-from server_gui.processes.own_robot import OwnRobot
+from server_gui.processes.demo_robot import DemoRobot
+from server_gui.processes.shutdown_signals import ShutdownRequested, ShutdownSignals
 from server_gui.processes.simulated import Part
-from server_gui.terminal.saying import say
+from server_gui.terminal.output import print_line
 
 if TYPE_CHECKING:  # what takes long to import is imported while simulator and gateway start
     from server_gui.core.desk.station import Station
@@ -67,20 +67,20 @@ def run(options: Options) -> int:
 
     """
     view = "the window" if options.window else "a view"
-    say(f"gwrms demo: a simulated exoskeleton, its gateway and {view} start; Ctrl-C ends all of them")
-    with Ending() as ending, _folder(options.folder) as folder:
+    print_line(f"gwrms demo: a simulated exoskeleton, its gateway and {view} start; Ctrl-C ends all of them")
+    with ShutdownSignals() as ending, _folder(options.folder) as folder:
         try:
-            with OwnRobot(options.scenario, folder) as own:
+            with DemoRobot(options.scenario, folder) as own:
                 if options.window:
                     return _window(own, options, folder.absolute(), ending.check)
                 _in_terminal(own, options, ending.check)
-        except Ended as ended:
+        except ShutdownRequested as ended:
             return ended.status
     return 0
 
 
-def _window(own: OwnRobot, options: Options, folder: Path, check: Callable[[], None]) -> int:
-    """What it records stays in the demo's folder: nothing simulated comes among real recordings."""
+def _window(own: DemoRobot, options: Options, folder: Path, check: Callable[[], None]) -> int:
+    """Return what it records stays in the demo's folder: nothing simulated comes among real recordings."""
     from server_gui.views.first_run.splash import Splash
     from server_gui.views.frame.application import application, kept_settings, kept_theme
 
@@ -117,10 +117,10 @@ def import_slowly() -> Iterator[str]:
 
 
 def _tell(step: Step, took_s: float) -> None:
-    say(f"{took_s:5.1f} s  {DONE[step]}")
+    print_line(f"{took_s:5.1f} s  {DONE[step]}")
 
 
-def _in_terminal(own: OwnRobot, options: Options, check: Callable[[], None]) -> None:
+def _in_terminal(own: DemoRobot, options: Options, check: Callable[[], None]) -> None:
     steps = FirstSteps(_tell, SHOWN_ONLY)
     from server_gui.terminal.followed_robot import FollowedRobot  # while the others start
 
@@ -134,7 +134,7 @@ def _in_terminal(own: OwnRobot, options: Options, check: Callable[[], None]) -> 
         _view(session, options, str(address), check_all)
 
 
-def _started(own: OwnRobot, steps: FirstSteps, check: Callable[[], None]) -> Address:
+def _started(own: DemoRobot, steps: FirstSteps, check: Callable[[], None]) -> Address:
     """Where the gateway listens, once it does."""
     while True:
         check()
@@ -229,13 +229,13 @@ def _headless(session: "FollowedRobot", seconds: float | None, check: Callable[[
             check()
             session.update()
             if time.monotonic() >= next_line:
-                say(headless.line(robot, processing.derived().gait, next_line - began))
+                print_line(headless.line(robot, processing.derived().gait, next_line - began))
                 next_line += LINE_S
             time.sleep(TICK_S)
     finally:
         # Also of a run that was cut short.
-        say(headless.table(summary, processing.derived().gait, robot))
+        print_line(headless.table(summary, processing.derived().gait, robot))
     failures = summary.failures()
     if failures:
         raise DemoFailed(f"this was no walk: {'; '.join(failures)}")
-    say("The joints moved, the feet alternated, no component was lost.")
+    print_line("The joints moved, the feet alternated, no component was lost.")

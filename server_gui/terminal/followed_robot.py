@@ -17,9 +17,9 @@ from server_gui.core.follow.feed import Feed, FollowSettings
 from server_gui.core.follow.mailbox import Mailbox
 from server_gui.core.follow.network import Network
 from server_gui.core.follow.news import News, NewsKind
-from server_gui.core.tuning.link import Link
+from server_gui.core.tuning.link import CommandLink
 from server_gui.core.tuning.writing import WriteState
-from server_gui.terminal.foreseeing import Foreseeing
+from server_gui.terminal.danger_prediction import DangerPrediction
 from server_gui.terminal.summary import Summary
 
 CLIENT = "gwrms view"
@@ -43,7 +43,7 @@ class FollowedRobot:
         self._mailbox = Mailbox()
         self._posted: collections.deque[Callable[[], None]] = collections.deque()
         self._network = Network()
-        self._link = Link(
+        self._link = CommandLink(
             self._network,
             address,
             self._mailbox.put,
@@ -53,9 +53,9 @@ class FollowedRobot:
         )
         self.station = Station(str(address), str(address), self._link, self._posted.append, News())
         self.station.predictions.foresees = foresees
-        self._foreseeing: Foreseeing | None = None
+        self._foreseeing: DangerPrediction | None = None
         if foresees:
-            self._foreseeing = Foreseeing(
+            self._foreseeing = DangerPrediction(
                 str(address), functools.partial(self.station.tell, NewsKind.WARNING)
             )
             following = replace(following, channels=(*following.channels, *CHANNELS))
@@ -107,7 +107,7 @@ class FollowedRobot:
                     summary.see(part.name, part.state)
 
     def _give_back_control(self) -> None:
-        """The lease is held only while something is written."""
+        """Release the lease when nothing is being written."""
         control, writing = self.station.control, self.station.writing
         wanted = control.until_ns is not None and writing.state is not WriteState.WRITING
         if wanted and writing.revision != self._given_back:

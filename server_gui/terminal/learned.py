@@ -65,7 +65,7 @@ class Learned:
 
 
 def _of(report: _Report, station: Station) -> str:
-    """What is said of this robot, by whichever name."""
+    """Return what is said of this robot, by whichever name."""
     description = station.robot.description
     calls_itself = None if description is None else description.robot
     for name, link in report.robots.items():

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 
 from rich.text import Text
 
-from gateway.plain import plain
+from gateway.plain_text import plain
 from server_gui.core.alarms.marks import GLYPHS, Mark, state_mark
 
 LEFT = "#56b4e9"  # Okabe–Ito sky blue

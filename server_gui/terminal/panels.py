@@ -6,19 +6,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rich import box
-from rich.console import Group, RenderableType
+from rich.console import Console, Group, RenderableType
 from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
 from gateway.client import ConnectionState
-from gateway.plain import plain
+from gateway.plain_text import plain
 from gateway.units import Unit, Units
 from gateway.wire.parameter import ParameterInfo, ParameterValue
 from ml.danger.levels import Level
 from server_gui.core.alarms.alarm import Active
-from server_gui.core.alarms.found import undriven
 from server_gui.core.alarms.marks import GLYPHS
+from server_gui.core.alarms.robot_alarms import undriven
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.news import NewsKind
 from server_gui.core.follow.robot import Robot
@@ -99,7 +99,10 @@ def learned(text: str) -> Text:
 
 
 def _danger(station: Station) -> Text:
-    """The level of danger, or that it is not known; nothing where nobody foresees it, or it is no sign."""
+    """Return the level of danger, or that it is not known.
+
+    Nothing where nobody foresees it, or it is no sign.
+    """
     shown = station.predictions.danger
     if not station.predictions.foresees or undriven(station.robot, station.stopping):
         return words("")
@@ -209,7 +212,7 @@ def feet_and_trunk(robot: Robot, gait: Gait, look: Look) -> RenderableType:
 
 
 def _walk(gait: Gait, look: Look) -> str:
-    """Steps a minute and, where there is room, each foot's share of its stride on the ground."""
+    """Return steps a minute and, where there is room, each foot's share of its stride on the ground."""
     if gait.cadence_spm is None:
         return ""
     cadence = f"{gait.cadence_spm:.0f} steps/min"
@@ -294,8 +297,8 @@ def resources(station: Station, look: Look) -> RenderableType:
     return _panel(grid, "Computer", robot, _age(robot.resources_at_ns))
 
 
-def footer(station: Station, controls: Controls, where: str) -> Group:
-    """Return the keys, grey where one may not, and the last thing that was said."""
+def footer(station: Station, controls: Controls, where: str, *, in_full: bool = False) -> Group:
+    """Return the keys, grey where one may not, and the last thing that was said, `in_full` or cut."""
     change, reset = (OLD if no else "" for no in (controls.no_change, controls.no_reset))
     keys = Text.assemble(
         (" s ", "bold white on red"),
@@ -312,13 +315,18 @@ def footer(station: Station, controls: Controls, where: str) -> Group:
         " quit",
     )
     news = _news(station, controls, where)
-    for text in (keys, news):
+    for text in (keys,) if in_full else (keys, news):
         text.no_wrap, text.overflow = True, "ellipsis"
     return Group(keys, news)
 
 
+def news_lines(station: Station, controls: Controls, where: str, columns: int) -> int:
+    """Return how many lines the last thing that was said takes in full."""
+    return len(_news(station, controls, where).wrap(Console(width=columns), columns))
+
+
 def _news(station: Station, controls: Controls, where: str) -> Text:
-    """The one thing that matters most now."""
+    """Return the one thing that matters most now."""
     robot, writing = station.robot, station.writing
     if controls.stop_sent:
         return words(station.stopping.text, style=f"bold {STOP_STYLES.get(station.stopping.state, BAD)}")
@@ -346,7 +354,7 @@ def _news(station: Station, controls: Controls, where: str) -> Text:
 
 
 def _alarm(active: Sequence[Active], controls: Controls) -> Text:
-    """The worst: what, then what to check, and how many more there are."""
+    """Return the worst: what, then what to check, and how many more there are."""
     alarm, more = active[0].alarm, len(active) - 1
     others = f"  (+{more} more)" if more else ""
     key = "  r r clears it" if alarm.clears and not controls.no_reset else ""

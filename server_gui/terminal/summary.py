@@ -106,7 +106,7 @@ def _values(batch: Batch, channel: str) -> list[float]:
 
 
 def _standing(left_n: float | None, right_n: float | None, left: str, right: str) -> str | None:
-    """The foot that carries nearly all of the weight, if one does."""
+    """Return the foot that carries nearly all of the weight, if one does."""
     if left_n is None or right_n is None or left_n + right_n < LOADED_N:
         return None
     share = left_n / (left_n + right_n)

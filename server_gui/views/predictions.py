@@ -1,5 +1,6 @@
 """What models say of a robot, in marks and words for header and overview; also that they do not know."""
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Final
@@ -8,19 +9,20 @@ from ml.danger.detector import DETECTORS
 from ml.danger.levels import Level as DangerLevel
 from ml.robot.task import ABNORMAL, UNKNOWN
 from ml.serving.trust import Level
-from server_gui.core.desk.belief import belief, blind, not_judged
+from server_gui.core.desk.confidence import belief, blind, not_judged
 from server_gui.core.desk.leg_phase import LegPhase, apart, leg_phase, phase_at
 from server_gui.core.desk.station import Station
 from server_gui.core.models.names import model_name, told_name
 from server_gui.core.prediction.adaptation import LEARNED_S, TRIED_S, Adapting, State
 from server_gui.core.prediction.current import STALE_S, Recalled, StationPredictions, Told
 from server_gui.core.processing.gait_events import Leg
-from server_gui.views.marks import Mark
+from server_gui.views.marks import Mark, enabled_text
 
 ACTIVITY, FALLING, GAIT_PHASE = "activity", "falling", "gait_phase"
 STEADY: Final = "steady"
 FEW: Final = 3  # classes of which one is true: more are no news
 LEAST: Final = 0.01  # what is less probable is not worth a word
+PROBABLE: Final = re.compile(r" \d+ %$")
 TITLES: Final = {FALLING: "Balance", GAIT_PHASE: "Stride"}
 LEARNED: Final = {state: ("ring", "dim", state.value) for state in State} | {
     State.OFFERED: ("diamond", "accent", "offered"),
@@ -35,7 +37,7 @@ UNSEEN: Final = "not judged"  # for the model does not see all
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class PredictionRow:
     """A mark, what it says, what there is to know of it, in few words too, and all else for a tool tip."""
 
     mark: Mark
@@ -43,6 +45,7 @@ class Line:
     detail: str = ""
     short: str = ""
     tip: str = ""
+    brief: str = ""  # all of it where there is the least room
 
     @property
     def short_text(self) -> str:
@@ -53,10 +56,11 @@ class Line:
     def wordings(self) -> tuple[str, ...]:
         """As one line, the fullest first."""
         details = (self.detail, self.short, "")
-        return tuple(dict.fromkeys(" · ".join(filter(None, (self.text, one))) for one in details))
+        said = [" · ".join(filter(None, (self.text, one))) for one in details]
+        return tuple(dict.fromkeys((*said, self.brief or self.text)))
 
 
-def said(shown: Told, *, stopped: str = "", unseen: str = "") -> Line:
+def said(shown: Told, *, stopped: str = "", unseen: str = "") -> PredictionRow:
     """Return what a model says now: the label and how probable, or that it does not know.
 
     Of a robot that does not drive its wearer, by what `stopped` says, nothing is called unlike what is known,
@@ -64,32 +68,34 @@ def said(shown: Told, *, stopped: str = "", unseen: str = "") -> Line:
     """
     prediction = shown.prediction
     if shown.is_stale():
-        return Line(Mark("ring", "old", OLD), "No prediction now", f"the last {shown.age_s():.0f} s ago")
+        return PredictionRow(
+            Mark("ring", "old", OLD), "No prediction now", f"the last {shown.age_s():.0f} s ago"
+        )
     falls = prediction.task == FALLING and prediction.label not in (STEADY, ABNORMAL, UNKNOWN)
     if stopped and not falls and (prediction.task == ACTIVITY or not _knows(shown)):
         return unjudged(stopped)
     word, worth = label_text(prediction.label), belief(shown)
     details = (" · ".join(filter(None, (worth.wordings[0], _runner_up(shown)))), worth.wordings[-1])
     if prediction.label == ABNORMAL and unseen:
-        return Line(Mark("ring", "old", UNSEEN), "Not judged", unseen, unseen, _tip(shown))
+        return PredictionRow(Mark("ring", "old", UNSEEN), "Not judged", unseen, unseen, _tip(shown))
     if prediction.label == ABNORMAL:
         novelty = f"novelty {prediction.novelty:.1f}"
-        return Line(
+        return PredictionRow(
             Mark("triangle", "warn", ABNORMAL), word, f"{novelty} · {details[0]}", novelty, _tip(shown)
         )
     if prediction.label == UNKNOWN:
-        return Line(Mark("ring", "dim", UNKNOWN), word, *details, _tip(shown))
+        return PredictionRow(Mark("ring", "dim", UNKNOWN), word, *details, _tip(shown))
     shape = ("square", "bad") if falls else ("diamond", "accent")
     text = f"{word} {100 * prediction.probability:.0f} %"
-    return Line(Mark(*shape, prediction.label), text, *details, _tip(shown))
+    return PredictionRow(Mark(*shape, prediction.label), text, *details, _tip(shown))
 
 
-def unjudged(why: str) -> Line:
+def unjudged(why: str) -> PredictionRow:
     """Return that nothing is said of what the wearer does, and why."""
-    return Line(Mark("ring", "dim", STOPPED), NOT_JUDGED, why, why)
+    return PredictionRow(Mark("ring", "dim", STOPPED), NOT_JUDGED, why, why)
 
 
-def status(station: Station) -> Line | None:
+def status(station: Station) -> PredictionRow | None:
     """Return the one line of the header: a fall before all, then activity; None without a model."""
     shown = station.predictions.told
     falling, stopped = shown.get(FALLING), not_judged(station)
@@ -105,24 +111,42 @@ def status(station: Station) -> Line | None:
     return line if line.mark.word == UNSEEN else _as_predicted(line)  # no prediction is not called one
 
 
-def activity(station: Station) -> Line:
+def activity(station: Station) -> PredictionRow:
     """Return what the wearer does: by a model where one says so, else by the steps that were seen."""
     gait, shown = station.processing.derived().gait, station.predictions.told.get(ACTIVITY)
     if not station.is_live:
-        return Line(Mark("ring", "old", "not known"), "Activity not known", "no live data")
+        return PredictionRow(Mark("ring", "old", "not known"), "Activity not known", "no live data")
     if shown is not None and not shown.is_stale():
         return said(shown, stopped=not_judged(station), unseen=blind(station))
     why = station.predictions.problem or "the model says nothing now"
     if stopped := not_judged(station):
         return unjudged(stopped)
     if gait.walking is None:
-        return Line(Mark("ring", "old", "not known"), "Activity not known", "too few steps seen yet", "", why)
+        return PredictionRow(
+            Mark("ring", "old", "not known"), "Activity not known", "too few steps seen yet", "", why
+        )
     if not gait.walking:
-        return Line(Mark("ring", "dim", "not walking"), "Not walking", "by the steps seen", "by steps", why)
-    return Line(Mark("diamond", "accent", "walking"), "Walking", "by the steps seen", "by steps", why)
+        return PredictionRow(
+            Mark("ring", "dim", "not walking"), "Not walking", "by the steps seen", "by steps", why
+        )
+    return PredictionRow(
+        Mark("diamond", "accent", "walking"), "Walking", "by the steps seen", "by steps", why
+    )
 
 
-def lines(station: Station) -> Iterator[Line]:
+def doing(station: Station) -> tuple[str, ...]:
+    """Return what a robot does, the fullest wording first: `Walking 74 steps/min · 6 of 6 enabled`."""
+    count = enabled_text(station.robot, live=station.is_live)
+    if not station.is_live:
+        return ("what it does is not known", "not known")
+    line, gait = activity(station), station.processing.derived().gait
+    walks = gait.walking and gait.cadence_spm is not None and line.mark.word != STOPPED
+    cadence = f"{line.text} {gait.cadence_spm:.0f} steps/min" if walks else line.short_text
+    least = f"{PROBABLE.sub('', line.short_text)} · {count.replace(' of ', '/')}"
+    return tuple(dict.fromkeys((f"{cadence} · {count}", f"{line.short_text} · {count}", least, count)))
+
+
+def lines(station: Station) -> Iterator[PredictionRow]:
     """Yield the overview's lines: balance and stride, rules that hold, devices in trouble."""
     predictions, stopped = station.predictions, not_judged(station)
     for task, title in TITLES.items():
@@ -132,27 +156,27 @@ def lines(station: Station) -> Iterator[Line]:
             if task == GAIT_PHASE and line.mark.colour == "accent":
                 line = _stride(station, line)
             if not station.is_live and line.mark.colour != "bad":
-                line = Line(Mark("ring", "old", "not known"), "not known", "no live data")
-            yield replace(line, text=f"{title}: {line.text}")
+                line = PredictionRow(Mark("ring", "old", "not known"), "not known", "no live data")
+            yield replace(line, text=f"{title}: {line.text}", brief=line.brief and f"{title}: {line.brief}")
     if predictions.problem:
-        yield Line(
+        yield PredictionRow(
             Mark("ring", "old", "no model"), "Not predicted", predictions.problem, "", predictions.problem
         )
     if not stopped and not station.robot.is_recording:
         yield from _danger(predictions)
     for rule in predictions.rules:
-        yield Line(Mark("triangle", "warn", "rule"), f"Rule {rule.rule.action.value}", rule.text)
+        yield PredictionRow(Mark("triangle", "warn", "rule"), f"Rule {rule.rule.action.value}", rule.text)
     told = {alarm.subject: alarm.mark for alarm in station.alarms.each}
     for part in station.robot.not_ok():
         why = part.problem or "no reason known"
         name = part.name.replace("_", " ")
         mark = told.get(part.name) or Mark("square", "bad", part.state)  # the same as everywhere
-        yield Line(mark, f"{name}: {mark.word}", why, "", why)
+        yield PredictionRow(mark, f"{name}: {mark.word}", why, "", why)
     if (adapting := predictions.adapting) is not None and adapting.text and not adapting.choices:
         yield _learning(adapting)
 
 
-def _learning(adapting: Adapting) -> Line:
+def _learning(adapting: Adapting) -> PredictionRow:
     """How it goes with what is learned from the wearer, while there is nothing to decide."""
     whom = f"from the steps of {adapting.wearer}"
     text, detail = {
@@ -161,15 +185,20 @@ def _learning(adapting: Adapting) -> Line:
         State.LEARNING: ("Learning", whom),
         State.TRYING: (f"Trying {adapting.stepped_s:.0f} of {TRIED_S:.0f} s", f"what was learned {whom}"),
     }.get(adapting.state, ("Nothing is learned", adapting.text))
-    return Line(Mark(*LEARNED[adapting.state]), text, detail, "", adapting.text)
+    return PredictionRow(Mark(*LEARNED[adapting.state]), text, detail, "", adapting.text)
 
 
-def _danger(predictions: StationPredictions) -> Iterator[Line]:
-    """What is foreseen: its level and number, then why; nothing old, unknown or unsaid is called fine."""
+def _danger(predictions: StationPredictions) -> Iterator[PredictionRow]:
+    """Yield what is foreseen: its level and number, then why.
+
+    Nothing old, unknown or unsaid is called fine.
+    """
     shown = predictions.danger
     if shown is None:
         if predictions.foresees:
-            yield Line(Mark("ring", "old", "not known"), "Danger: not known", "nothing has been said of it")
+            yield PredictionRow(
+                Mark("ring", "old", "not known"), "Danger: not known", "nothing has been said of it"
+            )
         return
     verdict = shown.said.verdict
     if not shown.is_known or verdict.number is None:
@@ -178,7 +207,7 @@ def _danger(predictions: StationPredictions) -> Iterator[Line]:
         mark = _DANGERS[verdict.level]
         text = f"Danger: {verdict.level.word} {100 * verdict.number:.0f} %"
     speak = f"{verdict.speaking} of {len(DETECTORS)} detectors"
-    yield Line(mark, text, "; ".join(verdict.why) or speak, speak, shown.text)
+    yield PredictionRow(mark, text, "; ".join(verdict.why) or speak, speak, shown.text)
 
 
 _DANGERS: Final = {
@@ -215,8 +244,8 @@ def label_text(label: str) -> str:
     return label.replace("_", " ").capitalize()
 
 
-def _stride(station: Station, line: Line) -> Line:
-    """The ring has the numbers; here stands whether both that know one agree."""
+def _stride(station: Station, line: PredictionRow) -> PredictionRow:
+    """Return the line with the agreement of steps and model; the ring has the numbers."""
     derived, modelled = station.processing.derived(), model_phases(station)
     steps = {leg: leg_phase(derived, leg, derived.stamp_ns) for leg in Leg}
     pairs = [(steps[leg], modelled[leg]) for leg in Leg]
@@ -224,7 +253,7 @@ def _stride(station: Station, line: Line) -> Line:
     if not differences:
         return replace(line, text="by the model alone")
     if max(differences) <= AGREES:
-        return replace(line, text="steps and model agree")
+        return replace(line, text="steps and model agree", brief="both agree")
     mark = Mark("triangle", "warn", "differs")
     return replace(line, mark=mark, text=f"{max(differences):.0f} % apart")
 
@@ -235,7 +264,7 @@ def _knows(shown: Told) -> bool:
     return prediction.label not in (UNKNOWN, ABNORMAL) and not drifted
 
 
-def _as_predicted(line: Line) -> Line:
+def _as_predicted(line: PredictionRow) -> PredictionRow:
     """As it is said where other things stand beside it; what is old is no prediction."""
     if line.mark.word == OLD:
         return line
@@ -243,7 +272,7 @@ def _as_predicted(line: Line) -> Line:
 
 
 def _runner_up(shown: Told) -> str:
-    """What it may be as well, where it may."""
+    """Return what it may be as well, where it may."""
     prediction = shown.prediction
     others = sorted(prediction.probabilities.items(), key=lambda item: -item[1])
     if 1 < len(prediction.either) <= FEW:

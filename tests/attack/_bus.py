@@ -16,7 +16,7 @@ import sys
 import time
 from collections.abc import Iterator
 
-from drivers.urgency import PRIORITY
+from drivers.realtime_priority import PRIORITY
 from tests.attack.on_bus import BAD_ANSWERS, HOSTILE, LIAR, Frame, bad_answer
 from tests.attack.robot_file import FIRST_PARAMETER, OUR_NODE, SERVED
 from tests.bench import _bus

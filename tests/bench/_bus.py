@@ -17,7 +17,7 @@ import struct
 import sys
 import time
 
-from drivers.urgency import PRIORITY
+from drivers.realtime_priority import PRIORITY
 from tests.bench._drives import DRIVES, MAPPED
 from tests.unit.bus.fake_node import FakeNode
 from tests.unit.joint.conftest import drive_objects, tpdo

@@ -27,9 +27,9 @@ from ml.robot.learned import Learned
 from ml.robot.task import SIDES
 from server_gui.core.follow.events import Telemetry
 from server_gui.core.prediction.adaptation import GAIT_PHASE, LEARNED_S, TRIED_S, Tried
-from server_gui.core.prediction.lesson import Lesson, Row, learn, tried
 from server_gui.core.prediction.model_loading import Model
 from server_gui.core.prediction.robot_predictor import Watched
+from server_gui.core.prediction.training_data import Row, TrainingData, learn, tried
 from server_gui.core.settings.prediction import PredictionSettings
 from tests.unit.evidence.walks import walk
 
@@ -84,7 +84,7 @@ def shipped() -> Model:
 def judged(base: Model, person: int) -> bool:
     """Let one wearer walk, and say what came of it; whether it would be offered."""
     every_ns = PredictionSettings().every_ns(GAIT_PHASE)
-    watched, lesson, truth = Watched(base, every_ns, ()), Lesson(base, every_ns), Truth([], [])
+    watched, lesson, truth = Watched(base, every_ns, ()), TrainingData(base, every_ns), Truth([], [])
     adapted, learned_s, followed_s = None, 0.0, 0.0
     for event in walk(WALK_S, seed=person, person=person, each_s=truth.each_s):
         if not isinstance(event, Telemetry):

@@ -1,12 +1,16 @@
 """`./dev bench predict`: from a robot's samples to a prediction, for one robot and for fifty in one batch.
 
 First the models of the benchmarks, then a robot's own, on their way through a server: row, grid, window,
-features, judging. The time is what this thread used of a core, so that other work does not count; and a
-busy computer's caches do not either: what is allowed is a multiple of a yardstick in the same run, which is
-scikit-learn's plain `predict` of trees and one network, of one row and of fifty.
+features, judging. `danger` is a row of all its channels, once its memory is full; it knows no batches:
+fifty robots take fifty times as long, which is told and not limited. The time is what this thread used of a
+core, so that other work does not count; and a busy computer's caches do not either: what is allowed is a
+multiple of a yardstick in the same run, which is scikit-learn's plain `predict` of the model of `ipol-
+status`, of one row and of fifty.
 """
 
+import copy
 import functools
+import math
 import sys
 import tempfile
 import time
@@ -25,6 +29,9 @@ from ml.benchmarks.models.gait_status import StatusSettings, status_model
 from ml.benchmarks.models.quick import QuickTerrain, probabilities, scaled_rows
 from ml.benchmarks.models.terrain import TerrainSettings, terrain_model
 from ml.benchmarks.models.trees import QuickTrees
+from ml.danger.combine import load
+from ml.danger.now import CHANNELS
+from ml.danger.watch import Watch
 from ml.features import FeatureStream, Recipe, features
 from ml.features.falling import FALLING
 from ml.features.gait_context import GAIT_CONTEXT
@@ -49,6 +56,8 @@ ONE_MS, ALL_MS = 2.0, 8.0  # the 99th percentiles that are allowed where the yar
 YARDSTICKS_MS = (2.4, 2.9)  # medians for one row and for fifty, on a computer that does little else
 PROMOTER = "tester"
 LEARNED = 1800  # rows that the models have learned from
+FULL = 3000  # rows after which danger's memory is full
+DANGER_NS = 40_000_000
 
 Predict = Callable[[npt.NDArray[np.float32]], Any]
 
@@ -65,6 +74,7 @@ def main() -> int:
     lines = [(recipe.name, functools.partial(_times, recipe, predict)) for recipe, predict in models]
     lines += [(f"own {task}", functools.partial(_served, learned)) for task, learned in _own().items()]
     over = [_line(name, times, yardsticks, allowed) for name, times in lines]
+    over.append(_line("danger", _watched, yardsticks, (allowed[0], math.inf)))
     sys.stdout.write(
         f"plain predict: {yardsticks[0]:.2f} and {yardsticks[1]:.2f} ms; allowed, 99th percentiles:"
         f" {allowed[0]:.2f} ms for one robot (ratio {ONE_MS / YARDSTICKS_MS[0]:.2f}),"
@@ -197,6 +207,34 @@ def _served(learned: Learned, robots: int) -> list[float]:
         judged("model", learned, due)
         times.append(1e3 * (time.thread_time() - began))
     return times[recipe.look_back + WARM :]
+
+
+def _watched(robots: int) -> list[float]:
+    """Milliseconds from a row of each robot, of somebody who walks, to what is said of danger."""
+    first = Watch(load())
+    for at in range(FULL):
+        first.take(*_walking(at))
+    watches = [copy.deepcopy(first) for _ in range(robots)]
+    times = []
+    for at in range(FULL, FULL + ROUNDS):
+        row = _walking(at)
+        began = time.thread_time()
+        for one in watches:
+            one.take(*row)
+        times.append(1e3 * (time.thread_time() - began))
+    return times
+
+
+def _walking(at: int) -> tuple[int, list[float | None]]:
+    """A stamp (ns) and the row of all of danger's channels; no two strides are alike."""
+    phase = math.tau * at / 30.0
+    swing = np.sin(phase + np.arange(len(CHANNELS))) + np.random.default_rng(at).normal(
+        0, 0.03, len(CHANNELS)
+    )
+    row = dict(zip(CHANNELS, swing.tolist(), strict=True))
+    row |= {"left_insole.force": 400.0 * (1.0 + math.sin(phase))}
+    row |= {"right_insole.force": 400.0 * (1.0 - math.sin(phase))}
+    return at * DANGER_NS, [row[name] for name in CHANNELS]
 
 
 def _stopping() -> list[float]:

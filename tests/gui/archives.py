@@ -22,8 +22,8 @@ from server_gui.core.settings.server_file import RecordingSettings, ServerSettin
 from server_gui.views.cloud.panel import Cloud
 from server_gui.views.frame.main_window import USUAL, MainWindow
 from server_gui.views.models.panel import ModelsPage
-from server_gui.views.pace import SLOW
 from server_gui.views.recordings.panel import Recordings
+from server_gui.views.refresh_rate import SLOW
 from server_gui.views.theme import Theme
 from tests.gui.fakes import Bench, destroy, draw_frames, leave_unpainted
 from tests.gui.foreseen import predicted
@@ -174,11 +174,16 @@ def cell(shown: Shown, column: int) -> str:
 
 
 def play(shown: Shown, archive: Archive) -> None:
-    """Open the newest recording and play it."""
+    """Open the newest recording, which plays at once, and stand still at its beginning."""
     shown.open("Recordings")
     page = shown.window.tabs.recordings.list
     shown.until(lambda: page.sessions.rowCount(), "listed it")
     page.table.selectRow(0)
     shown.until(lambda: archive.tape, "looked into it")
     page.play.click()
+    assert archive.playback.playing
+    tape = archive.playback.tape
+    assert tape is not None
+    archive.playback.play(on=False)
+    archive.playback.seek(tape.first_ns)
     shown.until(lambda: not archive.playback.is_loading, "showed it")

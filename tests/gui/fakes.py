@@ -9,8 +9,8 @@ from server_gui.views.edits.page import Edits
 from server_gui.views.experiments.bar import ExperimentBar
 from server_gui.views.frame.header import Header
 from server_gui.views.frame.main_window import MainWindow
-from server_gui.views.pace import SLOW, Pace
 from server_gui.views.parameters.trial_bar import TrialBar
+from server_gui.views.refresh_rate import SLOW, RefreshRate
 from server_gui.views.robots.panel import RobotsPanel
 from server_gui.views.theme import Theme
 from tests.support import desk
@@ -66,7 +66,7 @@ class Parts(QWidget):
 
 def draw_frames(window: MainWindow) -> None:
     """Frames enough for everything to have been refreshed: what is read is read with the first."""
-    window._pace = Pace()
+    window._pace = RefreshRate()
     for _ in range(2 if window.tabs.currentIndex() == OVERVIEW else SLOW + 1):
         window.refresh()
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from datetime import UTC, datetime, timedelta
 
-from ml.registry.card import Card, Source
+from ml.registry.card import Card, DataSource
 from ml.serving.predictor import Prediction
 from ml.serving.trust import Trust
 from server_gui.core.prediction.news import Predicted
@@ -19,7 +19,7 @@ def predicted(
     novelty: float = 0.1,
     trust: Trust = TRUSTED,
     values: Mapping[str, float] | None = None,
-    source: Source = Source.SIMULATED,
+    source: DataSource = DataSource.SIMULATED,
 ) -> Predicted:
     """A model, three days old, that says this of exo-01 now."""
     prediction = Prediction(

@@ -21,8 +21,8 @@ from PySide6.QtWidgets import (
 from server_gui.views.robots.panel import RobotCard
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.elided import ElidedLabel, PathLabel
-from server_gui.views.widgets.fitted import FittedLabel
 from server_gui.views.widgets.mark import MarkIcon
+from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 from server_gui.views.widgets.stop_button import StopButton
 
 DIGIT = re.compile(r"\d")
@@ -83,7 +83,7 @@ def halved_numbers(window: QWidget, sight: Iterable[QWidget] | None = None) -> l
             and (_is_cut(widget) or not (_is_inside(widget, window) or _is_scrolled(widget)))
         ):
             found.append(f"{_path(widget)}: {widget.text()}")
-        if isinstance(widget, FittedLabel) and DIGIT.search(widget.shown) and not widget.is_whole:
+        if isinstance(widget, ShrinkingLabel) and DIGIT.search(widget.shown) and not widget.is_whole:
             found.append(f"{_path(widget)}: {widget.shown}")
         if isinstance(widget, StopButton):
             found += [] if widget.is_whole else [f"{_path(widget)}: {widget.lines}"]

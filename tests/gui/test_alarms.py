@@ -23,14 +23,15 @@ from server_gui.core.follow.events import LinkChanged, Looked
 from server_gui.core.follow.news import NewsKind
 from server_gui.core.tuning.stop import StopProgress
 from server_gui.views.alarms.full_list import AlarmRow
-from server_gui.views.ask import Question
+from server_gui.views.alarms.words import fewer
+from server_gui.views.confirmation import Question
 from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.overview.joint_table import JointTable
 from server_gui.views.theme import Theme
 from tests.gui import rules
 from tests.gui.fakes import Around, Bench, stop_is_whole
 from tests.gui.foreseen import predicted
-from tests.support.desk import JOINTS, described, looked, telemetry, walking
+from tests.support.desk import JOINTS, looked, telemetry, walking
 
 CAUSE = "0x2310 continuous overcurrent at the output (register: generic, current)"
 WHY = "there is no link to 127.0.0.1:7420 now (127.0.0.1:7420 did not answer hello within 5 s)"
@@ -160,6 +161,30 @@ def test_what_to_check_is_on_the_strip_and_what_may_be_done_whole_in_the_list_wi
     for button in (row.clear, row.show_signal, row.acknowledge):
         assert button.isVisible()
         assert button.visibleRegion().boundingRect() == button.rect(), button.text()
+
+
+def test_rows_that_are_opened_under_the_pointer_are_whole_also_where_a_headline_grows(
+    theme: Theme, window: MainWindow, bench: Bench
+) -> None:
+    theme.set(scale=1.5)
+    window.resize(1024, 700)
+    fault(bench)
+    settle(window, bench)
+    window.panels_button.click()
+    settle(window, bench)
+    window.alarms.list.setAttribute(Qt.WidgetAttribute.WA_UnderMouse)
+    window.alarms.list.turn()
+    for words in ("", "; 42 % of its PDOs are missing", "; and this goes on for a line or two" * 8):
+        bench.look_again([looked(state="fault", problem=f"the drive is in fault: {CAUSE}{words}")])
+        settle(window, bench)
+        shown = [row for row in window.alarms.list.rows if row.isVisible()]
+        for label in (label for row in shown for label in (row.headline, row.details)):
+            assert is_whole(label) or label.isHidden(), (words, label.text())
+        for row in shown:
+            for button in (row.clear, row.show_signal, row.acknowledge):
+                assert button.isHidden() or button.height() >= button.sizeHint().height(), words
+    tip = window.alarms.list.rows[0].toolTip().replace("\n", " ")
+    assert "and this goes on for a line or two; and" in tip, "what has no room stands nowhere"
 
 
 @pytest.mark.parametrize(("width", "height"), [(1024, 700), (1366, 768), (1920, 1080)])
@@ -402,18 +427,6 @@ def test_a_held_stop_is_reset_after_a_question_about_that_robot_once_it_is_answe
     assert any("to go on: enable the drives" in text for text in window.alarms.texts)
 
 
-def test_each_stop_names_its_robot_and_all_says_all(around: Around, bench: Bench) -> None:
-    other = bench.add("a-robot-with-quite-a-long-name-of-its-own", 7421)
-    other.is_named = True
-    other.take([described()])
-    settle(around, bench)
-    first, second = around.robots.cards
-    assert first.stop.text() == "STOP  exo-01"
-    assert second.stop.text().startswith("STOP  a-robot")
-    assert second.stop.accessibleName() == "STOP a-robot-with-quite-a-long-name-of-its-own"
-    assert around.robots.all_stop.text() == "STOP  ALL"
-
-
 def test_a_robot_is_chosen_by_keyboard_and_removed_after_a_question(window: MainWindow, bench: Bench) -> None:
     other = bench.add("exo-02", 7421)
     bench.draw(window)
@@ -468,3 +481,15 @@ def test_after_a_reset_how_to_go_on_stands_before_warnings_and_after_what_is_bad
     bench.look_again([looked(state="lost", problem="gone")])
     settle(around, bench)
     assert around.alarms.told[0][1].alarm.mark.word == "lost"
+
+
+def test_of_much_to_check_the_first_thing_is_kept_where_not_all_of_it_has_room() -> None:
+    said = ["since 07:28:21, for 4 s · robot: it walks", "→ check its power; check its encoder"]
+    shorter = fewer(said)
+    assert shorter[0] == " · ".join(said)
+    assert shorter[-4:] == (
+        "since 07:28:21, for 4 s · → check its power …",
+        "→ check its power …",
+        "since 07:28:21, for 4 s",
+        "",
+    )

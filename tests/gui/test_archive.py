@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
@@ -132,6 +133,13 @@ def test_the_bar_of_time_is_used_by_keys_and_by_mouse_and_a_span_exported_in_the
     play(shown, archive)
     playback, timeline = archive.playback, shown.window.tabs.recordings.player.timeline
     assert playback.tape is not None
+    shown.until(lambda: any(not np.isnan(least).all() for least in playback.outline.least.values()), "read")
+    shown.draw()
+    drawn, bar = timeline.grab().toImage(), timeline._bar()
+    inside = range(round(bar.top()) + 3, round(bar.top() + 0.57 * bar.height()))
+    columns = range(round(bar.left()) + 3, round(bar.right()) - 3)
+    told = [x for x in columns if len({drawn.pixel(x, y) for y in inside}) > 1]
+    assert len(told) > 0.9 * len(columns), "all of it is seen at a glance"
     first, last = playback.tape.first_ns, playback.tape.last_ns
     QTest.keyClick(timeline, Qt.Key.Key_Right)
     assert playback.position_ns == first + 10**9

@@ -18,7 +18,7 @@ from server_gui.core.follow.news import NewsKind
 from server_gui.core.settings.server_file import ServerSettings, add_robots
 from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.overview.page import Overview
-from server_gui.views.pace import SLOW
+from server_gui.views.refresh_rate import SLOW
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.files import ask_open, ask_save
 from server_gui.views.workspace.page import Signals

@@ -11,7 +11,7 @@ from server_gui.core.follow.events import BusesSeen
 from server_gui.core.processing.bus_health import TAKEN
 from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.frame.status_bar import StatusBar
-from server_gui.views.pace import SLOW
+from server_gui.views.refresh_rate import SLOW
 from server_gui.views.resources.bus_health import NOT_NOW, TOO_OLD, BusHealthView
 from server_gui.views.theme import Theme
 from tests.gui.fakes import Bench, destroy

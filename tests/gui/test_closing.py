@@ -9,8 +9,8 @@ import pytest
 from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QApplication
 
-from server_gui.core.desk.ending import Ending
 from server_gui.core.desk.feeds import Feeds
+from server_gui.core.desk.shutdown import Shutdown
 from server_gui.views.frame.closing import Closing, wait_closed
 from server_gui.views.theme import Theme
 
@@ -47,7 +47,7 @@ def test_within_half_a_second_it_is_said_what_is_waited_for_and_closing_that_wai
     theme: Theme, feeds: SlowFeeds
 ) -> None:
     last: list[str] = []
-    ending = Ending(cast("Feeds", feeds), lambda _within_s: True, lambda: last.append("robot"))
+    ending = Shutdown(cast("Feeds", feeds), lambda _within_s: True, lambda: last.append("robot"))
     said: list[tuple[float, str]] = []
     began_s = time.monotonic()
 
@@ -71,7 +71,7 @@ def test_within_half_a_second_it_is_said_what_is_waited_for_and_closing_that_wai
 
 def test_what_ends_at_once_is_not_worth_a_word(theme: Theme, feeds: SlowFeeds) -> None:
     feeds.hurry()
-    ending = Ending(cast("Feeds", feeds), lambda _within_s: True, lambda: None)
+    ending = Shutdown(cast("Feeds", feeds), lambda _within_s: True, lambda: None)
     ending.begin()
     wait_closed(ending, theme)
     ending.finish()
@@ -87,7 +87,7 @@ def test_what_hangs_although_it_was_hurried_is_left_to_the_end_of_the_process(
     def hang() -> None:
         stuck.wait(LONG_S)
 
-    ending = Ending(cast("Feeds", feeds), lambda _within_s: True, hang)
+    ending = Shutdown(cast("Feeds", feeds), lambda _within_s: True, hang)
     ending.begin()
     ending.hurry()
     wait_closed(ending, theme)
@@ -100,7 +100,7 @@ def test_what_hangs_although_it_was_hurried_is_left_to_the_end_of_the_process(
 
 def test_a_store_that_hangs_is_given_up_at_once_when_hurried(feeds: SlowFeeds) -> None:
     feeds.hurry()
-    ending = Ending(cast("Feeds", feeds), lambda _within_s: False, lambda: None)
+    ending = Shutdown(cast("Feeds", feeds), lambda _within_s: False, lambda: None)
     ending.begin()
     ending.hurry()
     assert ending.wait(LONG_S)

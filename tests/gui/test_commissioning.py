@@ -8,10 +8,10 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QApplication, QLineEdit, QPushButton, QWidget
 
+from server_gui.core.commissioning.request import SUFFIX
 from server_gui.core.commissioning.stages import Stage
-from server_gui.core.commissioning.wish import SUFFIX
-from server_gui.views.ask import Question
 from server_gui.views.commissioning.page import CommissionPage
+from server_gui.views.confirmation import Question
 from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.theme import Look, Theme
 from tests.gui import rules

@@ -18,8 +18,8 @@ from server_gui.core.tuning.writing import Trial
 from server_gui.views.edits.page import Edits
 from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.theme import Theme
-from server_gui.views.widgets.framed import draw_frame
-from server_gui.views.widgets.scrolled import Scrolled
+from server_gui.views.widgets.plot_frame import draw_frame
+from server_gui.views.widgets.scroll_area import ScrollArea
 from server_gui.views.widgets.stride_curves import CYCLE
 from tests.gui.fakes import Bench, Parts, destroy
 from tests.gui.rules import settle
@@ -70,7 +70,7 @@ def test_values_and_metrics_are_in_the_units_that_were_chosen(bench: Bench, part
 
 def test_strides_stand_below_each_other_rather_than_beyond_the_edge(bench: Bench, theme: Theme) -> None:
     page = Edits(bench.desk, theme)
-    scrolled = Scrolled(page)
+    scrolled = ScrollArea(page)
     one = worse()
     curves = tuple(replace(one.curves[0], channel=f"left_knee.{name}") for name in DRAWN)
     bench.station.judged.take(replace(one, curves=curves))
@@ -166,12 +166,17 @@ def test_an_edit_stands_at_the_time_of_this_place(
     time.tzset()
     try:
         known = worse()
-        bench.station.judged.take(replace(known, edit=replace(known.edit, utc_ns=1_700_000_000 * 10**9)))
+        edit = replace(known.edit, utc_ns=1_700_000_000 * 10**9)
+        note = f"the edit of gait.step_length at {edit.utc} (9f1b194352) leaves fewer cycles before this one"
+        noted = replace(known.evidence, notes=(note,))
+        bench.station.judged.take(replace(known, edit=edit, evidence=noted))
         parts.edits.refresh()
+        words = parts.edits.words.text()
     finally:
         monkeypatch.undo()
         time.tzset()
     assert parts.edits.list.item(0).text().startswith("2023-11-15 03:43  ")
+    assert "The edit of gait.step_length at 2023-11-15 03:43 leaves fewer cycles" in words
 
 
 def test_evidence_that_grows_lays_no_other_edit_out_again(bench: Bench, parts: Parts) -> None:

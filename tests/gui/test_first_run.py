@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QApplication, QMenu, QPushButton
 
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.first_steps import FirstSteps, Step
-from server_gui.processes.own_robot import OwnRobot
+from server_gui.processes.demo_robot import DemoRobot
 from server_gui.processes.sim_control import ActiveFault, FaultKind, Listed, SimControl, SimulatorRefuses
 from server_gui.processes.simulated import Part
 from server_gui.views.first_run.demo_bar import DemoBar
@@ -58,7 +58,7 @@ class FakeControl(SimControl):
         self.asked.append("walk")
 
 
-class Running(OwnRobot):
+class Running(DemoRobot):
     """A simulated robot that needs no processes."""
 
     runs = True

@@ -9,7 +9,7 @@ import pytest
 from PySide6.QtWidgets import QPushButton, QVBoxLayout, QWidget
 
 from gateway.client import ConnectionState
-from ml.registry.card import Source
+from ml.registry.card import DataSource
 from ml.serving.trust import Trust
 from server_gui.core.desk.leg_phase import leg_phase
 from server_gui.core.desk.station import Station
@@ -146,7 +146,7 @@ def test_a_fall_stands_before_all_else(station: Station) -> None:
 
 def test_a_robot_that_differs_from_what_was_learned_is_said_to(station: Station) -> None:
     drifted = Trust(600, 0.0, 0.0, 0.5, {"left_hip.position": 0.4})
-    station.take_prediction(predicted("walk", WALKS, trust=drifted, source=Source.RECORDED))
+    station.take_prediction(predicted("walk", WALKS, trust=drifted, source=DataSource.RECORDED))
     line = status(station)
     assert line is not None
     assert "unlike what it has learned (left_hip.position): do not rely on it" in line.detail

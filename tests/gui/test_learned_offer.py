@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QApplication, QLineEdit, QWidget
 
 from server_gui.core.desk.station import Station
 from server_gui.core.prediction.adaptation import NEXT, Adapting, Happening, State, Tried
-from server_gui.views.ask import Question
+from server_gui.views.confirmation import Question
 from server_gui.views.frame.recording_chip import ask_name
 from server_gui.views.overview.learned_offer import wordings
 from server_gui.views.overview.page import Overview

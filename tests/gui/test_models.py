@@ -181,6 +181,7 @@ def test_a_training_shows_how_far_it_is_while_the_window_draws_and_serves_nobody
     assert page.chosen is not None
     assert list(archive.models.trained) == [page.chosen.card.id]
     assert page.said.property("tone") == "good"
+    assert not page.form.isVisible(), "what came of it is looked at next"
     assert "F1, mean over classes, on held-out people" in page.said.text()
     assert registry.history("activity") == []
 

@@ -36,9 +36,9 @@ from server_gui.core.settings.server_file import (
     Upload,
     add_robots,
 )
-from server_gui.views.ask import Question
+from server_gui.views.confirmation import Question
 from server_gui.views.frame.main_window import MainWindow
-from server_gui.views.widgets.fitted import FittedLabel
+from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 from tests.fake_robot import FakeRobot
 from tests.gui.fakes import Bench
 from tests.gui.running import running, wait
@@ -308,7 +308,7 @@ def test_what_the_window_shows_is_in_the_store_and_came_by_one_link(
         wait(lambda: not app.desk.stations[1].robot.is_stale(), "saw the one that was added")
         name = app.desk.stations[1].name
         wait(lambda: rows(app, name) > 5, "recorded it too")
-        shown = app.window.statusBar().findChildren(FittedLabel)
+        shown = app.window.statusBar().findChildren(ShrinkingLabel)
         wait(lambda: any(label.text().startswith("Recording · ") for label in shown), "said so")
     store = Store(settings.store.url)
     assert store.dataset(TELEMETRY.location("exo-01", 1)).count_rows() > 10

@@ -22,7 +22,7 @@ from server_gui.views.resources.processes import CPU, MEMORY, NAME, PID
 from server_gui.views.resources.trend import Trend
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.plot import Curve
-from server_gui.views.widgets.wrapped import Wrapped
+from server_gui.views.widgets.wrapping_legend import WrappingLegend
 from tests.gui.fakes import Bench, destroy
 from tests.support.desk import resources
 
@@ -54,7 +54,7 @@ def use(name: str, pid: int, cpu: float | None, memory: int = MIB) -> ProcessUse
 @pytest.mark.parametrize("scale", [1.0, 1.5])
 def test_a_legend_breaks_a_long_name_and_never_its_number(theme: Theme, scale: float) -> None:
     theme.set(scale=scale)
-    legend = Wrapped("values")
+    legend = WrappingLegend("values")
     legend.say([("#ffffff", "━", "gateway, of one core % 10.7"), ("#ffffff", "━", f"{'x' * 60} 93.4")])
     legend.show()
     for width in (90, 140, 230, 600):

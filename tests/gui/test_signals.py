@@ -11,7 +11,7 @@ from gateway.units import Units
 from server_gui.core.desk.flags import Flag, FlagKind
 from server_gui.core.workspace.workspace import MOST_CURVES
 from server_gui.views.theme import Theme
-from server_gui.views.widgets.scrolled import Scrolled
+from server_gui.views.widgets.scroll_area import ScrollArea
 from server_gui.views.widgets.time_axis import NOW, PAUSED
 from server_gui.views.workspace.page import Signals
 from tests.gui.fakes import Bench, destroy
@@ -44,7 +44,7 @@ def test_a_narrow_page_is_never_scrolled_sideways(theme: Theme, bench: Bench, sc
     bench.station.take([walking(300)])
     page = Signals(bench.desk, theme)
     page.cursors.setChecked(True)
-    scrolled = Scrolled(page)
+    scrolled = ScrollArea(page)
     scrolled.show()
     for width in (1000, 600, 470, 320):
         scrolled.resize(width, 500)

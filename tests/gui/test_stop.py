@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QApplication, QPushButton
 from gateway.client import LinkLost, NotConnected
 from gateway.wire.stop import Reset, Stopped
 from server_gui.core.tuning.stop import Sent, StopProgress, StopState
-from server_gui.views.ask import Question
+from server_gui.views.confirmation import Question
 from server_gui.views.frame.header import Header
 from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.frame.stop_keys import StopKeys

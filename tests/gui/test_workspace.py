@@ -14,7 +14,7 @@ from gateway.units import Units
 from server_gui.core.desk.flags import FlagKind
 from server_gui.core.workspace.layouts import Layouts
 from server_gui.core.workspace.trigger import Condition, Mode, On, State
-from server_gui.views.ask import Question
+from server_gui.views.confirmation import Question
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.dragging import CURVES, dragged, dropped
 from server_gui.views.workspace.expression_bar import EXAMPLE

@@ -19,10 +19,10 @@ from gateway import main
 from ml.robot.groups import GROUPS
 from ml.robot.task import TASKS
 from ml.store import NoSuchTable, Store
-from ml.store.labels import Label, Source
+from ml.store.labels import Label, LabelSource
 from ml.store.sessions import Session as Stored
 from ml.store.sessions import labels, sessions
-from ml.training.simulated import Session, read
+from ml.training.simulated import SimulatedSession, read
 from server_gui.core.archive.labelling import Labelling
 from server_gui.core.prediction.state import PredictingState
 from server_gui.core.settings.server_file import load
@@ -57,7 +57,7 @@ def practice(file: Path) -> list[str]:
     return [*command, "--out", str(file), "--subjects", "1-3", "--minutes", str(PRACTICE_S / 60)]
 
 
-def stretches(session: Session) -> Iterator[tuple[float, float, str]]:
+def stretches(session: SimulatedSession) -> Iterator[tuple[float, float, str]]:
     """When who did what, in seconds since the first row."""
     edges = np.flatnonzero(session.label[1:] != session.label[:-1]) + 1
     bounds = [0, *edges.tolist(), len(session.label)]
@@ -71,7 +71,7 @@ def put_practice(file: Path, url: str) -> list[Label]:
     for number, session in enumerate(read(file)):
         began = BEGAN_UTC + number * 3600 * S
         every = list(stretches(session))
-        said = [(*one, Source.SIMULATOR) for one in every if one[2] in FIRST]
+        said = [(*one, LabelSource.SIMULATOR) for one in every if one[2] in FIRST]
         name, who = f"practice-{session.subject}", session.subject
         made.append(Made(name, session.of(CHANNELS), said, CHANNELS, wearer=who, robot="practice"))
         later += [

@@ -5,9 +5,9 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from server_gui.core.commissioning.commissioning import GUARD_S, Commissioning, Exit
-from server_gui.core.commissioning.wish import Wish
+from server_gui.core.commissioning.request import CommissioningRequest
 
-WISH = Wish("/home/ada/exo-01.toml", "can0", who="Ada")
+WISH = CommissioningRequest("/home/ada/exo-01.toml", "can0", who="Ada")
 JOINT = ("which drive", "its EDS", "heartbeat", "PDO", "what counts mean", "limits", "ratings", "homing")
 FIRST = ("its name", "what is on the bus", "who leads the bus", "who commands the drives", "its joints")
 LAST = ("feet and trunk", "the file")
@@ -77,7 +77,7 @@ class Played:
         """The newest one."""
         return self.talkers[-1]
 
-    def start(self, wish: Wish = WISH) -> None:
+    def start(self, wish: CommissioningRequest = WISH) -> None:
         self.model.start(wish)
 
     def hear(self, *lines: Mapping[str, Any] | str) -> None:

@@ -13,7 +13,7 @@ import shtab
 
 from gateway import main
 from gateway.cli.completion import SHELLS
-from gateway.missing import DRAWN, Argument, Page
+from gateway.missing_extras import DRAWN, Argument, Page
 from hil_sim.exoskeleton import CONTROLLER, JOINTS, SENSORS
 from hil_sim.faults.registry import FAULTS
 from hil_sim.gait.activity import Activity
@@ -22,7 +22,7 @@ from tools.draw.commands import ALONE, WORDS, commands, parser_of
 
 
 def help_pages() -> str:
-    """Every command's help as data; `gateway/missing.py` makes parsers of it again."""
+    """Every command's help as data; `gateway/missing_extras.py` makes parsers of it again."""
     pages = {" ".join(one.words): _page(one.parser) for one in commands()}
     pages |= {name: Page(text=_said(name)) for name in WORDS if name not in pages}
     return msgspec.json.format(msgspec.json.encode(dict(sorted(pages.items()))), indent=1).decode() + "\n"

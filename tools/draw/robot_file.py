@@ -63,7 +63,7 @@ nodes, and sends SYNC and a heartbeat where its buses say so. Before you change 
 [who may connect](../../SECURITY.md). `linger_s` and the budget are explained in
 [measure the cost](../how-to/measure-the-cost.md)."""
 _PARAMETER: Final = "The stricter of this and the device's EDS counts: [parameters](parameters.md)."
-_MAKER: Final = "[what only its maker has](../how-to/wire-a-joint.md#what-only-its-maker-has)"
+_MAKER: Final = "[vendor-specific objects](../how-to/wire-a-joint.md#vendor-specific-objects)"
 _CHANNEL: Final = f"""The channel is there as `COMPONENT.NAME`, of a joint or a device, with the type that the
 EDS gives its object. Where a TPDO of the node brings it, it is read there; else it is asked for by SDO
 `poll_hz` times a second. So a device gets channels, and a joint {_MAKER}."""

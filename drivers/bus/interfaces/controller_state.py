@@ -21,7 +21,7 @@ _CONTROLLER_STATES = ((0x30, BusState.PASSIVE), (0x0C, BusState.WARNING), (0x40,
 
 
 def bus_state(can_id: int, data: bytes) -> BusState | None:
-    """The state that an error frame announces; `None` where it is about something else."""
+    """Return the state that an error frame announces; `None` where it is about something else."""
     if not can_id & ERROR:
         return None
     if can_id & _BUS_OFF:

@@ -2,28 +2,28 @@
 
 import socket
 
-from drivers.bus.interfaces.netlink import Link
+from drivers.bus.interfaces.netlink import NetworkInterface
 
 RESTART_MS = 100  # suggested: how long after bus off the controller tries again
 USUAL_BITRATE = 1_000_000
 
 
 def missing_link(name: str) -> str:
-    """The words for an interface that is not there."""
+    """Return the words for an interface that is not there."""
     here = [known for _, known in socket.if_nameindex() if "can" in known]
     present = f"CAN interfaces here: {', '.join(here)}" if here else "there is no CAN interface here"
     return f"there is no interface {name}; {present}: plug the adapter in, or load its driver"
 
 
-def blocking_problem(name: str, link: Link, bitrate: int | None) -> str | None:
+def blocking_problem(name: str, link: NetworkInterface, bitrate: int | None) -> str | None:
     """Why no frame can pass at all; `None` when frames can."""
     if not link.up:
         return f"{name} is down; run: {_up_line(name, link, bitrate)}"
     return None
 
 
-def warning(name: str, link: Link, bitrate: int | None) -> str | None:
-    """What differs from the robot's file, or will hurt later; `None` when all is well."""
+def warning(name: str, link: NetworkInterface, bitrate: int | None) -> str | None:
+    """Return what differs from the robot's file, or will hurt later; `None` when all is well."""
     if link.bitrate is not None and bitrate is not None and link.bitrate != bitrate:
         return (
             f"{name} runs at {link.bitrate} bit/s, the robot's file says {bitrate}; "
@@ -37,7 +37,7 @@ def warning(name: str, link: Link, bitrate: int | None) -> str | None:
     return None
 
 
-def _up_line(name: str, link: Link, bitrate: int | None) -> str:
+def _up_line(name: str, link: NetworkInterface, bitrate: int | None) -> str:
     if link.kind != "can":
         return f"sudo ip link set {name} up"
     rate = bitrate or link.bitrate or USUAL_BITRATE

@@ -23,7 +23,7 @@ CAN_STATES = ("error active", "error warning", "error passive", "bus off", "stop
 
 
 @dataclass(frozen=True, slots=True)
-class Link:
+class NetworkInterface:
     """A network interface; the CAN fields are `None` where it has none (vcan has no bitrate)."""
 
     up: bool
@@ -33,8 +33,11 @@ class Link:
     state: str | None
 
 
-def read_link(name: str) -> Link | None:
-    """The link called `name`; `None` where there is none. Raises `OSError` from a kernel that is silent."""
+def read_link(name: str) -> NetworkInterface | None:
+    """Return the link called `name`; `None` where there is none.
+
+    Raises `OSError` from a kernel that is silent.
+    """
     try:
         index = socket.if_nametoindex(name)
     except OSError:
@@ -46,13 +49,13 @@ def read_link(name: str) -> Link | None:
 
 
 def link_request(index: int) -> bytes:
-    """The message that asks for one link."""
+    """Return the message that asks for one link."""
     body = _INTERFACE.pack(socket.AF_UNSPEC, 0, index, 0, 0)
     return _HEADER.pack(_HEADER.size + len(body), _GET_LINK, _REQUEST, 1, 0) + body
 
 
-def parse_link(message: bytes) -> Link | None:
-    """A link out of the kernel's answer; `None` for any other message."""
+def parse_link(message: bytes) -> NetworkInterface | None:
+    """Return a link out of the kernel's answer; `None` for any other message."""
     if len(message) < _HEADER.size + _INTERFACE.size:
         return None
     length, kind, *_ = _HEADER.unpack_from(message)
@@ -63,7 +66,7 @@ def parse_link(message: bytes) -> Link | None:
     info = dict(_attributes(attributes.get(_LINK_INFO, b"")))
     can = dict(_attributes(info.get(_INFO_DATA, b"")))
     state = _number(can.get(_CAN_STATE))
-    return Link(
+    return NetworkInterface(
         up=bool(flags & _IFF_UP),
         kind=info[_INFO_KIND].rstrip(b"\0").decode("ascii", "replace") if _INFO_KIND in info else None,
         bitrate=_number(can.get(_CAN_BIT_TIMING)) or None,

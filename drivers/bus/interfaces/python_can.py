@@ -67,7 +67,7 @@ class PythonCanTransport:
         return True
 
     def await_room(self, timeout_s: float) -> None:
-        """It always takes a frame, or fails."""
+        """Return at once: the interface always accepts a frame, or fails."""
 
     def carried(self) -> tuple[int, int] | None:
         return None
@@ -76,7 +76,7 @@ class PythonCanTransport:
         """Most interfaces filter in Python, which costs more than it saves."""
 
     def close(self) -> None:
-        """An adapter that does not take even its last word is let go all the same."""
+        """Close the adapter, even if it does not accept its last frame."""
         try:
             self._bus.shutdown()
         except OSError as error:
@@ -95,7 +95,7 @@ class PythonCanTransport:
         self.dropped += 1
 
     def _bound_line(self) -> None:
-        """An adapter that never ends its line must not fill the memory."""
+        """Bound the line of an adapter that never ends it."""
         pending = getattr(self._bus, "_buffer", None)
         if isinstance(pending, bytearray) and len(pending) > MAX_PENDING:
             pending.clear()

@@ -112,7 +112,10 @@ class SocketCanTransport:
         self._socket.close()
 
     def _stamp_ns(self, ancillary: list[tuple[int, int, bytes]]) -> int:
-        """The kernel's stamp on the monotonic clock: the offset is read anew, for wall time may jump."""
+        """Return the kernel's stamp on the monotonic clock.
+
+        The offset is read anew, for wall time may jump.
+        """
         now_ns, wall_ns = _both_clocks()
         stamp_ns = now_ns
         for _, kind, data in ancillary:

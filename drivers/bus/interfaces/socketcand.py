@@ -46,7 +46,7 @@ class SocketcandParser:
 
 
 def frame_of(message: str, stamp_ns: int) -> Frame | None:
-    """A frame out of ` frame 181 1234.5 0102 `; `None` for other or damaged messages.
+    """Return a frame out of ` frame 181 1234.5 0102 `; `None` for other or damaged messages.
 
     ` error 088 1234.5 ` is an error frame, of which the protocol tells no more than its class.
     """
@@ -97,7 +97,7 @@ def waited_stamps(messages: Sequence[str], since_ns: int, now_ns: int) -> list[i
 
 
 def server_ns(message: str) -> int | None:
-    """The server's stamp in ` frame 181 1234.5 0102 `; `None` where there is none."""
+    """Return the server's stamp in ` frame 181 1234.5 0102 `; `None` where there is none."""
     words = message.split(maxsplit=3)
     try:
         seconds = float(words[2]) if len(words) > 2 else math.nan
@@ -107,7 +107,7 @@ def server_ns(message: str) -> int | None:
 
 
 def send_message(can_id: int, data: bytes) -> str:
-    """The line that sends a frame."""
+    """Return the line that sends a frame."""
     identifier = f"{can_id & 0x1FFF_FFFF:08X}" if can_id & EXTENDED else f"{can_id & STANDARD_IDS:03X}"
     content = REMOTE_WORD if can_id & REMOTE else f"{len(data)} {data.hex(' ')}"
     return f"< send {identifier} {content} >"
@@ -197,7 +197,7 @@ class SocketcandTransport:
         return None
 
     def accept(self, can_ids: frozenset[int] | None) -> None:
-        """The protocol's raw mode has no filters."""
+        """Ignore filters: the protocol's raw mode has none."""
 
     def close(self) -> None:
         self._out.close()

@@ -38,5 +38,5 @@ ABORT_CODES: dict[int, str] = {
 
 
 def abort_text(abort_code: int) -> str:
-    """The code and what it means."""
+    """Return the code and what it means."""
     return f"{ABORT_CODES.get(abort_code, 'a code of the vendor')} (abort 0x{abort_code:08X})"

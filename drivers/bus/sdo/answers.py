@@ -5,7 +5,7 @@ import queue
 import time
 from dataclasses import dataclass
 
-from drivers.bus.sdo.doubles import Doubles
+from drivers.bus.sdo.duplicate_answers import DuplicateAnswers
 from drivers.bus.sdo.outstanding import Outstanding
 from drivers.bus.sdo.round_trips import RoundTrips
 from drivers.inbox import Inbox
@@ -37,7 +37,7 @@ class Answers:
         self._counters = counters
         self._round_trips = round_trips
         self._inbox: Inbox[tuple[int, bytes] | None] = Inbox()
-        self._doubles = Doubles()
+        self._doubles = DuplicateAnswers()
 
     @property
     def doubled(self) -> bool:
@@ -51,10 +51,10 @@ class Answers:
 
     def forget_doubles(self) -> None:
         """They were another life's."""
-        self._doubles = Doubles()
+        self._doubles = DuplicateAnswers()
 
     def put(self, stamp_ns: int, response: bytes) -> None:
-        """A response has come."""
+        """Take a response."""
         if self._inbox.qsize() >= INBOX:
             self._counters.dropped += 1
         else:

@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable
 from typing import Any, Protocol, TypeVar
 
+from drivers.bus.confirmed_writes import ConfirmedWrites
 from drivers.bus.sdo import protocol
 from drivers.bus.sdo.aborts import abort_text
 from drivers.bus.sdo.answers import Answers, SdoCounters
@@ -19,7 +20,6 @@ from drivers.bus.sdo.outstanding import Outstanding, Request
 from drivers.bus.sdo.round_trips import RoundTrips
 from drivers.bus.sdo.transfer import Transfer, nothing, read, write
 from drivers.bus.sender import StillLeaving
-from drivers.bus.written import Written
 from drivers.errors import DeviceAbort, DeviceTimeout, NotPermitted, Unavailable
 
 T = TypeVar("T")
@@ -80,7 +80,7 @@ class SdoChannel:
         self.round_trips = RoundTrips(timeout_s)
         self._answers = Answers(self._outstanding, self.counters, self.round_trips)
         self._unassigned = 0  # failed attempts to bring it in sync, in a row
-        self._written = Written()
+        self._written = ConfirmedWrites()
         self._urgent = False
         self._current: Callable[[], bool] = _always
         self._pause: Callable[[], None] = _end
@@ -96,7 +96,7 @@ class SdoChannel:
         return self._unassigned >= OUT_OF_SYNC
 
     def known(self, index: int, subindex: int, otherwise: bytes | None = None) -> bytes | None:
-        """What the device has confirmed to hold since it came up, `otherwise` where nothing was written.
+        """Return the value confirmed since the device came up, `otherwise` if none was written.
 
         `None` where nobody knows: a write of it is under way, or stayed unanswered.
         """
@@ -109,7 +109,7 @@ class SdoChannel:
     # What comes, and who is first.
 
     def on_response(self, stamp_ns: int, data: bytes) -> None:
-        """A frame with the identifier of this channel's responses; called in the bus's thread."""
+        """Take a frame with the identifier of this channel's responses; called in the bus's thread."""
         if len(data) == 8:
             self._answers.put(stamp_ns, data)
 
@@ -151,11 +151,11 @@ class SdoChannel:
         self._interrupted.clear()
 
     def forget_written(self) -> None:
-        """The device may hold other values than it was given."""
+        """Note that the device may hold other values than written."""
         self._written.forget()
 
     def rebooted(self) -> None:
-        """The node has booted: it has forgotten what it was asked and given."""
+        """Forget requests and writes after a boot of the node."""
         self._outstanding.forget()
         self._written.forget()
         self._answers.forget_doubles()

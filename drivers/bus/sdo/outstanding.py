@@ -48,7 +48,7 @@ class Outstanding:
         self._lock = threading.Lock()
 
     def add(self, about: bytes, frame: bytes) -> Request:
-        """A request that is sent now."""
+        """Return a request that is sent now."""
         request = Request(about, frame, time.monotonic_ns())
         with self._lock:
             self._requests.append(request)
@@ -57,7 +57,7 @@ class Outstanding:
         return request
 
     def drop(self, request: Request) -> None:
-        """It could not be sent."""
+        """Note that it could not be sent."""
         with self._lock:
             if request in self._requests:
                 self._requests.remove(request)
@@ -92,7 +92,7 @@ class Outstanding:
             return settled
 
     def forget(self) -> None:
-        """The node has booted and knows of no request; it may have got the newest one since."""
+        """Drop requests after a boot; the node may have got the newest one since."""
         with self._lock:
             del self._requests[:-1]
             self._crowd.clear()

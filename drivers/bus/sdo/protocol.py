@@ -77,7 +77,7 @@ def concludes(response: bytes, request: bytes) -> bool:
 
 
 def confirmed_write(response: bytes) -> tuple[int, int] | None:
-    """The object of which a response says that a write of it was taken, or begins; of whomever's."""
+    """Return the object of which a response says that a write of it was taken, or begins; of whomever's."""
     if len(response) == 8 and response[0] & SPECIFIER in (_DOWNLOADED, _BLOCK_DOWNLOADED):
         return int.from_bytes(response[1:3], "little"), response[3]
     return None
@@ -89,7 +89,7 @@ def is_expedited_download(request: bytes) -> bool:
 
 
 def abort_request(index: int, subindex: int, abort_code: int) -> bytes:
-    """The request that ends a transfer."""
+    """Return the request that ends a transfer."""
     return _HEADER.pack(ABORT, index, subindex) + struct.pack("<I", abort_code)
 
 
@@ -124,7 +124,7 @@ def _upload_segments() -> Upload:
 
 
 def expedited(index: int, subindex: int, data: bytes) -> bytes:
-    """The one request that writes an object of up to four bytes."""
+    """Return the one request that writes an object of up to four bytes."""
     return _HEADER.pack(0x23 | (EXPEDITED - len(data)) << 2, index, subindex) + data.ljust(EXPEDITED, b"\0")
 
 

@@ -3,7 +3,7 @@
 import threading
 from collections import deque
 
-from drivers.noted import Noted, found
+from drivers.findings import FindingState, active_findings
 from drivers.samples import Finding
 
 KEPT, RECENT_S = 64, 60.0  # answers that figures are made of
@@ -18,13 +18,13 @@ class RoundTrips:
         self.late = 0  # answers that came when nobody waited for them any more
         self._timeout_s = timeout_s
         self._recent: deque[tuple[int, int]] = deque(maxlen=KEPT)  # when it was answered, and after how long
-        self._silence, self._lateness = Noted(), Noted()
+        self._silence, self._lateness = FindingState(), FindingState()
         self._unanswered, self._first_unanswered_ns = 0, 0
         self._prompt = 0
         self._lock = threading.Lock()
 
     def answered(self, sent_ns: int, stamp_ns: int, *, given_up: bool) -> None:
-        """An answer came at `stamp_ns`; `given_up`: nobody waited for it any more."""
+        """Take an answer of `stamp_ns`; `given_up`: nobody waited for it any more."""
         trip_ns = max(0, stamp_ns - sent_ns)
         with self._lock:
             self._recent.append((stamp_ns, trip_ns))
@@ -45,7 +45,7 @@ class RoundTrips:
                     self._lateness.clear()
 
     def unanswered(self, now_ns: int) -> None:
-        """A request was given up."""
+        """Note that a request was given up."""
         with self._lock:
             if self._unanswered == 0:
                 self._first_unanswered_ns = now_ns
@@ -58,7 +58,7 @@ class RoundTrips:
                 )
 
     def restart(self) -> None:
-        """The node began anew; what was counted stays."""
+        """Restart with the node; counts stay."""
         with self._lock:
             self._recent.clear()
             self._unanswered = self._prompt = 0
@@ -73,4 +73,4 @@ class RoundTrips:
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        return found((self._silence, self._lateness))
+        return active_findings((self._silence, self._lateness))

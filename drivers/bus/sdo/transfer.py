@@ -54,7 +54,7 @@ class Transfer(Generic[T]):
 
 
 def read(label: str, index: int, subindex: int, timeout_s: float) -> Transfer[bytes]:
-    """A read of an object of the device `label`."""
+    """Return a read of an object of the device `label`."""
     what = f"{label}: reading 0x{index:04X}:{subindex:02X}"
     return Transfer(partial(protocol.upload, index, subindex), index, subindex, what, timeout_s)
 
@@ -62,7 +62,7 @@ def read(label: str, index: int, subindex: int, timeout_s: float) -> Transfer[by
 def write(
     label: str, index: int, subindex: int, data: bytes, timeout_s: float, permitted: Callable[[], str | None]
 ) -> Transfer[None]:
-    """A write of an object of the device `label`."""
+    """Return a write of an object of the device `label`."""
     what = f"{label}: writing {value_text(data)} to 0x{index:04X}:{subindex:02X}"
     begin = partial(protocol.download, index, subindex, data)
     return Transfer(begin, index, subindex, what, timeout_s, data, permitted)

@@ -18,7 +18,7 @@ from typing import Any, TypeVar
 
 from drivers.bus.sdo.channel import Interrupted, SdoChannel
 from drivers.errors import Unavailable
-from drivers.urgency import make_urgent
+from drivers.realtime_priority import make_realtime
 
 T = TypeVar("T")
 Job = Callable[[SdoChannel], T]
@@ -144,7 +144,7 @@ class SdoWorker:
         return Unavailable(f"{self.channel.label}: its bus is not open, nothing can be asked of it")
 
     def _run(self) -> None:
-        make_urgent()  # a stop waits for what this holds
+        make_realtime()  # a stop waits for what this holds
         while (task := self._next()) is not None:
             self._do(task)
         for task in self._tasks:

@@ -19,7 +19,7 @@ _WORDS = struct.Struct("<3h")
 
 
 def decode(payload: bytes) -> ImuFrame | None:
-    """The frame in one CAN payload; `None` where it is not WitMotion's."""
+    """Return the frame in one CAN payload; `None` where it is not WitMotion's."""
     if len(payload) != LENGTH or not _is_head(payload, 0):
         return None
     kind = payload[1]

@@ -9,8 +9,8 @@ from drivers.imu.format import NodeFormat
 from drivers.imu.settings import NodeImuSettings
 
 if TYPE_CHECKING:
+    from drivers.build_context import BuildContext
     from drivers.imu.inclinometer import Inclinometer
-    from drivers.site import Site
 
 Sign = Literal[1, -1]
 
@@ -25,8 +25,8 @@ class InclinometerSettings(NodeImuSettings, frozen=True, forbid_unknown_fields=T
     poll_hz: Annotated[float, msgspec.Meta(ge=0, le=200)] = 20.0  # slopes that no TPDO brings; 0: never
 
 
-def build(name: str, settings: InclinometerSettings, site: "Site") -> "Inclinometer":
-    """Raises `SettingsError` and `EdsError` where the settings or the device's file cannot be used."""
+def build(name: str, settings: InclinometerSettings, site: "BuildContext") -> "Inclinometer":
+    """Build it; raises `SettingsError` and `EdsError` for unusable settings or device files."""
     from drivers.imu.inclinometer import Inclinometer  # needs what only a started bus needs
 
     description = eds.load(eds.locate(settings.eds, site.file), settings.node_id)

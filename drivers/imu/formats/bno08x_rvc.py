@@ -27,7 +27,7 @@ _BODY = struct.Struct("<B6h")
 
 
 def from_angles(roll: float, pitch: float, yaw: float) -> Quaternion:
-    """The orientation: yaw about z, then pitch about x, then roll about y."""
+    """Return the orientation: yaw about z, then pitch about x, then roll about y."""
     turned = rotation.multiply(rotation.about_z(yaw), rotation.about_x(pitch))
     return rotation.multiply(turned, rotation.about_y(roll))
 

@@ -162,7 +162,7 @@ def _binary_length(buffer: bytearray, start: int) -> int:
 
 
 def _layout(buffer: bytes | bytearray, start: int) -> tuple[list[tuple[tuple[int, int], int, int]], int]:
-    """The fields of the binary message at `start` as ((group, bit), place, size), and where they end."""
+    """Return the fields of the binary message at `start`: ((group, bit), place, size), and the end."""
     groups = [group for group in range(len(GROUPS)) if buffer[start + 1] >> group & 1]
     at = start + 2 + 2 * len(groups)
     fields = []
@@ -176,7 +176,7 @@ def _layout(buffer: bytes | bytearray, start: int) -> tuple[list[tuple[tuple[int
 
 
 def _values(names: tuple[str, ...], fields: list[str]) -> dict[str, float] | None:
-    """The message's numbers by name; `None` where they are too few, too many or no numbers."""
+    """Return the message's numbers by name; `None` where they are too few, too many or no numbers."""
     try:
         values = dict(zip(names, map(float, fields), strict=True))
     except ValueError:

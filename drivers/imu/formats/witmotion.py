@@ -53,7 +53,7 @@ class WitmotionParser(FrameScanner[ImuFrame]):
 
 
 def _decoded(kind: int, raw: bytes) -> tuple[ImuFrame, bool]:
-    """The frame in `raw`, and whether a value is at the end of its range."""
+    """Return the frame in `raw`, and whether a value is at the end of its range."""
     if kind == TIME:
         return _time(raw), False
     a, b, c, last = _WORDS.unpack_from(raw, HEAD)
@@ -70,7 +70,7 @@ def _decoded(kind: int, raw: bytes) -> tuple[ImuFrame, bool]:
 
 
 def vectors(kind: int, a: int, b: int, c: int, temperature: float | None = None) -> ImuFrame | None:
-    """The frame of three words, as serial and CAN variant share them; `None` for other types."""
+    """Return the frame of three words, as serial and CAN variant share them; `None` for other types."""
     if kind == ACCELERATIONS:
         scaled = _scaled(a, b, c, ACCELERATION)
         return ImuFrame("acceleration", acceleration=scaled, temperature=temperature)

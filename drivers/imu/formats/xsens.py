@@ -67,7 +67,7 @@ def _fixed_12_20(data: bytes) -> Numbers:
 
 
 def _fixed_16_32(data: bytes) -> Numbers:
-    """The fraction's four bytes come first, then the whole part's two."""
+    """Decode numbers with four bytes of fraction, then two of whole part."""
     return tuple(whole + part / (1 << 32) for part, whole in struct.iter_unpack(">Ih", data))
 
 
@@ -167,7 +167,7 @@ class XsensParser(FrameScanner[ImuFrame]):
 
 
 def _items(payload: bytes) -> dict[int, bytes] | None:
-    """The payload's items by id; `None` where they do not fill it exactly."""
+    """Return the payload's items by id; `None` where they do not fill it exactly."""
     items: dict[int, bytes] = {}
     at = 0
     while at + 3 <= len(payload):
@@ -178,7 +178,7 @@ def _items(payload: bytes) -> dict[int, bytes] | None:
 
 
 def _numbers(kind: int, item: int, data: bytes) -> Numbers | None:
-    """The item's numbers; `None` for an item that is not known or has another size."""
+    """Return the item's numbers; `None` for an item that is not known or has another size."""
     if INTEGERS.get(kind) == len(data):
         return (int.from_bytes(data, "big"),)
     size, read = NUMBER_FORMATS[item & FORMAT_BITS]

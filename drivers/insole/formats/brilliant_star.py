@@ -98,7 +98,7 @@ def _in_range(foot: InsoleFrame) -> bool:
 
 
 def _as_load(foot: InsoleFrame) -> InsoleFrame:
-    """Counts that rise with the load, and none of a foot that did not come."""
+    """Return counts that rise with the load, and none of a foot that did not come."""
     if foot.missing or not any(foot.cells):
         return replace(foot, cells=(None,) * len(foot.cells), missing=True, bits=BITS)
     return replace(foot, cells=tuple(UNLOADED - (cell or 0) for cell in foot.cells), bits=BITS)

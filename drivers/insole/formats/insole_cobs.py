@@ -29,7 +29,10 @@ _CELLS = {n: struct.Struct(f"<{n}H") for n in range(1, MAX_CELLS + 1)}
 
 
 def cobs_decode(encoded: bytes) -> bytes | None:
-    """The bytes that `encoded` (no zero in it, at most 254 bytes) stands for; `None` where it is not COBS."""
+    """Return the bytes that `encoded` (no zero in it, at most 254 bytes) stands for.
+
+    `None` where it is not COBS.
+    """
     decoded = bytearray(encoded)
     at, end = 0, len(decoded)
     while at < end:

@@ -73,7 +73,7 @@ class InsoleCsvParser(DelimitedParser[InsoleFrame]):
         return frames
 
     def _frames(self, row: list[str], columns: Columns) -> list[InsoleFrame] | None:
-        """The feet of one line; `None` where a field is not what it should be."""
+        """Return the feet of one line; `None` where a field is not what it should be."""
         try:
             sequence = None if columns.sequence is None else _whole(int(row[columns.sequence]))
             time = None if columns.time is None else float(row[columns.time])
@@ -165,20 +165,20 @@ def _cells(wanted: str | tuple[Column, ...], places: Mapping[str, int]) -> tuple
 
 
 def _numbers_in(text: str) -> list[tuple[int, str]]:
-    """What names are ordered by, so that ch2 comes before ch10; however many digits somebody sends."""
+    """Return what names are ordered by, so that ch2 comes before ch10; however many digits somebody sends."""
     numbers = [digits.lstrip("0") for digits in re.findall(r"\d+", text)]
     return [(len(digits), digits) for digits in numbers]
 
 
 def _whole(number: int) -> int:
-    """Raises `ValueError` for one that no device can mean."""
+    """Check a number; raises `ValueError` for one that no device can mean."""
     if abs(number) > LARGEST:
         raise ValueError(number)
     return number
 
 
 def _number(text: str) -> float | None:
-    """A cell's number; `None` for an empty field or "nan"."""
+    """Return a cell's number; `None` for an empty field or "nan"."""
     if not text:
         return None
     number = float(text)

@@ -133,7 +133,7 @@ class InsoleFrameParser(FrameScanner[InsoleFrame]):
         return values
 
     def _frame(self, values: dict[str, Numbers]) -> InsoleFrame | None:
-        """The frame of the fields' raw numbers; `None` where its foot or a number is impossible."""
+        """Return the frame of the fields' raw numbers; `None` where its foot or a number is impossible."""
         description = self._description
         foot: Foot | None = None
         if "foot" in values:
@@ -165,7 +165,7 @@ class InsoleFrameParser(FrameScanner[InsoleFrame]):
         )
 
     def _more(self, values: dict[str, Numbers]) -> dict[str, float | list[float]]:
-        """The fields without a meaning of their own, scaled."""
+        """Return the fields without a meaning of their own, scaled."""
         more: dict[str, float | list[float]] = {}
         for field in self._others:
             scaled = [number * field.scale for number in values[field.name]]

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from drivers.bus.settings import CanSettings
-from drivers.urgency import PRIORITY
+from drivers.realtime_priority import PRIORITY
 from gateway.config.robot import RobotConfig
 from gateway.doctor.observations import Computer
 from gateway.modules.resource.extras import kernel
@@ -17,7 +17,7 @@ _UNLIMITED = "unlimited"
 
 
 def computer(config: RobotConfig, root: Path = ROOT) -> Computer:
-    """What it tells; what it does not is `None` or not there."""
+    """Return what it tells; what it does not is `None` or not there."""
     names = {link for settings in config.can.values() if (link := links(settings)) is not None}
     paths = {sensor.port for _, sensor in config.on_ports()}
     return Computer(
@@ -32,7 +32,10 @@ def computer(config: RobotConfig, root: Path = ROOT) -> Computer:
 
 
 def links(settings: CanSettings) -> str | None:
-    """The network interface of this computer that a bus is on; `None` where it is no such, or elsewhere."""
+    """Return the network interface of this computer that a bus is on.
+
+    `None` where it is no such, or elsewhere.
+    """
     if settings.interface == "socketcan":
         return str(settings.channel)
     if settings.interface == "socketcand" and settings.network is None:
@@ -41,7 +44,7 @@ def links(settings: CanSettings) -> str | None:
 
 
 def usb_name(port: str) -> str:
-    """What sysfs calls the device behind a port: `ttyUSB0`; a slash in it is written `!`."""
+    """Return what sysfs calls the device behind a port: `ttyUSB0`; a slash in it is written `!`."""
     real = os.path.realpath(port)
     return real.removeprefix("/dev/").replace("/", "!")
 

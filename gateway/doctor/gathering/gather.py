@@ -13,7 +13,7 @@ from drivers.scan.products import Library, files
 from eds.shipped import SHIPPED
 from gateway.client import Address, ClientError, LinkSettings, Robot, Unreachable
 from gateway.config.robot import RobotConfig
-from gateway.doctor.gathering import running, silent
+from gateway.doctor.gathering import with_gateway, without_gateway
 from gateway.doctor.gathering.computer import ROOT, computer
 from gateway.doctor.gathering.listening import Listening, Wait
 from gateway.doctor.observations import BusFacts, Computer, NodeTable, Object, Observations, Samples, Value
@@ -78,7 +78,7 @@ def gather(config: RobotConfig, how: How) -> Observations:
 
 @contextlib.contextmanager
 def _gateway(how: How) -> Iterator[Robot | None]:
-    """The robot's gateway, where one runs."""
+    """Return the robot's gateway, where one runs."""
     if how.gateway is None:
         yield None
         return
@@ -116,17 +116,19 @@ def _running(empty: Observations, how: How, robot: Robot) -> _Seen:
     with Listening(ears, _waiting()) as listening:
         before = robot.buses()
         samples = (
-            running.samples(robot, described, how.seconds) if other_file is None else Samples(why_none=OTHER)
+            with_gateway.samples(robot, described, how.seconds)
+            if other_file is None
+            else Samples(why_none=OTHER)
         )
         if not samples.columns:
             _waiting()(how.seconds)
         after = robot.buses()
-        buses = running.by_figures(before, after)
-        facts = listening.facts(running.begun_between(before, after))
+        buses = with_gateway.by_figures(before, after)
+        facts = listening.facts(with_gateway.begun_between(before, after))
         buses |= {name: one for name, one in facts.items() if one.heard is not None}
     if other_file is not None:
         return _Seen(buses, {}, samples, OTHER, other_file=other_file)
-    objects = running.objects(robot, empty.nodes(), empty.descriptions)
+    objects = with_gateway.objects(robot, empty.nodes(), empty.descriptions)
     units = {f"{one.component}.{one.object}": (one.scale, one.unit) for one in described.parameters}
     return _Seen(buses, objects, samples, NOT_HERE, units)
 
@@ -149,15 +151,15 @@ def _other_file(config: RobotConfig, described: Robots) -> str | None:
 def _silent(empty: Observations, how: How) -> _Seen:
     config, wait = empty.config, _waiting()
     with Listening(config.can, wait) as listening:
-        samples = silent.samples(config, how.seconds, wait, active=False)
+        samples = without_gateway.samples(config, how.seconds, wait, active=False)
         if not samples.columns:
             wait(how.seconds)
         buses = listening.facts({})
         asked = {name: listening.asked(name) for name in config.can}
     if not how.active:
         return _Seen(buses, {}, samples, NOT_ACTIVE)
-    objects = silent.objects(config, empty.nodes(), empty.descriptions, asked, wait)
-    return _Seen(buses, objects, silent.samples(config, how.seconds, wait, active=True), NOT_HERE)
+    objects = without_gateway.objects(config, empty.nodes(), empty.descriptions, asked, wait)
+    return _Seen(buses, objects, without_gateway.samples(config, how.seconds, wait, active=True), NOT_HERE)
 
 
 def _waiting() -> Wait:
@@ -167,7 +169,7 @@ def _waiting() -> Wait:
 def _proposals(
     seen: Observations, objects: Mapping[str, Mapping[Object, Value]], folders: tuple[Path, ...]
 ) -> Iterator[tuple[str, str]]:
-    """The EDS file for what each device says it is, where its own is another's."""
+    """Yield the EDS file for what each device says it is, where its own is another's."""
     library: Library | None = None
     for place in seen.nodes():
         vendor, product = (objects.get(place.name, {}).get((0x1018, sub)) for sub in (1, 2))
@@ -185,5 +187,5 @@ def _proposals(
 
 
 def _told(vendor: int, product: int) -> Told:
-    """A device of which only that is known."""
+    """Return a device of which only that is known."""
     return Told(0, None, None, None, None, vendor, product, None, None, None, (), ())

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from drivers.urgency import PRIORITY
+from drivers.realtime_priority import PRIORITY
 from gateway.config.robot import header
 from gateway.doctor.gathering.computer import links, usb_name
 from gateway.doctor.observations import Observations
@@ -16,7 +16,7 @@ _ABOUT = "the robot's computer"
 
 
 def latency_timer(seen: Observations) -> Iterator[Verdict]:
-    """A USB serial adapter that gathers bytes for so long that frames come in bursts."""
+    """Yield a USB serial adapter that gathers bytes for so long that frames come in bursts."""
     timers = seen.computer.latency_ms
     ports = list(seen.config.on_ports())
     if not ports:
@@ -44,7 +44,7 @@ def latency_timer(seen: Observations) -> Iterator[Verdict]:
 
 
 def clock(seen: Observations) -> Iterator[Verdict]:
-    """A clock that nobody sets: recordings of two computers do not fit together."""
+    """Yield a clock that nobody sets: recordings of two computers do not fit together."""
     if seen.computer.clock_synchronised is None:
         yield Unknown("clock", _ABOUT, seen.computer.why_none)
     elif not seen.computer.clock_synchronised:
@@ -79,7 +79,7 @@ def governor(seen: Observations) -> Iterator[Verdict]:
 
 
 def realtime(seen: Observations) -> Iterator[Verdict]:
-    """The gateway may not take real-time priority for a stop."""
+    """Yield whether the gateway lacks the right to real-time priority for a stop."""
     if seen.computer.realtime_allowed is None:
         yield Unknown("realtime", _ABOUT, seen.computer.why_none)
     elif not seen.computer.realtime_allowed:
@@ -99,7 +99,7 @@ def realtime(seen: Observations) -> Iterator[Verdict]:
 
 
 def txqueuelen(seen: Observations) -> Iterator[Verdict]:
-    """A CAN interface that has room for a handful of frames."""
+    """Yield a CAN interface that has room for a handful of frames."""
     for name, settings in seen.config.can.items():
         link = links(settings)
         length = None if link is None else seen.computer.queue_lengths.get(link)

@@ -73,7 +73,7 @@ def velocity_unit(seen: Observations) -> Iterator[Verdict]:
 
 
 def _wrong_unit(seen: Observations, place: Place, table: JointSettings, ratio: float) -> Verdict:
-    """The unit that fits best, where one does."""
+    """Return the unit that fits best, where one does."""
     now = _per_count(table, table.velocity_unit)
 
     def misfit(unit: str) -> float:
@@ -114,7 +114,7 @@ def _speeds_ratio(position: list[float], velocity: list[float], period_s: float)
 
 
 def mode(seen: Observations) -> Iterator[Verdict]:
-    """A mode of operation that does not follow what the RPDOs bring, or is not that of the other joints."""
+    """Yield modes of operation that do not fit the RPDOs, or differ from the other joints'."""
     modes = {place.name: seen.whole(place, 0x6061) for place in seen.joints()}
     known = Counter(one for one in modes.values() if one is not None)
     usual = known.most_common(1)[0][0] if known else None
@@ -143,7 +143,7 @@ def mode(seen: Observations) -> Iterator[Verdict]:
 
 
 def _commanded(seen: Observations, place: Place) -> int | None:
-    """The cyclic mode whose target an enabled RPDO brings on SYNC; `None` where none or several do."""
+    """Return the cyclic mode whose target an enabled RPDO brings on SYNC; `None` where none or several do."""
     found = set()
     for number in range(4):
         cob_id, kind = seen.whole(place, 0x1400 + number, 1), seen.whole(place, 0x1400 + number, 2)
@@ -198,7 +198,7 @@ def following_window(seen: Observations) -> Iterator[Verdict]:
 
 
 def reaction(seen: Observations) -> Iterator[Verdict]:
-    """What leaves a drive moving when its master dies, or it is stopped."""
+    """Yield what leaves a drive moving when its master dies, or it is stopped."""
     for place in seen.joints():
         if any(seen.unanswered(place, index) for index in MOVES_ON):
             yield Unknown("reaction", place.header, seen.why_no_objects)
@@ -232,6 +232,6 @@ def _whole(seen: Observations, index: int, place: Place) -> int | None:
 
 
 def _usual(seen: Observations, value: Callable[[Place], int | None], least: int, most: int) -> int | None:
-    """What the other joints have, of what can be meant."""
+    """Return what the other joints have, of what can be meant."""
     found = [one for place in seen.joints() if (one := value(place)) is not None and least <= one <= most]
     return int(median(found)) if found else None

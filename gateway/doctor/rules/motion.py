@@ -98,7 +98,7 @@ def _unjudged(seen: Observations, rule: str, kind: str) -> Unknown:
 
 
 def gear(seen: Observations) -> Iterator[Verdict]:
-    """Counts and ratio: as the drive says, and by how far left and right go."""
+    """Yield counts and ratio: as the drive says, and by how far left and right go."""
     told = list(figures(seen))
     yield from told
     wrong = {finding.about for finding in told if isinstance(finding, Finding)}
@@ -140,7 +140,7 @@ def _stride(pairs: list[Pair | str], but: str) -> float:
 
 
 def _scale(kind: str, spans: dict[str, float], places: dict[str, Place], stride: float) -> Finding:
-    """The side that is farther from how people walk is the wrong one."""
+    """Return the side that is farther from how people walk is the wrong one."""
     usual = stride * normal_span(kind)
     wrong = max(SIDES, key=lambda side: abs(math.log(spans[side] / usual)))
     place, factor = places[wrong], _simple(spans[wrong] / spans[other(wrong)])
@@ -161,7 +161,7 @@ def _simple(factor: float) -> float:
 
 
 def sign(seen: Observations) -> Iterator[Verdict]:
-    """A joint that bends where it should stretch."""
+    """Yield a joint that bends where it should stretch."""
     found = gait(seen)
     if isinstance(found, str):
         yield Unknown("sign", "joints", found)
@@ -249,7 +249,7 @@ def _swapped_insoles(seen: Observations, found: Gait, swapped: list[str]) -> Fin
 
 
 def zero(seen: Observations) -> Iterator[Verdict]:
-    """A joint whose middle is not where the other leg's is."""
+    """Yield a joint whose middle is not where the other leg's is."""
     found = gait(seen)
     flipped = (
         set() if isinstance(found, str) else {key for key, one in found.matches.items() if is_flipped(one)}
@@ -295,7 +295,7 @@ def _off(seen: Observations, kind: str, means: dict[str, float]) -> Finding:
 
 
 def insole_scale(seen: Observations) -> Iterator[Verdict]:
-    """A foot that carries what no foot does, or many times what the other one carries."""
+    """Yield a foot that carries what no foot does, or many times what the other one carries."""
     most: dict[str, float] = {}
     if not seen.config.insole:
         yield Unknown("insole_scale", "insoles", "the robot has none")

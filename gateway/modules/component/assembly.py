@@ -8,6 +8,7 @@ from functools import partial
 from typing import Any, TypeVar
 
 import eds
+from drivers.build_context import BuildContext
 from drivers.bus.bus import CanBus
 from drivers.bus.device import CanDevice
 from drivers.bus.interfaces.opening import needs_python_can
@@ -17,9 +18,8 @@ from drivers.errors import DriverError
 from drivers.imu.build import build_imu
 from drivers.insole.build import build_insole, join_insoles
 from drivers.joint.drive import JointDrive
-from drivers.joint.pairs import join_joints
+from drivers.joint.leg_pairs import join_joints
 from drivers.joint.settings import JointSettings
-from drivers.site import Site
 from eds.light_imports import import_canopen, without
 from eds.profile import profile_of
 from gateway.config.robot import RobotConfig
@@ -41,7 +41,7 @@ class Robot:
 class Builder:
     """How components of one kind are made of their tables, and learn of all others once those are there."""
 
-    build: Callable[[str, Any, Site], Component]
+    build: Callable[[str, Any, BuildContext], Component]
     join: Callable[[Mapping[str, Component]], None] | None = None
 
 
@@ -54,7 +54,7 @@ def assemble(config: RobotConfig) -> Robot:
     for name, settings in config.can.items():
         robot.buses[name] = CanBus(name, settings, config.gateway.role, urgent=config.guard is not None)
     chosen = {name: config.channels_of(name) for name in (*config.joint, *config.device)}
-    site = Site(
+    site = BuildContext(
         config.path, robot.buses, descriptions=robot.descriptions, channels=chosen, recognise=_format_of
     )
     for kind, builder in BUILDERS.items():
@@ -92,9 +92,9 @@ def _add(robot: Robot, kind: Kind, name: str, build: Callable[[], Component]) ->
 def _on_can(
     make: Callable[..., Component], join: Callable[[Mapping[str, Component]], None] | None = None
 ) -> Builder:
-    """The builder of what a vendor's EDS describes."""
+    """Return the builder of what a vendor's EDS describes."""
 
-    def build(name: str, settings: JointSettings | DeviceSettings, site: Site) -> Component:
+    def build(name: str, settings: JointSettings | DeviceSettings, site: BuildContext) -> Component:
         description = eds.load(eds.locate(settings.eds, site.file), settings.node_id)
         if all(description.path != known.path for known in site.descriptions.values()):
             gc.collect()  # what reading a file leaves is larger than what it gives, and would lie there long
@@ -114,7 +114,7 @@ BUILDERS: Mapping[Kind, Builder] = {
 
 
 def facts(config: RobotConfig, name: str, description: eds.Description) -> Mapping[str, str | int]:
-    """What `robot.describe` tells of a device: what its EDS says, and where it is."""
+    """Return what `robot.describe` tells of a device: what its EDS says, and where it is."""
     tables: dict[str, Any] = {name: one for kind in BUILDERS for name, one in getattr(config, kind).items()}
     bus, bitrate = tables[name].bus, config.can[tables[name].bus].bitrate
     found: dict[str, str | int] = {

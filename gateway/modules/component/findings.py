@@ -69,7 +69,7 @@ def _node(node: Node, now_ns: int) -> NodeInfo:
 
 
 def emcy_info(component: Component | None) -> EmcyInfo | UnsetType:
-    """The last one of a component that is a CANopen device."""
+    """Return the last one of a component that is a CANopen device."""
     node: Node | None = getattr(component, "node", None)
     life: NodeLife | None = None if node is None else node.life
     if node is None or life is None or not life.emcy_history:

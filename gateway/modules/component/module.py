@@ -129,7 +129,7 @@ class ComponentModule:
         return self._when(lambda: self._is_warm() or all(map(_has_values, wanted)))
 
     def read(self, selections: Iterable[Selection], also: Collection[str] = ()) -> Snapshot:
-        """The values now, and the quality of their components and of those that are named beside them."""
+        """Return the present values, and the quality of their components and of the named ones."""
         now_ns = time.monotonic_ns()
         values: dict[str, float | None] = {}
         stamps_ns: dict[str, int | None] = {}

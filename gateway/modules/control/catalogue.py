@@ -60,7 +60,7 @@ def resolve(
 def described(
     name: str, settings: ParameterSettings, descriptions: Mapping[str, Description], absent: Mapping[str, str]
 ) -> Parameter:
-    """A parameter that the robot's file describes: `[parameter."name"]`."""
+    """Return a parameter that the robot's file describes: `[parameter."name"]`."""
     component = name.partition(".")[0]
     index, subindex = settings.address
     low, high = settings.min, settings.max
@@ -101,6 +101,6 @@ def described(
 def _scaled_limits(
     low: Number | None, high: Number | None, scale: float
 ) -> tuple[Number | None, Number | None]:
-    """The EDS's limits in the parameter's unit; a negative scale turns them round."""
+    """Return the EDS's limits in the parameter's unit; a negative scale turns them round."""
     both = [None if limit is None else scaled(limit, scale) for limit in (low, high)]
     return (both[1], both[0]) if scale < 0 else (both[0], both[1])

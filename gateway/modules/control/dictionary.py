@@ -15,11 +15,11 @@ from eds.datatypes import DATA_TYPES, DOMAIN
 from eds.naming import remark
 from eds.report import pdo_rows
 from gateway.config.robot import RobotConfig
-from gateway.connections.turns import Client
+from gateway.connections.fair_queue import Client
 from gateway.modules.component.module import ComponentModule
-from gateway.modules.control.locked import Table, locked
 from gateway.modules.control.parameters import READABLE, WRITABLE, Parameter
 from gateway.modules.control.unanswered import Unanswered
+from gateway.modules.control.write_refusals import Table, locked
 from gateway.process.futures import back, done, gather, then
 from gateway.process.loop import Loop
 from gateway.wire.dictionary import (
@@ -86,7 +86,7 @@ class Objects:
         self._ask = ask
 
     def listed(self, params: ObjectListParams) -> ObjectList:
-        """What the EDS says of those that fit.
+        """Return what the EDS says of those that fit.
 
         Raises:
             RpcError: there is no such component, or it has no object dictionary.
@@ -103,7 +103,7 @@ class Objects:
         return ObjectList(params.component, shown, len(found) - len(shown))
 
     def read(self, params: ObjectReadParams, client: Client) -> "Future[ObjectValues]":
-        """What the device holds of them now; raises `RpcError` for one that its EDS lacks."""
+        """Return what the device holds of them now; raises `RpcError` for one that its EDS lacks."""
         description = self._description(params.component)
         wanted = [self._wanted(params.component, text, description) for text in dict.fromkeys(params.objects)]
         ready = self._component.when_ready({params.component})
@@ -129,7 +129,7 @@ class Objects:
         return wanted
 
     def _mapped_in(self, component: str, description: Description) -> Mapping[tuple[int, int], list[str]]:
-        """The PDOs that each object is mapped in."""
+        """Return the PDOs that each object is mapped in."""
         if component not in self._mapped:
             found: dict[tuple[int, int], list[str]] = {}
             for pdo in pdo_rows(description):
@@ -211,7 +211,7 @@ def address(index: int, subindex: int) -> str:
 
 
 def by_eds(variable: "ODVariable") -> ObjectInfo:
-    """What the EDS alone says of an object."""
+    """Return what the EDS alone says of an object."""
     known, default = DATA_TYPES.get(variable.data_type or 0), variable.default
     return ObjectInfo(
         address(variable.index, variable.subindex),

@@ -49,7 +49,7 @@ _STOPPING = (  # CiA 402-2: what a drive does when it is stopped, or nobody spea
 def offered(
     config: RobotConfig, descriptions: Mapping[str, Description], own: Iterable[Parameter]
 ) -> Iterator[Parameter]:
-    """The parameters of every table that says `parameters = "eds"`, without the file's `own`."""
+    """Yield the parameters of every table that says `parameters = "eds"`, without the file's `own`."""
     taken = {(config.node_of(one.component), one.index, one.subindex): one.name for one in own}
     shared: set[Node] = set()  # those whose common objects have their names already
     for kind, tables in (("joint", config.joint), ("device", config.device)):
@@ -153,7 +153,7 @@ class _Offer:
         return lock or (None if matches(name, release) else Lock.UNRELEASED)
 
     def _unmatched(self, variables: list["ODVariable"], names: list[str]) -> Iterator[Parameter]:
-        """What is to be released and does not exist, to be seen where parameters are."""
+        """Yield what is to be released and does not exist, to be seen where parameters are."""
         addresses = {_address(one) for one in variables}
         known = {*names, *(one.partition(".")[2] for one in self._taken.values() if self._is_own(one))}
         for entry in self._table.release:
@@ -171,7 +171,10 @@ class _Offer:
 
 
 def own_lock(index: int, *, is_led: bool) -> Lock | None:
-    """What locks an object by what it is, whoever describes it; `is_led`: an RPDO of the EDS brings it."""
+    """Return what locks an object by what it is, whoever describes it.
+
+    `is_led`: an RPDO of the EDS brings it.
+    """
     index = _of_first_axis(index)
     if index == CONTROLWORD:
         return Lock.CONTROLWORD

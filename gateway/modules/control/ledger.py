@@ -50,7 +50,7 @@ class WriteLedger:
         return self.undos.get(self.number)
 
     def replaced(self, changes: Sequence[Change]) -> tuple[Undo, ...]:
-        """The trials on the same parameters, which only another trial takes over.
+        """Return the trials on the same parameters, which only another trial takes over.
 
         Raises:
             RpcError: trial_pending; it is none, or they are being taken back.
@@ -72,7 +72,7 @@ class WriteLedger:
         return tuple(found)
 
     def goal(self, change: Change, before: bytes) -> bytes | None:
-        """What the end of this trial would take a parameter back to."""
+        """Return what the end of this trial would take a parameter back to."""
         if self.trial_s is None:
             return None
         trials = self.replaced([change])
@@ -94,7 +94,7 @@ class WriteLedger:
         self._journal.append(self._who, "write refused", Share.ASKED, after=what, result=str(error))
 
     def made(self, name: str, data: bytes) -> None:
-        """The device has made something else of what was written, which is to be taken back all the same."""
+        """Note that the device altered the written value, which must still be reverted."""
         self.changes = _made(self.changes, name, data)
         if self.kept is not None:
             kept = msgspec.structs.replace(self.kept, changes=_made(self.kept.changes, name, data))
@@ -121,7 +121,7 @@ class WriteLedger:
         self.taken_over = tuple(one.write for one in replaced)
 
     def rolled_back(self, error: RpcError, left: tuple[UndoChange, ...]) -> None:
-        """It has failed, and these are still to be taken back."""
+        """Note the failure, and the values that must still be reverted."""
         failed = error.kind is Kind.ROLLBACK_FAILED
         if failed:
             self.problem = str(error)
@@ -162,7 +162,7 @@ def _made(changes: Sequence[UndoChange], name: str, data: bytes) -> tuple[UndoCh
 
 
 def _merged(undo: Undo, replaced: Sequence[Undo]) -> Undo:
-    """A trial with those it takes over: all their parameters, each with its first value before.
+    """Return a trial with those it takes over: all their parameters, each with its first value before.
 
     In the order of their last downloads, so that the last one is taken back first.
     """

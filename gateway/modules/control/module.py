@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, cast
 
 from gateway.access.folder import AccessFolder
 from gateway.handlers import Handlers, on
-from gateway.modules.control.admitted import AdmissionsJournal
+from gateway.modules.control.access_journal import AccessJournal
 from gateway.modules.control.lease import RENEWED, TAKEN, Leases
 from gateway.modules.control.storage import RESTORING, STORING
 from gateway.modules.control.tuning import Tuning
@@ -138,7 +138,7 @@ class ControlModule:
                 config, self._component, loop, self._records, self._stop.authority, self._trials_changed
             )
             opened.callback(self._tuning.close)
-            self._admissions = AdmissionsJournal(self._records, AccessFolder(config.access))
+            self._admissions = AccessJournal(self._records, AccessFolder(config.access))
             self._admissions.look()
             self._stop.claim = self._tuning.claim
             left = self._tuning.load()
@@ -158,7 +158,7 @@ class ControlModule:
         self._records.close()
 
     def describe(self) -> "Future[Described]":
-        """Waits for a cold start, so that it says what is there."""
+        """Describe the robot after a cold start is over."""
         ready = self._component.when_ready(self._component.robot.components)
         return then(ready, lambda _none: self._described())
 
@@ -286,5 +286,5 @@ class ControlModule:
         return self._stop.stop(who, reason)
 
     def trip(self, who: str, reason: str) -> None:
-        """The same for the guard, whose stop leaves one that is held already as it is. From any thread."""
+        """Stop for the guard, which leaves an already held stop as it is. From any thread."""
         self._stop.trip(who, reason)

@@ -72,7 +72,7 @@ class Change:
 
 
 def result(future: "Future[T]", more_s: float = 0.0) -> T:
-    """What comes of it; raises `TimeoutError`, and asks no more, where that takes too long."""
+    """Return what comes of it; raises `TimeoutError`, and asks no more, where that takes too long."""
     try:
         return future.result(ANSWER_S + more_s)
     except TimeoutError:
@@ -81,7 +81,7 @@ def result(future: "Future[T]", more_s: float = 0.0) -> T:
 
 
 def results(futures: "Mapping[K, Future[T]]") -> "dict[K, T | Exception]":
-    """What comes of all of them, in the time of one; an error stands in its place as itself."""
+    """Return what comes of all of them, in the time of one; an error stands in its place as itself."""
     wait(futures.values(), ANSWER_S)
     found: dict[K, T | Exception] = dict.fromkeys(futures, TimeoutError("no answer"))
     for key, future in futures.items():
@@ -93,7 +93,7 @@ def results(futures: "Mapping[K, Future[T]]") -> "dict[K, T | Exception]":
 
 
 def read(parameter: Parameter, node: Node) -> bytes:
-    """The device's bytes now.
+    """Return the device's bytes now.
 
     Raises:
         RpcError: the device does not tell.
@@ -143,7 +143,7 @@ def download(
 
 
 def device_error(parameter: Parameter, doing: str, error: Exception) -> RpcError:
-    """What a driver could not do, as an answer."""
+    """Return what a driver could not do, as an answer."""
     kinds = ((DeviceAbort, Kind.DEVICE_ABORT), (TimeoutError, Kind.DEVICE_TIMEOUT))
     kind = next((kind for type_, kind in kinds if isinstance(error, type_)), Kind.UNAVAILABLE)
     return refuse(

@@ -136,7 +136,7 @@ class Parameter:
         )
 
     def refusal(self, kind: Kind, text: str, limit: float | None = None) -> RpcError:
-        """An error about this parameter."""
+        """Return an error about this parameter."""
         return refuse(kind, f"{self.name}: {text}", component=self.component, object=self.object, limit=limit)
 
     def check_readable(self) -> None:
@@ -161,7 +161,7 @@ class Parameter:
         return lock.remedy.format(name=self.name.partition(".")[2], table=self.table)
 
     def encode(self, value: Number) -> bytes:
-        """The bytes to write, checked against access, type and limits.
+        """Return the bytes to write, checked against access, type and limits.
 
         Raises:
             RpcError: read_only, not_allowed or out_of_limit.
@@ -182,7 +182,7 @@ class Parameter:
         return data
 
     def accepts(self, data: bytes) -> Number:
-        """The value of bytes that may be written as they are: what a device held before.
+        """Return the value of bytes that may be written as they are: what a device held before.
 
         Raises:
             RpcError: read_only, not_allowed, mismatch or out_of_limit.
@@ -196,11 +196,17 @@ class Parameter:
         return value
 
     def told(self, data: bytes) -> Number | str:
-        """What the device's bytes mean: a value, or a text; raises `RpcError` (mismatch) as `decode`."""
+        """Return what the device's bytes mean: a value, or a text.
+
+        Raises `RpcError` (mismatch) as `decode`.
+        """
         return self.decode(data) if self.is_number else words(data, self.data_type)
 
     def decode(self, data: bytes) -> Number:
-        """The value that the device's bytes mean; raises `RpcError` (mismatch) where they mean none."""
+        """Return the value that the device's bytes mean.
+
+        Raises `RpcError` (mismatch) where they mean none.
+        """
         try:
             return self.coding.decode(data)
         except CodingError as error:

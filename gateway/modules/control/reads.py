@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Final, Generic, Protocol, TypeVar
 
-from gateway.connections.turns import Client, Turns
+from gateway.connections.fair_queue import Client, FairQueue
 from gateway.process.futures import done, outcome, then
 from gateway.process.loop import Loop
 
@@ -45,16 +45,16 @@ class _Reading(Generic[P, V]):
     _left: dict[str, deque[P]] | None = None  # by device; only once it is this one's turn
 
     def free(self, busy: Container[str]) -> str | None:
-        """A device that is to be read, and is not being read."""
+        """Return a device that is to be read, and is not being read."""
         return next((name for name, left in self._by_device().items() if left and name not in busy), None)
 
     def take(self, device: str) -> list[P]:
-        """What is to be read of it now."""
+        """Return what is to be read of it now."""
         left = self._by_device()[device]
         return [left.popleft() for _ in range(min(OBJECTS, len(left)))]
 
     def put(self, taken: Sequence[P], values: Sequence[V]) -> None:
-        """These have these values; when it has all, it is answered in the order in which it was asked."""
+        """Take values; when all are there, answer in the order of the request."""
         self.values.update((one.name, value) for one, value in zip(taken, values, strict=True))
         if len(self.values) == len(self.chosen) and not self.answer.done():
             self.answer.set_result({one.name: self.values[one.name] for one in self.chosen})
@@ -80,7 +80,7 @@ class Reads(Generic[P, V]):
         self._loop = loop
         self._device_of = device_of
         self._read_all = read_all
-        self._turns = Turns[_Reading[P, V]]()
+        self._turns = FairQueue[_Reading[P, V]]()
         self._busy: dict[str, float] = {}  # devices, and since when
         self._slow: set[str] = set()
 

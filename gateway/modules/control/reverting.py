@@ -70,7 +70,7 @@ class Attempt:
         return TakenBack(outcome, tuple(reversed(left)))
 
     def _objection(self, address: Address) -> str | None:
-        """A stop is held, or has claimed the object meanwhile. From any thread."""
+        """Return the objection of a held stop, or one that has claimed the object. From any thread."""
         if address not in self._authority.locked:
             return None
         undo = self._undos.get(self._write)

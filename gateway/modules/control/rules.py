@@ -60,12 +60,12 @@ class Rules:
         return device.bus, device.node_id, parameter.index, parameter.subindex
 
     def device(self, of: OfComponent) -> str:
-        """What is one device is one name, whichever tables of the robot's file describe it."""
+        """Return a name for the device, the same whichever tables of the robot's file describe it."""
         device = self._devices[of.component]
         return f"node {device.node_id} on {device.bus}"
 
     def node(self, parameter: Parameter) -> Node:
-        """Raises `RpcError` (unavailable) where its device could not be built."""
+        """Return the node; raises `RpcError` (unavailable) if its device could not be built."""
         component: Any = self._component.robot.components.get(parameter.component)
         if component is None:
             raise parameter.refusal(Kind.UNAVAILABLE, parameter.problem or "its device is not there")
@@ -98,7 +98,7 @@ class Rules:
         return str(quality["problem"] or "it is silent")
 
     def reach(self, change: UndoChange) -> tuple[Parameter, Node]:
-        """What was written, as long as the robot's file still means the same by its name.
+        """Return what was written, as long as the robot's file still means the same by its name.
 
         Raises:
             OutOfReach: it does not, or the device is not there now.
@@ -181,7 +181,7 @@ class Rules:
 
 
 def allowed_states(parameter: Parameter) -> frozenset[DriveState] | None:
-    """The drive states in which a parameter may be written; `None` where the state does not matter."""
+    """Return the drive states in which a parameter may be written; `None` where the state does not matter."""
     settings = parameter.settings
     if settings.states is None:
         return None if settings.live else frozenset(DriveState) - ENERGISED

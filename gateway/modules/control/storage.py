@@ -163,7 +163,7 @@ class _Run:
             raise self._refusal(Kind.NOT_ALLOWED, self._node.distrust)
 
     def _check_trials(self) -> None:
-        """It would be made permanent; and taking it back must not wait for a device that stores."""
+        """Refuse while a trial is pending: it would become permanent, and its revert would wait."""
         for undo in self._storage.records.undo.all():
             how = "on trial; confirm or revert" if undo.trial else "still being taken back; wait for"
             names = ", ".join(change.parameter for change in undo.changes)
@@ -207,7 +207,7 @@ class _Run:
     # Afterwards
 
     def _verify(self, before: Mapping[str, tuple[Number, bytes]]) -> None:
-        """It has confirmed; what now cannot be looked at is not known, whatever the reason."""
+        """Compare after the confirmation; an unreadable value is unknown, whatever the reason."""
         try:
             self._check_answers()
             self._check_unchanged(before)
@@ -218,7 +218,7 @@ class _Run:
             raise refuse(Kind.DEVICE_TIMEOUT, said, component=self._component) from error
 
     def _check_answers(self) -> None:
-        """A device that is busy afterwards answers again, and still says that it can."""
+        """Wait until the busy device answers again, and still says that it can store."""
         deadline = time.monotonic() + self._timeout_s
         while True:
             try:
@@ -234,7 +234,7 @@ class _Run:
             raise self._device_error(error) from error
 
     def _values(self) -> dict[str, tuple[Number, bytes]]:
-        """What can be changed in the device, as it is now."""
+        """Return what can be changed in the device, as it is now."""
         found = {}
         for one in self._storage.parameters.values():
             usable = one.problem is None and one.lock is None and one.access in READABLE
@@ -264,7 +264,7 @@ class _Run:
         kind: Kind = Kind.UNAVAILABLE,
         **details: str,
     ) -> None:
-        """Returns when it is durable; raises `RpcError` where it cannot be recorded, `so` says what then."""
+        """Append an entry durably; raises `RpcError` if that fails, `so` says what then."""
         journal = self._storage.records.journal
         try:
             journal.append(self._who, what, share, component=self._component, **details).result()

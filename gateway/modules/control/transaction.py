@@ -35,7 +35,7 @@ class Leave:
         return self.overtaken() or self.permit.objection(address)
 
     def kind(self, said: str) -> Kind:
-        """What an objection means."""
+        """Return what an objection means."""
         if said == ENDING:
             return Kind.UNAVAILABLE
         allowed = said not in (self.overtaken(), self.permit.authority.frozen())
@@ -131,7 +131,10 @@ class Transaction:
             raise change.parameter.refusal(Kind.NOT_ALLOWED, change.node.distrust)
 
     def _current(self) -> dict[str, bytes]:
-        """What the devices hold; read anew where a trial that this one takes over has ended meanwhile."""
+        """Return what the devices hold.
+
+        Read anew where a trial that this one takes over has ended meanwhile.
+        """
         while True:
             replaced = self._ledger.replaced(self._changes)
             found = {}
@@ -145,7 +148,7 @@ class Transaction:
         return change.parameter.decode(self._before[change.name])
 
     def _check_way_back(self, change: Change) -> None:
-        """What could not be taken back is not tried."""
+        """Refuse a trial that could not be reverted at its end."""
         goal = self._ledger.goal(change, self._before[change.name])
         if goal is None:
             return

@@ -86,7 +86,10 @@ class TrialJobs:
         return any(change.address in self._authority.locked for change in changes)
 
     def claim(self) -> list[int]:
-        """What stops a controller is never taken back: a stop has set it. Returns the writes concerned."""
+        """Return what stops a controller is never taken back: a stop has set it.
+
+        Returns the writes concerned.
+        """
         claimed = {}
         for undo in self._undos.all():
             theirs = [one for one in undo.changes if one.address in self._authority.locked]
@@ -105,7 +108,7 @@ class TrialJobs:
             self._undos.settle(drop=[undo.write])
 
     def _tell(self, what: str, **details: object) -> None:
-        """A disk that fails was logged, and does not change what was done."""
+        """Append to the journal; a failing disk was logged, and the work is done."""
         outcome(self._journal.append(GATEWAY, what, **details))
 
 

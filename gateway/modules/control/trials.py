@@ -77,7 +77,7 @@ class Trials:
         changed: Callable[[], None],
         wrote: Callable[[Iterable[str]], None],
     ) -> None:
-        """`changed` is told whenever `pending` may be another, `wrote` which parameters may be."""
+        """Set the callbacks: `changed` when `pending` may differ, `wrote` with parameters that may."""
         self._loop = loop
         self._writer = writer
         self._jobs = jobs
@@ -98,7 +98,7 @@ class Trials:
         return [trial.info for trial in self._trials.values()]
 
     def expect(self, session: "Session") -> Coming:
-        """A trial was asked for; what has been expected is `dismissed` in any case."""
+        """Expect a requested trial; it is `dismissed` in any case."""
         coming = Coming(session)
         self._coming.add(coming)
         return coming
@@ -107,7 +107,7 @@ class Trials:
         self._coming.discard(coming)
 
     def begin(self, undo: Undo, trial_s: float, coming: Coming, taken_over: Iterable[int]) -> None:
-        """A write has succeeded on trial."""
+        """Take over a write that has succeeded on trial."""
         for other in taken_over:
             self._forget(other, f"it was taken over by write {undo.write}")
         trial = self._trials[undo.write] = _Trial(undo, coming.session)
@@ -157,7 +157,7 @@ class Trials:
         self._revert(lambda _one: True, why)
 
     def claim(self) -> "Future[None]":
-        """A stop has set what stops the controllers: nothing of that is taken back. From any thread."""
+        """Release the objects set by a stop: they are never reverted. From any thread."""
         if not self._jobs.concerned():
             return done(None)
         claimed = self._writer.submit(self._jobs.claim, Turn.CLAIM)

@@ -17,7 +17,7 @@ from msgspec import UNSET
 
 from drivers.errors import DeviceTimeout, DriverError
 from gateway.config.robot import RobotConfig
-from gateway.connections.turns import Client
+from gateway.connections.fair_queue import Client
 from gateway.modules.component.module import ComponentModule
 from gateway.modules.control.catalogue import resolve
 from gateway.modules.control.dictionary import Objects, Wanted
@@ -106,7 +106,7 @@ class Tuning:
         self._writer.close()
 
     def load(self) -> list[Undo]:
-        """What the last gateway left to be taken back. Before anything is written."""
+        """Return what the last gateway left to be taken back. Before anything is written."""
         undos, problem = self._records.undo.load()
         if problem is not None:
             log.critical("%s", problem)
@@ -125,7 +125,10 @@ class Tuning:
             self.trials.take_up(undo, f"the gateway ended {how}", ready)
 
     def claim(self) -> "Future[None]":
-        """What stops the controllers is as a stop has set it now, and never taken back. From any thread."""
+        """Return what stops the controllers is as a stop has set it now, and never taken back.
+
+        From any thread.
+        """
         return self.trials.claim()
 
     def enabling_objection(self, joints: Iterable[str]) -> str | None:
@@ -143,13 +146,13 @@ class Tuning:
         return self._infos
 
     def listed(self, names: list[str] | None) -> ParameterValues:
-        """What is known without asking: the last value read, as long as its device is there."""
+        """Return what is known without asking: the last value read, as long as its device is there."""
         chosen = self._parameters.chosen(names)
         lost = self._lost(chosen)
         return ParameterValues({one.name: self._last(one, lost) for one in chosen})
 
     def read(self, names: list[str] | None, client: Client) -> "Future[ParameterValues]":
-        """What the devices hold now; where one does not tell, `problem` says why."""
+        """Return what the devices hold now; where one does not tell, `problem` says why."""
         chosen = self._parameters.chosen(names)
         ready = self._component.when_ready({one.component for one in chosen})
         values = then(ready, lambda _none: self._reads.ask(client, chosen))
@@ -188,7 +191,7 @@ class Tuning:
     # Reading
 
     def _forget(self, names: Iterable[str]) -> None:
-        """What was read of these is known no longer."""
+        """Forget the values of these."""
         for name in names:
             self._known.pop(name, None)
 
@@ -210,7 +213,7 @@ class Tuning:
         return self._read_all(parameters) if parameters else self.objects.read_all(objects)
 
     def _read_all(self, parameters: Sequence[Parameter]) -> "Future[list[ParameterValue]]":
-        """These are of one device. What cannot be asked of it says why."""
+        """Read parameters of one device; an unreadable one says why."""
         why = {name: self._why_unasked(name) for name in {one.component for one in parameters}}
         refusals = ((one.name, self._refusal(one, why[one.component])) for one in parameters)
         refused = {name: refusal for name, refusal in refusals if refusal is not None}
@@ -229,7 +232,7 @@ class Tuning:
     def _each(
         self, asked: Sequence[Parameter], node: Node, told: "Sequence[bytes | DriverError] | Exception"
     ) -> Iterator[bytes | Exception]:
-        """What is told of each; where a device did not answer, that is so for all that is left."""
+        """Return what is told of each; where a device did not answer, that is so for all that is left."""
         found: list[bytes | Exception] = [told] if isinstance(told, Exception) else [*told]
         last = found[-1]
         if isinstance(last, DeviceTimeout):
@@ -291,7 +294,7 @@ class Tuning:
         self.trials.dismiss(asked.coming)
 
     def _check_enabling(self, changes: Iterable[Change]) -> None:
-        """The other half of `enabling_objection`: whichever was asked for first is done."""
+        """Refuse a change that bars an enabling under way, as `enabling_objection` does the reverse."""
         if self._authority.state.phase is not Phase.ENABLING:
             return
         for change in changes:
@@ -300,7 +303,7 @@ class Tuning:
                 raise change.parameter.refusal(Kind.WRONG_STATE, text)
 
     def _follow(self, asked: "_Asked", ledger: WriteLedger, ended: "Future[Outcome]") -> None:
-        """What stays of a write: its trial, or what could not be rolled back."""
+        """Keep a write's trial, or the values that could not be rolled back."""
         kept = ledger.kept
         if kept is None:
             return

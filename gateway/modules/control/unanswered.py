@@ -24,7 +24,7 @@ class Unanswered:
         self._missed: dict[str, _Missed] = {}
 
     def note(self, components: Iterable[str], node: Node, problem: str) -> None:
-        """These, which are on this node, were not answered for just now."""
+        """Note that these, of this node, were not answered just now."""
         missed = _Missed(node, time.monotonic_ns(), problem)
         self._missed.update(dict.fromkeys(components, missed))
 

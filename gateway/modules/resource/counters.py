@@ -38,7 +38,7 @@ class Counters(Protocol):
         """Of the whole computer."""
 
     def own_rss_bytes(self) -> int:
-        """What this process holds itself."""
+        """Return what this process holds itself."""
 
     def command_line(self, pid: int) -> list[str]:
         """Its words, none where there is none to be seen."""

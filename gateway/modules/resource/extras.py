@@ -69,7 +69,7 @@ def _cooling(root: Path) -> Iterator[tuple[str, float]]:
 
 
 def kernel(root: Path = SYS) -> KernelFacts:
-    """The kernel, and what its clocks are worth; `root` is where sysfs is mounted."""
+    """Return the kernel, and what its clocks are worth; `root` is where sysfs is mounted."""
     facts = platform.uname()
     preempt_rt: bool | None = None
     if facts.system == "Linux":

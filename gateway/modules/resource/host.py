@@ -103,7 +103,7 @@ class Meter:
         return GatewayUse(percent, self._counters.own_rss_bytes())
 
     def _table(self, params: ResourceSnapshotParams, now_ns: int) -> list[ProcessUse]:
-        """The hot loop: thousands of processes may pass here, and most of them have done nothing."""
+        """Return the hot loop: thousands of processes may pass here, and most of them have done nothing."""
         elapsed_ns, self._scanned_ns = now_ns - self._scanned_ns, now_ns
         before = self._processes if elapsed_ns > 0 else {}
         percent_per_s = 100e9 / max(1, elapsed_ns)

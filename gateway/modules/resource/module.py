@@ -14,7 +14,7 @@ import msgspec
 
 from drivers.latest import Latest, Listener
 from drivers.samples import Channel
-from gateway.connections.turns import Turns
+from gateway.connections.fair_queue import FairQueue
 from gateway.handlers import Handlers, on
 from gateway.process.futures import back, done, pass_on, then
 from gateway.streaming.sources import Selection, whole
@@ -49,7 +49,7 @@ _encoder = msgspec.json.Encoder()
 
 
 def columns(snapshot: ResourceSnapshot) -> tuple[float | None, ...]:
-    """A snapshot as the values of `RESOURCE_CHANNELS`."""
+    """Return a snapshot as the values of `RESOURCE_CHANNELS`."""
     memory = snapshot.memory
     return (
         snapshot.cpu.percent,
@@ -127,7 +127,7 @@ class ResourceModule:
         loop = context.config.control_loop
         self._control = () if loop is None else loop.processes
         self._meters: dict[tuple[Session, str], Meter] = {}
-        self._turns = Turns[_Wish]()
+        self._turns = FairQueue[_Wish]()
         self._measuring = False  # for a client
         self.handlers = Handlers(on(RESOURCE_SNAPSHOT, self._snapshot))
 
@@ -148,18 +148,18 @@ class ResourceModule:
         return self._host.meter()
 
     def own_rss_bytes(self) -> int:
-        """What the gateway holds."""
+        """Return what the gateway holds."""
         return self._host.own_rss_bytes()
 
     def selections(self) -> list[Selection]:
         return [whole(self._source)]
 
     def look(self, meter: "Meter", params: ResourceSnapshotParams) -> "Future[ResourceSnapshot]":
-        """A snapshot of one asker's, given in the loop."""
+        """Return a snapshot of one asker's, given in the loop."""
         return back(self._context.loop, self._worker.submit(meter.snapshot, params))
 
     def measure(self, session: "Session", method: str) -> "Future[ResourceSnapshot]":
-        """A snapshot without processes whose percentages are since this connection last called `method`."""
+        """Return a snapshot; its percentages are since this connection last called `method`."""
         meter = self._meter_of(session, method)
         return self._for(session, lambda: meter.snapshot(_NO_PROCESSES))
 

@@ -42,7 +42,7 @@ Span = tuple[int, int]
 
 
 def redact(words: list[str]) -> str:
-    """A command line without the values of what is named like a secret, and without users in URLs.
+    """Return a command line without the values of what is named like a secret, and without users in URLs.
 
     It cannot know every program's own way: a secret that nothing names is shown.
     """
@@ -53,7 +53,7 @@ def redact(words: list[str]) -> str:
 
 
 def _without(line: str, find: Callable[[str], Iterator[Span]]) -> str:
-    """The line with these spans hidden; they come in order."""
+    """Return the line with these spans hidden; they come in order."""
     shown, at = [], 0
     for begin, end in find(line):
         if begin >= at and end > begin:
@@ -63,7 +63,10 @@ def _without(line: str, find: Callable[[str], Iterator[Span]]) -> str:
 
 
 def _named(line: str) -> Iterator[Span]:
-    """What follows a name that says that it is a secret. Each letter is looked at a few times at most."""
+    """Yield what follows a name that says that it is a secret.
+
+    Each letter is looked at a few times at most.
+    """
     at = 0
     while name := _NAME.search(line, at):
         at = name.end()
@@ -94,7 +97,7 @@ def _value_of(line: str, name: re.Match[str]) -> Span | None:
 
 
 def _options(line: str) -> Iterator[Span]:
-    """What follows an option that is a secret of its program only, and the password after a user's name."""
+    """Yield the values of secret options of known programs, and passwords after user names."""
     attached = followed = before = ""
     for piece in _PIECE.finditer(line):
         text, begin, end = piece[0], *piece.span()

@@ -75,7 +75,7 @@ class Tasks:
         return new
 
     def look(self) -> Look:
-        """What each thread that was met has had so far."""
+        """Return what each thread that was met has had so far."""
         found: Look = {}
         for task, descriptor in self._open.items():
             with suppress(OSError):  # it has ended
@@ -84,7 +84,10 @@ class Tasks:
         return found
 
     def named(self, globs: Sequence[str]) -> dict[int, str]:
-        """Processes by what they are called, or by their program: the first words of their command lines."""
+        """Return processes by what they are called, or by their program.
+
+        The first words of their command lines.
+        """
         pids = {pid for pid, _ in self._open}
         named = {pid: self.name(pid) for pid in pids}
         return {
@@ -97,7 +100,7 @@ class Tasks:
         return sorted(tid for owner, tid in self._open if owner == pid)
 
     def name(self, pid: int, tid: int | None = None) -> str:
-        """The kernel's own name of it; empty where it has ended."""
+        """Return the kernel's own name of it; empty where it has ended."""
         text = self._read((pid, pid if tid is None else tid), "comm")
         return (text or b"").rstrip(b"\n").decode(errors="replace")
 

@@ -77,7 +77,7 @@ class Authority:
         return self.state.number == number
 
     def unproved(self, findings: Mapping[str, Finding]) -> list[str]:
-        """The targets that are not known to rest."""
+        """Return the targets that are not known to rest."""
         return list(unproved(self.state, findings))
 
     def permit(self, asked_ns: int) -> Permit:

@@ -127,6 +127,6 @@ class HoldFile:
         durable.write(self._path, data)
 
     def _remove(self) -> None:
-        """The record of a gateway that may not use the folder is not there; what is, is another one's."""
+        """Remove the record, unless the folder belongs to another gateway."""
         if self._unusable is None:
             durable.remove(self._path)

@@ -184,7 +184,7 @@ class Step:
 
 
 def step(state: State, event: Event) -> Step:
-    """What follows from an event."""
+    """Return what follows from an event."""
     if event.input in _ENDS and event.number != state.number:
         return Step(state)
     if event.input in (Input.SEEN, Input.LOST):

@@ -50,7 +50,7 @@ class StopAnswers:
         self._tell = tell
 
     def follow(self, first: "Mapping[str, Future[Report]]", kept: Kept | None) -> "Future[Stopped]":
-        """The answer to a stop that was asked of every target a moment ago."""
+        """Return the answer to a stop that was asked of every target a moment ago."""
         stops = {name: self._once_more(name, stop) for name, stop in first.items()}
         drives = {name: stop for name, stop in stops.items() if name in self._stoppers}
         last = then(back(self._loop, gather(drives)), self._last_resort)
@@ -106,7 +106,7 @@ def _is_confirmed(stop: "Future[Report]") -> bool:
 
 
 def _so_far(stops: "Mapping[str, Future[Report]]", last: "Future[dict[str, Report]]") -> dict[str, Report]:
-    """What is known by now; a target that has not answered yet is not confirmed."""
+    """Return what is known by now; a target that has not answered yet is not confirmed."""
     reports = dict.fromkeys(stops, Report(StopOutcome.UNCONFIRMED))
     for name, stop in stops.items():
         if stop.done():

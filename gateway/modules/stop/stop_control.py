@@ -149,11 +149,11 @@ class StopControl:
         return self._ask(Input.STOP, Asked(who, reason))
 
     def trip(self, who: str, reason: str) -> None:
-        """A rule of the guard that stops has tripped: the same, but a stop that is held stays whose it is."""
+        """Stop for a tripped rule of the guard; an already held stop keeps its owner."""
         self._ask(Input.TRIP, Asked(who, reason))
 
     def _happened(self, what: Input, target: str, stamp_ns: int) -> None:
-        """What the watch has seen."""
+        """Take the observations of the watch."""
         asked = Asked(GATEWAY, f"{target}: {what.value} while the hold was ending")
         with contextlib.suppress(Ended):
             self.authority.feed(what, partial(self._act, asked, target), at_ns=stamp_ns, target=target)
@@ -262,7 +262,7 @@ class StopControl:
         return back(self._loop, acted)
 
     def _give_up(self, number: int, ended: "Future[Descent]") -> None:
-        """A way down that failed inside has proved nothing."""
+        """Note that a failed reset has proved nothing."""
         if ended.exception() is not None:
             self.authority.feed(Input.UNPROVED, _nothing, number=number)
 
@@ -309,7 +309,7 @@ class StopControl:
             self._record.write_again()
 
     def _told(self, who: str, descent: Descent) -> "Future[Reset]":
-        """The answer, once it is written down."""
+        """Return the answer, once it is written down."""
         reset = Reset(descent.drives, descent.problems, held=self.held)
         problems = {"problems": reset.problems} if reset.problems else {}
         written = self._journal.append(
@@ -370,7 +370,7 @@ class StopControl:
         return answer
 
     def _explained(self, who: str, joints: list[str], enabling: Enabling) -> "Future[Enabled]":
-        """What cannot be journaled is not begun."""
+        """Begin what could be journaled: nothing else is begun."""
         entry = gather(
             {"journal": back(self._loop, self._journal.append(who, "enabling", Share.ASKED, joints=joints))}
         )
@@ -420,7 +420,7 @@ class StopControl:
 
 
 def locked_objects(config: RobotConfig) -> frozenset[Address]:
-    """The objects that stop a controller."""
+    """Return the objects that stop a controller."""
     return frozenset(
         (table.bus, table.node_id, *one.address)
         for one in config.stop.controller
@@ -429,11 +429,11 @@ def locked_objects(config: RobotConfig) -> frozenset[Address]:
 
 
 def _nothing(_step: Step) -> None:
-    """What follows is begun by who has asked."""
+    """Leave the next step to the caller."""
 
 
 def _reaction(drive: Drive, armed: bool) -> DriveReaction:
-    """What a drive does by itself, as it said when it came up."""
+    """Return what a drive does by itself, as it said when it came up."""
     options = {} if drive.reading is None else drive.reading.options
     quick_stop, abort_connection = options.get("quick_stop"), options.get("abort_connection")
     return DriveReaction(

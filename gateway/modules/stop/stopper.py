@@ -56,7 +56,7 @@ class Stopper:
 
 
 def nmt_stop(drives: Iterable[Drive], reports: Mapping[str, Report], tell: Tell) -> dict[str, Report]:
-    """The last resort, on each node none of whose axes has confirmed; what it does nobody confirms."""
+    """Return the last resort, on each node none of whose axes has confirmed; what it does nobody confirms."""
     nodes: dict[int, list[Drive]] = {}
     for drive in drives:
         nodes.setdefault(id(drive.node), []).append(drive)

@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable
 
 from drivers.inbox import Inbox
-from drivers.urgency import make_urgent
+from drivers.realtime_priority import make_realtime
 from gateway.process.memory import MemoryLock
 
 log = logging.getLogger(__name__)
@@ -60,7 +60,7 @@ class StopThread:
             self._work.put(work)
 
     def _run(self) -> None:
-        make_urgent()
+        make_realtime()
         while (work := self._next()) is not None:
             try:
                 work()

@@ -167,7 +167,7 @@ class _Boots:
     on_boot_up: Callable[[int], object]
 
     def on_emcy(self, emcy: Emcy) -> None:
-        """It says nothing about rest."""
+        """Ignore an EMCY: it says nothing about rest."""
 
 
 def _statusword(drive: Drive) -> int | None:

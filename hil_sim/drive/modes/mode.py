@@ -45,11 +45,11 @@ class Mode:
         self.halted = False
 
     def enter(self) -> None:
-        """The drive was enabled in this mode, or has changed to it: the joint comes to rest and is held."""
+        """Begin this mode: the joint comes to rest and is held."""
         self.clipped = self.halted = False
 
     def command(self, controlword: int, risen: int) -> None:  # noqa: ARG002 - modes with a handshake add it
-        """A controlword came; `risen` are the bits that were 0 before."""
+        """Take a controlword; `risen` are the bits that were 0 before."""
         halted = bool(controlword & HALT)
         if halted != self.halted:
             self.halted = halted
@@ -66,13 +66,13 @@ class Mode:
         """Bit 8 has fallen."""
 
     def target_written(self, key: Key, changed: bool) -> None:
-        """A target object is being written, be it with another value or the same."""
+        """Take a write of a target object, with another value or the same."""
 
     def synchronise(self) -> None:
-        """A SYNC came; received PDOs have taken effect."""
+        """Take a SYNC; received PDOs have taken effect."""
 
     def update(self, elapsed_s: float) -> None:
-        """The joint has moved for `elapsed_s`."""
+        """Advance by `elapsed_s`."""
 
     def status(self) -> int:
         """Bits 10, 12 and 13 of the statusword (13 of position modes comes from the drive)."""

@@ -165,7 +165,7 @@ class Seeking:
             self._at_limit()
 
     def _at_limit(self) -> None:
-        """It goes back once where its method says so; else there is nothing to be found."""
+        """Turn back once if the method allows it; else fail."""
         if self._turns:
             self._turns, self._direction = False, -self._direction
             self._ramp = self._towards(self._direction)
@@ -183,7 +183,7 @@ class Seeking:
         )
 
     def _look_for_index(self) -> None:
-        """The index lies where a revolution begins; it is latched in hardware, between two steps."""
+        """Latch the index at the start of a revolution, as hardware does between two steps."""
         before, self._turn = self._turn, self._revolution()
         if self._turn != before:
             servo = self._servo

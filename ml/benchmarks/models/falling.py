@@ -103,7 +103,7 @@ class FallDetector(ClassifierMixin, BaseEstimator):  # type: ignore[misc]  # sci
         return falling, falling | before_fall | daily
 
     def _threshold(self, probability: Floats, recording: Integers) -> float:
-        """The lowest that so few of these daily recordings reach."""
+        """Return the lowest that so few of these daily recordings reach."""
         mean = trailing_mean(probability, recording, self.settings.decisions)
         _, number = np.unique(recording, return_inverse=True)
         highest = np.zeros(number.max(initial=0) + 1)
@@ -112,7 +112,7 @@ class FallDetector(ClassifierMixin, BaseEstimator):  # type: ignore[misc]  # sci
 
 
 def probability_of(model: Any, x: Features, rows: npt.NDArray[np.intp]) -> Floats:
-    """The probability of falling at each of `rows`, in parts: scikit-learn copies what it is given."""
+    """Return the probability of falling at each of `rows`, in parts: scikit-learn copies what it is given."""
     said = np.empty(len(rows))
     for begin in range(0, len(rows), TOGETHER):
         part = slice(begin, begin + TOGETHER)
@@ -121,7 +121,7 @@ def probability_of(model: Any, x: Features, rows: npt.NDArray[np.intp]) -> Float
 
 
 def trailing_mean(values: Floats, recording: Integers, count: int) -> Floats:
-    """The mean of each row and the `count` − 1 before it in its recording; before that, 0."""
+    """Return the mean of each row and the `count` − 1 before it in its recording; before that, 0."""
     total = values.copy()
     for back in range(1, count):
         total[back:] += np.where(recording[back:] == recording[:-back], values[:-back], 0.0)
@@ -129,7 +129,7 @@ def trailing_mean(values: Floats, recording: Integers, count: int) -> Floats:
 
 
 def fall_trees(settings: FallSettings) -> Any:
-    """The trees of one fold."""
+    """Return the trees of one fold."""
     return HistGradientBoostingClassifier(
         max_iter=settings.rounds,
         learning_rate=0.1,

@@ -71,7 +71,7 @@ class EventModel:
         return heights
 
     def events(self, at: Integers, height: Floats) -> Integers:
-        """The samples of one foot's events of a kind, by `height` (n,) at the samples `at`; in time's order.
+        """Return the samples of one foot's events of a kind, in time's order; `height` (n,) is of `at`.
 
         A top is known once TOP samples have shown nothing higher.
         """
@@ -96,7 +96,7 @@ def _network(settings: EventSettings, seed: int, rows: int) -> Any:
 
 
 def _top(at: Integers, height: Floats, place: int) -> int:
-    """The sample of the highest point of a parabola through a moment and its two neighbours."""
+    """Return the sample of the highest point of a parabola through a moment and its two neighbours."""
     before, after = at[place] - at[max(place - 1, 0)], at[min(place + 1, len(at) - 1)] - at[place]
     if before != after or not before:
         return int(at[place])

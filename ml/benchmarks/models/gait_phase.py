@@ -63,7 +63,7 @@ class PhaseModel(RegressorMixin, BaseEstimator):  # type: ignore[misc]  # scikit
         return phase
 
     def personal(self, x: Features, phase: Phases, stride: npt.NDArray[np.int_]) -> "PhaseModel":
-        """A copy that has also learned from these rows of one wearer."""
+        """Return a copy that has also learned from these rows of one wearer."""
         own = copy.deepcopy(self)
         believed = self._believed(x, phase, stride)
         inputs, targets = self.scale_.transform(x[believed]), _on_circle(phase[believed])
@@ -83,7 +83,7 @@ class PhaseModel(RegressorMixin, BaseEstimator):  # type: ignore[misc]  # scikit
         return own
 
     def _believed(self, x: Features, phase: Phases, stride: npt.NDArray[np.int_]) -> npt.NDArray[np.bool_]:
-        """The rows of strides that this can follow; all of them where it can follow none."""
+        """Return the rows of strides that this can follow; all of them where it can follow none."""
         error = np.abs((self.predict(x) - phase + 0.5) % 1.0 - 0.5)
         _, number = np.unique(stride, return_inverse=True)
         mean = np.bincount(number, error) / np.bincount(number)

@@ -15,7 +15,7 @@ Numbers = npt.NDArray[Any]
 
 
 def scaled_rows(scale: Pipeline, x: Features) -> Features:
-    """What `ml.neural.scaled()` makes of rows; the same bits."""
+    """Return what `ml.neural.scaled()` makes of rows; the same bits."""
     return within(_standard(scale[0], x))
 
 
@@ -25,7 +25,7 @@ def _standard(scale: Any, x: Numbers) -> Numbers:
 
 
 def outputs(network: Any, inputs: Features) -> Numbers:
-    """The outputs of a fitted MLP with ReLU, before its last activation; the same bits."""
+    """Return the outputs of a fitted MLP with ReLU, before its last activation; the same bits."""
     values: Numbers = inputs
     last = len(network.coefs_) - 1
     for layer, (weights, bias) in enumerate(zip(network.coefs_, network.intercepts_, strict=True)):

@@ -45,7 +45,8 @@ class Alarm:
         """How it is shown, wherever that is: in its own word, as bad as the worst that it explains."""
         own, worst = TEXTS[self.kind].mark, min((self, *self.under), key=lambda one: _RANK[one.kind])
         shown = TEXTS[worst.kind].mark
-        return own if worst is self else Mark(shown.shape, shown.colour, own.word)
+        # As bad by itself: then in its own shape, so that one word has one mark.
+        return own if shown.colour == own.colour else Mark(shown.shape, shown.colour, own.word)
 
     @property
     def rank(self) -> int:
@@ -155,7 +156,7 @@ class Alarms:
 
 
 def _kept(before: Active | None, alarm: Alarm, now_s: float, newest_ns: int | None) -> Active:
-    """The same alarm as before, or a new one; what has become worse is to be read again."""
+    """Return the same alarm as before, or a new one; what has become worse is to be read again."""
     if before is None:
         since_s = now_s if alarm.since_s is None else alarm.since_s
         at_ns = None if newest_ns is None else newest_ns - round(max(0.0, now_s - since_s) * 1e9)

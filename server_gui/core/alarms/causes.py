@@ -113,7 +113,10 @@ def gathered(active: Iterable[Active], stalls: Sequence[Stall], now_s: float) ->
 def _cause(
     one: Active, gone: Sequence[Active], stood: Active | None, stalls: Sequence[Stall], now_s: float
 ) -> Active | None:
-    """The alarm that explains this one; that of a stall before that of a node, which may be the stall's."""
+    """Return the alarm that explains this one.
+
+    That of a stall before that of a node, which may be the stall's.
+    """
     if stood is not None and _is_of_stall(one, stalls, now_s):
         return stood
     alone = [cause for cause in gone if stood is None or not _is_of_stall(cause, stalls, now_s)]
@@ -144,7 +147,7 @@ def _is_told(
 
 
 def _above(one: Active, under: Sequence[Active]) -> Active:
-    """It with what it explains; read only when all of that is."""
+    """Return it with the alarms that it explains; read only when all of them are."""
     if not under:
         return one
     alarm = dataclasses.replace(

@@ -162,5 +162,5 @@ _CHECKS: Final = {
 
 
 def check_of(kind: Kind, component: str = "") -> str:
-    """What to check, by the kind of component too."""
+    """Return what to check, by the kind of component too."""
     return _CHECKS.get((kind, component), TEXTS[kind].check)

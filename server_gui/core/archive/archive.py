@@ -5,11 +5,11 @@ from pathlib import Path
 
 from ml.store.sessions import Session
 from server_gui.core.archive.collected_journals import KeptJournals
-from server_gui.core.archive.compared import Compared
 from server_gui.core.archive.labels import SessionLabels
 from server_gui.core.archive.library import Library
 from server_gui.core.archive.playback import Playback
 from server_gui.core.archive.recorded_predictions import said
+from server_gui.core.archive.recording_comparison import RecordingComparison
 from server_gui.core.cloud.jobs import Job, Jobs, JobState
 from server_gui.core.cloud.tape import Tape
 from server_gui.core.desk.desk import Desk
@@ -40,7 +40,7 @@ class Archive:
         self.journals = KeptJournals(settings, self.library.reading.do, deliver)
         self._reading = Background("playback")
         self.playback = Playback(self._reading.do, deliver, desk.shown)
-        self.compared = Compared(settings, self._reading.do, deliver)
+        self.compared = RecordingComparison(settings, self._reading.do, deliver)
         self.labels = SessionLabels(settings, self._reading.do, deliver, author)
         self.jobs = Jobs(lambda job: deliver(lambda: self._over(job)))
         self.models = Models(settings.store.url, deliver, self._robots, author, settings.promoters)
@@ -85,7 +85,10 @@ class Archive:
         return self._desk.shown.units
 
     def held_then(self, session: Session) -> list[str]:
-        """The parameters that it began with, in the window's units; in SI where the robot is not there."""
+        """Return the parameters that it began with, in the window's units.
+
+        In SI where the robot is not there.
+        """
         found = (station.robot.description for station in self._desk if station.name == session.robot)
         described = next((one for one in found if one is not None), None)
         si = {} if described is None else {one.name: one.unit for one in described.parameters}
@@ -99,7 +102,7 @@ class Archive:
         return said
 
     def _words(self, robot: str) -> dict[str, dict[str, str]]:
-        """The words of states, which recordings do not have: of the live robot, if it is there."""
+        """Return the words of states, which recordings do not have: of the live robot, if it is there."""
         named = (station.robot.description for station in self._desk if station.name == robot)
         described = next((found for found in named if found is not None), None)
         channels = [] if described is None else described.channels

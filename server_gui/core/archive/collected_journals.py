@@ -115,7 +115,7 @@ def _kept(entries: Iterable[Entry]) -> Kept:
 
 
 def _stored(url: str) -> list[dict[str, Any]]:
-    """The newest rows of each robot."""
+    """Return the newest rows of each robot."""
     try:
         store = Store.existing(url)
     except NoSuchTable:

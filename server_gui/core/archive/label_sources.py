@@ -13,7 +13,7 @@ import numpy as np
 
 from ml.store import Store, StoreError
 from ml.store import sessions as stored
-from ml.store.labels import INSTANTS, Label, Source, utc_ns
+from ml.store.labels import INSTANTS, Label, LabelSource, utc_ns
 from ml.store.sessions import Session
 from ml.training.recorded import Recorded, recorded
 from server_gui.core.archive.labelling import BadLabel
@@ -57,7 +57,7 @@ def from_truth(store: Store, session: Session, path: Path) -> list[Label]:
         found.append((group[0].stamp_ns, following.stamp_ns, name))
     found += [(each.stamp_ns, each.stamp_ns, event) for each in inside for event in each.events]
     lasting = [(begin, end, name) for begin, end, name in found if end > begin or name in INSTANTS]
-    return _labels(session, rows, lasting, SIMULATOR, Source.SIMULATOR)
+    return _labels(session, rows, lasting, SIMULATOR, LabelSource.SIMULATOR)
 
 
 def from_events(store: Store, session: Session) -> list[Label]:
@@ -74,7 +74,7 @@ def from_events(store: Store, session: Session) -> list[Label]:
     found = [(each.stamp_ns, each.stamp_ns, f"{each.leg}_{each.kind}") for each in shown.events]
     if not found:
         raise BadLabel(f"no foot of {session.session} is seen to step: there is nothing to label")
-    return _labels(session, rows, found, SENSORS, Source.SENSORS)
+    return _labels(session, rows, found, SENSORS, LabelSource.SENSORS)
 
 
 def from_table(
@@ -131,7 +131,7 @@ def _within(stamp_ns: int, rows: Recorded) -> bool:
 
 
 def _labels(
-    session: Session, rows: Recorded, found: list[tuple[int, int, str]], author: str, source: Source
+    session: Session, rows: Recorded, found: list[tuple[int, int, str]], author: str, source: LabelSource
 ) -> list[Label]:
     """Stretches of the robot's clock as labels of the session."""
     if not len(rows.stamps_ns):

@@ -15,7 +15,7 @@ from typing import Final
 import msgspec
 
 from ml.store import StoreError
-from ml.store.labels import ACTIVITIES, INSTANTS, Label, Source, utc_ns
+from ml.store.labels import ACTIVITIES, INSTANTS, Label, LabelSource, utc_ns
 from ml.store.sessions import Session
 from server_gui.core.cloud.recordings import Recordings
 from server_gui.core.fleet.collector import connect
@@ -82,7 +82,9 @@ class Labelling:
     ) -> Kept:
         """Say what robot and wearer did; raises as `add_all`."""
         whole = self.session(session, robot).session
-        return self.add_all([Label(robot, whole, began_utc_ns, ended_utc_ns, label, author, Source(source))])
+        return self.add_all(
+            [Label(robot, whole, began_utc_ns, ended_utc_ns, label, author, LabelSource(source))]
+        )
 
     def add_all(self, labels: Sequence[Label]) -> Kept:
         """Keep these labels of one session: all, or none where one cannot be so. Repeating changes nothing.
@@ -191,7 +193,7 @@ def _check(label: Label) -> None:
 
 def _contradictions(labels: Sequence[Label], new: Set[Label]) -> Iterator[tuple[Label, Label]]:
     """Two activities of one author at one time, of which one is new."""
-    until: dict[tuple[str, Source], Label] = {}
+    until: dict[tuple[str, LabelSource], Label] = {}
     for label in sorted(each for each in labels if each.label in ACTIVITIES):
         before = until.get((label.author, label.source))
         if before is None or before.ended_utc_ns <= label.began_utc_ns:

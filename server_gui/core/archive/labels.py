@@ -6,7 +6,7 @@ from concurrent.futures import Future
 from typing import Any
 
 from ml.store import StoreError
-from ml.store.labels import INSTANTS, Label, Source
+from ml.store.labels import INSTANTS, Label, LabelSource
 from ml.store.sessions import Session
 from server_gui.core.archive.labelling import BadLabel, Kept, Labelling, Where
 from server_gui.core.settings.server_file import ServerSettings
@@ -47,7 +47,7 @@ class SessionLabels:
             ended_utc_ns=began_ns if text in INSTANTS else ended_ns,
             label=text.strip(),
             author=self.author,
-            source=Source.PERSON,
+            source=LabelSource.PERSON,
         )
         self._ask(lambda: self._labelling.add_all([label]), f"labelled: {label.label}")
 

@@ -130,7 +130,7 @@ def _completed(stored: Session, told: Mapping[tuple[str, str], Session]) -> Sess
 
 
 def _joined(stored: list[Session], waiting: list[Session]) -> tuple[Session, ...]:
-    """The store knows more of what it has, and the spool whether it has ended; newest first."""
+    """Merge sessions of store and spool, newest first; the spool knows whether one has ended."""
     told = {(each.robot, each.session): each for each in waiting}
     known = told | {(each.robot, each.session): _completed(each, told) for each in stored}
     return tuple(reversed(in_order(known.values())))

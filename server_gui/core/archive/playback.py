@@ -15,8 +15,9 @@ from gateway.client import Batch, ConnectionState
 from gateway.wire.component import ChannelInfo, ComponentInfo
 from gateway.wire.robot import Clock, Description, GuardInfo
 from gateway.wire.stop import StopInfo
-from server_gui.core.archive.happened import Happened
+from server_gui.core.archive.outline import Outline
 from server_gui.core.archive.recorded_predictions import Said
+from server_gui.core.archive.timeline_events import TimelineEvents
 from server_gui.core.cloud.tape import Rows, Tape
 from server_gui.core.desk.desk import Desk, Shown
 from server_gui.core.desk.flags import Flag, FlagKind
@@ -96,7 +97,7 @@ class PlayedRobot(Robot):
         return self.rows_per_s
 
     def judge(self) -> None:
-        """What each component was then, as far as its channels tell: nobody has recorded more."""
+        """Show each component's state of that time, as far as its channels tell."""
         described = () if self.description is None else self.description.channels
         held = {info.component for info in described if self.values.get(info.name) is not None}
         for part in self.parts.values():
@@ -151,7 +152,8 @@ class Playback:
         self._robot = PlayedRobot()
         self._words: Mapping[str, dict[str, str]] = {}
         self._recall: Recall = nothing_said
-        self.happened = Happened(read, deliver)
+        self.happened = TimelineEvents(read, deliver)
+        self.outline = Outline(read, deliver)
         self._said: dict[str, Said] = {}  # the newest of each task
         self._pieces: dict[int, Piece] = {}
         self._reading: int | None = None
@@ -176,6 +178,7 @@ class Playback:
         self.desk.stations = [station]
         self.desk.select(station)
         self.happened.open(tape, _words(tape, words))
+        self.outline.open(tape)
         self.seek(tape.first_ns)
 
     def close(self) -> None:
@@ -203,7 +206,7 @@ class Playback:
         return self.tape is not None and not self.problem and self._fed_ns != self.position_ns
 
     def step(self) -> None:
-        """A frame: go on as far as time has, and show what there was."""
+        """Advance to the present time of playback, and show its data."""
         if self.tape is None or self.problem:
             return
         now_s = time.monotonic()
@@ -250,7 +253,7 @@ class Playback:
         station.predictions.take(Serves(station.name, {}, {"": NOT_PREDICTED}))
 
     def _show_said(self, now_ns: int) -> None:
-        """What models said last, as far as that was not too old."""
+        """Show the last predictions, unless they are too old."""
         recalled = {
             task: Recalled(one.prediction, (now_ns - one.utc_ns) / 1e9) for task, one in self._said.items()
         }
@@ -324,7 +327,7 @@ def _words(tape: Tape, told: Mapping[str, dict[str, str]]) -> dict[str, dict[str
 
 
 def _description(tape: Tape, jumps: int, words: Mapping[str, dict[str, str]]) -> Description:
-    """What the robot said it was made of, as far as its channels tell."""
+    """Return what the robot said it was made of, as far as its channels tell."""
     channels = []
     for name, unit in tape.units.items():
         component, _, quantity = name.rpartition(".")

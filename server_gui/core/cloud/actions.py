@@ -100,7 +100,7 @@ def check(settings: ServerSettings, *, deep: bool) -> Work:
 
 
 def _steps(job: Job, unit: str) -> Callable[[int], AbstractContextManager[Callable[[int], object]]]:
-    """What hears how many steps there will be, and then of each."""
+    """Return a context that reports the number of steps, and then each."""
 
     @contextlib.contextmanager
     def expect(steps: int) -> Iterator[Callable[[int], object]]:

@@ -45,7 +45,7 @@ class Count:
     rest_sum: int = 0
 
     def add(self, other: "Count") -> None:
-        """These too."""
+        """Add these."""
         self.rows += other.rows
         self.sum += other.sum
         self.names += other.names
@@ -177,7 +177,7 @@ def _merged(found: Iterable[Sequence[_Seen]]) -> Sequence[_Seen]:
 def _rows(
     store: Store, file: DataFile, known: Units, naming: Sequence[str], told: list[str]
 ) -> Iterator[pa.RecordBatch]:
-    """These columns and the times, or all that the table knows; `told` hears which times are not as said."""
+    """Yield these columns and the times, or all; `told` gets wrong statistics of times."""
     name = f"{file.location}/{file.path}"
     with translated(f"{store.url}/{name} cannot be read"), store.files.open_input_file(name) as opened:
         parquet, extent = pq.ParquetFile(opened), extents.Seen()
@@ -281,7 +281,7 @@ def _sums(batch: pa.RecordBatch, same: Mapping[str, str]) -> checksums.Sums:
 
 
 def _seen(claims: Mapping[Batch, Claim], batch: pa.RecordBatch, values: bool) -> Sequence[_Seen]:
-    """What these rows of another table are of each claim."""
+    """Return what these rows of another table are of each claim."""
     each = checksums.of_rows(pa.Table.from_batches([batch])) if values else None
     rows = _Rows(each, None if values else named(batch, NUMBER), times_us(batch[TIME]))
     found: dict[Batch, list[int]] = defaultdict(list)

@@ -83,7 +83,7 @@ def found(sessions: Collection[Name], but: str) -> list[Exported]:
 
 
 def _in(file: Path, wanted: Set[Name], but: str) -> Exported | None:
-    """What an entry of the list says, where it is of somebody's sessions."""
+    """Return what an entry of the list says, where it is of somebody's sessions."""
     try:
         note = _read(file)
     except (OSError, msgspec.MsgspecError) as error:
@@ -157,7 +157,7 @@ def _why(error: Exception) -> str:
 
 
 def _text(file: Path) -> str:
-    """A name that can be written down."""
+    """Return a name that can be written down."""
     name = str(file)
     try:
         name.encode()
@@ -180,7 +180,7 @@ def _read(file: Path) -> _Note:
 
 
 def _known(place: str) -> _Note | None:
-    """What was noted of it before; one that cannot be read is written anew."""
+    """Return what was noted of it before; one that cannot be read is written anew."""
     try:
         return _read(_note_of(place))
     except (FileNotFoundError, msgspec.MsgspecError):

@@ -23,7 +23,7 @@ class Seen:
     _found: dict[str, _Extent] = field(default_factory=dict)
 
     def add(self, batch: pa.RecordBatch) -> None:
-        """These too."""
+        """Add these."""
         for name in COLUMNS:
             if name in batch.schema.names:
                 extent = pc.min_max(batch[name])

@@ -183,7 +183,7 @@ def _begin(folder: Path, known: Plan, name: str) -> None:
 
 
 def _begun(folder: Path, name: str) -> list[Name]:
-    """The sessions of somebody whom an interrupted command was to forget."""
+    """Return the sessions of somebody whom an interrupted command was to forget."""
     try:
         found = msgspec.json.decode((folder / _BEGUN).read_bytes(), type=_Begun)
     except (OSError, msgspec.MsgspecError):
@@ -197,7 +197,7 @@ def digest(name: str) -> str:
 
 
 def _tell(store: Store, spool: Spool, known: Plan, name: str) -> None:
-    """An event in the recording of each robot."""
+    """Record an event for each robot."""
     if not known.sessions:
         return
     spool.append([], [_event(robot, known, name) for robot in sorted({robot for robot, _ in known.sessions})])

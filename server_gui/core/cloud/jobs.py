@@ -64,7 +64,7 @@ class Job:
         self.check()
 
     def check(self) -> None:
-        """Raises `Cancelled` where nobody wants it any more."""
+        """Check for cancellation; raises `Cancelled`."""
         if self.cancelled.is_set():
             raise Cancelled
 
@@ -116,7 +116,10 @@ class Jobs:
 
 
 def _failed(job: Job, error: Exception) -> tuple[JobState, str]:
-    """What a job that raised has come to; libraries may hand a `Cancelled` on as an error of their own."""
+    """Return what a job that raised has come to.
+
+    Libraries may hand a `Cancelled` on as an error of their own.
+    """
     if job.cancelled.is_set():
         return JobState.CANCELLED, "cancelled"
     if isinstance(error, KNOWN):

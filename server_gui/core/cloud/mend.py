@@ -98,7 +98,7 @@ def plan(store: Store, spool: Spool, expect: Callable[[int], AbstractContextMana
 
 
 def _nowhere(store: Store, batches: Sequence[int]) -> str:
-    """That nobody here can bring them, and what else may have become of them: no other computer tells it."""
+    """Return in words that this computer cannot restore them, and other explanations."""
     words = f"the spool has no second copy of {verify.told_batches(batches)}: bring one back"
     wanted = pc.field("kind") == EventKind.FORGOTTEN.value
     times: list[datetime] = []
@@ -121,7 +121,7 @@ def _told(store: Store, file: DataFile) -> str:
 
 
 def _held(store: Store, spool: Spool, numbers: Collection[int]) -> dict[Batch, tuple[Part, ...]]:
-    """What second copies, and batches that wait, could bring; nothing of those that cannot be read."""
+    """Return what second copies, and batches that wait, could bring; nothing of those that cannot be read."""
     found = {}
     untouched = Untouched.existing(store.url) if numbers else store
     for number in numbers:
@@ -219,7 +219,7 @@ def _look(
 
 
 def _rewrite(file: Path, receipts: Sequence[Receipt]) -> None:
-    """The file with these alone; as it was it stays beside."""
+    """Rewrite the file with these only; the old one stays beside it."""
     draft = file.with_name(f"{file.name}.draft")
     draft.unlink(missing_ok=True)
     draft.touch(FILE)
@@ -232,7 +232,7 @@ def _rewrite(file: Path, receipts: Sequence[Receipt]) -> None:
 
 
 def _bring(store: Again, spool: Spool, number: int, *, is_behind: bool) -> None:
-    """What the store lacks of a second copy, and its receipt where there is none."""
+    """Restore the missing rows of a second copy, and its receipt if there is none."""
     store.left.clear()
     store.passed.clear()
     sent = _sent(store, spool, number)

@@ -52,7 +52,7 @@ class Merge:
         self._where = " AND ".join(f"{_quoted(name)} = {_text(value)}" for name, value in values.items())
 
     def check(self) -> None:
-        """Raises `StoreError` where both have a row, or a column, that is not the same."""
+        """Check that rows and columns of both are the same; raises `StoreError`."""
         self._check_units()
         for naming in (_naming(self._table), *([_OF_A_SESSION] if self._table is SESSIONS else ())):
             with self._opened() as (connection, columns):
@@ -127,7 +127,7 @@ def _said() -> Iterator[None]:
 
 
 def _view(name: str, columns: list[str], known: list[str], where: str) -> str:
-    """A column that this side does not have is null."""
+    """Return a column that this side does not have is null."""
     have = set(known)
     chosen = ", ".join(_quoted(each) if each in have else f"NULL AS {_quoted(each)}" for each in columns)
     return f"CREATE TEMP VIEW {name} AS SELECT {chosen} FROM all_{name} WHERE {where}"

@@ -191,7 +191,7 @@ def _columns_gone(
 
 
 def _found(claim: Claim, told: Mapping[str, Units], units: Mapping[str, Units]) -> Part:
-    """What is there of a claim, as its receipt would say it."""
+    """Return what is there of a claim, as its receipt would say it."""
     part, there = claim.part, units.get(claim.part.location, {})
     return msgspec.structs.replace(
         part,
@@ -215,7 +215,7 @@ def _claim(batch: Batch, part: Part, retained: datetime | None) -> Claim:
 
 
 def _problem(claim: Claim, *, values: bool) -> str | None:
-    """What is wrong with the rows of a claim, in words."""
+    """Return what is wrong with the rows of a claim, in words."""
     part, (writer, batch) = claim.part, claim.batch
     (sent, total), (rows, found) = claim.expected, claim.there
     if claim.is_open:

@@ -22,7 +22,7 @@ import pyarrow.dataset
 from ml.store import NoSuchTable, StoreError, StoreRefused, StoreUnreachable, Table, sessions
 from ml.store.labels import holding
 from ml.store.precedence import recorded_order
-from ml.store.sessions import Channel, Piece, Session, Source
+from ml.store.sessions import Channel, Piece, Session, TelemetrySource
 from ml.store.snapshot import Snapshot
 from ml.store.tables import EVENTS, LABELS, SESSIONS, TELEMETRY, Known, columns
 from ml.store.translation import translated
@@ -181,7 +181,7 @@ class Recordings:
             return False
 
     def _waiting(self, table: Table, batches: list[int]) -> list[Row]:
-        """The table's rows in these batches that it does not have."""
+        """Return the table's rows in these batches that it does not have."""
         found: list[Row] = []
         for batch in self._missing(table.name, batches):
             rows = spool_reader.table_of(self._spool, table, [batch])
@@ -194,7 +194,7 @@ class Recordings:
         return found
 
     def _missing(self, location: str, batches: list[int]) -> list[int]:
-        """The batches of the spool of which this table may lack something."""
+        """Return the batches of the spool of which this table may lack something."""
         return [
             each
             for each in batches
@@ -202,7 +202,7 @@ class Recordings:
         ]
 
     def _lacking(self, location: str, batch: int, run: pa.RecordBatch) -> Sequence[pa.RecordBatch]:
-        """The rows of a run in this batch that the table does not have."""
+        """Return the rows of a run in this batch that the table does not have."""
         if self._store is None or not self._claims(location, batch):
             return [run]
         return missing_rows.newer([missing_rows.by_key(self._store, location, run)], self._store, location)
@@ -224,7 +224,7 @@ class Recorded:
     session: Session
     channels: Sequence[Channel]
     waiting: int
-    _sources: Sequence[Source]
+    _sources: Sequence[TelemetrySource]
     _url: str
 
     def telemetry(
@@ -256,12 +256,12 @@ class _Waiting:
         self._pieces = {batch: piece for batch in batches if (piece := self._looked_into(batch))}
         self.rows = sum(piece.rows for piece in self._pieces.values())
 
-    def source(self) -> Source:
+    def source(self) -> TelemetrySource:
         """Return all of it, for `merged`."""
-        return Source([*self._pieces.values()], self._between)
+        return TelemetrySource([*self._pieces.values()], self._between)
 
     def _between(self, begin_ns: int, end_ns: int) -> pyarrow.dataset.Dataset:
-        """The batches that have something with such stamps."""
+        """Return the batches that have something with such stamps."""
         wanted = [
             batch
             for batch, (_, _, first_ns, last_ns, _) in self._pieces.items()
@@ -316,4 +316,4 @@ class _Waiting:
 
 
 def _unheard(_: str) -> None:
-    """What the store has in another way is told by `gwrms cloud verify`."""
+    """Ignore a difference: `gwrms cloud verify` reports it."""

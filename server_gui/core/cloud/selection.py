@@ -32,7 +32,7 @@ class Choice:
         return [each for each in known if any(fnmatch.fnmatchcase(each.name, glob) for glob in self.channels)]
 
     def check(self, session: Session) -> None:
-        """Raises `StoreError` where the session has nothing of the time."""
+        """Check that the session has data of the time; raises `StoreError`."""
         first, last = session.first, session.last
         begin, end = self.begin or first, self.end or last
         if first is None or last is None or begin is None or end is None:

@@ -64,7 +64,7 @@ def is_empty(spool: Path, number: int) -> bool:
 
 
 def kept(spool: Path) -> list[int]:
-    """These, and those that are still here after they were uploaded; oldest first."""
+    """Return these, and uploaded ones that are still here; oldest first."""
     return sorted({*waiting(spool), *(int(file.name[:8]) for file in spool.glob(f"{_NUMBER}.uploaded.db"))})
 
 

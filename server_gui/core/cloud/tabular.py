@@ -29,7 +29,10 @@ def write_csv(file: Path, recording: Recording) -> int:
 
 
 def iso_8601(utc: pa.ChunkedArray | pa.Array) -> pa.ChunkedArray | pa.Array:
-    """Times in UTC as `gwrms watch` writes them; Arrow's own way, by time zones, takes ten times as long."""
+    """Return times in UTC as `gwrms watch` writes them.
+
+    Arrow's own way, by time zones, takes ten times as long.
+    """
     spaced = utc.cast(pa.timestamp(utc.type.unit)).cast(pa.string())
     text = pc.replace_substring(spaced, " ", "T", max_replacements=1)
     return pc.binary_join_element_wise(text, "Z", "")

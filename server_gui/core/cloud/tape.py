@@ -39,7 +39,7 @@ class Rows:
         return self.part(slice(int(first), int(last)))
 
     def part(self, part: slice) -> "Rows":
-        """These rows."""
+        """Return these rows."""
         columns = {name: column[part] for name, column in self.columns.items()}
         return Rows(self.utc_ns[part], self.stamps_ns[part], columns)
 
@@ -118,7 +118,10 @@ def _look(settings: ServerSettings, session: Session) -> tuple[Recordings, Recor
 
 
 def _units(session: Session, channels: Iterable[Channel]) -> dict[str, str]:
-    """The unit of each channel that is there, in the robot's order; what its column says goes before."""
+    """Return the unit of each channel that is there, in the robot's order.
+
+    What its column says goes before.
+    """
     held = {each.name: each.unit for each in channels}
     told = {name: str(unit) for name, unit in session.units.items() if name in held}
     return told | {name: told.get(name, "") if unit is None else unit for name, unit in held.items()}

@@ -76,7 +76,7 @@ def _joints(root: str, left: dict[str, str | None]) -> Iterator[Topic]:
 
 
 def _imus(root: str, left: dict[str, str | None]) -> Iterator[Topic]:
-    """A message an IMU."""
+    """Yield a message an IMU."""
     beginnings = tuple(f".{quantity}_x" for quantity, _ in IMU.values())
     for imu in sorted({name.rpartition(".")[0] for name in left if name.endswith(beginnings)}):
         columns = {
@@ -99,7 +99,7 @@ def _imu(imu: str, columns: Mapping[str, Mapping[str, str]], utc_ns: int, values
 
 
 def _cells(root: str, left: dict[str, str | None]) -> Iterator[Topic]:
-    """A message an insole, with all its cells in their order."""
+    """Yield a message an insole, with all its cells in their order."""
     cells: dict[str, dict[int, str]] = {}
     for name in left:
         if found := _CELL.fullmatch(name):

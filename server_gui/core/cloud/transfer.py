@@ -170,7 +170,7 @@ def _order(found: Object) -> tuple[int, str]:
 
 
 def _check(source: Objects, target: Objects, ours: Listing, theirs: Listing) -> None:
-    """The newest entry of each of the target's logs must be the source's too."""
+    """Check that the newest entry of each of the target's logs is the source's too."""
     newest = {found[1]: path for path in sorted(theirs) if (found := _ENTRY.fullmatch(path))}
     for table, path in newest.items():
         if path not in ours or source.read(path) != target.read(path):

@@ -110,7 +110,7 @@ def _notes(
     receipts: Sequence[Receipt | Altered],
     gone: Sequence[mending.TakenOut],
 ) -> Iterator[str]:
-    """What can be done about it, what was done, and what is still to come."""
+    """Yield what can be done about it, what was done, and what is still to come."""
     if any(isinstance(each, Altered) for each in receipts):
         yield (
             f"bring {spool / RECEIPTS} back from a copy; without one, gwrms cloud mend --accept-loss goes on "
@@ -148,7 +148,7 @@ def sent_to(url: str, spool: Path) -> int:
 
 
 def no_store(url: str, spool: Path) -> str:
-    """That a store is no more to which batches of the spool went."""
+    """Return in words that a store with batches of the spool is gone."""
     sent = counted(sent_to(url, spool), "batch", "batches")
     return (
         f"there is no store at {url} any more, though {sent} of the spool {spool} "
@@ -174,7 +174,7 @@ def look(store: Store) -> tuple[list[DataFile], dict[str, str]]:
 
 
 def _pinned(store: Store, newest: Sequence[DataFile]) -> tuple[dict[Pin, list[DataFile]], list[str]]:
-    """The files that only a pinned version needs, and which of these cannot be read."""
+    """Return the files that only a pinned version needs, and which of these cannot be read."""
     known = {(file.location, file.path) for file in newest}
     found: dict[Pin, list[DataFile]] = {}
     problems = []
@@ -303,7 +303,7 @@ def _has_name(spool: Path, number: int) -> bool:
 
 
 def _second_batches(spool: Path) -> tuple[list[spool_reader.Batch], list[str]]:
-    """The second copies, and which cannot be read; not those that go meanwhile, to make room."""
+    """Return the second copies, and which cannot be read; not those that go meanwhile, to make room."""
     found, problems = [], []
     for number in spool_reader.uploaded(spool):
         try:

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Final, Protocol
 
-from server_gui.core.commissioning import spoken
-from server_gui.core.commissioning.spoken import Line, Reading, Step, Stopped, Written
+from server_gui.core.commissioning import messages
+from server_gui.core.commissioning.messages import Message, Reading, Step, Stopped, Written
+from server_gui.core.commissioning.request import CommissioningRequest
 from server_gui.core.commissioning.stages import LOOKS, Look, Stage
-from server_gui.core.commissioning.wish import Wish
 
 MOST_LINES: Final = 2000  # of what was said
 MOST_NEWS: Final = 16  # and since the last answer
@@ -83,9 +83,9 @@ class Commissioning:
     """`talk` starts a command; `look` takes what has come, some times a second."""
 
     def __init__(self, talk: Talk, clock: Callable[[], float] = time.monotonic) -> None:
-        self.wish: Wish | None = None
+        self.wish: CommissioningRequest | None = None
         self.stage = Stage.NOT_STARTED
-        self.question: Line | None = None
+        self.question: Message | None = None
         self.steps: tuple[Step, ...] = ()
         self.proposed: tuple[str, str] | None = None  # the file's name and text, before it is written
         self.written: Written | None = None
@@ -151,7 +151,7 @@ class Commissioning:
 
     # --- what is done
 
-    def start(self, wish: Wish) -> None:
+    def start(self, wish: CommissioningRequest) -> None:
         """Begin, or go on; raises `ValueError` where something is missing. Nothing where it runs."""
         if wish.problem:
             raise ValueError(wish.problem)
@@ -178,7 +178,7 @@ class Commissioning:
         self.news.clear()
         self._heard_s = self._clock()
         self.stage = Stage.WORKING
-        talker.send(spoken.answer(line, question.number))
+        talker.send(messages.answer(line, question.number))
         return True
 
     def stop(self) -> None:
@@ -187,7 +187,7 @@ class Commissioning:
             self._stop_s, self._stopped = self._clock(), None  # what was confirmed before is of before
         talker = self._talker
         if talker is not None:
-            talker.send(spoken.STOP)
+            talker.send(messages.STOP)
 
     def interrupt(self) -> None:
         """End the command; what was found is kept."""
@@ -212,7 +212,7 @@ class Commissioning:
         for talker in (self._talker, self._stopper):
             if talker is not None:
                 for text in talker.heard():
-                    self._take(spoken.understood(text))
+                    self._take(messages.understood(text))
         self._see_to_stop()
         self._see_to_end()
         if self.stage is not Stage.STOPPING and self._stop_s is None and self._ending and self.runs:
@@ -220,7 +220,7 @@ class Commissioning:
 
     # --- inside
 
-    def _take(self, line: Line) -> None:
+    def _take(self, line: Message) -> None:
         self._heard_s = self._clock()
         if line.say is not None:
             self._said(line)
@@ -258,14 +258,14 @@ class Commissioning:
         if self.stage is Stage.MOVING:
             self.stage, self.problem = Stage.WORKING, ""
 
-    def _said(self, line: Line) -> None:
+    def _said(self, line: Message) -> None:
         self._note(Kind.SAID, line.say or "")
         if line.file:
             self.proposed = (line.file, line.say or "")
         else:
             self.news.extend((line.say or "").splitlines())
 
-    def _asked(self, line: Line) -> None:
+    def _asked(self, line: Message) -> None:
         if self.question == line or not self.runs:  # told twice
             return
         self._note(Kind.ASKED, line.question)
@@ -273,7 +273,7 @@ class Commissioning:
         self._asked_s = self._clock()
         self.stage = Stage.HAND if line.press else Stage.ASKING
 
-    def _told(self, line: Line) -> None:
+    def _told(self, line: Message) -> None:
         """Live values of the question that waits; those of another come late."""
         if self.question is None or line.number != self.question.number:
             return

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from server_gui.core.desk.station import Station
-from server_gui.core.follow.moment import now_ns
+from server_gui.core.follow.frame_time import now_ns
 from server_gui.core.processing.process_names import short_name
 
 OLD_S: Final = 10.0  # a look before says nothing of now

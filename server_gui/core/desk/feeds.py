@@ -191,7 +191,7 @@ class Feeds:
     # --- inside
 
     def _collect(self) -> tuple[Collector | None, str]:
-        """A collector, or why there can be none."""
+        """Return a collector, or why there can be none."""
         if self._record is None:
             return None, "the window was started to show only"
         following = shown_and_recorded(self._following, self._settings.recorder)
@@ -241,14 +241,14 @@ class Feeds:
             self._ending.submit(judging.__exit__)
 
     def _predicted(self, news: Sequence[PredictionNews]) -> None:
-        """What is not recorded."""
+        """Ignore it: it is not recorded."""
         judging = self._judging
         if judging is not None:
             judging.predicted(news)
         self._tell_predictions(news)
 
     def _shown(self, robot: str, event: Event) -> None:
-        """What is not recorded."""
+        """Ignore it: it is not recorded."""
         predicting = self._predicting
         if self._collector is not None:
             return
@@ -260,7 +260,7 @@ class Feeds:
         self._show(robot, without_processes(event))
 
     def _kept(self, robot: str, event: Event) -> None:
-        """What was kept is shown. The table of processes has a look of its own."""
+        """Show the kept values; the table of processes has a look of its own."""
         self._show(robot, without_processes(event))
 
 

@@ -18,7 +18,7 @@ class Pins:
         self._by_robot.setdefault(robot, set()).symmetric_difference_update({name})
 
     def take(self, kept: object) -> None:
-        """What was kept the last time; what is no such thing is left out."""
+        """Load the kept pins; invalid ones are left out."""
         for robot, names in kept.items() if isinstance(kept, Mapping) else ():
             if isinstance(names, list):
                 self._by_robot[str(robot)] = {str(name) for name in names}

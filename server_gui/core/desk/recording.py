@@ -12,7 +12,7 @@ from server_gui.core.alarms.alarm import Alarm, Alarms
 from server_gui.core.alarms.texts import Kind, check_of
 from server_gui.core.fleet.collector import CollectorReport
 from server_gui.core.fleet.link_statistics import LinkReport
-from server_gui.core.follow.moment import now_ns
+from server_gui.core.follow.frame_time import now_ns
 from server_gui.core.follow.news import News, NewsKind
 from server_gui.core.recording.recorder import AlarmKind
 from server_gui.core.threads.answers import Deliver, when_done
@@ -128,7 +128,7 @@ class Recording:
         )
 
     def see(self, threads: Sequence[Trouble], by: By = By.WINDOW) -> None:
-        """What is wrong with the threads that follow, record and predict: this window's, or another's."""
+        """Show problems of the threads that follow, record and predict: this window's, or another's."""
         told = {trouble.thread: trouble.text for trouble in self._threads.get(by, ())}
         now = {trouble.thread: trouble.text for trouble in threads}
         for thread, text in now.items():

@@ -8,7 +8,10 @@ from server_gui.core.alarms.texts import Kind, check_of
 
 
 def after_reset(reset: Reset) -> tuple[str, str]:
-    """What became of the stop; and of drives that have not left fault, with why and what to do, else ""."""
+    """Return what became of the stop.
+
+    And of drives that have not left fault, with why and what to do, else "".
+    """
     stays = {name: why for name, why in reset.problems.items() if "fault" in reset.drives.get(name, "")}
     others = {name: why for name, why in reset.problems.items() if name not in stays}
     in_fault = "; ".join(f"{name} DID NOT LEAVE FAULT: {why}" for name, why in stays.items())
@@ -23,7 +26,7 @@ def after_reset(reset: Reset) -> tuple[str, str]:
 
 
 def without_answer(error: Exception) -> str:
-    """What is known of a clearing of faults that the robot has not answered, or has refused."""
+    """Return what is known of a clearing of faults that the robot has not answered, or has refused."""
     is_unknown = isinstance(error, LinkLost | CallTimeout)
     return f"{'Nobody knows whether anything' if is_unknown else 'Nothing'} was cleared: {error}"
 

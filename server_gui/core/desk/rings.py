@@ -59,7 +59,10 @@ class Rings:
         return self._base_ns + round(seconds * 1e9)
 
     def times(self, seconds: float) -> Floats:
-        """Times of the rows of the last `seconds`, s since the first row. The ring's own: do not keep it."""
+        """Return times of the rows of the last `seconds`, s since the first row. The ring's own.
+
+        Do not keep it.
+        """
         times = self._span(self._times)
         if not len(times):
             return times

@@ -20,16 +20,16 @@ from gateway.wire.stop import Reset, Stopped
 from ml.danger.levels import Level
 from server_gui.core.alarms.alarm import Alarms
 from server_gui.core.alarms.causes import STOOD_S, Stalls, gathered
-from server_gui.core.alarms.found import Facts, any_enabled
-from server_gui.core.alarms.found import alarms as found
 from server_gui.core.alarms.marks import Mark
-from server_gui.core.alarms.worst import worst
+from server_gui.core.alarms.robot_alarms import Facts, any_enabled
+from server_gui.core.alarms.robot_alarms import alarms as found
+from server_gui.core.alarms.worst_state import worst
 from server_gui.core.audit.journal import Audit
 from server_gui.core.desk.flags import Flag, FlagKind, Flags, StateWatch, of_journal
 from server_gui.core.desk.resetting import after_reset, without_answer
 from server_gui.core.desk.rings import Rings
+from server_gui.core.evidence.edit_list import EditList
 from server_gui.core.evidence.file import Told
-from server_gui.core.evidence.judged import JudgedEdits
 from server_gui.core.experiments.plan import Plan
 from server_gui.core.experiments.run import Run, begun
 from server_gui.core.follow.events import (
@@ -42,7 +42,7 @@ from server_gui.core.follow.events import (
     Resources,
     Telemetry,
 )
-from server_gui.core.follow.moment import Moment, this_moment
+from server_gui.core.follow.frame_time import FrameTime, this_moment
 from server_gui.core.follow.news import News, NewsKind
 from server_gui.core.follow.robot import Robot
 from server_gui.core.follow.robot_news import RobotNews
@@ -57,9 +57,9 @@ from server_gui.core.tuning.edits import Change, Edits
 from server_gui.core.tuning.flash import Flash
 from server_gui.core.tuning.lease import LeaseState
 from server_gui.core.tuning.link import LEASE_S
+from server_gui.core.tuning.reverted_trials import OVERDUE_S, RevertedTrials
 from server_gui.core.tuning.stop import ENABLED, Sent, StopProgress, StopState
 from server_gui.core.tuning.storing import Storing
-from server_gui.core.tuning.taken_back import OVERDUE_S, TakenBack
 from server_gui.core.tuning.writing import WriteProgress, WriteState, written_line
 
 WATCH_NS: Final = 200_000_000  # between looks for news
@@ -92,7 +92,7 @@ class Station:
         self.cost: GatewayCost | None = None  # what monitoring costs the robot, as long as it is looked at
         self.predictions = StationPredictions()
         self.experiment: Run | None = None  # an A/B trial or a sweep, the newest
-        self.judged = JudgedEdits()
+        self.judged = EditList()
         self.stopping = StopProgress()
         self.control = LeaseState()
         self.edits = Edits()
@@ -105,12 +105,12 @@ class Station:
         self._deliver = deliver
         self.news = news
         self._alarms = Alarms()
-        self._judged: Moment | None = None  # by which the alarms were looked for, since anything has come
+        self._judged: FrameTime | None = None  # by which the alarms were looked for, since anything has come
         self._watch = RobotNews(self.tell)
         self._watched_ns = 0
         self._states = StateWatch()
         self._stalls = Stalls()
-        self._back = TakenBack(self.robot, self.writing, self.tell)
+        self._back = RevertedTrials(self.robot, self.writing, self.tell)
         self._storing = Storing(commands, deliver, self.writing, self.control, self.tell)
 
     @property
@@ -265,7 +265,7 @@ class Station:
             self.tell(NewsKind.WARNING, f"staged edits dropped, the robot no longer has {', '.join(gone)}")
 
     def _processes(self, event: Resources) -> None:
-        """A look at the process table; of CPU and memory the other looks tell, over their own periods."""
+        """Take a look at the process table; CPU and memory come from other looks."""
         self.processes, self.processes_at_ns = event.snapshot, event.at_ns
         table = event.snapshot.processes or []
         known = max(table, key=lambda one: one.cpu_percent or 0.0, default=None)
@@ -335,7 +335,7 @@ class Station:
         self.tell(NewsKind.NOT_STOPPED if not_stopped else NewsKind.STOP, self.stopping.text)
 
     def _show_stop(self, event: Telemetry) -> None:
-        """What the drives' states show of a STOP that goes on."""
+        """Update a running STOP from the drives' states."""
         if self.stopping.at_ns is None or self.stopping.state is StopState.IDLE:
             return
         stamps_ns, columns = event.batch.stamps_ns, event.batch.columns
@@ -380,7 +380,7 @@ class Station:
         self._ask(self._commands.release_control(), lambda _: self._control_gone(), "release")
 
     def lost_control(self) -> None:
-        """The link that held the lease has dropped."""
+        """Note that the link with the lease has dropped."""
         if self.control.until_ns is not None:
             self.tell(NewsKind.CONTROL, "control lost with the link")
         self._control_gone()
@@ -457,7 +457,7 @@ class Station:
         self.tell(NewsKind.PARAMETER, how)
 
     def end_trial_if_over(self, now_ns: int) -> None:
-        """A trial whose time is over has gone back when the robot holds the old values again, not before.
+        """Check whether an expired trial is reverted: the robot must hold the old values again.
 
         Only values that were read after its end count: a link, or this window, may be slow.
         """

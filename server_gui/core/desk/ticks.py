@@ -23,7 +23,7 @@ def at_ticks(rows: Rows, ticks_ns: Ints) -> Rows:
 
 
 def drawable(rows: Rows) -> Rows:
-    """Recorded rows as they are; at ticks where they are samples of single sources."""
+    """Return recorded rows as they are, or at ticks if they are samples of single sources."""
     there = sum(int(np.count_nonzero(~np.isnan(column))) for column in rows.columns.values())
     if not len(rows) or there >= SPARSE * len(rows) * len(rows.columns):
         return rows
@@ -77,7 +77,7 @@ def nullable(column: Floats) -> list[float | None]:
 
 
 def _ticks(first_ns: int, last_ns: int) -> Ints:
-    """The multiples of the period from one to the other."""
+    """Return the multiples of the period from one to the other."""
     begin = -(-first_ns // PERIOD_NS) * PERIOD_NS
     return np.arange(begin, last_ns + 1, PERIOD_NS, dtype=np.int64)
 

@@ -190,7 +190,7 @@ def drawn(cycles: Iterable[Cycle], spell: Spell) -> list[Cycle]:
 
 
 def _sorted_out(cycles: Iterable[Cycle], spell: Spell) -> tuple[list[Cycle], dict[str, int]]:
-    """The cycles of either side whose activity is known, and how many were left out for what."""
+    """Return the cycles of either side whose activity is known, and how many were left out for what."""
     counted: collections.Counter[str] = collections.Counter()
     taken = []
     for cycle in cycles:
@@ -211,7 +211,7 @@ def _since_back(sided: _Sided, spell: Spell) -> int:
 
 
 def _all_of(cycles: Sequence[Cycle], spell: Spell) -> _Sided:
-    """These cycles, each on its side."""
+    """Return these cycles, each on its side."""
     return _Sided(
         cycles,
         np.array([spell.side(cycle) for cycle in cycles], dtype=np.bool_),
@@ -352,7 +352,10 @@ def differing(measured: Iterable[Measured]) -> Iterator[Measured]:
 
 
 def verdict(measured: Sequence[Measured], judged: Sequence[Measured]) -> Word:
-    """The word for all; where nothing differs, that of what was edited: no cadence speaks for a knee."""
+    """Return the word for all; where nothing differs, that of what was edited.
+
+    No cadence speaks for a knee.
+    """
     words = {one.word for one in measured}
     if {Word.BETTER, Word.WORSE} <= words:
         return Word.MIXED

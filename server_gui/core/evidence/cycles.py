@@ -119,7 +119,7 @@ class CycleCutter:
         return Cycle(stride.leg, stride.began_ns, stride.ended_ns, activity, values, left_out, drawn)
 
     def _activity(self, stride: Stride) -> str | None:
-        """What models said for most of the stride; empty where they said nothing."""
+        """Return what models said for most of the stride; empty where they said nothing."""
         said = [word for at_ns, word in self._activities if stride.began_ns <= at_ns <= stride.ended_ns]
         if not said:
             return ""
@@ -216,7 +216,10 @@ class _Ring:
 
 
 def _even(stamps_ns: npt.NDArray[np.int64], values: Floats, grid_ns: Floats, *, steps: bool) -> Floats | None:
-    """The values at the grid's instants; None where they are too far apart. A state is not interpolated."""
+    """Return the values at the grid's instants; None where they are too far apart.
+
+    A state is not interpolated.
+    """
     first = int(np.searchsorted(stamps_ns, grid_ns[0], "right")) - 1
     last = int(np.searchsorted(stamps_ns, grid_ns[-1], "left"))
     if first < 0 or last >= len(stamps_ns) or np.diff(stamps_ns[first : last + 1]).max() > MAX_GAP_NS:

@@ -165,7 +165,7 @@ OLD_VALUE: Final = frozenset({"taken back", "unchanged"})  # what a robot says o
 
 
 def _not_back(entry: Entry) -> Iterator[str]:
-    """What a stop has set, somebody else has changed, or was given up."""
+    """Yield what a stop has set, somebody else has changed, or was given up."""
     outcome = entry.get("outcome")
     if _OUTCOMES.get(str(entry.get("what"))) is State.REVERTED and isinstance(outcome, Mapping):
         yield from (f"{name}: {said}" for name, said in outcome.items() if said not in OLD_VALUE)

@@ -95,7 +95,10 @@ def effects(values: Floats, step: Floats, design: Floats, after: Bools) -> Effec
 def _autoregressive(
     residuals: Floats, weights: Floats, regressors: Floats, after: Bools
 ) -> tuple[Floats, Floats]:
-    """The variance of Σ weight · error where errors keep a part of the one before; its degrees of freedom."""
+    """Return the variance of Σ weight · error where errors keep a part of the one before.
+
+    Its degrees of freedom.
+    """
     cycles, terms = regressors.shape
     seen = _correlation(residuals, after)
     kept, seen = map(_together, ((seen * cycles + terms) / max(cycles - terms - 2, 1), seen))
@@ -107,7 +110,7 @@ def _autoregressive(
 
 
 def _together(correlations: Floats) -> Floats:
-    """What each metric has for itself, and at least what half of them have."""
+    """Return what each metric has for itself, and at least what half of them have."""
     clipped = np.clip(correlations, 0.0, MOST_CORRELATION)
     return np.asarray(np.maximum(clipped, np.median(clipped)))
 

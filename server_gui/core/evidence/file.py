@@ -131,7 +131,7 @@ def _without(path: Path, sessions: Collection[tuple[str, str]]) -> None:
 
 
 def _whose(line: bytes) -> tuple[str, str] | None:
-    """The robot and the recording of a line of any format; None where nobody can tell."""
+    """Return the robot and the recording of a line of any format; None where nobody can tell."""
     try:
         found = msgspec.json.decode(line, type=_Whose)
     except (msgspec.DecodeError, RecursionError):

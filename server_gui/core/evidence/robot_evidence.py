@@ -129,7 +129,7 @@ class RobotEvidence:
     # --- inside
 
     def _told(self, edit: Edit, *, is_final: bool) -> Told:
-        """What an edit has done, as far as the cycles until now tell."""
+        """Return what an edit has done, as far as the cycles until now tell."""
         windows, notes = self._spell(edit)
         edited = [joint for joint in self.joints if joint in edit.components]
         found = compare(self.cycles, windows, self.joints, edited)
@@ -137,7 +137,7 @@ class RobotEvidence:
         return Told(edit, replace(found, notes=found.notes + notes), is_final, curves=drawn)
 
     def _recorded(self, session: str) -> None:
-        """A recording is of one wearer: what is in another one is compared with no edit of this one."""
+        """Begin another recording: its data is not compared with edits of the one before."""
         if session == self._recordings[-1][1]:
             return
         if self._first_ns is None:  # nothing was seen before it
@@ -146,7 +146,7 @@ class RobotEvidence:
         self._divide(self.newest_ns, session)
 
     def _divide(self, at_ns: int, session: str) -> None:
-        """What is later than this is compared with nothing of before."""
+        """Mark a break: later data is not compared with earlier."""
         self._recordings.append((at_ns, session))
         while len(self._recordings) > 1 and self._recordings[1][0] < self.newest_ns - KEPT_NS:
             del self._recordings[0]
@@ -252,10 +252,10 @@ class RobotEvidence:
 
 
 def _left(edit: Edit) -> Edit:
-    """An edit that nobody follows any more: of a trial nobody here hears how it ends."""
+    """Return an edit that nobody follows any more: of a trial nobody here hears how it ends."""
     return replace(edit, state=State.ASKED) if edit.state is State.ON_TRIAL else edit
 
 
 def _load(buses: tuple[BusInfo, ...] | None) -> float | None:
-    """The busiest bus's."""
+    """Return the busiest bus's."""
     return max((bus.load_percent for bus in buses or () if bus.load_percent is not None), default=None)

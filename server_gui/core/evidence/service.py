@@ -92,7 +92,7 @@ class EvidenceService:
             self._guarded(robot, RobotEvidence.end)
 
     def _guarded(self, robot: str, work: Callable[[RobotEvidence], Iterable[Told]]) -> None:
-        """What one robot sends wrongly disturbs no other."""
+        """Isolate errors of one robot from the others."""
         self.worker.beat()
         known = self._robots.get(robot)
         if known is None:
@@ -106,7 +106,7 @@ class EvidenceService:
             self._robots[robot] = known.anew()
 
     def _tell_news(self, robot: str) -> None:
-        """What a command has kept meanwhile, such as `gwrms ab`, is told as well."""
+        """Report evidence kept by commands such as `gwrms ab`."""
         if self._size(robot) != self._sizes.get(robot):
             self._tell_kept(robot)
 

@@ -31,7 +31,7 @@ def from_to(old: float | None, new: float | None) -> str:
 
 
 def share(one: Measured) -> str:
-    """The difference, in percent of what was before where that says something."""
+    """Return the difference, in percent of what was before where that says something."""
     if one.difference is None:
         return NONE
     if not _is_share(one):
@@ -46,7 +46,10 @@ def _is_share(one: Measured) -> bool:
 
 
 def interval(one: Measured) -> str:
-    """The 95 % interval of `share`, in the same kind: percent beside percent, else in the metric's unit."""
+    """Return the 95 % interval of `share`, in the same kind.
+
+    Percent beside percent, else in the metric's unit.
+    """
     if one.low is None or one.high is None:
         return NONE
     if not _is_share(one):
@@ -57,7 +60,7 @@ def interval(one: Measured) -> str:
 
 
 def word(told: Told) -> str:
-    """What an edit did, and in which tense: what has ended was so, however many strides still come."""
+    """Return what an edit did, and in which tense: what has ended was so, however many strides still come."""
     found = told.evidence.word
     if told.edit.state in (State.REVERTED, State.TAKEN_OVER) and told.experiment is None:
         return f"was {found}" if found in (Word.BETTER, Word.WORSE, Word.MIXED) else str(found)

@@ -54,7 +54,7 @@ def randomised(differences: Floats, chosen: npt.NDArray[np.int8], orders: npt.ND
 
 
 def _interval(effects: Floats, drawn: int, alike: Floats) -> tuple[Floats, Floats]:
-    """The effects that are not excluded.
+    """Return the effects that are not excluded.
 
     An order with signs that are `alike` to the drawn one's has so much of an effect too. It speaks for all
     effects from (found - its own) / (1 - alike) to (found + its own) / (1 + alike), in whichever order.

@@ -61,7 +61,7 @@ def result(run: Run, who: str, unit: str, session: str = "") -> Told | None:
 
 
 def _edit(run: Run, who: str) -> Edit:
-    """What stands for all its trials in a list of edits."""
+    """Return what stands for all its trials in a list of edits."""
     plan = run.plan
     first, last = plan.values[0], plan.values[-1]
     name = hashlib.sha256(f"{run.robot} {run.boot_id} {run.utc_ns} {plan.name}".encode()).hexdigest()[:ID]

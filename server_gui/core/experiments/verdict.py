@@ -138,7 +138,7 @@ def _family(
     *,
     is_same: bool,
 ) -> list[tuple[Measured, Metric]]:
-    """What is known of each, p still without the other families."""
+    """Return what is known of each, p still without the other families."""
     means = {one.key: period_means(one, [held for pair in pairs for held in pair]) for one in series}
     groups: dict[bytes, list[Series]] = {}
     found: dict[str, Measured] = {}
@@ -187,7 +187,7 @@ def period_means(one: Series, periods: Sequence[Held]) -> Floats:
 
 
 def _within(periods: Sequence[Floats]) -> float:
-    """The metric's change with the stride's time, within periods."""
+    """Return the metric's change with the stride's time, within periods."""
     centred = [period[:, :2] - period[:, :2].mean(axis=0) for period in periods]
     together = np.concatenate(centred) if centred else np.zeros((1, 2))
     power = float(together[:, 1] @ together[:, 1])
@@ -207,7 +207,7 @@ def _values(one: Series, side: Sequence[Held]) -> list[float]:
 
 
 def _told(one: Series, sides: Sequence[Sequence[Held]]) -> Measured:
-    """What both sides have, without a word."""
+    """Return what both sides have, without a word."""
     values = [_values(one, side) for side in sides]
     means = [float(np.mean(side)) if side and not one.metric.is_slope else None for side in values]
     word = Word.SAME if any(values) else Word.NO_DATA

@@ -81,11 +81,11 @@ class Watch:
         return self.bounds
 
     def writes(self) -> None:
-        """A value is about to be written by us."""
+        """Note that we are about to write a value."""
         self._value = None
 
     def holds(self, value: float, now_ns: int) -> None:
-        """The robot has written it and read this back; `now_ns` is our clock."""
+        """Take the value read back by the robot; `now_ns` is our clock."""
         self._value, self._since_ns, self._differs = value, now_ns, 0
 
     def take(self, event: Event) -> None:
@@ -134,7 +134,7 @@ class Watch:
                     yield f"{joint}: {_over(quantity, found, limit)}{self._allowed(quantity)}"
 
     def _allowed(self, quantity: str) -> str:
-        """What to do where the bound was nobody's choice."""
+        """Return what to do where the bound was nobody's choice."""
         if quantity not in self._usual:
             return ""
         return (

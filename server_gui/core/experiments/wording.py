@@ -71,7 +71,7 @@ def ending(run: Run) -> str:
 
 
 def what(told: Told) -> str:
-    """What was changed: of an experiment all its values."""
+    """Return what was changed: of an experiment all its values."""
     one = told.experiment
     if one is None:
         return changes(told.edit)
@@ -131,7 +131,7 @@ def chart(one: Experiment) -> Iterator[tuple[str, ...]]:
 
 
 def _bar(point: Point, low: float, high: float) -> str:
-    """The interval as a line, the mean as a dot on it."""
+    """Return the interval as a line, the mean as a dot on it."""
     span = (high - low) or 1.0
     first, at, last = (round((each - low) / span * (BAR - 1)) for each in (point.low, point.mean, point.high))
     return "".join("●" if place == at else "─" if first <= place <= last else " " for place in range(BAR))

@@ -112,7 +112,7 @@ async def _answer(line: bytes, answers: Answers) -> bytes:
 
 @contextlib.contextmanager
 def _short(folder: Path) -> Iterator[str]:
-    """A name of the socket that fits into an address (107 bytes), however long the folder's is."""
+    """Return a name of the socket that fits into an address (107 bytes), however long the folder's is."""
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
         yield f"/proc/self/fd/{descriptor}/{NAME}"

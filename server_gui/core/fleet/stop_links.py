@@ -7,7 +7,7 @@ from gateway.client import Address
 from gateway.wire.stop import Stopped
 from server_gui.core.follow.network import Network
 from server_gui.core.settings.prediction import Action, RuleSettings
-from server_gui.core.tuning.link import Link
+from server_gui.core.tuning.link import CommandLink
 
 StopRobot = Callable[[str, str], "concurrent.futures.Future[Stopped]"]  # (robot, reason); from any thread
 
@@ -18,13 +18,15 @@ class StopLinks:
     def __init__(self, network: Network, rules: Sequence[RuleSettings]) -> None:
         self._network = network
         self._rules = [rule for rule in rules if rule.action is Action.STOP]
-        self._links: dict[str, Link] = {}
+        self._links: dict[str, CommandLink] = {}
         self._running: list[concurrent.futures.Future[None]] = []
 
     def follow(self, robot: str, address: Address) -> None:
         """Hold a link to this robot from now on, if any rule may stop it."""
         if any(rule.concerns(robot) for rule in self._rules):
-            link = Link(self._network, address, lambda _event: None, lambda: None, "gwrms collect (rules)")
+            link = CommandLink(
+                self._network, address, lambda _event: None, lambda: None, "gwrms collect (rules)"
+            )
             self._links[robot] = link
             self._running.append(self._network.run(link.run()))
 

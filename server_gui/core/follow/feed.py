@@ -42,8 +42,8 @@ from server_gui.core.follow.events import (
     Resources,
     Telemetry,
 )
+from server_gui.core.follow.journal_witness import signed_head
 from server_gui.core.follow.validation import Unfit, Validator, journal
-from server_gui.core.follow.witnessing import signed_head
 
 Tell = Callable[[Event], None]
 

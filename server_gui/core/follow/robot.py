@@ -13,7 +13,7 @@ from gateway.wire.component import QualityInfo
 from gateway.wire.parameter import ParameterValue
 from gateway.wire.resource import ResourceSnapshot
 from gateway.wire.robot import Description, Hello
-from server_gui.core.follow import moment
+from server_gui.core.follow import frame_time
 from server_gui.core.follow.events import (
     BusesSeen,
     Described,
@@ -127,7 +127,7 @@ class Robot:
         """Seconds since the newest row was taken; None before the first."""
         if self._newest_ns is None:
             return None
-        return max(0, (moment.now_ns() if now_ns is None else now_ns) - self._newest_ns) / 1e9
+        return max(0, (frame_time.now_ns() if now_ns is None else now_ns) - self._newest_ns) / 1e9
 
     def is_stale(self, now_ns: int | None = None) -> bool:
         """Return whether the values are too old to be called live."""
@@ -136,13 +136,13 @@ class Robot:
 
     def rate_hz(self, now_ns: int | None = None) -> float:
         """Rows a second over the last two seconds."""
-        now_ns = moment.now_ns() if now_ns is None else now_ns
+        now_ns = frame_time.now_ns() if now_ns is None else now_ns
         recent = sum(rows for at_ns, rows in self._arrivals if now_ns - at_ns <= RATE_WINDOW_NS)
         return recent / (RATE_WINDOW_NS / 1e9)
 
     def is_slow(self, now_ns: int | None = None) -> bool:
         """Return whether fewer rows come than were asked for; not before a link has lasted for a while."""
-        now_ns = moment.now_ns() if now_ns is None else now_ns
+        now_ns = frame_time.now_ns() if now_ns is None else now_ns
         return now_ns - self._flows_since_ns > RATE_WINDOW_NS and self.rate_hz(now_ns) < SLOW * self.asked_hz
 
     def rate_text(self, now_ns: int | None = None) -> str:

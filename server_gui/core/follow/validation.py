@@ -11,7 +11,7 @@ from typing import Any, Final
 import msgspec
 
 from gateway.client import Batch, ProtocolError
-from gateway.plain import LONGEST_NAME, NAME_SIGNS, ROBOT_SIGNS, is_name, is_robot_name
+from gateway.plain_text import LONGEST_NAME, NAME_SIGNS, ROBOT_SIGNS, is_name, is_robot_name
 from gateway.wire.control import SignedHead
 from gateway.wire.robot import Description
 from server_gui.core.follow.events import (

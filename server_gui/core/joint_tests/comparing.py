@@ -51,7 +51,7 @@ def analysed(path: Path) -> Shown:
 
 
 def last_before(test: Test) -> Path | None:
-    """The newest older test of the same robot, joint and kind beside it that was recorded to its end."""
+    """Return the newest older complete test of the same robot, joint and kind beside it."""
     head, found = test.head, []
     for path in test.path.parent.glob(f"*.{head.joint}.{head.test}.*.jsonl"):
         try:
@@ -65,7 +65,7 @@ def last_before(test: Test) -> Path | None:
 
 
 def differences(one: Test, other: Test) -> Iterator[str]:
-    """What else is not the same in both, in words: `other` is the older one."""
+    """Yield what else is not the same in both, in words: `other` is the older one."""
     if one.head.robot != other.head.robot or one.head.joint != other.head.joint:
         yield f"another joint: {other.head.robot} {other.head.joint}, now {one.head.robot} {one.head.joint}"
     for name in _CONDITIONS:

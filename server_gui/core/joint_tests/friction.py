@@ -137,7 +137,7 @@ def _line(speeds: Samples, losses: Samples) -> tuple[Measure, Measure]:
 
 
 def _cogging(test: Test, runs: Sequence[Run]) -> tuple[list[Measure], list[Curve]]:
-    """The strongest order of the motor's turn, of the slowest pair of runs."""
+    """Return the strongest order of the motor's turn, of the slowest pair of runs."""
     slow = min(abs(run.speed) for run in runs)
     chosen = [run for run in runs if abs(run.speed) <= slow * (1.0 + SAME_SPEED)]
     gear = float(test.head.drive["gear_ratio"])
@@ -166,7 +166,7 @@ def _cogging(test: Test, runs: Sequence[Run]) -> tuple[list[Measure], list[Curve
 
 
 def _resolution(torques: Samples) -> float:
-    """The least that two of the drive's figures differ by."""
+    """Return the least that two of the drive's figures differ by."""
     steps = np.diff(np.unique(np.round(torques, 9)))
     return float(steps.min()) if len(steps) else 0.0
 

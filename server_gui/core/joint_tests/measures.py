@@ -47,5 +47,5 @@ class Result(Struct, frozen=True):
 
 
 def unknown(name: str, unit: str, why: str) -> Measure:
-    """A measure that could not be taken."""
+    """Return a measure that could not be taken."""
     return Measure(name, None, unit, why=why)

@@ -49,7 +49,7 @@ class Serving:
 
 
 def _signer(registry: Registry, task: str, robot: str, now: Pointer, promoters: Mapping[str, str]) -> str:
-    """A signature that does not hold is none."""
+    """Return a signature that does not hold is none."""
     try:
         return signer(now, task, robot, registry.card(now.model), promoters)
     except UnusableModel:

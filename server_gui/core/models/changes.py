@@ -75,7 +75,7 @@ class Change:
 
 
 def promotion(url: str, model: str, robot: str) -> Change:
-    """What it would change to let a model serve a robot, or all; blocks.
+    """Return what it would change to let a model serve a robot, or all; blocks.
 
     Raises:
         UnusableModel: it is refused, as `gwrms models promote` refuses it.
@@ -90,7 +90,7 @@ def promotion(url: str, model: str, robot: str) -> Change:
 
 
 def way_back(url: str, task: str, robot: str) -> Change:
-    """What a rollback would change; blocks.
+    """Return what a rollback would change; blocks.
 
     Raises:
         UnusableModel: it is refused, as `gwrms models rollback` refuses it.

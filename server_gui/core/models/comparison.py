@@ -30,8 +30,8 @@ FIGURES: Final[Mapping[str, Figure]] = {
     "rmse_percent": Figure("Error, of the gait cycle", 1.0, False),
     "abstained": Figure("Says “unknown”", 100.0, False),
     "stepping_where_none_steps": Figure("Says steps where nobody steps", 100.0, False),
-    "covered": Figure("Truth within what it says", 100.0, True),
-    "worst_subject_covered": Figure("The same, of the worst wearer", 100.0, True),
+    "covered": Figure("The truth is among what it names", 100.0, True),
+    "worst_subject_covered": Figure("The same, for the worst wearer", 100.0, True),
 }
 F1: Final = Figure("F1", 100.0, True)
 CALIBRATION: Final = Figure("Probabilities are off by", 100.0, False)

@@ -4,15 +4,15 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from typing import Final
 
-from ml.registry.card import Card, Source
+from ml.registry.card import Card, DataSource
 from server_gui.core.prediction.adaptation import ADAPTED
 
 EVERY: Final = "every robot"
 TASKS: Final[Mapping[str, str]] = {"activity": "Activity", "gait_phase": "Gait phase", "falling": "Falling"}
 SOURCES: Final = {
-    Source.RECORDED: "from recordings",
-    Source.SIMULATED: "from simulated wearers",
-    Source.MIXED: "from recordings and simulated wearers",
+    DataSource.RECORDED: "from recordings",
+    DataSource.SIMULATED: "from simulated wearers",
+    DataSource.MIXED: "from recordings and simulated wearers",
 }
 ID_SHOWN: Final = 4  # digits of an id, where two models would have one name
 

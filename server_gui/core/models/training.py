@@ -16,7 +16,12 @@ UNITS: Final = {
 }
 
 BETTER: Final = "Better"
-WORDS: Final = {"macro_f1": "F1, mean over classes,", "rmse_percent": "error, % of the gait cycle,"}
+WORDS: Final = {
+    "macro_f1": "F1, mean over classes,",
+    "rmse_percent": "error of the place in the gait cycle",
+    "calibration_error": "how far its probabilities are off",
+    "abstained": "how often it says “unknown”",
+}
 
 
 class Progress(msgspec.Struct, frozen=True):

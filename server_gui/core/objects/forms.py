@@ -48,7 +48,7 @@ def place(address: str) -> tuple[int, int]:
 
 
 def forms(info: ObjectInfo, held: ObjectValue) -> list[tuple[str, str]]:
-    """The notations of a value, each with its title; none of what is not known."""
+    """Return the notations of a value, each with its title; none of what is not known."""
     value = held.value
     if value is None:
         return []

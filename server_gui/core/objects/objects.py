@@ -36,7 +36,7 @@ class Dictionary:
     still: frozenset[str] = frozenset()  # addresses of what is never read
 
     def take(self, objects: list[ObjectInfo]) -> None:
-        """These are all."""
+        """Take the complete list."""
         self.objects, self.is_whole, self.is_asked = objects, True, False
         self.addresses = frozenset(one.object for one in objects)
         self.still = frozenset(one.object for one in objects if one.access == "wo" or one.type == "DOMAIN")
@@ -64,7 +64,7 @@ class Objects:
         return found
 
     def described(self, *, is_another: bool) -> None:
-        """The robot has described itself: its files may be others; in another life, its values too."""
+        """Take the robot's description: files may differ, and after a boot values too."""
         if is_another:
             self._by_component.clear()
         for known in self._by_component.values():  # shown until it is known anew

@@ -106,7 +106,7 @@ class Reading:
                 self.held[one] = Held(told, at_ns, utc_s)
 
     def _failed(self, objects: Sequence[Object], error: Exception) -> None:
-        """What was read before stays, with its age."""
+        """Take a failure; values read before stay, with their age."""
         self._is_asking = False
         self.problem = str(error)
         self.revision += 1

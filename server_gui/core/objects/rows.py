@@ -59,11 +59,11 @@ class Compared:
         return BY_EDS if self.with_component is None else self.with_component.replace("_", " ")
 
     def value(self, info: ObjectInfo) -> Number | str | None:
-        """What the device held when it was read; None for what is not known."""
+        """Return what the device held when it was read; None for what is not known."""
         return _value(self.held.get((self.component, info.object)))
 
     def other(self, info: ObjectInfo) -> Number | str | None:
-        """What it is compared with."""
+        """Return what it is compared with."""
         if self.with_component is None:
             return info.default
         return _value(self.held.get((self.with_component, info.object)))
@@ -74,7 +74,7 @@ class Compared:
 
 
 def pin_of(component: str, address: str) -> str:
-    """The name by which an object is pinned: its address, as commands take it."""
+    """Return the name by which an object is pinned: its address, as commands take it."""
     return f"{component}.{address}"
 
 
@@ -116,20 +116,20 @@ def _by_kind(
 
 
 def limits(info: ObjectInfo) -> str:
-    """The smallest and largest value by the EDS; empty where it names none."""
+    """Return the smallest and largest value by the EDS; empty where it names none."""
     low, high = ("" if one is None else str(one) for one in (info.min, info.max))
     return f"{low} … {high}" if low or high else ""
 
 
 def channel_lines(component: str, info: ObjectInfo) -> str:
-    """The lines of robot.toml that make it a channel, which is recorded and drawn."""
+    """Return the lines of robot.toml that make it a channel, which is recorded and drawn."""
     name = re.sub(r"[^a-z0-9]+", "_", info.name.rpartition(".")[2].lower()).strip("_") or "object"
     unit = f'\nunit = "{info.unit}"' if re.fullmatch(r'[^"\\]+', info.unit) else ""
     return f'[channel."{component}.{name}"]\nobject = "{info.object}"{unit}'
 
 
 def cells(objects: Sequence[ObjectInfo], compared: Compared) -> Iterator[tuple[object, ...]]:
-    """The lines under `CSV_TITLES`, of what was read."""
+    """Yield the lines under `CSV_TITLES`, of what was read."""
     for info in objects:
         held = compared.held.get((compared.component, info.object))
         if held is None:

@@ -30,8 +30,8 @@ from server_gui.core.prediction.adaptation import (
     Wearing,
 )
 from server_gui.core.prediction.inbox import Inbox
-from server_gui.core.prediction.lesson import Lesson, learn, tried
 from server_gui.core.prediction.model_loading import Model
+from server_gui.core.prediction.training_data import TrainingData, learn, tried
 from server_gui.core.threads.supervision import BEAT_S, Worker
 
 log = logging.getLogger(__name__)
@@ -73,7 +73,7 @@ class _Attempts:
         self.now = Adapting(robot, 0, State.OFF)
         self.adapted: Model | None = None
         self._tell = tell
-        self._lesson: Lesson | None = None
+        self._lesson: TrainingData | None = None
         self._every_ns = 1
 
     @property
@@ -107,7 +107,7 @@ class _Attempts:
         self._lesson.see(thing)
         self._look(self._lesson, told)
 
-    def _look(self, lesson: Lesson, told: Callable[[], None]) -> None:
+    def _look(self, lesson: TrainingData, told: Callable[[], None]) -> None:
         stepped_s, base = lesson.stepped_s, lesson.base
         if self.now.state is State.COLLECTING and stepped_s >= LEARNED_S:
             self.happened(Happening.ENOUGH)
@@ -125,7 +125,7 @@ class _Attempts:
         if is_new:
             found = None
         if state is State.COLLECTING and self.context.model is not None:
-            self._lesson = Lesson(self.context.model, self._every_ns)
+            self._lesson = TrainingData(self.context.model, self._every_ns)
         elif state not in (State.LEARNING, State.TRYING):
             self._lesson = None  # nothing of the walk is kept
         if state not in (State.TRYING, State.OFFERED, State.SERVING):
@@ -222,7 +222,7 @@ class AdaptingService:
             self._put(robot, windows)
 
     def broke(self, robot: str) -> None:
-        """The adapted model cannot judge."""
+        """Note that the adapted model cannot predict."""
         if robot in self.now:
             self._inbox.put(robot, Said(self.now[robot].number, Happening.BROKE))
 
@@ -288,7 +288,7 @@ class AdaptingService:
         self._leaving.wait(GIVE_WAY_S)
 
     def _drop_silent(self) -> None:
-        """A robot that nobody follows any more tells nothing of its end."""
+        """Forget a robot that is not followed any more."""
         now_s = time.monotonic()
         for robot, known in self._attempts.items():
             if known.context != EMPTY and now_s - self._heard_s.get(robot, now_s) > SILENT_S:
@@ -302,7 +302,7 @@ class AdaptingService:
 
 
 def _after(before: Context, events: Iterable[Event]) -> Context:
-    """What the robot's link and boot are after these events."""
+    """Return what the robot's link and boot are after these events."""
     boot_id, links, is_linked = before.boot_id, before.links, before.is_linked
     for event in events:
         match event:
@@ -317,5 +317,5 @@ def _after(before: Context, events: Iterable[Event]) -> Context:
     return replace(before, boot_id=boot_id, links=links, is_linked=is_linked)
 
 
-def _is_enough(lesson: Lesson) -> bool:
+def _is_enough(lesson: TrainingData) -> bool:
     return lesson.stepped_s >= TRIED_S and lesson.strides >= FEWEST_STRIDES

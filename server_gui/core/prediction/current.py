@@ -8,7 +8,7 @@ from typing import Final
 from ml.danger.levels import Level
 from ml.danger.watch import Verdict
 from ml.serving.predictor import Prediction
-from server_gui.core.follow import moment
+from server_gui.core.follow import frame_time
 from server_gui.core.prediction.adaptation import Adapting
 from server_gui.core.prediction.news import Endangered, Predicted, PredictionNews, Ruled, Serves
 from server_gui.core.settings.prediction import RuleSettings
@@ -32,7 +32,7 @@ class Shown:
 
     def age_s(self, now_ns: int | None = None) -> float:
         """Seconds since the newest sample that it is about."""
-        waited_ns = (moment.now_ns() if now_ns is None else now_ns) - self.came_ns
+        waited_ns = (frame_time.now_ns() if now_ns is None else now_ns) - self.came_ns
         return max(0, waited_ns + (self.predicted.took_ns or 0)) / 1e9
 
     def is_stale(self, now_ns: int | None = None) -> bool:
@@ -147,7 +147,7 @@ class StationPredictions:
         return None if self.danger is None else self.danger.known
 
     def clear(self) -> None:
-        """The link has dropped, or the robot has booted: nothing is known of it now."""
+        """Forget everything: the link has dropped, or the robot has booted."""
         self.revision += 1
         self.by_task.clear()
         self.danger = self.adapting = None

@@ -67,7 +67,10 @@ class DangerWatch:
 
 
 def prediction(verdict: Verdict) -> Prediction:
-    """The verdict as rules take it: each level that is reached has the probability of harm, others none."""
+    """Return the verdict as rules take it.
+
+    Each level that is reached has the probability of harm, others none.
+    """
     number = 0.0 if verdict.number is None else verdict.number
     reached: Mapping[str, float] = {
         level.word.replace(" ", "_"): number if verdict.level >= level else 0.0 for level in URGENT

@@ -78,7 +78,7 @@ class ModelLoader:
         self._looking.__exit__(*exc)
 
     def robot(self, name: str, units: dict[str, str]) -> None:
-        """A robot has these channels, by their units; from any thread."""
+        """Take a robot's channels, by their units; from any thread."""
         if self._robots.get(name) != units:
             self._robots = self._robots | {name: units}
             self._looking.wake()
@@ -150,7 +150,7 @@ class ModelLoader:
         return True
 
     def _load(self, registry: "Registry", name: str) -> tuple[Card, Learned]:
-        """A model, loaded once; one that was refused is not asked for again."""
+        """Return a model, loaded once; one that was refused is not asked for again."""
         if name in self._refused:
             raise UnusableModel(self._refused[name])
         if name not in self._loaded:

@@ -55,7 +55,10 @@ class Endangered:
 
 
 def turn(before: Level, verdict: Verdict) -> str | None:
-    """What is to be noted where advice, or what is worse, begins or ends; None where nothing has happened."""
+    """Return what is to be noted where advice, or what is worse, begins or ends.
+
+    None where nothing has happened.
+    """
     if verdict.level is before or max(verdict.level, before) < Level.ADVICE:
         return None
     if verdict.level is Level.UNKNOWN:

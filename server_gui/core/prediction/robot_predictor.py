@@ -103,7 +103,7 @@ class RobotPredictor:
         self._served: Serves | None = None
 
     def serve(self, models: Mapping[str, Model], why: Mapping[str, str]) -> Serves | None:
-        """These models, by task, from now on; the news, if that is any. `why` others do not."""
+        """Use these models, by task, from now on; return the news, if any. `why` others are refused."""
         for task in self.tasks.keys() - models.keys():
             del self.tasks[task]
         for task, model in models.items():
@@ -142,7 +142,7 @@ class RobotPredictor:
 
 
 def _rows(batch: Batch, channels: Sequence[str]) -> Iterator[Row]:
-    """A batch's rows with these channels alone; None where it does not have one."""
+    """Return a batch's rows with these channels alone; None where it does not have one."""
     nothing: list[float | None] = [None] * len(batch.stamps_ns)
     columns = [batch.columns.get(name, nothing) for name in channels]
     return zip(batch.stamps_ns, zip(*columns, strict=True), strict=True)

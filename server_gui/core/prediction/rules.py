@@ -21,7 +21,7 @@ class Rule:
     _newest_ns: int = 0
 
     def take(self, prediction: Prediction) -> bool | None:
-        """True where the rule begins to hold with this prediction, False where it ends, else None."""
+        """Return True if the rule begins to hold with this prediction, False if it ends, else None."""
         if prediction.stamp_ns - self._newest_ns > HOLE * self.every_ns:
             self._since_ns = None
         self._newest_ns = prediction.stamp_ns

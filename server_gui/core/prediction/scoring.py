@@ -10,7 +10,7 @@ import numpy as np
 from ml.features.windows import Samples
 from ml.robot.task import ABNORMAL, SIDES, STRIDE, UNKNOWN, Task
 from ml.serving.grid import Stamps
-from ml.store.labels import Label, Source
+from ml.store.labels import Label, LabelSource
 from ml.training.judging import WITHIN
 from ml.training.recorded import Recorded
 from ml.training.truth import NOBODY, Names, Said, activities, phases
@@ -42,7 +42,7 @@ def compared(
 
     `clock` relates the labels' times to the robot's. What a model itself has labelled proves nothing.
     """
-    known = [one for one in labels if one.source is not Source.PSEUDO]
+    known = [one for one in labels if one.source is not LabelSource.PSEUDO]
     if not known or not said.labels:
         return np.full(len(said.labels), NOBODY), said.labels
     times = np.array([(one.began_utc_ns, one.ended_utc_ns) for one in known], np.int64)

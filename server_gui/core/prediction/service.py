@@ -128,7 +128,7 @@ class PredictionService:
                 yield f"{robot}: rule {rule.name} CANNOT STOP IT: {model.objection}"
 
     def _stops(self, robot: str, task: str) -> Iterator[RuleSettings]:
-        """The rules that stop this robot by what a task's model says."""
+        """Yield the rules that stop this robot by what a task's model says."""
         for rule in self._settings.rules:
             if rule.action is Action.STOP and rule.task == task and rule.concerns(robot):
                 yield rule
@@ -201,7 +201,7 @@ class PredictionService:
             self._tell([news])
 
     def _own(self, robot: str, events: Iterable[Event], model: Model | None) -> Model | None:
-        """What was adapted to the wearer and serves now, where it can be used."""
+        """Return what was adapted to the wearer and serves now, where it can be used."""
         if self._adapting is None:
             return None
         trusted = model is not None and model.objection is None
@@ -214,7 +214,7 @@ class PredictionService:
         return None
 
     def _due(self) -> Iterator[tuple[Model, list[tuple[RobotPredictor, Watched]]]]:
-        """What is due, by model: robots that have the same one are judged together."""
+        """Yield what is due, by model: robots that have the same one are judged together."""
         found: dict[str, tuple[Model, list[tuple[RobotPredictor, Watched]]]] = {}
         for robot in self._robots.values():
             for watched in robot.tasks.values():
@@ -225,7 +225,7 @@ class PredictionService:
         yield from found.values()
 
     def _judge(self, model: Model, due: Sequence[tuple[RobotPredictor, Watched]]) -> list[PredictionNews]:
-        """What a model says of everything that is due; a model that breaks ends nothing but itself."""
+        """Return what a model says of everything that is due; a model that breaks ends nothing but itself."""
         windows = [window for _, watched in due for window in watched.due]
         try:
             predictions = iter(judged(model.card.id, model.learned, windows))
@@ -245,7 +245,7 @@ class PredictionService:
 
 
 def _of(robot: str, found: Mapping[tuple[str, str], Thing]) -> dict[str, Thing]:
-    """What is of this robot, by task."""
+    """Return what is of this robot, by task."""
     return {task: found[robot, task] for task in TASKS if (robot, task) in found}
 
 

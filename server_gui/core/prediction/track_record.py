@@ -82,7 +82,7 @@ class TrackRecord:
             return None
 
     def _stretches(self, robots: Set[str], since: datetime, labels: int, said: int) -> Iterator[Stretch]:
-        """A stretch a session, from its first label to its last."""
+        """Yield a stretch a session, from its first label to its last."""
         delta = self._store.table(PREDICTIONS.name, said)
         with translated(f"{self._store.url}/{PREDICTIONS.name} cannot be read"):
             files = list(data_files(delta, PREDICTIONS.name))
@@ -108,7 +108,7 @@ class TrackRecord:
         return sorted((Label.of(row) for row in holding(rows)), key=_session)
 
     def _compared(self, stretch: Stretch, version: int) -> Mapping[Key, Counts]:
-        """What was said in a stretch, against what was so, by robot, task and model."""
+        """Return what was said in a stretch, against what was so, by robot, task and model."""
         robot, session = _session(stretch.labels[0])
         rows = self._said(stretch, version)
         clock = Recorded(

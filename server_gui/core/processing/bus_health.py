@@ -8,7 +8,7 @@ from typing import Final
 
 from gateway.client import ConnectionState
 from gateway.wire.bus import CLOSED, BusInfo, NodeInfo
-from server_gui.core.follow.moment import now_ns
+from server_gui.core.follow.frame_time import now_ns
 from server_gui.core.follow.robot import Robot
 
 ACTIVE: Final = "error active"
@@ -62,7 +62,8 @@ def level(bus: BusInfo) -> Level:
         return Level.ALARM
     if bus.state != ACTIVE or (bus.load_percent or 0.0) >= BUSY_PERCENT or bus.findings or bus.problem:
         return Level.WARNING
-    return max((node_level(node) for node in bus.nodes), key=ORDER.index, default=Level.GOOD)
+    of_nodes = max((node_level(node) for node in bus.nodes), key=ORDER.index, default=Level.GOOD)
+    return Level.UNKNOWN if of_nodes is Level.GOOD and bus.load_percent is None else of_nodes
 
 
 def node_level(node: NodeInfo) -> Level:
@@ -108,7 +109,7 @@ def trouble(bus: BusInfo) -> tuple[str, str] | None:
 
 def findings(bus: BusInfo) -> list[tuple[str, str]]:
     """Return each thing that is wrong with a bus, and what to check; what several nodes have, once."""
-    if level(bus) is Level.GOOD:
+    if level(bus) in (Level.GOOD, Level.UNKNOWN):
         return []
     load, full = bus.load_percent or 0.0, []
     own = [one for one in bus.findings if not one.words.endswith(TAKEN)]  # by the load of a moment ago
@@ -180,7 +181,7 @@ def _misses(node: NodeInfo) -> bool:
 
 
 def _gathered(nodes: Sequence[NodeInfo]) -> Iterator[tuple[str, str]]:
-    """What nodes have, those with the same in one: `all 6 nodes: 3–4 % of their PDOs are missing`."""
+    """Yield what nodes have, those with the same in one: `all 6 nodes: 3–4 % of their PDOs are missing`."""
     same: dict[tuple[str, str], list[tuple[NodeInfo, str]]] = {}
     for node in nodes:
         said = [(one.words, one.check) for one in node.findings]

@@ -74,19 +74,19 @@ class LinkMonitor:
         self._calendar_ns = 0  # robot's minus ours
 
     def state(self, state: ConnectionState, problem: str | None, at_ns: int) -> None:
-        """The link went up or down."""
+        """Take a change of the link."""
         if state is ConnectionState.CONNECTED and self._state is not state:
             self._second(at_ns).reconnects += self._was_up
             self._was_up = True
         self._state, self._problem = state, problem
 
     def round_trip(self, round_trip_ns: int | None) -> None:
-        """A round trip was measured."""
+        """Take a measured round trip."""
         if round_trip_ns is not None:
             self._trips.append(round_trip_ns)
 
     def take(self, stream: int, batch: Batch, age_ns: int | None) -> None:
-        """A batch came; `age_ns` is how old its newest row was then."""
+        """Take a batch; `age_ns` is the age of its newest row."""
         if batch.link != self._link:
             self._link, self._transit_ns = batch.link, None
             self._dropped.clear()
@@ -103,7 +103,7 @@ class LinkMonitor:
         self._newest_ns = batch.received_ns
 
     def refused(self, why: str, at_ns: int) -> None:
-        """The robot sent what cannot be kept."""
+        """Count invalid data from the robot."""
         self._refused = at_ns, why
 
     def calendar(self, ahead_ns: int) -> None:
@@ -159,7 +159,7 @@ class LinkMonitor:
         return [*own, *_complaints(found)]
 
     def _lies(self, now_ns: int) -> Iterator[tuple[Health, bool, str]]:
-        """What the robot itself says that cannot be so."""
+        """Yield what the robot itself says that cannot be so."""
         if self._refused is not None:
             at_ns, why = self._refused
             yield Health.POOR, now_ns - at_ns < SECONDS * 1e9, f"it sends what cannot be kept: {why}"
@@ -169,7 +169,7 @@ class LinkMonitor:
 
 
 def _complaints(found: LinkQuality) -> list[tuple[Health, bool, str]]:
-    """What can be wrong with a link that is up: how bad, whether it is so, and in words."""
+    """Return what can be wrong with a link that is up: how bad, whether it is so, and in words."""
     loss, age, jitter, trip = (
         value or 0.0 for value in (found.loss, found.age, found.jitter, found.round_trip)
     )

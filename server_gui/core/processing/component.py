@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from server_gui.core.processing.foot_imu_events import FootImuEvents
-from server_gui.core.processing.gait_events import MAX_GAP_NS, EventKind, GaitEvent, Leg, Source
+from server_gui.core.processing.gait_events import MAX_GAP_NS, EventKind, EventSource, GaitEvent, Leg
 from server_gui.core.processing.gait_measures import Gait, GaitMeasures, Stride
 from server_gui.core.processing.joint_measures import Error, Extremes, TrackingError
 from server_gui.core.processing.kinematic_events import KinematicEvents
@@ -34,7 +34,7 @@ class Derived:
 
     stamp_ns: int = 0  # the newest row, on the robot's clock
     gait: Gait = field(default_factory=Gait)
-    sources: Mapping[Leg, Source | None] = field(default_factory=dict)  # what gives each leg's events
+    sources: Mapping[Leg, EventSource | None] = field(default_factory=dict)  # what gives each leg's events
     errors: Mapping[str, Error] = field(default_factory=dict)  # of joints that follow a target
     events: tuple[GaitEvent, ...] = ()  # the newest, oldest first
 
@@ -56,8 +56,8 @@ class ComponentProcessing:
         self._pressure = {leg: PressureEvents(leg) for leg in Leg}
         self._foot_imu = {leg: FootImuEvents(leg) for leg in Leg}
         self._kinematics = KinematicEvents()
-        self._heard_ns: dict[tuple[Leg, Source], int] = {}
-        self._source: dict[Leg, Source] = {}
+        self._heard_ns: dict[tuple[Leg, EventSource], int] = {}
+        self._source: dict[Leg, EventSource] = {}
         self._angles = [0.0] * (TRUNK + 1)  # left hip and knee, right hip and knee, trunk: the newest of each
         self._angles_ns = [0] * TRUNK  # when each of the joints' was taken; 0: never
         self._measures = GaitMeasures()
@@ -97,11 +97,11 @@ class ComponentProcessing:
     # --- gait
 
     def _found(self, wiring: Wiring, stamp_ns: int, row: int, columns: Columns) -> list[GaitEvent]:
-        """The events of every source; only those of each leg's best source count."""
+        """Return the events of every source; only those of each leg's best source count."""
         found: list[GaitEvent] = []
         for detectors, source, fed in (
-            (self._pressure, Source.PRESSURE, wiring.forces),
-            (self._foot_imu, Source.FOOT_IMU, wiring.pitch_rates),
+            (self._pressure, EventSource.PRESSURE, wiring.forces),
+            (self._foot_imu, EventSource.FOOT_IMU, wiring.pitch_rates),
         ):
             for leg, (channel, component) in fed:
                 value = columns[channel][row]
@@ -113,9 +113,9 @@ class ComponentProcessing:
                     found.append(self._continued(event, source))
         if wiring.angles:
             found += [
-                self._continued(event, Source.KINEMATICS)
+                self._continued(event, EventSource.KINEMATICS)
                 for event in self._by_joints(wiring, stamp_ns, row, columns)
-                if self._best(event.leg, stamp_ns) is Source.KINEMATICS
+                if self._best(event.leg, stamp_ns) is EventSource.KINEMATICS
             ]
         return found
 
@@ -131,18 +131,20 @@ class ComponentProcessing:
                 angles[place] = 0.0
         if stamp_ns - min(self._angles_ns) > MAX_GAP_NS:
             return []
-        self._heard_ns[Leg.LEFT, Source.KINEMATICS] = self._heard_ns[Leg.RIGHT, Source.KINEMATICS] = stamp_ns
+        self._heard_ns[Leg.LEFT, EventSource.KINEMATICS] = self._heard_ns[
+            Leg.RIGHT, EventSource.KINEMATICS
+        ] = stamp_ns
         left_hip, left_knee, right_hip, right_knee, trunk = angles
         return self._kinematics.feed(stamp_ns, (left_hip, left_knee), (right_hip, right_knee), trunk)
 
-    def _best(self, leg: Leg, now_ns: int) -> Source | None:
-        for source in Source:
+    def _best(self, leg: Leg, now_ns: int) -> EventSource | None:
+        for source in EventSource:
             heard_ns = self._heard_ns.get((leg, source))
             if heard_ns is not None and abs(now_ns - heard_ns) <= SILENT_NS:
                 return source
         return None
 
-    def _continued(self, event: GaitEvent, source: Source) -> GaitEvent:
+    def _continued(self, event: GaitEvent, source: EventSource) -> GaitEvent:
         before = self._source.get(event.leg)
         self._source[event.leg] = source
         return event if before is source else dataclasses.replace(event, after_gap=True)

@@ -26,7 +26,7 @@ class EventKind(StrEnum):
     TOE_OFF = "toe_off"
 
 
-class Source(StrEnum):
+class EventSource(StrEnum):
     """What an event was seen by, best first."""
 
     PRESSURE = "pressure"

@@ -145,7 +145,7 @@ class _Leg:
         self.forget()
 
     def forget(self) -> None:
-        """What comes next does not continue what was."""
+        """Break: the next event does not continue the last stride."""
         self.strike_ns: int | None = None
         self.off_ns: int | None = None
 

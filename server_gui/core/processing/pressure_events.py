@@ -53,7 +53,7 @@ class PressureEvents:
         return event
 
     def _begin(self, force: float) -> None:
-        """The foot is where the first sample has it: what was in the gap is not guessed."""
+        """Restart from the first sample after a gap, without guessing events."""
         self._down = force > self._threshold(LAND_SHARE)
         self._crossed_ns, self._after_gap = None, True
         self._highest = force

@@ -5,7 +5,7 @@ from typing import Final
 
 from msgspec import UNSET
 
-from gateway.plain import plain
+from gateway.plain_text import plain
 from gateway.wire.resource import ProcessUse
 
 MOST_LETTERS: Final = 28

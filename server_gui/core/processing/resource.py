@@ -114,7 +114,7 @@ class ResourceProcessing:
         return sorted(seen, key=lambda one: -one.memory_bytes)[:limit]
 
     def over_time(self, consumers: Sequence[Consumer]) -> tuple[Floats, list[Floats]]:
-        """Times (s) of the last looks at processes, and the CPU of each of these, NaN where not known."""
+        """Return times (s) of the last looks at processes, and the CPU of each, NaN if unknown."""
         times = np.array(self._looks, np.float64)
         return times, [self._processes[one.pid, one.name].percentages(self._looks) for one in consumers]
 

@@ -138,7 +138,7 @@ class Batching:
     def _happened(
         self, new: Notification, why: str | None, steps: Iterable[Step], offset_ns: int
     ) -> list[Record]:
-        """The events that a notification tells of."""
+        """Return the events that a notification tells of."""
         batch, events = new.batch, []
         first_ns = batch.stamps_ns[0] if batch.stamps_ns else None
         came = Moment(batch.received_ns + new.clocks.to_utc_ns, new.clocks.to_utc_ns)
@@ -219,6 +219,6 @@ def _check(new: Notification) -> None:
 
 
 def _values(batch: Batch) -> Floats:
-    """A row a channel; None becomes NaN."""
+    """Return a row a channel; None becomes NaN."""
     values = list(itertools.chain.from_iterable(batch.columns.values()))  # faster than array by array
     return np.array(values, np.float64).reshape(len(batch.columns), len(batch.stamps_ns))

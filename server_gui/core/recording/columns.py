@@ -84,7 +84,7 @@ class Columns:
 
 
 def _nullable(values: npt.NDArray[np.float64]) -> list[pa.Array]:
-    """An array a row; NaN is how a run says null. Without a copy where nothing is missing."""
+    """Return an array a row; NaN is how a run says null. Without a copy where nothing is missing."""
     missing = np.isnan(values.sum(axis=1))
     return [
         pa.array(column, mask=np.isnan(column) if some else None)

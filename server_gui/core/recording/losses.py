@@ -38,7 +38,7 @@ class Losses:
         return sum(lost.rows for _, _, lost in self.each())
 
     def add(self, parts: Iterable[Part]) -> None:
-        """These; journals that were not recorded are seen again, and not told."""
+        """Add these losses; unrecorded journals are read again, and not reported."""
         for part in parts:
             if isinstance(part, Run):
                 times = (part.stamps_ns + part.utc_offset_ns).tolist()
@@ -66,7 +66,7 @@ class Losses:
         return [f"{robot or 'no robot'}: {_told(table, lost)}" for robot, table, lost in self.each()]
 
     def join(self, others: "Losses") -> None:
-        """These too."""
+        """Add these."""
         for robot, table, lost in others.each():
             self._found[robot][table].add(lost.rows, lost.times_ns)
 

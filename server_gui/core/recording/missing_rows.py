@@ -65,7 +65,7 @@ def of_rows(store: Store, table: Table, rows: pa.Table, hear: Hear = refuse) -> 
 
 
 def by_key(store: Store, location: str, batch: pa.RecordBatch) -> pa.RecordBatch:
-    """The rows of a run that the table does not have by their names alone, whatever columns it has."""
+    """Return the rows of a run that the table does not have by their names alone, whatever columns it has."""
     with translated(f"{store.url}/{location} cannot be read"):
         found = store.dataset(location).to_table(columns=["seq", "row"], filter=_like(batch))
     known = set(_keys(found))

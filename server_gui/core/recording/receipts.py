@@ -212,7 +212,7 @@ class _Known:
         self.units: dict[str, dict[str, str | None]] = {}  # of a table's id: column → unit
 
     def add(self, receipt: Receipt) -> None:
-        """What the store's tables are called now; where one was begun anew, the others may be, too."""
+        """Take the tables' present ids; if one was recreated, others may be, too."""
         now = {part.location: part.table for part in receipt.parts if part.rows}
         known = self.tables.setdefault(canonical(receipt.url), {})
         if any(known.get(where, table) != table for where, table in now.items()):
@@ -236,7 +236,7 @@ class _Known:
 
 
 def _read(line: bytes, before: int) -> Receipt | str:
-    """The receipt on a line that follows one with the CRC `before`, or in words what is wrong with it."""
+    """Return the receipt on a line after one with CRC `before`, or its problem in words."""
     body = line[_LENGTH:].removesuffix(b"\n")
     if not line.endswith(b"\n"):
         return "is cut off"
@@ -249,7 +249,7 @@ def _read(line: bytes, before: int) -> Receipt | str:
 
 
 def _stated(line: bytes) -> int:
-    """The CRC that a line gives; 0 before the first."""
+    """Return the CRC that a line gives; 0 before the first."""
     try:
         return int(line[_LENGTH - 10 : _LENGTH - 2], 16)
     except ValueError:

@@ -294,7 +294,7 @@ class Recorder:
                 self._changed.notify_all()
 
     def _break(self, error: BaseException) -> None:
-        """A mistake of ours has cost rows."""
+        """Count rows lost by an internal error."""
         self._broke_s = time.monotonic()
         text = f"rows were lost by an internal error of the recorder, {type(error).__name__}: see its log"
         self._alarm(AlarmKind.BROKEN, text)
@@ -329,7 +329,7 @@ class Recorder:
         return queue, handed, ending
 
     def _done(self, item: Item) -> list[Record]:
-        """The records that an item makes; what a robot sends wrongly disturbs no other robot."""
+        """Return the records that an item makes; what a robot sends wrongly disturbs no other robot."""
         try:
             found = list(item.work())
             _check(found)
@@ -385,7 +385,7 @@ class Recorder:
         return time.monotonic() >= self._until_s
 
     def _give_up(self, why: str) -> None:
-        """What is lost at the end has no event any more, so the log says by name all that has none."""
+        """Log losses at the end, which no event can record any more."""
         for text in self._untold.lines():
             log.error("%s; lost: %s", why, text)
 

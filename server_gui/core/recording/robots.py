@@ -169,7 +169,7 @@ class Robots:
             self.heads[robot] = kept[robot]
 
     def lost(self, whose: str, lost: Loss, what: str) -> list[Record]:
-        """That rows were lost here; of nobody knows whom: told in the recording of every robot there is."""
+        """Return records of rows lost here; for an unknown robot, in every recording."""
         now = Moment.now()
         known = [self.known(whose)] if whose else [*self._robots.values()] or [Batching("")]
         text = f"this server lost rows of {whose or 'all its robots'}: {what}"
@@ -177,14 +177,14 @@ class Robots:
         return [robot.now(EventKind.LOST, text, now, **data) for robot in known]
 
     def refused(self, robot: str, what: str, why: str) -> list[Record]:
-        """That the robot sent what cannot be kept; of each `what` the first time is enough to know it."""
+        """Return records of invalid data, only for the first time of each `what`."""
         text = f"{robot}: {what}: {why}" if what else f"{robot} sent what cannot be kept: {why}"
         return self._tell(robot, f"refused {what}", EventKind.REFUSED, Moment.now(), text)
 
     def _tell(
         self, robot: str, problem: str, kind: EventKind, now: Moment, text: str | None = None
     ) -> list[Record]:
-        """An event for what is wrong with a robot, and a line in the log: once."""
+        """Return an event for what is wrong with a robot, and a line in the log: once."""
         if (robot, problem) in self._told:
             return []
         self._told.add((robot, problem))

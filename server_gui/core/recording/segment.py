@@ -63,7 +63,7 @@ _record_decoder = msgspec.msgpack.Decoder(Record)
 
 @functools.cache
 def _made() -> dict[str, frozenset[str]]:
-    """The columns of each table, as we make it."""
+    """Return the columns of each table, as we make it."""
     with contextlib.closing(sqlite3.connect(":memory:")) as database:
         database.executescript(SCHEMA)
         return {table: _columns(database, table) for table in TABLES}
@@ -160,7 +160,7 @@ class Segment:
                 self._database.execute(f"ALTER TABLE {table} ADD COLUMN crc INTEGER")
 
     def check_columns(self) -> None:
-        """Raises `Damaged` where its tables are not as we make them: nothing can be written to them."""
+        """Check the tables' schema; raises `Damaged`."""
         for table, wanted in _made().items():
             if wrong := wanted - _columns(self._database, table):
                 missing = ", ".join(sorted(wrong))
@@ -285,7 +285,7 @@ class Segment:
             return list(self._damaged or ())
 
     def _lines(self) -> Iterator[tuple[Any, ...]]:
-        """The runs that are sound; after the last one it is known which are not."""
+        """Yield the runs that are sound; after the last one it is known which are not."""
         damaged = []
         sql = f"SELECT {_LINE}, rowid FROM run ORDER BY robot, connection, stream, seq, row"
         for line in self._database.execute(sql):
@@ -384,7 +384,7 @@ def _text(raw: bytes) -> str:
 
 
 def _portions(lines: Iterable[tuple[Any, ...]]) -> Iterator[bytes]:
-    """The packed rows of these lines, put together."""
+    """Yield the packed rows of these lines, put together."""
     portion: list[bytes] = []
     rows = 0
     for line in lines:

@@ -184,7 +184,7 @@ class Spool:
         return segment
 
     def uploaded(self, number: int) -> None:
-        """The segment is in the store, durably, and has its receipt: it may go when room is needed.
+        """Mark a segment as uploaded with its receipt: it may be deleted when room is needed.
 
         Raises:
             SpoolUnusable: it waits for upload as before.
@@ -267,7 +267,7 @@ class Spool:
             return self._files.name_loss(number, f"{self.writer}/{LOST}")
 
     def told(self, number: int) -> None:
-        """The store knows that this batch is lost."""
+        """Note that the store has the loss of this batch."""
         self._settled.add(number)
 
     def robots_beside(self, number: int) -> set[str]:
@@ -314,7 +314,10 @@ class Spool:
         return self._free_bytes(self.folder) >= self._reserve_bytes
 
     def _identify(self) -> str:
-        """The name of this spool at the store, given once; of one that is damaged, as its batches have it."""
+        """Return the name of this spool at the store, given once.
+
+        Of one that is damaged, as its batches have it.
+        """
         if known := identity(self.folder):
             return known
         file = self.folder / "id"
@@ -327,7 +330,7 @@ class Spool:
         return named
 
     def _called(self) -> Iterator[str]:
-        """What receipts and segments call this spool, the newest first."""
+        """Yield what receipts and segments call this spool, the newest first."""
         receipt = self.receipts.newest()
         if receipt:
             yield receipt.spool
@@ -371,7 +374,7 @@ class Spool:
             return {}
 
     def _resume(self) -> Segment:
-        """The segment to write now: a new one, unless the newest is still empty."""
+        """Return the segment to write now: a new one, unless the newest is still empty."""
         newest, kept = self._files.own()[-1] if self._files.own() else (0, Kept.UPLOADED)
         receipt = self.receipts.newest()
         known = receipt.batch if receipt else 0

@@ -63,7 +63,7 @@ class Files:
             durable.sync(self.folder)
 
     def finish_names(self) -> None:
-        """What was cut off when a segment got another name goes on."""
+        """Complete an interrupted renaming of a segment."""
         for number, kept in self.own():
             file = self.path(number)
             left = file.with_name(f"{file.name}-wal").exists() and not file.exists()
@@ -121,7 +121,7 @@ class Files:
             self._cut(number)
 
     def _copy(self, number: int) -> None:
-        """The database last: where that is there, all of the copy is."""
+        """Copy the database last: its presence proves a complete copy."""
         for suffix in reversed(SUFFIXES):
             source = self.path(number).with_name(self.path(number).name + suffix)
             if not source.exists():  # the log's index; SQLite makes it anew

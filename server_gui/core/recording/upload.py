@@ -79,7 +79,7 @@ def lost_batches(spool: Spool, store: Store) -> list[str]:
 
 
 def _tell(spool: Spool, number: int, text: str, store: Store) -> bool:
-    """An event for each robot whose rows may have been in a batch; False where the store has it already.
+    """Record an event for each robot of a lost batch; return False if the store has it already.
 
     One that was set aside gets a receipt too. Of one that is gone `gwrms cloud verify` finds none.
     """
@@ -92,7 +92,7 @@ def _tell(spool: Spool, number: int, text: str, store: Store) -> bool:
 
 
 def _tell_anew(spool: Spool, number: int, parts: Sequence[Part], store: Store) -> None:
-    """An event, and a word in the spool, where the store is another one than batches of the spool went to."""
+    """Record an event if the store is not the one that earlier batches went to."""
     gone = sorted(spool.receipts.begun_anew(store.url, parts).items())
     if not gone:
         return
@@ -111,7 +111,7 @@ def _tell_anew(spool: Spool, number: int, parts: Sequence[Part], store: Store) -
 
 
 def _append(spool: Spool, store: Store, lost: "_Lost", writer: str, number: int, named: object) -> bool:
-    """The events that tell a loss, once, and their receipt; False where the store has them already."""
+    """Return the events that tell a loss, once, and their receipt; False where the store has them already."""
     origin = {"spool": writer, "batch": number}
     now_ns = Moment.now().utc_ns
     rows = EVENTS.rows([each.fields | origin | {"number": place} for place, each in lost.records(now_ns)])
@@ -137,7 +137,7 @@ def _bring(store: Store, rows: pa.Table, named: str) -> bool:
 
 
 def _told(store: Store, writer: str, number: int) -> Part:
-    """What the store has of such events."""
+    """Return what the store has of such events."""
     column = pyarrow.dataset.field
     mine = (column("spool") == writer) & (column("batch") == number)
     with translated(f"{store.url}/{EVENTS.name} cannot be read"):
@@ -199,7 +199,10 @@ def ahead(spool: Spool, store: Store) -> list[str]:
 
 
 def _openings(spool: Spool, store: Store) -> set[str]:
-    """What other openings of this spool were called, also those after it was copied: each begins sessions."""
+    """Return what other openings of this spool were called, also those after it was copied.
+
+    Each begins sessions.
+    """
     with contextlib.suppress(NoSuchTable):
         store.mend(SESSIONS.name)
         with translated(f"{store.url}/{SESSIONS.name} cannot be read"):
@@ -338,7 +341,7 @@ def _commits_lost(segment: Segment) -> list[_Lost]:
 
 
 def _robots(segment: Segment, store: Store) -> dict[str, set[str]]:
-    """The robots whose rows go to each of the telemetry's locations."""
+    """Return the robots whose rows go to each of the telemetry's locations."""
     robots = defaultdict(set)
     for robot, _ in segment.layouts():
         robots[TELEMETRY.location(robot, store.about.shards)].add(robot)

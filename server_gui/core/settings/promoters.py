@@ -15,7 +15,7 @@ UNSIGNED: Final = "unsigned"
 
 
 def desk_signature() -> Sign | None:
-    """What signs with this desk's key; `None` where it has none."""
+    """Return what signs with this desk's key; `None` where it has none."""
     folder = keys_folder()
     if not ((folder / KEY).exists() and (folder / CERTIFICATE).exists()):
         return None

@@ -169,7 +169,7 @@ def examine(file: Path) -> Examined:
 
 
 def examined(file: Path, document: dict[str, Any]) -> Examined:
-    """The same for what stands in it."""
+    """Return the same for what stands in it."""
     reading = _Reading(Decoding(_path))
     settings = reading.settings(document, file.parent)
     findings = in_order([*reading.findings, *_unlikely(settings)], document)
@@ -177,7 +177,7 @@ def examined(file: Path, document: dict[str, Any]) -> Examined:
 
 
 def findings(file: Path, tables: dict[str, Any], *, machine: bool) -> Iterator[Told]:  # noqa: ARG001 - of robots
-    """What `gwrms check` says of it."""
+    """Return what `gwrms check` says of it."""
     return told(examined(file, tables).findings)
 
 
@@ -205,7 +205,7 @@ class _Reading:
         self._decoding = decoding
 
     def settings(self, document: dict[str, Any], folder: Path) -> ServerSettings:
-        """What can be made of it."""
+        """Return what can be made of it."""
         self._decoding.tables(document, ServerSettings.__struct_fields__)
         recorder = self._table("recorder", document, RecordingSettings)
         return ServerSettings(
@@ -291,7 +291,7 @@ class _Reading:
 
 
 def _unlikely(settings: ServerSettings) -> Iterator[Finding]:
-    """What can work and is likely not what was meant."""
+    """Yield what can work and is likely not what was meant."""
     if settings.rules and not settings.prediction.enabled:
         yield warning(
             "[prediction]", "enabled", "is false, and without predictions no rule of [[rules]] acts"

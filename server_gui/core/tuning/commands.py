@@ -58,11 +58,11 @@ class Commands(Protocol):
         ...
 
     def objects(self, component: str, search: str) -> "Future[ObjectList]":
-        """What an EDS says of those objects that the search means."""
+        """Return what an EDS says of those objects that the search means."""
         ...
 
     def read_objects(self, component: str, objects: Sequence[str]) -> "Future[ObjectValues]":
-        """What a device holds of these now."""
+        """Return what a device holds of these now."""
         ...
 
     def dial(self) -> None:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from gateway.client import ClockOffset
-from gateway.several import devices
+from gateway.several_joints import devices
 from gateway.wire.component import QualityInfo
 from gateway.wire.method import Number
 from gateway.wire.robot import Description
@@ -66,7 +66,7 @@ class _Reading:
             self.claims[name] = Claim(self._values[name], stamp_ns, boot_id)
 
     def storing(self, entry: Entry) -> None:
-        """What the device's memory holds is not known while it is written, nor where that has failed."""
+        """Forget the memory's content while it is written, and after a failure."""
         for name in self._of_device(entry, self.claims):
             del self.claims[name]
 
@@ -122,7 +122,7 @@ class Flash:
                 self._since[name] = life, at_ns
 
     def forget(self) -> None:
-        """The link has dropped: what was in between is not known."""
+        """Forget the values after a drop of the link."""
         self._since.clear()
 
     def holds(self, name: str, value: Number, description: Description) -> bool:

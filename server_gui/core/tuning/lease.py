@@ -4,7 +4,7 @@ import time
 from dataclasses import dataclass
 
 from gateway.wire.control import Lease
-from server_gui.core.follow import moment
+from server_gui.core.follow import frame_time
 
 
 @dataclass(slots=True)
@@ -19,7 +19,7 @@ class LeaseState:
         """Seconds that are left, None where we do not hold it."""
         if self.until_ns is None:
             return None
-        left_ns = self.until_ns - (moment.now_ns() if now_ns is None else now_ns)
+        left_ns = self.until_ns - (frame_time.now_ns() if now_ns is None else now_ns)
         return left_ns / 1e9 if left_ns > 0 else None
 
     def asked(self) -> None:
@@ -31,7 +31,7 @@ class LeaseState:
         self.asking, self.problem = False, None
 
     def renewed(self, ttl_s: float) -> None:
-        """A write took it anew."""
+        """Note that a write took the lease again."""
         self.taken(Lease("", ttl_s))
 
     def refused(self, why: str) -> None:

@@ -25,7 +25,7 @@ PROCESSES_S: Final = 1.0  # between looks at the process table, while it is show
 PROCESSES: Final = ResourceSnapshotParams(include=["disk", "network", "thermal", "cmdline"])
 
 
-class Link:
+class CommandLink:
     """One robot's commands; `run` keeps the link until it is cancelled. Implements `Commands`.
 
     `tell` gets the process table, and what monitoring costs, while that is wanted; `dropped` is called when

@@ -101,7 +101,7 @@ class StopProgress:
         return self.number
 
     def answered(self, number: int, stopped: Stopped, at_ns: int | None = None) -> None:
-        """What the drives said, and when that was here; by default it is now."""
+        """Take the drives' answers, and their local time (default: now)."""
         if number != self.number:
             return
         self.held = stopped.held
@@ -123,7 +123,7 @@ class StopProgress:
             self._not_confirmed(reason)
 
     def was_reset(self, held: bool) -> None:
-        """A held stop was ended, or not."""
+        """Take the result of a reset."""
         self.held = held
         if not held:
             self.state, self.text, self.why, self.reason = StopState.IDLE, "", "", ""
@@ -132,7 +132,7 @@ class StopProgress:
     # --- what the robot shows meanwhile
 
     def described(self, held: bool, reason: str | None) -> None:
-        """What the robot says of itself on every new link."""
+        """Take the robot's description on every new link."""
         self.held, self.reason = held, (reason or "") if held else ""
 
     def read(self, entries: Iterable[Mapping[str, Any]]) -> None:

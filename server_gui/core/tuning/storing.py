@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from gateway.client import NotConnected, RemoteError
-from gateway.several import Outcome, refused_or_unknown, storing
+from gateway.several_joints import Outcome, refused_or_unknown, storing
 from gateway.wire.parameter import Stored
 from gateway.wire.robot import Description
 from server_gui.core.follow.news import NewsKind
@@ -123,7 +123,7 @@ class Storing:
 
 
 def _summed(done: Sequence[tuple[str, Outcome, str]]) -> tuple[WriteState, str]:
-    """The worst of it, and what came of each; of one device its own words."""
+    """Return the worst of it, and what came of each; of one device its own words."""
     outcomes = {outcome for _, outcome, _ in done}
     state = WriteState.DONE if outcomes == {Outcome.STORED} else WriteState.NOT_STORED
     if Outcome.UNKNOWN in outcomes:

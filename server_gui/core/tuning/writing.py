@@ -10,7 +10,7 @@ from typing import Final
 from gateway.client import NotConnected, RemoteError
 from gateway.wire.method import Number
 from gateway.wire.parameter import Written
-from server_gui.core.follow import moment
+from server_gui.core.follow import frame_time
 from server_gui.core.tuning.edits import Change
 
 UNDO: Final = 100  # writes that can be taken back one after another
@@ -44,7 +44,7 @@ class Trial:
 
     def left_s(self, now_ns: int | None = None) -> float:
         """Seconds until it reverts, never below 0."""
-        return max(0, self.until_ns - (moment.now_ns() if now_ns is None else now_ns)) / 1e9
+        return max(0, self.until_ns - (frame_time.now_ns() if now_ns is None else now_ns)) / 1e9
 
 
 @dataclass(slots=True)
@@ -61,13 +61,13 @@ class WriteProgress:
     revision: int = 0
 
     def began(self, changes: tuple[Change, ...]) -> None:
-        """These were sent."""
+        """Note that these were sent."""
         self._set(WriteState.WRITING, f"writing {_count(len(changes))} …")
         for change in changes:
             self.rows.pop(change.name, None)
 
     def done(self, written: Written) -> None:
-        """The robot has written and read back."""
+        """Take the values that the robot has written and read back."""
         if written.trial_s is None:
             self.undo.append(written.before)
             self._set(WriteState.DONE, f"{_count(len(written.after))} written and read back")
@@ -77,11 +77,11 @@ class WriteProgress:
             self._set(WriteState.DONE, "on trial: read back, and in force until it is taken back")
 
     def storing(self, component: str) -> None:
-        """A device was asked to store."""
+        """Note that a device was asked to store."""
         self._set(WriteState.WRITING, f"{component} is storing to its flash …")
 
     def failed(self, changes: tuple[Change, ...], error: Exception) -> None:
-        """It was refused or rolled back, or nobody knows; what is known of a row stands on it."""
+        """Take a failed write: refused, rolled back or unknown, with the outcome of each row."""
         refused = isinstance(error, RemoteError) and error.kind not in UNSURE
         nothing_done = refused or isinstance(error, NotConnected)
         self._set(WriteState.FAILED if nothing_done else WriteState.UNKNOWN, str(error))
@@ -91,22 +91,22 @@ class WriteProgress:
             self.rows[change.name] = str(told) if told is not None else str(error)
 
     def kept(self) -> None:
-        """What was on trial stays."""
+        """Note that the trial was confirmed."""
         if self.trial is not None:
             self.undo.append(self.trial.before)
             self._end_trial("kept: the trial's values stay")
 
     def reverting(self) -> None:
-        """The robot says that what was on trial has gone back; it is not read yet."""
+        """Note a revert that the robot reports, before it is read back."""
         self.trial = None
         self._set(WriteState.WRITING, "taken back: reading what is held …")
 
     def reverted(self, how: str) -> None:
-        """What was on trial has gone back."""
+        """Note that the trial was reverted."""
         self._end_trial(how)
 
     def say(self, state: WriteState, text: str) -> None:
-        """What else is to be told."""
+        """Add another message."""
         self._set(state, text)
 
     def _end_trial(self, text: str) -> None:

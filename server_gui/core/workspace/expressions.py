@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from server_gui.core.workspace.dimensions import Dimension, literal
-from server_gui.core.workspace.grammar import ExpressionError, Node, Written
+from server_gui.core.workspace.grammar import ExpressionError, ExpressionNode, Written
 
 Floats = npt.NDArray[np.float64]
 Rows = npt.NDArray[np.int64]
@@ -69,7 +69,7 @@ class _Compiler:
         self._text = text
         self._units = units
 
-    def part(self, node: Node) -> Part:
+    def part(self, node: ExpressionNode) -> Part:
         match node.kind:
             case "number":
                 return self._number(node)
@@ -82,7 +82,7 @@ class _Compiler:
                 return self._call(node)
         return self._sign(node, *(self.part(each) for each in node.parts))
 
-    def _number(self, node: Node) -> Part:
+    def _number(self, node: ExpressionNode) -> Part:
         factor, dimension = 1.0, NONE
         if node.unit is not None:
             found = literal(node.unit)
@@ -94,7 +94,7 @@ class _Compiler:
         value = np.float64(float(node.text) * factor)
         return Part(lambda _block: np.asarray(value), dimension)
 
-    def _sign(self, node: Node, left: Part, right: Part) -> Part:
+    def _sign(self, node: ExpressionNode, left: Part, right: Part) -> Part:
         one, other = left.step, right.step
         if node.kind in WORDS:
             self._same(node, WORDS[node.kind], left, right)
@@ -105,7 +105,7 @@ class _Compiler:
             return Part(lambda block: one(block) * other(block), left.dimension.times(right.dimension))
         return Part(lambda block: one(block) / other(block), left.dimension.times(right.dimension, -1))
 
-    def _call(self, node: Node) -> Part:
+    def _call(self, node: ExpressionNode) -> Part:
         if node.text not in FUNCTIONS:
             raise self._error(
                 f"there is no function {node.text}: there are {', '.join(sorted(FUNCTIONS))}", node
@@ -116,7 +116,7 @@ class _Compiler:
             raise self._error(f"{node.text} takes {many}, not {len(node.parts)}", node)
         return make(self, node, [self.part(each) for each in node.parts])
 
-    def _same(self, node: Node, done: str, *parts: Part) -> None:
+    def _same(self, node: ExpressionNode, done: str, *parts: Part) -> None:
         for other in parts[1:]:
             if other.dimension != parts[0].dimension:
                 both = f"{parts[0].dimension.said} and {other.dimension.said}"
@@ -127,12 +127,12 @@ class _Compiler:
                 )
                 raise self._error(f"{both} cannot be {done}{hint}", node)
 
-    def _is(self, node: Node, part: Part, wanted: Dimension) -> None:
+    def _is(self, node: ExpressionNode, part: Part, wanted: Dimension) -> None:
         if part.dimension != wanted:
             raise self._error(f"{node.text} is of {wanted.said}, not of {part.dimension.said}", node)
 
-    def _constant(self, node: Node, wanted: Dimension, most: float) -> float:
-        """The second argument: a number above 0 and up to `most`, in this unit or none."""
+    def _constant(self, node: ExpressionNode, wanted: Dimension, most: float) -> float:
+        """Return the second argument: a number above 0 and up to `most`, in this unit or none."""
         told = node.parts[1]
         if told.kind != "number":
             raise self._error(f"the second argument of {node.text} is a number in {wanted.said}", told)
@@ -144,24 +144,26 @@ class _Compiler:
             raise self._error(f"it is above 0 and at most {most:g} {wanted.said}", told)
         return value
 
-    def _error(self, problem: str, node: Node) -> ExpressionError:
+    def _error(self, problem: str, node: ExpressionNode) -> ExpressionError:
         return ExpressionError(problem, self._text, node.place, node.length)
 
     # --- functions
 
-    def plain(self, _node: Node, parts: Sequence[Part]) -> Part:
+    def plain(self, _node: ExpressionNode, parts: Sequence[Part]) -> Part:
         """`abs`."""
         return Part(lambda block: np.abs(parts[0].step(block)), parts[0].dimension)
 
-    def least(self, node: Node, parts: Sequence[Part]) -> Part:
+    def least(self, node: ExpressionNode, parts: Sequence[Part]) -> Part:
         """`min` of what is at one time."""
         return self._extreme(node, parts, np.minimum)
 
-    def most(self, node: Node, parts: Sequence[Part]) -> Part:
+    def most(self, node: ExpressionNode, parts: Sequence[Part]) -> Part:
         """`max` of what is at one time."""
         return self._extreme(node, parts, np.maximum)
 
-    def _extreme(self, node: Node, parts: Sequence[Part], better: Callable[[Floats, Floats], Floats]) -> Part:
+    def _extreme(
+        self, node: ExpressionNode, parts: Sequence[Part], better: Callable[[Floats, Floats], Floats]
+    ) -> Part:
         self._same(node, "compared", *parts)
 
         def step(block: Block) -> Floats:
@@ -172,33 +174,33 @@ class _Compiler:
 
         return Part(step, parts[0].dimension)
 
-    def root(self, node: Node, parts: Sequence[Part]) -> Part:
+    def root(self, node: ExpressionNode, parts: Sequence[Part]) -> Part:
         """`sqrt`."""
         dimension = parts[0].dimension.root()
         if dimension is None:
             raise self._error(f"{parts[0].dimension.said} has no square root", node)
         return Part(lambda block: np.sqrt(parts[0].step(block)), dimension)
 
-    def angle(self, node: Node, parts: Sequence[Part]) -> Part:
+    def angle(self, node: ExpressionNode, parts: Sequence[Part]) -> Part:
         """`sin`, `cos`."""
         self._is(node, parts[0], ANGLE)
         wave = np.sin if node.text == "sin" else np.cos
         return Part(lambda block: wave(parts[0].step(block)), NONE)
 
-    def degrees(self, node: Node, parts: Sequence[Part]) -> Part:
+    def degrees(self, node: ExpressionNode, parts: Sequence[Part]) -> Part:
         """`deg`: an angle as a plain number of degrees."""
         self._is(node, parts[0], ANGLE)
         return Part(lambda block: np.degrees(parts[0].step(block)), NONE)
 
-    def slope(self, _node: Node, parts: Sequence[Part]) -> Part:
+    def slope(self, _node: ExpressionNode, parts: Sequence[Part]) -> Part:
         """`diff`: by time, from row to row."""
         return Part(_Slope(parts[0].step), parts[0].dimension.times(SECOND, -1))
 
-    def smooth(self, node: Node, parts: Sequence[Part]) -> Part:
+    def smooth(self, node: ExpressionNode, parts: Sequence[Part]) -> Part:
         """`lowpass`: of first order."""
         return Part(_LowPass(parts[0].step, self._constant(node, HERTZ, 1e4)), parts[0].dimension)
 
-    def over(self, node: Node, parts: Sequence[Part]) -> Part:
+    def over(self, node: ExpressionNode, parts: Sequence[Part]) -> Part:
         """`rms`, `mean`: over the last seconds."""
         seconds = self._constant(node, SECOND, LONGEST_S)
         return Part(_Window(parts[0].step, seconds, squared=node.text == "rms"), parts[0].dimension)
@@ -310,7 +312,7 @@ class _Window:
         return found
 
 
-Make = Callable[[_Compiler, Node, Sequence[Part]], Part]
+Make = Callable[[_Compiler, ExpressionNode, Sequence[Part]], Part]
 FUNCTIONS: Final[Mapping[str, tuple[int, int, Make]]] = {
     "abs": (1, 1, _Compiler.plain),
     "min": (2, 99, _Compiler.least),

@@ -35,7 +35,7 @@ class ExpressionError(ValueError):
         self.problem, self.text, self.place, self.length = problem, text, place, max(length, 1)
 
     def __str__(self) -> str:
-        """The text, and below it the place that is meant with what is wrong there."""
+        """Return the text, and below it the place that is meant with what is wrong there."""
         return f"{self.text}\n{' ' * self.place}{'^' * self.length} {self.problem}"
 
     @property
@@ -50,7 +50,7 @@ class ExpressionError(ValueError):
 
 
 @dataclass(frozen=True, slots=True)
-class Node:
+class ExpressionNode:
     """One part of an expression, from `place` for `length` letters.
 
     `kind` is `number` (its unit in `unit`), `channel`, `call` (of the function `text`), `negative` or a sign.
@@ -60,7 +60,7 @@ class Node:
     text: str
     place: int
     length: int
-    parts: tuple["Node", ...] = ()
+    parts: tuple["ExpressionNode", ...] = ()
     unit: str | None = None
 
 
@@ -69,7 +69,7 @@ class Written:
     """What somebody has written as a curve: its name, and the tree of what follows."""
 
     name: str
-    tree: Node
+    tree: ExpressionNode
 
     @property
     def channels(self) -> frozenset[str]:
@@ -103,7 +103,7 @@ def parse(text: str) -> Written:
     return Written(" ".join(name.split()) if equals else " ".join(rest.split() or text.split()), tree)
 
 
-def walk(tree: Node) -> Iterator[Node]:
+def walk(tree: ExpressionNode) -> Iterator[ExpressionNode]:
     """Yield every node."""
     yield tree
     for part in tree.parts:
@@ -120,7 +120,7 @@ class _Parser:
         self._depth = 0
         self._nodes = 0
 
-    def whole(self) -> Node:
+    def whole(self) -> ExpressionNode:
         tree = self._sum()
         if self._here.kind != "end":
             raise self._error(f"{self._here.text!r} is not expected here")
@@ -130,17 +130,17 @@ class _Parser:
     def _here(self) -> _Token:
         return self._tokens[self._at]
 
-    def _sum(self) -> Node:
+    def _sum(self) -> ExpressionNode:
         return self._chain("+-", lambda: self._chain("*/", self._factor))
 
-    def _chain(self, signs: str, part: Callable[[], Node]) -> Node:
+    def _chain(self, signs: str, part: Callable[[], ExpressionNode]) -> ExpressionNode:
         left = part()
         while self._here.kind == "sign" and self._here.text in signs:
             sign = self._take()
             left = self._node(sign.text, sign.text, sign.place, 1, (left, part()))
         return left
 
-    def _factor(self) -> Node:
+    def _factor(self) -> ExpressionNode:
         self._depth += 1
         if self._depth > DEEPEST:
             raise self._error(f"more than {DEEPEST} brackets and signs within each other")
@@ -148,7 +148,7 @@ class _Parser:
         self._depth -= 1
         return found
 
-    def _factor_here(self) -> Node:
+    def _factor_here(self) -> ExpressionNode:
         token = self._take()
         match token.kind, token.text:
             case "number", text:
@@ -169,7 +169,7 @@ class _Parser:
         self._at -= 1
         raise self._error("a channel, a number or a function is missing here")
 
-    def _number(self, token: _Token, text: str) -> Node:
+    def _number(self, token: _Token, text: str) -> ExpressionNode:
         unit = None
         if self._here.kind == "unit":
             unit = self._take().text[1:-1].strip()
@@ -177,7 +177,7 @@ class _Parser:
             raise ExpressionError("the number is too large", self._text, token.place, len(text))
         return self._node("number", text, token.place, len(text), unit=unit)
 
-    def _call(self, name: _Token) -> Node:
+    def _call(self, name: _Token) -> ExpressionNode:
         self._take()
         parts = [self._sum()]
         while self._here.text == ",":
@@ -204,13 +204,13 @@ class _Parser:
         text: str,
         place: int,
         length: int,
-        parts: tuple[Node, ...] = (),
+        parts: tuple[ExpressionNode, ...] = (),
         unit: str | None = None,
-    ) -> Node:
+    ) -> ExpressionNode:
         self._nodes += 1
         if self._nodes > MOST_NODES:
             raise self._error(f"more than {MOST_NODES} parts")
-        return Node(kind, text, place, length, parts, unit)
+        return ExpressionNode(kind, text, place, length, parts, unit)
 
     def _error(self, problem: str) -> ExpressionError:
         return ExpressionError(problem, self._text, self._here.place, len(self._here.text))

@@ -9,7 +9,7 @@ import msgspec
 import tomlkit
 from msgspec import Struct
 
-from gateway.plain import plain
+from gateway.plain_text import plain
 from server_gui.core.atomic_files import draft
 from server_gui.core.workspace.grammar import LONGEST, ExpressionError, parse
 from server_gui.core.workspace.trigger import Condition, Mode, On
@@ -216,7 +216,7 @@ class Layouts:
         return path
 
     def _free(self, name: str) -> Path:
-        """A file for a new one: of its letters, whatever the file system thinks of the others."""
+        """Return a file for a new one: of its letters, whatever the file system thinks of the others."""
         stem = re.sub(r"\W+", "-", name.casefold(), flags=re.ASCII).strip("-") or "layout"
         place, number = self.folder / f"{stem}{SUFFIX}", 2
         while place.exists():

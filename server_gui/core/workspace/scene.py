@@ -12,8 +12,15 @@ from server_gui.core.desk.flags import Flag, FlagKind
 from server_gui.core.desk.measuring import nearest
 from server_gui.core.desk.station import Station
 from server_gui.core.workspace.alignment import Align, offset_text, shift_ns
+from server_gui.core.workspace.curve_binding import (
+    BESIDE,
+    Channels,
+    CurveBinding,
+    channels_of,
+    meaning,
+    with_beside,
+)
 from server_gui.core.workspace.layouts import Layout, PlotLayout, TriggerLayout
-from server_gui.core.workspace.meaning import BESIDE, Channels, Meaning, channels_of, meaning, with_beside
 from server_gui.core.workspace.series import ALL_S, HELD_S, Beside, Floats, Series
 from server_gui.core.workspace.trigger import Condition, On, State, Trigger
 from server_gui.core.workspace.workspace import Workspace
@@ -56,7 +63,7 @@ class Scene:
         self._station: Station | None = None
         self._series: Series | None = None
         self._theirs: Channels = {}
-        self._meanings: dict[str, Meaning] = {}
+        self._meanings: dict[str, CurveBinding] = {}
         self._known: tuple[object, ...] = ()
         self._source: object = None
 
@@ -89,26 +96,26 @@ class Scene:
 
     # --- what is drawn
 
-    def meaning(self, text: str) -> Meaning:
-        """What this text means on the robot."""
+    def meaning(self, text: str) -> CurveBinding:
+        """Return what this text means on the robot."""
         if text not in self._meanings:
             self._meanings[text] = meaning(text, self.channels, self._shown.units)
         return self._meanings[text]
 
-    def meaning_beside(self, text: str) -> Meaning:
-        """What it means on what is beside it."""
+    def meaning_beside(self, text: str) -> CurveBinding:
+        """Return what it means on what is beside it."""
         key = f"{BESIDE_KEY}{text}"
         if key not in self._meanings:
             self._meanings[key] = meaning(text, self._theirs, self._shown.units)
         return self._meanings[key]
 
     def unit(self, place: int) -> Unit | None:
-        """The unit of a plot's values: of the first of its curves that means something."""
+        """Return the unit of a plot's values: of the first of its curves that means something."""
         found = (self.meaning(text).unit for text in self.workspace.plots[place].curves)
         return next((unit for unit in found if unit is not None), None)
 
     def units(self) -> list[Unit | None]:
-        """That of each plot."""
+        """Return the unit of each plot."""
         return [self.unit(place) for place in range(len(self.workspace.plots))]
 
     def drawn(self, text: str, unit: Unit | None) -> str:
@@ -119,13 +126,13 @@ class Scene:
         return "" if meant.unit == unit else "in another unit here than the plot"
 
     def times(self, seconds: float) -> Floats:
-        """Times of the rows of the last `seconds`, s; not to be kept."""
+        """Return times of the rows of the last `seconds`, s; not to be kept."""
         if self.frozen is not None:
             return self.frozen.times_of(seconds)
         return np.zeros(0) if self._station is None else self._station.rings.times(seconds)
 
     def values(self, text: str, rows: int) -> Floats:
-        """The newest values of a curve; not to be kept."""
+        """Return the newest values of a curve; not to be kept."""
         if self.frozen is None:
             return np.zeros(0) if self._series is None else self._series.values(self.meaning(text), rows)
         column = self.frozen.columns.get(text)
@@ -273,7 +280,10 @@ class Scene:
         return np.full(rows, np.nan) if errors is None else errors(station, rows)
 
     def _errors(self, component: str) -> Callable[[Station, int], Floats] | None:
-        """What tells of a drive's errors: its error code (603Fh), else whether its state is a fault."""
+        """Return what tells of a drive's errors.
+
+        Its error code (603Fh), else whether its state is a fault.
+        """
         code, state = f"{component}.error_code", f"{component}.state"
         if code in self.channels:
             return lambda station, rows: station.rings.values(code, rows)

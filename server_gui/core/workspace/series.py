@@ -8,8 +8,8 @@ import numpy.typing as npt
 
 from server_gui.core.desk.rings import Rings
 from server_gui.core.desk.station import Station
+from server_gui.core.workspace.curve_binding import BESIDE, CurveBinding
 from server_gui.core.workspace.expressions import Block, Program
-from server_gui.core.workspace.meaning import BESIDE, Meaning
 
 Floats = npt.NDArray[np.float64]
 HELD_S: Final = 0.1  # a sample of another clock stands for its channel no longer
@@ -60,7 +60,7 @@ class Beside:
         self.shift_ns = 0
         self.series = Series(station)
 
-    def values(self, meant: Meaning, rings: Rings, times: Floats) -> Floats:
+    def values(self, meant: CurveBinding, rings: Rings, times: Floats) -> Floats:
         """Return a value for each of these times of `rings`: the last, no older than `HELD_S`, else none."""
         other = self.station.rings
         if other.newest_ns is None or not len(times) or rings.newest_ns is None:
@@ -88,7 +88,7 @@ class Series:
         self.beside = beside
         self._computed: dict[tuple[str, tuple[tuple[str, str], ...]], Computed] = {}
 
-    def values(self, meant: Meaning, count: int) -> Floats:
+    def values(self, meant: CurveBinding, count: int) -> Floats:
         """Return the newest `count` values, all NaN for what means nothing here; not to be kept."""
         rings = self.station.rings
         if meant.problem:
@@ -106,7 +106,7 @@ class Series:
         """Forget all but these."""
         self._computed = {key: known for key, known in self._computed.items() if key[0] in texts}
 
-    def _over_both(self, meant: Meaning, count: int) -> Floats:
+    def _over_both(self, meant: CurveBinding, count: int) -> Floats:
         """Of two robots: what comes late from one belongs to rows that were there; all is computed anew."""
         rings = self.station.rings
         times = rings.times(ALL_S)
@@ -122,4 +122,4 @@ class Series:
         if self.beside is None:
             return np.full(len(times), np.nan)
         channel = name.removeprefix(BESIDE)
-        return self.beside.values(Meaning(channel, channel), rings, times)
+        return self.beside.values(CurveBinding(channel, channel), rings, times)

@@ -104,7 +104,7 @@ class Trigger:
         self.state, self.at_s = State.OFF, None
 
     def begin_anew(self) -> None:
-        """The rows have another axis of time: what was is gone."""
+        """Reset for rows with another time axis."""
         if self.state is not State.OFF and self.state is not State.STOPPED:
             self._wait(None)
 

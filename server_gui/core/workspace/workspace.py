@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from gateway.units import Unit
-from server_gui.core.workspace.meaning import Meaning
+from server_gui.core.workspace.curve_binding import CurveBinding
 
 MOST_CURVES: Final = 24
 MOST_PLOTS: Final = 12
@@ -45,7 +45,7 @@ class Workspace:
         """How many curves may be added."""
         return MOST_CURVES - sum(len(plot.curves) for plot in self.plots)
 
-    def arrange(self, curves: Iterable[Meaning]) -> None:
+    def arrange(self, curves: Iterable[CurveBinding]) -> None:
         """Begin anew: those of one unit share a plot; as many as may be drawn."""
         by_unit: dict[Unit | None, PlotSpec] = {}
         for meant in list(curves)[:MOST_CURVES]:
@@ -57,7 +57,7 @@ class Workspace:
         self.plots = [PlotSpec(list(plot.curves), plot.x) for plot in plots]
         self.revision += 1
 
-    def put(self, meant: Meaning, units: Sequence[Unit | None]) -> None:
+    def put(self, meant: CurveBinding, units: Sequence[Unit | None]) -> None:
         """Put a curve where its like is, else into a plot of its own; `units` has that of each plot.
 
         Raises:
@@ -70,7 +70,7 @@ class Workspace:
         place = next(fits, None)
         self.new_plot(meant) if place is None else self.add(meant, place, units[place])
 
-    def add(self, meant: Meaning, place: int, unit: Unit | None) -> None:
+    def add(self, meant: CurveBinding, place: int, unit: Unit | None) -> None:
         """Put a curve into a plot, whose curves are in `unit`, None while nobody knows.
 
         Raises:
@@ -92,7 +92,7 @@ class Workspace:
         plot.curves.append(meant.text)
         self.revision += 1
 
-    def new_plot(self, meant: Meaning | None = None, over: str = "", place: int | None = None) -> int:
+    def new_plot(self, meant: CurveBinding | None = None, over: str = "", place: int | None = None) -> int:
         """Make a plot, with a curve in it where one is given, `over` another one; return its place.
 
         Raises:
@@ -134,5 +134,5 @@ class Workspace:
 
 
 def said(unit: Unit | None) -> str:
-    """A unit for a sentence."""
+    """Return a unit for a sentence."""
     return "an unknown unit" if unit is None else unit.symbol or "no unit"

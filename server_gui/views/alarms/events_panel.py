@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from gateway.plain import plain
+from gateway.plain_text import plain
 from server_gui.core.alarms.alarm import Active
 from server_gui.core.alarms.marks import GLYPHS, NEWS, Mark
 from server_gui.core.desk.desk import Desk
@@ -41,7 +41,7 @@ CHOICES: Final[dict[str, frozenset[NewsKind]]] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class EventRow:
     """A row: when, of what sort, of which robot, what; and what is seen of it in the signals."""
 
     when: str
@@ -60,7 +60,7 @@ class NewsModel(QAbstractTableModel):
         self._theme = theme
         self._kinds = CHOICES["Everything"]
         self._words: Sequence[str] = ()
-        self.lines: list[Line] = []
+        self.lines: list[EventRow] = []
         self.pinned = 0  # lines that are active alarms
         self._revision: object = None
 
@@ -90,12 +90,12 @@ class NewsModel(QAbstractTableModel):
         stations = self._desk.stations
         return stations[0] if len(stations) == 1 else None
 
-    def _said(self, line: Line) -> str:
-        """What is said, and of whom where that is neither in the column beside it nor the only robot."""
+    def _said(self, line: EventRow) -> str:
+        """Return the text, with the robot unless its column shows it or there is only one."""
         only = self.only
         return line.text if only is None or line.robot == only.title else f"{line.robot}: {line.text}"
 
-    def _has_words(self, line: Line) -> bool:
+    def _has_words(self, line: EventRow) -> bool:
         said = f"{line.mark.word} {line.robot} {line.text}".lower()
         return all(word in said for word in self._words)
 
@@ -169,12 +169,12 @@ class EventsPanel(QWidget):
         self._restyle()
 
     @property
-    def lines(self) -> Sequence[Line]:
+    def lines(self) -> Sequence[EventRow]:
         """What is shown, the active alarms first."""
         return self._news.lines
 
     @property
-    def pinned(self) -> Sequence[Line]:
+    def pinned(self) -> Sequence[EventRow]:
         """The active alarms."""
         return self._news.lines[: self._news.pinned]
 
@@ -199,18 +199,18 @@ class EventsPanel(QWidget):
         self.table.setMinimumHeight(self._theme.px(40))
 
 
-def _of_alarm(station: Station, one: Active) -> Line:
+def _of_alarm(station: Station, one: Active) -> EventRow:
     alarm = one.alarm
     where = alarm.where or alarm.subject.replace("_", " ")
     text = ": ".join(filter(None, (where, alarm.what)))
     known = alarm.channel is not None and one.at_ns is not None
     at = (station, str(alarm.channel), one.at_ns or 0) if known else None
-    return Line(f"since {_clock(one.since_s)}", alarm.mark, station.title, text, at)
+    return EventRow(f"since {_clock(one.since_s)}", alarm.mark, station.title, text, at)
 
 
-def _of_item(item: Item) -> Line:
+def _of_item(item: Item) -> EventRow:
     again = "" if item.first_s is None else f"  ({item.count} times since {_clock(item.first_s)})"
-    return Line(_clock(item.utc_s), NEWS[item.kind], item.robot, f"{item.text}{again}")
+    return EventRow(_clock(item.utc_s), NEWS[item.kind], item.robot, f"{item.text}{again}")
 
 
 def _clock(utc_s: float) -> str:

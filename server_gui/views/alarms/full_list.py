@@ -11,9 +11,9 @@ from server_gui.views.marks import Mark
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text, set_tone
 from server_gui.views.widgets.mark import MarkIcon
+from server_gui.views.widgets.overlay import Overlay
 from server_gui.views.widgets.plain import set_tip
-from server_gui.views.widgets.sheet import Sheet
-from server_gui.views.widgets.whole import WholeLabel
+from server_gui.views.widgets.wrapping_label import WrappingLabel
 
 WIDEST: Final = 900  # at text of 100 %
 AROUND_BUTTONS: Final = 24  # pixels, of a row
@@ -43,7 +43,7 @@ class Deeds(Protocol):
         ...
 
     def acknowledge(self, told: Told) -> None:
-        """It is read."""
+        """Acknowledge the alarm."""
         ...
 
 
@@ -65,7 +65,7 @@ class AlarmRow(QFrame):
         self.setObjectName("alarm")
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Maximum)
         self._icon = MarkIcon(theme, 13)
-        self.headline, self.details = WholeLabel(), WholeLabel("dim")
+        self.headline, self.details = WrappingLabel(), WrappingLabel("dim")
         words = QVBoxLayout()
         words.setSpacing(1)
         words.addWidget(self.headline)
@@ -94,15 +94,19 @@ class AlarmRow(QFrame):
         mark = OVER if is_over else one.alarm.mark
         self._icon.show_mark(mark)
         set_tone(self, mark.colour)
-        set_text(self.headline, headline(told, named=named, more="over" if is_over else ""))
+        more = "over" if is_over else ""
+        wordings = [headline(told, named=named, more=more, brief=brief) for brief in range(3)]
         said = details(one, now_s(station), each=True)
         self.buttons.offer(told)
         self.buttons.setVisible(not is_over)
-        self.setAccessibleName(self.headline.text())
+        self.setAccessibleName(wordings[0])
         self.setAccessibleDescription("\n".join(said))
+        main = wordings[0] if self._held is None else self._fitting_headline(wordings)
+        set_text(self.headline, main)
         shown = said if self._held is None else self._fitting(said)
         set_text(self.details, "\n".join(shown))
-        set_tip(self, "\n".join(said) if shown != said else "")
+        all_of_it = (wordings[0], said) == (main, shown)
+        set_tip(self, "" if all_of_it else "\n".join([wordings[0], *said]))
 
     def hold(self, wanted: bool) -> None:
         """Be as high as now from now on; not where another width needs another height."""
@@ -115,23 +119,37 @@ class AlarmRow(QFrame):
             self.setMinimumHeight(0)
             self.setMaximumHeight(MOST_PX)
 
-    def _fitting(self, said: list[str]) -> list[str]:
-        """As many of these lines as have room below the headline, and above the buttons."""
+    @property
+    def _room(self) -> int:
+        """How high the words may be, above the buttons."""
         column = self.layout()
         around = 0 if column is None else self.height() - column.contentsRect().height()
         below = 0 if self.buttons.isHidden() else self.buttons.sizeHint().height() + SPACE
-        above = self.headline.heightForWidth(self.headline.width()) + 1
-        room, width = self.height() - around - below - above, max(self.details.width(), 1)
-        box = QRect(0, 0, width, MOST_PX)
+        return self.height() - around - below
+
+    def _fitting_headline(self, wordings: list[str]) -> str:
+        """Return the fullest one that has room."""
+        fits = (text for text in wordings if _high(self.headline, text) <= self._room)
+        return next(fits, wordings[-1])
+
+    def _fitting(self, said: list[str]) -> list[str]:
+        """As many of these lines as have room below the headline, and above the buttons."""
+        room = self._room - self.headline.heightForWidth(self.headline.width()) - 1
         for count in range(len(said), 0, -1):
             shown = said if count == len(said) else [*said[:count], MORE]
-            if self.details.fontMetrics().boundingRect(box, WRAPPED, "\n".join(shown)).height() <= room:
+            if _high(self.details, "\n".join(shown)) <= room:
                 return shown
         return []
 
     def _restyle(self) -> None:
         self.headline.setFont(self._theme.text_font(bold=True))
         self.setStyleSheet(style(self._theme))
+
+
+def _high(label: WrappingLabel, text: str) -> int:
+    """How high a label is with this text."""
+    box = QRect(0, 0, max(label.width(), 1), MOST_PX)
+    return label.fontMetrics().boundingRect(box, WRAPPED, text).height()
 
 
 class AlarmButtons(QWidget):
@@ -169,7 +187,7 @@ class AlarmButtons(QWidget):
         self.acknowledge.setVisible(all_of_them and unread)
 
 
-class AlarmList(Sheet):
+class AlarmList(Overlay):
     """Every alarm in full. While it is open no row moves: new ones come last, and what is over stays.
 
     Texts grow and buttons go; as long as the pointer is over the list, no row changes its height by that.
@@ -184,7 +202,7 @@ class AlarmList(Sheet):
         self._column = QVBoxLayout(words)
         self._column.setContentsMargins(0, 0, 0, 0)
         self._column.setSpacing(4)
-        self._none = WholeLabel("dim")
+        self._none = WrappingLabel("dim")
         self._none.setText("No alarms.")
         self._column.addWidget(self._none)
         self._column.addStretch(1)
@@ -227,7 +245,7 @@ class AlarmList(Sheet):
 
 
 def style(theme: Theme) -> str:
-    """The frame of an alarm, by its tone."""
+    """Return the frame of an alarm, by its tone."""
     colours = theme.colours
     return (
         f"QFrame#alarm {{ background: {colours.card}; border: 1px solid {colours.border}; "

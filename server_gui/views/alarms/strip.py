@@ -13,17 +13,17 @@ from server_gui.views.alarms.full_list import AlarmButtons, AlarmList, style
 from server_gui.views.alarms.words import REMEDY, Told, details, fewer, headline, key_of, now_s, quiet
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text, set_tone
-from server_gui.views.widgets.choosable import Choosable
+from server_gui.views.widgets.clickable_frame import ClickableFrame
 from server_gui.views.widgets.mark import MarkIcon
 from server_gui.views.widgets.plain import set_tip
-from server_gui.views.widgets.whole import WholeLabel
+from server_gui.views.widgets.wrapping_label import WrappingLabel
 
 WIDE: Final = 1200  # at text of 100 %: then two lines are enough, and the buttons have room beside them
 HOLD_S: Final = 0.8  # nobody reads faster: until then a click was meant for the alarm before
 WRAPPED: Final = Qt.TextFlag.TextWordWrap.value
 
 
-class AlarmStrip(Choosable):
+class AlarmStrip(ClickableFrame):
     """One line that is always there: the worst alarm, or that there is none. It never changes its height.
 
     `cleared` asks for a reset of a station's fault; `shown` brings a station, a channel and an instant on the
@@ -42,7 +42,7 @@ class AlarmStrip(Choosable):
         self.told: tuple[Told, ...] = ()
         self.setAccessibleName("Active alarms")
         self._icon, self._words = MarkIcon(theme, 13), _Words()
-        self.headline, self.details = WholeLabel(), WholeLabel("dim")
+        self.headline, self.details = WrappingLabel(), WrappingLabel("dim")
         self._words.hold(self.headline, self.details)
         self.buttons, self.more = AlarmButtons(), QPushButton()
         self.more.setToolTip("Every alarm in full, and what may be done about it")
@@ -113,7 +113,7 @@ class AlarmStrip(Choosable):
             self.shown.emit(station, one.alarm.channel, one.at_ns)
 
     def acknowledge(self, told: Told) -> None:
-        """It is read."""
+        """Acknowledge the alarm."""
         station, one = told
         (self._desk.recording if station is None else station).alarms.acknowledge(one.alarm.key)
         if station is not None and one.alarm.kind is Kind.RESET:
@@ -177,7 +177,7 @@ class AlarmStrip(Choosable):
     def _fit(self, wordings: tuple[str, ...], fuller: tuple[str, ...]) -> None:
         room = self._words.viewport().size()
 
-        def high(label: WholeLabel, text: str) -> int:
+        def high(label: WrappingLabel, text: str) -> int:
             box = QRect(0, 0, max(room.width(), 1), 100_000)
             return label.fontMetrics().boundingRect(box, WRAPPED, text).height() if text else 0
 

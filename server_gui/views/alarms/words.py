@@ -46,7 +46,7 @@ def headline(told: Told, *, named: bool, more: str = "", brief: int = 0) -> str:
 
 
 def now_s(station: Station | None) -> float:
-    """The instant that is shown, UTC."""
+    """Return the instant that is shown, UTC."""
     return time.time() if station is None else station.robot.now_s()
 
 
@@ -62,12 +62,21 @@ def details(one: Active, now_s: float, *, each: bool = False) -> list[str]:
 
 
 def fewer(said: list[str]) -> tuple[str, ...]:
-    """These details as one text, and less and less of them: what to check stays longest, then since when."""
+    """Return the details as texts of decreasing length: what to check stays longest, then the time."""
     since, check = said[0].partition(" · ")[0], [one for one in said[1:] if one.startswith(REMEDY)]
-    shorter: tuple[list[str], ...] = said, [since, *said[1:]], said[1:], [since, *check], check, [since], []
+    first = [f"{begins} …" for one in check if (begins := one.partition("; ")[0]) != one]
+    with_check = (
+        said,
+        [since, *said[1:]],
+        said[1:],
+        [since, *check],
+        check,
+        [since, *first] if first else [],
+    )
+    shorter: tuple[list[str], ...] = (*with_check, first, [since], [])
     return tuple(dict.fromkeys(map(" · ".join, shorter)))
 
 
 def lasting(for_s: float) -> str:
-    """A time that grows, in whole seconds as long as these matter."""
+    """Return a time that grows, in whole seconds as long as these matter."""
     return f"{for_s:.0f} s" if for_s < 120 else age_text(for_s)

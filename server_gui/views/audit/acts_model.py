@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from PySide6.QtCore import Qt
 
-from gateway.plain import plain
+from gateway.plain_text import plain
 from gateway.units import Unit
 from gateway.wire.method import Number
 from server_gui.core.audit.acts import Act
@@ -35,7 +35,7 @@ BAD: Final = ("NOT ", "FAILED", "refused", "write taken back")  # in an outcome 
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class ActRow:
     """One act on one robot, the unit that its values are shown in, and who tells of it: robot or store."""
 
     robot: str
@@ -48,7 +48,7 @@ class Line:
         return self.robot, self.act.hash, self.act.thing
 
 
-class ActsModel(RowsModel[Line]):
+class ActsModel(RowsModel[ActRow]):
     """Each robot's lines, oldest first."""
 
     def __init__(self, theme: Theme) -> None:
@@ -75,16 +75,16 @@ def _is_bad(act: Act) -> bool:
     return any(word in act.outcome for word in BAD)
 
 
-def _when(line: Line) -> str:
+def _when(line: ActRow) -> str:
     when = datetime.datetime.fromtimestamp(line.act.utc_ns / 1e9, datetime.UTC).astimezone()
     return f"{when:%Y-%m-%d %H:%M:%S}"
 
 
-def _number(line: Line, value: Number | None) -> str:
+def _number(line: ActRow, value: Number | None) -> str:
     return "" if value is None else brief(line.unit, value)
 
 
-def _tip(line: Line) -> str:
+def _tip(line: ActRow) -> str:
     """Every digit, and where it stands in the journal."""
     act, unit = line.act, line.unit
     known = {"old": act.old, "new": act.new, "read back": act.read_back}
@@ -94,7 +94,7 @@ def _tip(line: Line) -> str:
     return "\n".join((*values, act.outcome, f"entry {act.n} of the journal, told by the {line.told_by}"))
 
 
-_TEXTS: Final[tuple[Callable[[Line], str], ...]] = (
+_TEXTS: Final[tuple[Callable[[ActRow], str], ...]] = (
     _when,
     lambda line: line.robot,
     lambda line: line.act.what,
@@ -109,7 +109,7 @@ _TEXTS: Final[tuple[Callable[[Line], str], ...]] = (
 )
 
 
-def _sort_key(line: Line, column: int) -> int | float | str:
+def _sort_key(line: ActRow, column: int) -> int | float | str:
     numbers = {OLD: line.act.old, NEW: line.act.new, READ_BACK: line.act.read_back}
     if column == TIME:
         return line.act.utc_ns

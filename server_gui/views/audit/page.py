@@ -22,7 +22,7 @@ from server_gui.core.archive.histories import History, histories
 from server_gui.core.desk.desk import Desk
 from server_gui.core.follow.news import NewsKind
 from server_gui.core.tuning.edits import unit_of
-from server_gui.views.audit.acts_model import ROBOT, TIME, ActsModel, Line
+from server_gui.views.audit.acts_model import ROBOT, TIME, ActRow, ActsModel
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.files import ask_save, save_whole
@@ -153,12 +153,12 @@ class Audit(QWidget):
     def _export(self, path: Path) -> None:
         self._desk.news.add(NewsKind.STATE, "audit", save_whole(self.save_csv, path))
 
-    def _lines(self, name: str, history: History) -> Iterator[Line]:
+    def _lines(self, name: str, history: History) -> Iterator[ActRow]:
         units = self._desk.shown.units
         parameters = [] if history.description is None else history.description.parameters
         si_of = {info.name: info.unit for info in parameters}
         for act, told_by in history.acts:
-            yield Line(name, act, unit_of(act.thing, si_of.get(act.thing, ""), units), told_by)
+            yield ActRow(name, act, unit_of(act.thing, si_of.get(act.thing, ""), units), told_by)
 
     def _filter(self) -> None:
         robot = "" if self.robot.currentIndex() <= 0 else self.robot.currentText()
@@ -211,7 +211,7 @@ def _offer(combo: QComboBox, texts: list[str]) -> None:
     combo.blockSignals(False)
 
 
-def _cells(line: Line) -> tuple[object, ...]:
+def _cells(line: ActRow) -> tuple[object, ...]:
     act = line.act
     when = datetime.datetime.fromtimestamp(act.utc_ns / 1e9, datetime.UTC).isoformat(timespec="milliseconds")
     values = ("" if value is None else value for value in (act.old, act.new, act.read_back))

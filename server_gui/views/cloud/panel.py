@@ -186,7 +186,7 @@ class Cloud(QWidget):
         self.download.setEnabled(there)
 
     def _holds(self) -> str:
-        """What nobody could look at holds not nothing."""
+        """Return what nobody could look at holds not nothing."""
         library = self._archive.library
         if library.looked_s is None or library.found.problem is not None:
             return "not known"

@@ -12,7 +12,7 @@ from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.mark import MarkIcon
 from server_gui.views.widgets.plain import set_tip
 from server_gui.views.widgets.stop_button import StopButton
-from server_gui.views.widgets.whole import WholeLabel
+from server_gui.views.widgets.wrapping_label import WrappingLabel
 
 STOP_WIDE: Final = 150  # at text of 100 %
 LONG_S: Final = 3.0  # work that takes longer says for how long
@@ -40,7 +40,7 @@ class Bar(QWidget):
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self._start = start
         self._icon = MarkIcon(theme, 14)
-        self.stage, self.words = WholeLabel("title"), WholeLabel()
+        self.stage, self.words = WrappingLabel("title"), WrappingLabel()
         self.interrupt = QPushButton("Interrupt")
         set_tip(self.interrupt, "End the command; what was found is kept, and gone on with")
         self.interrupt.clicked.connect(self.interrupted)

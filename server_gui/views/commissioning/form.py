@@ -9,12 +9,12 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QComboBox, QGridLayout, QLineEdit, QPushButton, QWidget
 
 from gateway.user_name import user_name
-from server_gui.core.commissioning.wish import Wish
-from server_gui.processes.surroundings import can_interfaces, serial_ports
+from server_gui.core.commissioning.request import CommissioningRequest
+from server_gui.processes.local_ports import can_interfaces, serial_ports
 from server_gui.views.widgets.card import Card
 from server_gui.views.widgets.files import ask_folder, ask_open
 from server_gui.views.widgets.plain import PlainLabel, set_tip
-from server_gui.views.widgets.whole import WholeLabel
+from server_gui.views.widgets.wrapping_label import WrappingLabel
 
 ABOUT: Final = (
     "Makes a robot's file from a bus of unknown drives: it asks, and you move the joints by hand, "
@@ -60,11 +60,11 @@ class Form(Card):
         self.start = QPushButton("Start")
         self.start.setObjectName("primary")
         self.start.clicked.connect(self.begin)
-        self.wrong = WholeLabel("banner")
+        self.wrong = WrappingLabel("banner")
         self.wrong.setProperty("tone", "bad")
         self.wrong.hide()
-        self.left = WholeLabel("dim")
-        about = WholeLabel("dim")
+        self.left = WrappingLabel("dim")
+        about = WrappingLabel("dim")
         about.setText(ABOUT)
         self.body.addWidget(about)
         self.body.addWidget(self.wrong)
@@ -72,9 +72,9 @@ class Form(Card):
         self.body.addWidget(self.left)
 
     @property
-    def wish(self) -> Wish:
+    def wish(self) -> CommissioningRequest:
         """What is typed now."""
-        return Wish(
+        return CommissioningRequest(
             file=_home(self.file.text()),
             bus=_home(self.bus.currentText()),
             bitrate=self.bitrate.text().strip(),

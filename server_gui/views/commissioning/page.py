@@ -16,8 +16,8 @@ from PySide6.QtWidgets import (
 )
 
 from server_gui.core.commissioning.commissioning import MOST_LINES, Commissioning
+from server_gui.core.commissioning.request import CommissioningRequest
 from server_gui.core.commissioning.stages import Stage
-from server_gui.core.commissioning.wish import Wish
 from server_gui.views.commissioning.bar import Bar
 from server_gui.views.commissioning.form import Form
 from server_gui.views.commissioning.question import Question
@@ -25,7 +25,7 @@ from server_gui.views.commissioning.result import Result
 from server_gui.views.commissioning.steps import Steps
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card
-from server_gui.views.widgets.scrolled import Scrolled
+from server_gui.views.widgets.scroll_area import ScrollArea
 
 NARROW: Final = 760  # at text of 100 %: no room for steps beside the question
 LINES: Final = 9  # of what was said, high
@@ -65,7 +65,7 @@ class CommissionPage(QWidget):
         everything.setContentsMargins(0, 0, 0, 0)
         everything.setSpacing(0)
         everything.addWidget(self.bar)
-        everything.addWidget(Scrolled(inner), 1)
+        everything.addWidget(ScrollArea(inner), 1)
         self.refresh()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -98,11 +98,11 @@ class CommissionPage(QWidget):
         self.log.refresh()
 
     def _answer(self, text: str) -> None:
-        """The keyboard waits for the next question: what it was on goes."""
+        """Send the answer, and keep the keyboard focus for the next question."""
         if self.commissioning.answer(text):
             self.setFocus()
 
-    def _start(self, wish: Wish) -> None:
+    def _start(self, wish: CommissioningRequest) -> None:
         self.commissioning.start(wish)
         self.setFocus()  # the form goes: the keyboard waits for the first question, and is on no button
         self.result.say("", again=True)

@@ -8,11 +8,11 @@ from PySide6.QtWidgets import QApplication, QGridLayout, QHBoxLayout, QLineEdit,
 
 from gateway.units import with_minus
 from server_gui.core.commissioning.commissioning import Commissioning
-from server_gui.core.commissioning.spoken import Line
+from server_gui.core.commissioning.messages import Message
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_text
 from server_gui.views.widgets.plain import PlainLabel
-from server_gui.views.widgets.whole import WholeLabel
+from server_gui.views.widgets.wrapping_label import WrappingLabel
 
 WORDS: Final = {"y": "Yes", "n": "No"}
 IN_ROW: Final = 3  # choices
@@ -40,9 +40,9 @@ class Question(Card):
         super().__init__("Question")
         self._commissioning = commissioning
         self._theme = theme
-        self._shown: Line | None = None
-        self.news, self.text = WholeLabel("dim"), WholeLabel()
-        self.refused = WholeLabel("banner")
+        self._shown: Message | None = None
+        self.news, self.text = WrappingLabel("dim"), WrappingLabel()
+        self.refused = WrappingLabel("banner")
         self.refused.setProperty("tone", "bad")
         self.field, self.unit = QLineEdit(), PlainLabel()
         self.field.returnPressed.connect(self._typed)
@@ -87,7 +87,7 @@ class Question(Card):
 
     # --- inside
 
-    def _ask(self, question: Line | None) -> None:
+    def _ask(self, question: Message | None) -> None:
         news = [one for one in self._commissioning.news if question is None or one != question.refused]
         set_text(self.news, "\n".join(news))
         self.news.setVisible(bool(news))
@@ -106,7 +106,7 @@ class Question(Card):
         self.range.setVisible(bool(self.range.text()))
         self.send.setEnabled(False)
 
-    def _offer(self, question: Line | None) -> None:
+    def _offer(self, question: Message | None) -> None:
         for button in self.buttons:
             self._choices.removeWidget(button)
             button.hide()
@@ -116,7 +116,7 @@ class Question(Card):
         for place, button in enumerate(self.buttons):
             self._choices.addWidget(button, place // IN_ROW, place % IN_ROW)
 
-    def _button(self, choice: str, question: Line | None) -> AnswerButton:
+    def _button(self, choice: str, question: Message | None) -> AnswerButton:
         button = AnswerButton(WORDS.get(choice, choice.capitalize()) if choice else "Done")
         button.setAccessibleName(f"Answer: {button.text()}")
         if not choice or (question is not None and choice == question.default):
@@ -126,7 +126,7 @@ class Question(Card):
         return button
 
     def _lead(self) -> None:
-        """The keyboard goes to the answer, where it was with the question before or on nothing."""
+        """Move the focus to the answer, if it was on the last question or nowhere."""
         focused = QApplication.focusWidget()
         ours = focused is None or focused.isAncestorOf(self) or self.isAncestorOf(focused)
         if not self.isVisible() or not ours:
@@ -158,7 +158,7 @@ class Live(QWidget):
         super().__init__()
         self._theme = theme
         self.setAccessibleName("What the drives tell now")
-        self._rows: list[tuple[PlainLabel, WholeLabel]] = []
+        self._rows: list[tuple[PlainLabel, WrappingLabel]] = []
         self._grid = QGridLayout(self)
         self._grid.setContentsMargins(0, 4, 0, 0)
         self._grid.setColumnStretch(1, 1)
@@ -188,7 +188,7 @@ class Live(QWidget):
         self.setVisible(bool(lines))
 
     def _add(self) -> None:
-        name, value = PlainLabel(), WholeLabel()
+        name, value = PlainLabel(), WrappingLabel()
         name.setObjectName("dim")
         self._grid.addWidget(name, len(self._rows), 0, Qt.AlignmentFlag.AlignTop)
         self._grid.addWidget(value, len(self._rows), 1)

@@ -6,11 +6,11 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QApplication, QHBoxLayout, QPlainTextEdit, QPushButton, QSizePolicy
 
 from server_gui.core.commissioning.commissioning import Commissioning
-from server_gui.core.commissioning.spoken import Written
+from server_gui.core.commissioning.messages import Written
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_text
 from server_gui.views.widgets.plain import set_tip
-from server_gui.views.widgets.whole import WholeLabel
+from server_gui.views.widgets.wrapping_label import WrappingLabel
 
 LINES: Final = 14  # high
 CONNECT: Final = "Start a gateway with it, and connect"
@@ -26,7 +26,7 @@ class Result(Card):
         super().__init__("The robot's file")
         self._commissioning = commissioning
         self._theme = theme
-        self.checked, self.next, self.said = WholeLabel(), WholeLabel("dim"), WholeLabel("dim")
+        self.checked, self.next, self.said = WrappingLabel(), WrappingLabel("dim"), WrappingLabel("dim")
         self.text = QPlainTextEdit()
         self.text.setObjectName("framed")
         self.text.setReadOnly(True)
@@ -99,7 +99,7 @@ class Result(Card):
 
 
 def checked(written: Written) -> str:
-    """What `gwrms check` says of it, a line each."""
+    """Return what `gwrms check` says of it, a line each."""
     lines = [f"▲ {severity}: {words}" for severity, words in written.findings]
     if written.unfinished:
         lines.append(f"▲ not in it, because not finished: {', '.join(written.unfinished)}")

@@ -6,11 +6,11 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QGridLayout, QWidget
 
 from server_gui.core.alarms.marks import GLYPHS, Mark
-from server_gui.core.commissioning.spoken import Step
+from server_gui.core.commissioning.messages import Step
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_text
 from server_gui.views.widgets.mark import MarkIcon
-from server_gui.views.widgets.whole import WholeLabel
+from server_gui.views.widgets.wrapping_label import WrappingLabel
 
 DONE, NOW, NEXT, PASSED = "done", "now", "next", "passed"
 MARKS: Final = {
@@ -31,8 +31,8 @@ class Steps(Card):
         super().__init__("Steps")
         self._theme = theme
         self._known: tuple[Step, ...] | None = None
-        self._rows: list[tuple[MarkIcon, WholeLabel, WholeLabel]] = []
-        self.none = WholeLabel("dim")
+        self._rows: list[tuple[MarkIcon, WrappingLabel, WrappingLabel]] = []
+        self.none = WrappingLabel("dim")
         self.none.setText(NONE)
         inner = QWidget()
         self._grid = QGridLayout(inner)
@@ -72,7 +72,7 @@ class Steps(Card):
         self.set_note(*((f"{done} of {len(steps)} gone through", f"{done}/{len(steps)}") if steps else ("",)))
 
     def _add(self) -> None:
-        icon, title, words = MarkIcon(self._theme), WholeLabel("title"), WholeLabel("dim")
+        icon, title, words = MarkIcon(self._theme), WrappingLabel("title"), WrappingLabel("dim")
         row = 2 * len(self._rows)
         self._grid.addWidget(icon, row, 0, Qt.AlignmentFlag.AlignVCenter)
         self._grid.addWidget(title, row, 1)
@@ -81,7 +81,7 @@ class Steps(Card):
 
 
 def _parts(steps: tuple[Step, ...]) -> list[tuple[str, list[Step]]]:
-    """Steps that follow each other in one part."""
+    """Return steps that follow each other in one part."""
     parts: list[tuple[str, list[Step]]] = []
     for step in steps:
         if not parts or parts[-1][1][-1].part != step.part:

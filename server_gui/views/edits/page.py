@@ -24,7 +24,7 @@ from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.evidence.comparison import Measured, Word
 from server_gui.core.evidence.cycles import DRAWN
-from server_gui.core.evidence.edits import Edit, State
+from server_gui.core.evidence.edits import State
 from server_gui.core.evidence.file import Told
 from server_gui.core.evidence.shown import in_units, symbols
 from server_gui.core.evidence.wording import changes, from_to, interval, number, share, strides, word
@@ -51,6 +51,9 @@ NONE: Final = (
     "torque and gait is judged here, stride by stride, before and after."
 )
 COLOURS: Final = "grey before, in colour after; {}the bands are one standard deviation of the strides"
+EDIT: Final = re.compile(
+    r"(\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d)Z \([0-9a-f]+\)"
+)  # when, and its id for the command
 BACK: Final = "strides since it was taken back are grey, too: they have the old value; "
 
 
@@ -118,7 +121,7 @@ class Edits(QWidget):
         self._choose()
 
     def _follow(self) -> None:
-        """A trial that has begun is looked at, until somebody chooses another edit."""
+        """Show a trial that has begun, until another edit is chosen."""
         running = (
             place
             for place, one in enumerate(self._shown)
@@ -143,7 +146,7 @@ class Edits(QWidget):
         return [in_units(one, units, si) for one in known]
 
     def _left(self) -> QVBoxLayout:
-        """The list, and what else may be tried."""
+        """Return the list, and what else may be tried."""
         self.ab, self.sweep = QPushButton("A/B trial…"), QPushButton("Sweep…")
         self.ab.setToolTip("Two values of a parameter against each other, several times in a drawn order")
         self.sweep.setToolTip("Values of a parameter upwards in small steps, while you watch")
@@ -173,7 +176,7 @@ class Edits(QWidget):
             self.form.show()
 
     def _chosen_edit(self, station: Station) -> Tried | None:
-        """What is looked at, unless something was staged or tried since."""
+        """Return what is looked at, unless something was staged or tried since."""
         told = self._chosen
         known = next((one for one in station.judged if told and one.edit.id == told.edit.id), None)
         if known is None or len(known.edit.changes) != 1 or station.writing.trial or station.edits.staged:
@@ -241,7 +244,7 @@ class Edits(QWidget):
         self._place()
 
     def _place(self) -> None:
-        """A joint a row; where that has no room, two rows or four."""
+        """Arrange one row per joint; without room, two or four."""
         told, px = self._drawn, self._theme.px
         room = self.width() - (0 if self._is_narrow else px(LIST))
         columns = next((one for one in (len(DRAWN), 2) if one * px(LEAST) <= room), 1)
@@ -258,7 +261,7 @@ class Edits(QWidget):
             one.show_hover(at)
 
     def _what(self, told: Told) -> str:
-        """What was changed, in its unit."""
+        """Return what was changed, in its unit."""
         if told.experiment is None:
             return changes(told.edit, self._units.get(told.edit.id, {}))
         return f"{what(told)} {told.experiment.unit}".rstrip()
@@ -267,7 +270,7 @@ class Edits(QWidget):
         ended = told.edit.became if told.experiment is None else told.experiment.kind
         values = self._what(told).replace(" → ", ARROW)  # no line ends within them, nor before a unit
         values = re.sub(r"(?<=\d) (?=[^\W\d]|[°%])", "\N{NO-BREAK SPACE}", values)
-        return f"{_when(told.edit)}  {values}\n{ended} · {word(told)}"
+        return f"{_when(told.edit.utc_ns)}  {values}\n{ended} · {word(told)}"
 
     def _verdict(self, told: Told) -> str:
         evidence, tried = told.evidence, told.experiment
@@ -286,7 +289,7 @@ class Edits(QWidget):
         return self.width() < self._theme.px(NARROW)
 
     def _scale(self) -> None:
-        """The list is beside the strides, or above them where there is less room."""
+        """Put the list beside the strides, or above them without room."""
         px, direction, is_narrow = self._theme.px, QBoxLayout.Direction, self._is_narrow
         self._row.setDirection(direction.TopToBottom if is_narrow else direction.LeftToRight)
         self.list.setMaximumSize(MOST_PX if is_narrow else px(LIST), px(ABOVE) if is_narrow else MOST_PX)
@@ -294,10 +297,10 @@ class Edits(QWidget):
         self._place()
 
 
-def _when(edit: Edit) -> str:
+def _when(utc_ns: int) -> str:
     """In the time of this place; of another day that, too."""
     try:
-        at = datetime.datetime.fromtimestamp(edit.utc_ns / 1e9, datetime.UTC).astimezone()
+        at = datetime.datetime.fromtimestamp(utc_ns / 1e9, datetime.UTC).astimezone()
     except (OverflowError, ValueError, OSError):  # nobody's calendar has it
         return NO_TIME
     is_today = at.date() == datetime.datetime.now().astimezone().date()
@@ -322,13 +325,25 @@ def _said(told: Told) -> list[str]:
     silent = sum(one.word is Word.NO_DATA for one in evidence.metrics)
     if silent:
         lines.append(f"No data for {counted(silent, 'metric')}.")
-    lines += [f"{note[0].upper()}{note[1:]}." for note in evidence.notes]
-    lines += [f"Left out: {counted(count, 'cycle')}, {why}." for why, count in evidence.left_out.items()]
+    lines += [f"{note[0].upper()}{note[1:]}." for note in map(_by_our_clock, evidence.notes)]
+    lines += [
+        f"Left out: {counted(count, 'cycle')}, {why.replace('_', ' ')}."
+        for why, count in evidence.left_out.items()
+    ]
     return lines
 
 
+def _by_our_clock(note: str) -> str:
+    """Name an edit in a note by its time, by which the list has it, instead of by the command's id."""
+
+    def time_of(found: re.Match[str]) -> str:
+        return _when(int(datetime.datetime.fromisoformat(f"{found[1]}+00:00").timestamp()) * 10**9)
+
+    return EDIT.sub(time_of, note)
+
+
 def _strong(told: Told) -> list[Measured]:
-    """What differs, the strongest first."""
+    """Return what differs, the strongest first."""
     found = (one for one in told.evidence.metrics if one.word in (Word.BETTER, Word.WORSE, Word.CHANGED))
     return sorted(found, key=lambda one: -abs(one.size or 0.0))
 
@@ -340,6 +355,6 @@ def _metric(one: Measured) -> str:
 
 
 def _in_unit(one: Measured) -> str:
-    """The difference in the metric's unit."""
+    """Return the difference in the metric's unit."""
     ends = f"{number(one.low)} to {number(one.high)} {one.unit}".rstrip()
     return f"{one.title.replace('_', ' ')}: {number(one.difference)} {one.unit}, 95 % interval {ends}"

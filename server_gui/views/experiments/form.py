@@ -38,8 +38,8 @@ from server_gui.core.experiments.wording import stated
 from server_gui.core.tuning.edits import unit_of
 from server_gui.core.tuning.writing import WriteState
 from server_gui.views.theme import Theme
-from server_gui.views.widgets.calm_spin import CalmSpin
 from server_gui.views.widgets.card import set_text
+from server_gui.views.widgets.no_wheel_spin import NoWheelSpin
 from server_gui.views.widgets.plain import PlainLabel
 
 WIDTH: Final = 460  # at text of 100 %
@@ -208,7 +208,7 @@ class ExperimentForm(QDialog):
         self._say("\n".join(line.strip() for line in stated(plan)))
 
     def _say(self, text: str) -> None:
-        """What is longer makes the form higher: Qt would press the fields together for it."""
+        """Grow the form with its contents: Qt would press the fields together."""
         set_text(self.words, text)
         needed = self.heightForWidth(self.width())
         if self.isVisible() and needed > self.height():
@@ -223,8 +223,8 @@ class ExperimentForm(QDialog):
         self.accept()
 
 
-def _spin(least: int, most: int, usual: int) -> CalmSpin:
-    spin = CalmSpin()
+def _spin(least: int, most: int, usual: int) -> NoWheelSpin:
+    spin = NoWheelSpin()
     spin.setRange(least, most)
     spin.setValue(usual)
     return spin

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from server_gui.core.evidence.experiment import Experiment, Point, Response
 from server_gui.core.evidence.wording import number
 from server_gui.views.theme import Theme
-from server_gui.views.widgets.framed import draw_frame
+from server_gui.views.widgets.plot_frame import draw_frame
 
 MARGIN: Final = 8
 DOT: Final = 3.0

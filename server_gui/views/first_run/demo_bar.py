@@ -9,7 +9,7 @@ from server_gui.core.alarms.marks import ENABLED
 from server_gui.core.desk.station import Station
 from server_gui.core.threads.answers import Deliver, when_done
 from server_gui.core.threads.background import Background
-from server_gui.processes.own_robot import OwnRobot
+from server_gui.processes.demo_robot import DemoRobot
 from server_gui.processes.sim_control import Listed, SimControl, SimulatorRefuses
 from server_gui.views.first_run.fault_menu import fill, words
 from server_gui.views.first_run.tour import Tour
@@ -17,7 +17,7 @@ from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.plain import set_tip
-from server_gui.views.widgets.whole import WholeLabel
+from server_gui.views.widgets.wrapping_label import WrappingLabel
 
 TOURED: Final = "toured"  # kept: the tour begins by itself only until somebody has left it
 HELD: Final = "A stop is held: end it first with “Reset stop…” above. Then this lets the robot walk again."
@@ -38,7 +38,7 @@ class DemoBar(QToolBar):
     def __init__(
         self,
         window: MainWindow,
-        own: OwnRobot,
+        own: DemoRobot,
         control: SimControl,
         station: Station,
         theme: Theme,
@@ -64,7 +64,7 @@ class DemoBar(QToolBar):
         )
         self.breaking = QPushButton("Break something")
         self.faults = QMenu(self.breaking)
-        self.said = WholeLabel("dim")
+        self.said = WrappingLabel("dim")
         self.tour = Tour(window, theme)
         self._build()
         window.addToolBar(self)

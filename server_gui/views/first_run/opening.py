@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING, Final
 
 from server_gui.core.desk.first_steps import FirstSteps, Step
-from server_gui.processes.own_robot import OwnRobot
+from server_gui.processes.demo_robot import DemoRobot
 from server_gui.processes.simulated import Part
 from server_gui.views.first_run.splash import Splash
 
@@ -17,7 +17,7 @@ LONGEST_S: Final = 60.0  # that a splash stands there
 class Opening:
     """`look` is called now and then, while the robot starts and after that."""
 
-    def __init__(self, own: OwnRobot, steps: FirstSteps, splash: Splash) -> None:
+    def __init__(self, own: DemoRobot, steps: FirstSteps, splash: Splash) -> None:
         self.own = own
         self._steps = steps
         self._splash = splash

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QDockWidget, QHBoxLayout, QPushButton, QWidget
 
 from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.theme import Theme
-from server_gui.views.widgets.whole import WholeLabel
+from server_gui.views.widgets.wrapping_label import WrappingLabel
 
 FRAME: Final = 3  # wide
 
@@ -94,7 +94,7 @@ class Tour(QWidget):
         self._window = window
         self._outline = Outline(window, theme)
         self.at = 0
-        self.words = WholeLabel()
+        self.words = WrappingLabel()
         self.back, self.next, self.skip = (
             QPushButton("Back"),
             QPushButton("Next"),

@@ -5,7 +5,7 @@ import sys
 from PySide6.QtCore import QSettings
 from PySide6.QtWidgets import QApplication
 
-from server_gui.views.frame.kept import kept_look, kept_scale
+from server_gui.views.frame.saved_state import kept_look, kept_scale
 from server_gui.views.theme import Look, Theme
 
 

@@ -6,7 +6,7 @@ from typing import Final
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication, QDialog, QHBoxLayout, QPushButton, QVBoxLayout
 
-from server_gui.core.desk.ending import Ending
+from server_gui.core.desk.shutdown import Shutdown
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.plain import PlainLabel
@@ -27,7 +27,7 @@ COMMISSIONING: Final = (
 class Closing(QDialog):
     """Closing it hurries what it waits for."""
 
-    def __init__(self, ending: Ending, theme: Theme) -> None:
+    def __init__(self, ending: Shutdown, theme: Theme) -> None:
         super().__init__(None, Qt.WindowType.Dialog | Qt.WindowType.WindowStaysOnTopHint)
         self._ending = ending
         self._began_s = time.monotonic()
@@ -59,7 +59,7 @@ class Closing(QDialog):
             self.show()
 
 
-def wait_closed(ending: Ending, theme: Theme) -> None:
+def wait_closed(ending: Shutdown, theme: Theme) -> None:
     """Wait for an end that was begun; whoever closes this too waits for what goes to the disk alone."""
     closing = Closing(ending, theme)
     while not ending.wait(LOOK_S) and not ending.is_hurried:

@@ -16,7 +16,7 @@ ADD = (
     "Where its gateway listens, as gwrms gateway prints it. One that has keys shows a code to pair with: "
     "sudo gwrms keys pair."
 )
-ALWAYS = "Robots that are to be followed at every start go into ~/.config/gwrms/server.toml."
+HINT = "Robots that are to be followed at every start go into ~/.config/gwrms/server.toml."
 SIMULATE = "A whole exoskeleton without hardware walks on this computer. It can be stopped, tuned and broken."
 COMMISSION = "Drives that nobody knows yet become a robot's file: it asks, and you move the joints by hand."
 OPEN = "Everything that was recorded, played in the same views; no robot is needed."
@@ -45,7 +45,7 @@ class EmptyView(QWidget):
         self.address.setAccessibleName("Address of the first robot")
         self.address.returnPressed.connect(self._add)
         self.add.setAccessibleName("Add this robot")
-        self.add.setToolTip(ALWAYS)
+        self.add.setToolTip(HINT)
         self.add.clicked.connect(self._add)
         self.pair = QPushButton("Pair with a code…")
         self.pair.clicked.connect(lambda: self.pairing.emit(self.address.text().strip()))

@@ -8,7 +8,7 @@ from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QPushButton, QWidget
 
 from gateway.wire.stop import ROBOT_RESET
-from server_gui.core.alarms.found import remedy
+from server_gui.core.alarms.robot_alarms import remedy
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.tuning.stop import StopState

@@ -5,8 +5,8 @@ from typing import Final
 from PySide6.QtWidgets import QGridLayout, QWidget
 
 from server_gui.views.theme import Theme
+from server_gui.views.widgets.overlay import Overlay
 from server_gui.views.widgets.plain import PlainLabel
-from server_gui.views.widgets.sheet import Sheet
 
 WIDEST: Final = 560  # at text of 100 %
 
@@ -64,7 +64,7 @@ KEYS: Final[dict[str, dict[str, str]]] = {
 }
 
 
-class KeysSheet(Sheet):
+class KeysSheet(Overlay):
     """Over `below`; `turn` shows it or puts it away."""
 
     def __init__(self, theme: Theme, below: QWidget) -> None:

@@ -31,31 +31,31 @@ from server_gui.core.commissioning.commissioning import Commissioning
 from server_gui.core.commissioning.stages import Stage
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
-from server_gui.core.follow.moment import one_moment
+from server_gui.core.follow.frame_time import one_moment
 from server_gui.views.alarms.events_panel import EventsPanel
 from server_gui.views.alarms.strip import AlarmStrip
-from server_gui.views.ask import ask
+from server_gui.views.confirmation import ask
 from server_gui.views.experiments.bar import ExperimentBar
 from server_gui.views.frame.closing import COMMISSIONING
 from server_gui.views.frame.docks import Area, Docks
 from server_gui.views.frame.empty import EmptyView
 from server_gui.views.frame.header import Header
 from server_gui.views.frame.help import Help
-from server_gui.views.frame.kept import keep_bytes, kept_bytes
 from server_gui.views.frame.keys_sheet import KeysSheet
 from server_gui.views.frame.page_bar import PageBar
 from server_gui.views.frame.pages import Pages
 from server_gui.views.frame.recording_chip import ask_recording
+from server_gui.views.frame.saved_state import keep_bytes, kept_bytes
 from server_gui.views.frame.status_bar import StatusBar
-from server_gui.views.pace import Pace
 from server_gui.views.parameters.panel import ParametersPanel
 from server_gui.views.parameters.trial_bar import TrialBar
 from server_gui.views.predictions import activity
+from server_gui.views.refresh_rate import RefreshRate
 from server_gui.views.robots.panel import RobotsPanel
 from server_gui.views.robots.reset import ask_clear, ask_reset
 from server_gui.views.theme import Look, Theme
-from server_gui.views.widgets.scrolled import Scrolled
-from server_gui.views.widgets.seen import has_focus_in, is_seen
+from server_gui.views.widgets.scroll_area import ScrollArea
+from server_gui.views.widgets.visibility import has_focus_in, is_seen
 
 SCALES: Final = (80, 90, 100, 125, 150, 175, 200)
 # Quantities with more than one unit worth choosing.
@@ -93,7 +93,7 @@ class MainWindow(QMainWindow):
         self._theme = theme
         self.kept = settings
         desk.pins.take(settings.value("pinned"))
-        self._pace = Pace()
+        self._pace = RefreshRate()
         self._is_arranged = False  # the panels, which may wait for the window to be shown
         self.setWindowTitle("GWRMS")
         self.resize(opening_size(self.screen().availableSize(), theme.scale))
@@ -134,7 +134,7 @@ class MainWindow(QMainWindow):
         self._pages = QStackedWidget()
         column = _column(self._middle)
         column.addWidget(self._pages, 1)
-        nobody = Scrolled()
+        nobody = ScrollArea()
         self._pages.addWidget(nobody)
         nobody.setWidget(self.empty)
         self.tabs = Pages(desk, theme, archive, commissioning)
@@ -237,7 +237,7 @@ class MainWindow(QMainWindow):
         self.closed.emit()
 
     def _ask_to_end(self, commissioning: Commissioning) -> None:
-        """It closes once that has ended: nothing here waits for it."""
+        """Close the window when the shutdown has ended, without waiting."""
 
         def end() -> None:
             self._is_closing = True

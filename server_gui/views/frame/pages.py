@@ -20,7 +20,7 @@ from server_gui.views.recordings.panel import Recordings
 from server_gui.views.resources.bus_health import BusHealthView
 from server_gui.views.resources.page import Resources
 from server_gui.views.theme import Theme
-from server_gui.views.widgets.later import Later
+from server_gui.views.widgets.lazy_view import LazyView
 from server_gui.views.workspace.beside_menu import others_of
 from server_gui.views.workspace.page import Signals
 
@@ -58,7 +58,7 @@ class Pages(QTabWidget):
         self.setAccessibleName("Views")
         step = None if archive is None else archive.playback.step
         journals = None if archive is None else archive.journals
-        self._rooms: list[Later[QWidget]] = []
+        self._rooms: list[LazyView[QWidget]] = []
         self._overview = self._add("&Overview", self._make_overview)
         self._signals = self._add(
             "&Signals",
@@ -160,9 +160,9 @@ class Pages(QTabWidget):
             if room.is_made:
                 room.view.read_now()
 
-    def _add(self, title: str, make: Callable[[], V], *, scrolled: bool = True) -> Later[V]:
-        room = Later(make, scrolled=scrolled)
-        self._rooms.append(cast("Later[QWidget]", room))
+    def _add(self, title: str, make: Callable[[], V], *, scrolled: bool = True) -> LazyView[V]:
+        room = LazyView(make, scrolled=scrolled)
+        self._rooms.append(cast("LazyView[QWidget]", room))
         self.addTab(room, title)
         return room
 

@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QLineEdit, QPushButton, QWidget
 
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.recording import Recording, Said, Tone
-from server_gui.views.ask import ask
+from server_gui.views.confirmation import ask
 from server_gui.views.frame.chip import Chip, Words
 from server_gui.views.marks import Mark
 from server_gui.views.recordings.timeline import clock_text

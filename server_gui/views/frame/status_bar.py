@@ -16,9 +16,9 @@ from server_gui.views.frame.recording_chip import TONES
 from server_gui.views.resources.bus_health import LEVELS
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
-from server_gui.views.widgets.fitted import FittedLabel
 from server_gui.views.widgets.mark import MarkIcon
 from server_gui.views.widgets.plain import PlainLabel, set_tip
+from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 
 FRAMES: Final = 60
 STOP: Final = (
@@ -35,10 +35,10 @@ class StatusBar(QStatusBar):
         super().__init__()
         self._desk = desk
         self._frames: collections.deque[float] = collections.deque(maxlen=FRAMES)
-        self.computer, self.bus, self.recording = FittedLabel(), FittedLabel(), FittedLabel()
+        self.computer, self.bus, self.recording = ShrinkingLabel(), ShrinkingLabel(), ShrinkingLabel()
         self._window = PlainLabel()
         self._icon, self._bus_icon = MarkIcon(theme, 11), MarkIcon(theme, 11)
-        stop = FittedLabel()
+        stop = ShrinkingLabel()
         stop.say(*STOP)
         stop.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         self.addWidget(self.computer)
@@ -93,7 +93,7 @@ class StatusBar(QStatusBar):
 
 
 def _bus(station: Station) -> tuple[Level, tuple[str, ...]]:
-    """The worst bus; where nothing new comes from the robot, none is known to be good."""
+    """Return the worst bus; where nothing new comes from the robot, none is known to be good."""
     level, words = worst(station.robot)
     is_known = level is not Level.GOOD or station.is_live
     return (level, words) if is_known else (Level.UNKNOWN, (UNKNOWN, "CAN –"))

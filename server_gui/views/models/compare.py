@@ -15,7 +15,7 @@ from PySide6.QtWidgets import (
 )
 
 from gateway.amounts import NONE
-from gateway.plain import plain
+from gateway.plain_text import plain
 from server_gui.core.models.catalogue import Catalogue, Entry
 from server_gui.core.models.comparison import Row, last_week, notes, percent, rows, signed, usual_other
 from server_gui.views.models.calibration import CalibrationPlot, Curve
@@ -34,6 +34,7 @@ MARKS: Final = {
 }
 NARROW: Final = 940  # at text of 100 %: no room for the plot beside the figures
 CHOOSE: Final = "Choose a model above to see how well it was judged."
+ROWS: Final = 20  # as many are whole at once: what is scrolled is the page, not a table within it
 NARROW_ROW: Final = 480  # likewise, for the choice beside the words
 
 
@@ -134,7 +135,6 @@ class Compare(Card):
         for part in (self._with, self.other, self.week, self.table, self._right):
             part.setVisible(entry is not None)
         self.table.clear()
-        self.table.setMinimumHeight(self._theme.px(190))
         if entry is None:
             set_text(self.said, CHOOSE)
             self.notes.hide()
@@ -148,6 +148,7 @@ class Compare(Card):
         set_text(self.notes, told)
         self.notes.setVisible(bool(told))
         self._fill_rows(rows(entry.card, None if other is None else other.card))
+        self.table.setMinimumHeight(self._high())
         self._fill_plot(entry, other)
         self._fit()
 
@@ -155,6 +156,13 @@ class Compare(Card):
         """Whole numbers; what a model is better or worse at is seen before how often it was judged."""
         alone = (OTHER, DIFFERENCE, VERDICT) if self.other.isHidden() else ()
         columns.fit(self.table, {NAME: self._theme.px(90)}, (DECISIONS, DIFFERENCE), alone)
+
+    def _high(self) -> int:
+        """Return how high the table is with its rows, or as many of them as are whole at once."""
+        tops = [self.table.topLevelItem(place) for place in range(self.table.topLevelItemCount())]
+        count = sum(1 + top.childCount() for top in tops if top is not None)
+        row = self.table.sizeHintForRow(0) if count else 0
+        return self.table.header().sizeHint().height() + min(count, ROWS) * row + 2 * self.table.frameWidth()
 
     def _its_week(self, other: Entry | None) -> str:
         return "" if other is None else f"\nThe other, last week: {last_week(other)}"

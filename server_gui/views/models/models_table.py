@@ -7,7 +7,7 @@ from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QAbstractItemView
 
 from gateway.amounts import counted
-from gateway.plain import plain
+from gateway.plain_text import plain
 from ml.registry.card import age_days
 from server_gui.core.models.catalogue import Entry
 from server_gui.core.models.comparison import headline, week_short

@@ -18,7 +18,7 @@ from server_gui.views.models.train_form import TrainForm, offer_robots
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_text
 from server_gui.views.widgets.plain import PlainLabel
-from server_gui.views.widgets.scrolled import bring_into_sight
+from server_gui.views.widgets.scroll_area import bring_into_sight
 
 SLOW: Final = 6  # frames between two looks
 NARROW: Final = 480  # at text of 100 %: no room for all buttons in a row
@@ -136,11 +136,13 @@ class ModelsPage(QWidget):
             bring_into_sight(self.form)
 
     def _choose_trained(self) -> None:
-        """What was trained here is looked at next, once."""
+        """Show a model trained here next, once."""
         for model in self._models.trained.keys() - self._known:
             if self._models.found.find(model) is not None:
                 self._known.add(model)
                 self.table.choose(model)
+                self.new.setChecked(False)  # what came of it is looked at next
+                bring_into_sight(self._list)
 
     def _train(self, wish: TrainingWish) -> None:
         self._models.train(wish, training)
@@ -171,7 +173,7 @@ class ModelsPage(QWidget):
             self.said.style().polish(self.said)
 
     def _show_learned(self) -> None:
-        """What is no model of the store, and serves or may: copies that have learned from who walks now."""
+        """Show adapted models, which are not in the store."""
         known = [(one.title, one.predictions.adapting) for one in self._desk or ()]
         lines = [f"◆ {title}: {one.standing}" for title, one in known if one is not None and one.standing]
         set_text(self.learned, "\n".join(lines))

@@ -7,7 +7,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QGridLayout, QPlainTextEdit, QPushButton
 
-from gateway.plain import plain
+from gateway.plain_text import plain
 from gateway.wire.dictionary import ObjectInfo
 from server_gui.core.objects.rows import channel_lines
 from server_gui.views.theme import Theme

@@ -7,9 +7,9 @@ from typing import Any, Final
 
 from PySide6.QtCore import QAbstractTableModel, QModelIndex, QPersistentModelIndex, Qt
 
-from gateway.plain import plain
+from gateway.plain_text import plain
 from gateway.wire.dictionary import ObjectInfo
-from server_gui.core.follow.moment import now_ns
+from server_gui.core.follow.frame_time import now_ns
 from server_gui.core.objects.reading import Held
 from server_gui.core.objects.rows import Compared, limits, pin_of
 from server_gui.views.theme import Theme
@@ -74,7 +74,7 @@ class ObjectsModel(QAbstractTableModel):
         return True
 
     def changed(self, first: int, last: int) -> None:
-        """What these hold may be something else."""
+        """Refresh the values of these."""
         if 0 <= first <= last < len(self.rows):
             self.dataChanged.emit(self.index(first, 0), self.index(last, len(TITLES) - 1))
 
@@ -106,7 +106,7 @@ class ObjectsModel(QAbstractTableModel):
         return None
 
     def text(self, info: ObjectInfo, column: int) -> str:
-        """What a cell says."""
+        """Return what a cell says."""
         text = plain(_TEXTS[column](self.shown, info))
         return text if len(text) <= LONGEST else f"{text[:LONGEST]}…"
 

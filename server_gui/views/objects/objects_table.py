@@ -186,7 +186,7 @@ class ObjectsTable(QTableView):
         return max(title, min(said, self._theme.px(WIDEST.get(column, MOST_PX))))
 
     def _grow(self, first: int, last: int) -> None:
-        """What is live needs as much room as what is in sight; it never shrinks, so that nothing jumps."""
+        """Fit the live column to visible values; it never shrinks, so that nothing jumps."""
         before = dict(self._widths)
         rows = self._model.rows[first : last + 1]
         for column in (HOLDS, OTHER):

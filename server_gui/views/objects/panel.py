@@ -33,8 +33,8 @@ from server_gui.views.objects.objects_table import ObjectsTable
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.files import ask_save, save_whole
-from server_gui.views.widgets.fitted import FittedLabel
 from server_gui.views.widgets.plain import PlainLabel
+from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 
 READ: Final = 6  # frames between two looks
 LOST: Final = "The robot is not linked: what is shown is as old as it says."
@@ -57,7 +57,7 @@ class ObjectsPage(QWidget):
         self._finder = Finder()
         self.setObjectName("page")
         self.bar = ChoiceBar(theme)
-        self.count = FittedLabel("dim")
+        self.count = ShrinkingLabel("dim")
         self.said = PlainLabel()
         self.said.setObjectName("banner")
         self.said.setWordWrap(True)
@@ -252,7 +252,10 @@ class ObjectsPage(QWidget):
     def _wanted(
         self, station: Station, dictionary: Dictionary, compared: Compared
     ) -> tuple[list[Object], list[Object]]:
-        """What is chosen or in sight, here and on the device beside it; and what of it never changes."""
+        """Return what is chosen or in sight, here and on the device beside it.
+
+        And what of it never changes.
+        """
         current = self.table.current
         shown = [*([] if current is None else [current]), *self.table.in_sight]
         still = [(compared.component, address) for address in dictionary.still]
@@ -268,7 +271,7 @@ class ObjectsPage(QWidget):
 
 
 def _trouble(station: Station, device: Device | None, dictionary: Dictionary) -> str:
-    """What is wrong as a whole; of single objects their rows tell."""
+    """Return what is wrong as a whole; of single objects their rows tell."""
     if not station.is_linked:
         return LOST
     if station.robot.description is None:

@@ -307,7 +307,7 @@ def _target(station: Station, joint: str) -> float | None:
 
 
 def _torque(station: Station, joint: str, desk: Desk, *, stale: bool) -> Cell:
-    """The torque as a share of what the drive may give, where that is known."""
+    """Return the torque as a share of what the drive may give, where that is known."""
     plain = _value(station, joint, "torque", desk, stale=stale)
     value, held = (
         station.robot.values.get(f"{joint}.torque"),
@@ -324,7 +324,10 @@ def _torque(station: Station, joint: str, desk: Desk, *, stale: bool) -> Cell:
 
 
 def _error(station: Station, part: Part, *, stale: bool) -> Cell:
-    """The drive's error code in words, or what is wrong with the component; nothing known is no dash."""
+    """Return the drive's error code in words, or what is wrong with the component.
+
+    Nothing known is no dash.
+    """
     code = station.robot.values.get(f"{part.name}.error_code")
     problem = part.problem or ""
     if code:
@@ -347,7 +350,10 @@ def _at_fault(station: Station, joints: list[str]) -> frozenset[int]:
 
 
 def _stop(station: Station, joint: str) -> Cell:
-    """What has shown that the latest stop stopped this drive; without proof it is not known to have."""
+    """Return what has shown that the latest stop stopped this drive.
+
+    Without proof it is not known to have.
+    """
     stopping = station.stopping
     proof = stopping.proofs.get(joint)
     if proof is not None:

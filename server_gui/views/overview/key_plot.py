@@ -16,7 +16,7 @@ from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card
 from server_gui.views.widgets.plot import Curve, Mouse, PlacedFlag, Plot, css
 from server_gui.views.widgets.time_axis import NOW, SHOWN, time_text
-from server_gui.views.widgets.wrapped import Wrapped
+from server_gui.views.widgets.wrapping_legend import WrappingLegend
 
 SECONDS: Final = 10.0
 WIDE_NUMBER: Final = re.compile(r"^−?\d+")
@@ -52,7 +52,7 @@ class KeyPlot(Card):
         self._theme = theme
         self._kind = kind
         self._curves = kind.curves  # of what the robot that is looked at has
-        self.legend = Wrapped(f"Values of {kind.title}")
+        self.legend = WrappingLegend(f"Values of {kind.title}")
         self.plot = Plot(theme, SECONDS, self._unit.scale * kind.least, Mouse.TIME)
         self.plot.set_curves([Curve(channel, colour) for channel, colour, _ in self._curves])
         self.plot.setAccessibleName(kind.title)
@@ -128,7 +128,7 @@ class KeyPlot(Card):
         )
 
     def _values(self, station: Station) -> list[float | None]:
-        """The newest, or those at the pointer."""
+        """Return the newest, or those at the pointer."""
         if self._hover is None:
             return [station.robot.values.get(name) for name in self.channels]
         times = station.rings.times(SECONDS)
@@ -157,7 +157,7 @@ class KeyPlot(Card):
         return [end for both in ends for end in both if end is not None]
 
     def _held(self, station: Station, wanted: str) -> list[float]:
-        """What drives hold in an object, where the robot's file gives it the plot's unit."""
+        """Return what drives hold in an object, where the robot's file gives it the plot's unit."""
         parts = {channel.partition(".")[0] for channel in self.channels}
         known = (
             () if not wanted or station.robot.description is None else station.robot.description.parameters

@@ -10,9 +10,9 @@ from server_gui.core.prediction.adaptation import Adapting, Happening, State
 from server_gui.views.marks import Mark
 from server_gui.views.predictions import LEARNED
 from server_gui.views.theme import Theme
-from server_gui.views.widgets.fitted import FittedLabel
 from server_gui.views.widgets.mark import MarkIcon
 from server_gui.views.widgets.plain import set_tip
+from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 
 WORDS: Final = {
     Happening.ACCEPT: ("Use it", "This robot is served by it, for this wearer and recording alone"),
@@ -31,7 +31,7 @@ class LearnedOffer(QWidget):
         self._shown: tuple[Station, Adapting] | None = None
         self.setAccessibleName("What was learned from the wearer")
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
-        self._icon, self.words = MarkIcon(theme, 10), FittedLabel()
+        self._icon, self.words = MarkIcon(theme, 10), ShrinkingLabel()
         self.buttons = {what: QPushButton(text) for what, (text, _) in WORDS.items()}
         self.buttons[Happening.ACCEPT].setObjectName("primary")
         line, row = QHBoxLayout(), QHBoxLayout()

@@ -13,9 +13,9 @@ from server_gui.views.edits.trial_words import TO_AB, changes, ends, so_far, why
 from server_gui.views.marks import Mark, drives_mark, enabled_text
 from server_gui.views.predictions import STOPPED, activity
 from server_gui.views.theme import Theme
-from server_gui.views.widgets.fitted import FittedLabel
 from server_gui.views.widgets.mark import MarkIcon
 from server_gui.views.widgets.plain import set_tip
+from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 
 A_FACT: Final = 230  # wide at least, at text of 100 %, where several stand beside each other
 ON_TRIAL: Final = Mark("half", "warn", "on trial")
@@ -29,7 +29,11 @@ class Fact(QWidget):
         self._theme = theme
         self.setAccessibleName(name)
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
-        self._icon, self.main, self.detail = MarkIcon(theme, 13), FittedLabel("title"), FittedLabel("dim")
+        self._icon, self.main, self.detail = (
+            MarkIcon(theme, 13),
+            ShrinkingLabel("title"),
+            ShrinkingLabel("dim"),
+        )
         words = QVBoxLayout()
         words.setSpacing(0)
         words.addWidget(self.main)
@@ -142,7 +146,7 @@ class NowLine(QFrame):
         set_tip(self.ab, why_not or TO_AB)
 
     def _fit(self, *, on_trial: bool) -> None:
-        """What is on trial stands beside the other facts where all its words have room, else below them.
+        """Put the trial beside the other facts if it fits, else below them.
 
         How it is judged changes with each stride, and nothing may move with that: it has what room there is.
         """

@@ -8,29 +8,29 @@ from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QVBoxLayout, QWidget
 
 from gateway.units import Unit, rounded
-from server_gui.core.desk.belief import not_judged
+from server_gui.core.desk.confidence import not_judged
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.leg_phase import leg_phase
 from server_gui.core.desk.soles import Load, Sole, loads, sole
 from server_gui.core.desk.station import Station
-from server_gui.core.follow.moment import now_ns
+from server_gui.core.follow.frame_time import now_ns
 from server_gui.core.processing.gait_events import Leg
 from server_gui.views.marks import age_text, old_text
 from server_gui.views.overview.joint_table import JointModel, JointTable
 from server_gui.views.overview.key_plot import SECONDS, KeyPlot, Kind
 from server_gui.views.overview.learned_offer import LearnedOffer
 from server_gui.views.overview.now_line import NowLine
-from server_gui.views.pace import READ_NS
 from server_gui.views.predictions import STOPPED, activity, lines, model_phases
+from server_gui.views.refresh_rate import READ_NS
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_tone
 from server_gui.views.widgets.colour_bar import ColourBar
 from server_gui.views.widgets.figure import Pose, StickFigure
-from server_gui.views.widgets.fitted import FittedLabel
 from server_gui.views.widgets.gait_ring import GaitRing
 from server_gui.views.widgets.lines import Lines
 from server_gui.views.widgets.plot import PlacedFlag
 from server_gui.views.widgets.pressure_map import PressureMap
+from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 
 SHARES: Final = (10, 9, 11)  # of the width, where three cards stand beside each other
 A_COLUMN: Final = 190  # wide at least, at text of 100 %
@@ -82,8 +82,8 @@ class Overview(QWidget):
         self._posture, self._figure = Card("Posture"), StickFigure(theme)
         self._posture.body.addWidget(self._figure)
         self._maps = {side: PressureMap(theme, side) for side in SIDES}
-        self._loads = {side: FittedLabel("title") for side in SIDES}
-        self._shares = {side: FittedLabel("dim") for side in SIDES}
+        self._loads = {side: ShrinkingLabel("title") for side in SIDES}
+        self._shares = {side: ShrinkingLabel("dim") for side in SIDES}
         self._pressure = self._pressure_card()
         self._plots = [self._plot(kind) for kind in PLOTS]
         self._joints, self._model = Card("Joints"), JointModel(desk, theme)
@@ -119,7 +119,7 @@ class Overview(QWidget):
         return QSize(self._theme.px(A_COLUMN), super().minimumSizeHint().height())
 
     def _arrange(self, columns: int) -> None:
-        """The cards beside each other, as many as have room, and the joints below all of them."""
+        """Arrange as many cards as fit in a row, and the joints below."""
         self._columns, grid = columns, self._grid
         grid.addWidget(self.now, 0, 0, 1, columns)
         cards = [] if self._is_plots else [self._status, self._posture, self._pressure]
@@ -221,7 +221,7 @@ class Overview(QWidget):
             self.learned.refresh(station)
 
     def _words(self, station: Station) -> tuple[str, str]:
-        """What the wearer does, and how fast."""
+        """Return what the wearer does, and how fast."""
         line, gait = activity(station), station.processing.derived().gait
         if line.mark.word == STOPPED:
             return line.short_text, "not judged"
@@ -308,7 +308,7 @@ def _load_texts(side: str, load: Load, force: Unit) -> tuple[str, ...]:
 
 
 def _meaning(sources: Collection[str], *, model: bool) -> tuple[str, ...]:
-    """What the rings mean, the fullest wording first."""
+    """Return what the rings mean, the fullest wording first."""
     rings, short = "outer ring left, inner right", "outer left, inner right"
     told = [f"line: steps by {', '.join(sorted(sources))}"] if sources else []
     told += ["dot: model"] if model else []

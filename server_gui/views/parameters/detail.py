@@ -15,12 +15,12 @@ from server_gui.core.desk.station import Station
 from server_gui.core.tuning.edits import refusal, unit_of
 from server_gui.core.tuning.flash import RULE
 from server_gui.views.parameters.range_bar import RangeBar
-from server_gui.views.parameters.several import SeveralMenu
+from server_gui.views.parameters.several_joints_menu import SeveralMenu
 from server_gui.views.parameters.tree import brief
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_text
-from server_gui.views.widgets.fitted import FittedLabel
 from server_gui.views.widgets.plain import PlainLabel, set_tip
+from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 
 STEPS: Final = 200
 SEVERAL: Final = "The same for other joints: one change, reviewed, written and taken back as a whole"
@@ -87,7 +87,7 @@ class Detail(Card):
         self._facts.setWordWrap(True)
         set_tip(self._facts, f"Stored: {RULE}")
         self.body.addWidget(self._facts)
-        self._brief = FittedLabel("dim")
+        self._brief = ShrinkingLabel("dim")
         self._brief.hide()
         self.body.addWidget(self._brief)
 
@@ -186,7 +186,7 @@ def reach(info: ParameterInfo, current: Number | None) -> tuple[float, float] | 
 
 
 def _round(value: float, span: float, scale: float, unit: Unit) -> float:
-    """A slider gives numbers that people would type, in `unit`, no finer than a count of the device."""
+    """Return a slider's value rounded for people, in `unit`, no finer than a count of the device."""
     digits = max(0, 2 - math.floor(math.log10(span * unit.scale)))
     if scale > 0:
         digits = min(digits, max(0, -math.floor(math.log10(scale * unit.scale) + 1e-9)))

@@ -22,7 +22,7 @@ from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.tuning.comparison import open_file, save_file, staged_as
 from server_gui.core.tuning.edits import Change, refusal, unit_of
-from server_gui.core.tuning.several import Offer
+from server_gui.core.tuning.several_joints import Offer
 from server_gui.core.tuning.writing import WriteState
 from server_gui.views.parameters.control_bar import ControlBar
 from server_gui.views.parameters.detail import Detail
@@ -35,7 +35,7 @@ from server_gui.views.parameters.trial_bar import TrialBar
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.files import ask_open, ask_save
 from server_gui.views.widgets.plain import PlainLabel, set_tip
-from server_gui.views.widgets.scrolled import Scrolled
+from server_gui.views.widgets.scroll_area import ScrollArea
 
 EDIT, REVIEW, STORE = range(3)  # pages; those that are not in front ask for no room
 STORING: Final = "Make a device keep its parameters when its power goes; a step of its own"
@@ -62,8 +62,8 @@ class ParametersPanel(QWidget):
         everything.setContentsMargins(8, 8, 8, 8)
         everything.addWidget(self.control)
         everything.addWidget(self.pages, 1)
-        self.pages.addWidget(Scrolled(self._edit_page()))  # what leads on, below, stays in sight
-        for page in (Scrolled(self.review), Scrolled(self.storing)):
+        self.pages.addWidget(ScrollArea(self._edit_page()))  # what leads on, below, stays in sight
+        for page in (ScrollArea(self.review), ScrollArea(self.storing)):
             page.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Ignored)
             self.pages.addWidget(page)
         everything.addWidget(self.banner)
@@ -239,7 +239,7 @@ class ParametersPanel(QWidget):
         return grid
 
     def _more_button(self) -> QPushButton:
-        """What its menu has is done by the buttons that it stands for."""
+        """Return what its menu has is done by the buttons that it stands for."""
         self._seldom = (self._compare, self._save, self.store_button)
         self.more = QPushButton("More")
         menu = QMenu(self.more)
@@ -352,7 +352,7 @@ class ParametersPanel(QWidget):
             self.pages.setCurrentIndex(EDIT)
 
     def _refused(self, station: Station | None) -> str:
-        """What of the staged the robot would refuse, as it stands now."""
+        """Return what of the staged the robot would refuse, as it stands now."""
         changes = () if station is None else station.difference(self._desk.shown.units)
         said = [f"{change.name}: {change.problem}" for change in changes if change.problem]
         return "\n".join(said)
@@ -377,7 +377,7 @@ def _close_file(station: Station) -> None:
 
 
 def _banner(station: Station | None, staged: int, problem: str) -> tuple[str, str]:
-    """What matters most now, and how it is meant."""
+    """Return what matters most now, and how it is meant."""
     if station is None:
         return "No robot chosen: there is nothing to change.", "plain"
     if problem:

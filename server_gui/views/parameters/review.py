@@ -18,8 +18,8 @@ from PySide6.QtWidgets import (
 from server_gui.core.tuning.edits import Change
 from server_gui.views.parameters.tree import range_text
 from server_gui.views.theme import Theme
-from server_gui.views.widgets.calm_spin import CalmSpin
 from server_gui.views.widgets.columns import title_widths
+from server_gui.views.widgets.no_wheel_spin import NoWheelSpin
 from server_gui.views.widgets.plain import PlainLabel, set_tip
 
 TITLES: Final = ("Parameter", "Robot now", "", "New", "Unit", "Change", "Allowed", "")
@@ -66,7 +66,7 @@ class Review(QWidget):
         self.said = PlainLabel()
         self.said.setObjectName("banner")
         self.said.setWordWrap(True)
-        self.seconds = CalmSpin()
+        self.seconds = NoWheelSpin()
         self.seconds.setRange(5, 300)
         self.seconds.setValue(TRIAL_S)
         self.seconds.setSuffix(" s")

@@ -208,7 +208,7 @@ class ParameterTree(QTreeView):
         self._filtering = False
 
     def _choose_again(self) -> None:
-        """A row that was left out has given its place to another one, which nobody has chosen."""
+        """Select the same row again; none if it was filtered out."""
         if self._looked_at is None:
             return
         known = self._rows.get(self._looked_at)
@@ -287,7 +287,7 @@ class ParameterTree(QTreeView):
     def _refresh_facts(
         self, station: Station, name: str, info: ParameterInfo, pinned: frozenset[str]
     ) -> None:
-        """What is known of it beside its value."""
+        """Set the facts beside its value."""
         items = self._rows[name]
         short = name.partition(".")[2].replace("_", " ")
         _set(items[NAME], f"★ {short}" if name in pinned else short)

@@ -20,9 +20,9 @@ from server_gui.core.cloud.tape import Tape
 from server_gui.views.recordings.timeline import SECOND_NS, Timeline, clock_text
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
-from server_gui.views.widgets.fitted import FittedLabel
 from server_gui.views.widgets.plain import set_tip
-from server_gui.views.widgets.whole import WholeLabel
+from server_gui.views.widgets.shrinking_label import ShrinkingLabel
+from server_gui.views.widgets.wrapping_label import WrappingLabel
 
 LABEL_ROLE: Final = Qt.ItemDataRole.UserRole + 1
 
@@ -37,7 +37,7 @@ class LabelBar(QWidget):
         self._theme = theme
         self._tape: Tape | None = None
         self._revision = -1
-        self.span, self.said = FittedLabel("dim"), WholeLabel("dim")
+        self.span, self.said = ShrinkingLabel("dim"), WrappingLabel("dim")
         self.list = QListWidget()
         self.list.setAccessibleName("Labels of this recording")
         self.list.setObjectName("framed")
@@ -141,7 +141,7 @@ class LabelBar(QWidget):
 
 
 def _span_texts(tape: Tape, span: tuple[int, int] | None) -> tuple[str, ...]:
-    """The span, in fewer words where there is less room."""
+    """Return the span, in fewer words where there is less room."""
     if span is None:
         return "No span chosen", "No span"
     begin, end = ((at - tape.first_ns) / SECOND_NS for at in span)

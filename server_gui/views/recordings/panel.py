@@ -4,12 +4,12 @@ from PySide6.QtWidgets import QStackedWidget
 
 from server_gui.core.archive.archive import Archive
 from server_gui.core.desk.recording import Recording
-from server_gui.views.recordings.changed import ChangedPage
+from server_gui.views.recordings.comparison import ComparisonPage
 from server_gui.views.recordings.player import Player
 from server_gui.views.recordings.sessions import SessionsPage
 from server_gui.views.theme import Theme
-from server_gui.views.widgets.later import Later
-from server_gui.views.widgets.scrolled import Scrolled
+from server_gui.views.widgets.lazy_view import LazyView
+from server_gui.views.widgets.scroll_area import ScrollArea
 
 LIST, PLAYER, CHANGED = range(3)
 
@@ -25,10 +25,10 @@ class Recordings(QStackedWidget):
         self.list = SessionsPage(archive, recording, theme)
         self.list.played.connect(self._play)
         self.list.compared.connect(lambda: self.setCurrentIndex(CHANGED))
-        self._player = Later(self._make_player)
-        self._changed = Later(self._make_changed)
+        self._player = LazyView(self._make_player)
+        self._changed = LazyView(self._make_changed)
         # Each is scrolled by itself, else a low one is as high as the other likes.
-        for page in (Scrolled(self.list), self._player, self._changed):
+        for page in (ScrollArea(self.list), self._player, self._changed):
             self.addWidget(page)
 
     @property
@@ -36,7 +36,7 @@ class Recordings(QStackedWidget):
         return self._player.view
 
     @property
-    def changed(self) -> ChangedPage:
+    def changed(self) -> ComparisonPage:
         return self._changed.view
 
     def refresh(self) -> None:
@@ -51,8 +51,8 @@ class Recordings(QStackedWidget):
         made.left.connect(lambda: self.setCurrentIndex(LIST))
         return made
 
-    def _make_changed(self) -> ChangedPage:
-        made = ChangedPage(self._archive, self._theme)
+    def _make_changed(self) -> ComparisonPage:
+        made = ComparisonPage(self._archive, self._theme)
         made.left.connect(lambda: self.setCurrentIndex(LIST))
         return made
 
@@ -60,3 +60,4 @@ class Recordings(QStackedWidget):
         if self._archive.play():
             self.setCurrentIndex(PLAYER)
             self.player.show_tape()
+            self._archive.playback.play(on=True)  # as the button says; at its very beginning there is little

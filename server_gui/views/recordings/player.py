@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from gateway.plain import plain
+from gateway.plain_text import plain
 from server_gui.core.archive.archive import Archive
 from server_gui.core.archive.playback import SPEEDS
 from server_gui.core.archive.recorded_notes import RecordedNotes
@@ -32,11 +32,11 @@ from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.files import ask_save
 from server_gui.views.widgets.plain import PlainLabel, set_tip
-from server_gui.views.widgets.scrolled import Scrolled
+from server_gui.views.widgets.scroll_area import ScrollArea
 from server_gui.views.workspace.page import Signals
 
-ROOMY: Final = 440  # high, at text of 100 %: what is lower shows the robot rather than what labels it
-ALL: Final = 960  # high, likewise: from there on all of the robot is seen above the labels
+ROOMY: Final = 440  # high, at text of 100 %: what is lower shows plots alone beside labels
+ALL: Final = 960  # high, likewise: what is lower begins with all of the robot rather than with what labels it
 SLOW: Final = 5  # frames between two looks at what people read
 
 
@@ -58,7 +58,7 @@ class Player(QWidget):
         self._views = (self.overview, self.signals)
         self._stack = QStackedWidget()
         for view in self._views:
-            self._stack.addWidget(Scrolled(view))
+            self._stack.addWidget(ScrollArea(view))
         self.banner = PlainLabel()
         self.banner.setObjectName("banner")
         self.banner.setWordWrap(True)
@@ -77,21 +77,21 @@ class Player(QWidget):
         everything.addWidget(self.timeline)
         everything.addLayout(self._transport())
         everything.addWidget(self.labels)
-        self._is_roomy = True
+        self._is_roomy, self._has_room_for_all = True, True
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Where the height begins or ends to be enough for all; else labels stay as somebody wants them."""
         super().resizeEvent(event)
-        is_roomy = self.height() >= self._theme.px(ROOMY)
-        if is_roomy is not self._is_roomy:
-            self._is_roomy = is_roomy
-            self.labelling.setChecked(is_roomy)
+        self._is_roomy = self.height() >= self._theme.px(ROOMY)
+        has_room = self.height() >= self._theme.px(ALL)
+        if has_room is not self._has_room_for_all:
+            self._has_room_for_all = has_room
+            self.labelling.setChecked(has_room)
         self._make_room()
 
     def _make_room(self) -> None:
         """While somebody labels, what is labelled is in sight: the plots, beside what it was then."""
-        is_low = self.height() < self._theme.px(ALL)
-        alone = is_low and self.labelling.isChecked()
+        alone = not self._has_room_for_all and self.labelling.isChecked()
         self.overview.show_plots_alone(alone, with_now=self._is_roomy)
 
     def heightForWidth(self, width: int) -> int:
@@ -114,6 +114,7 @@ class Player(QWidget):
             return
         self._views[self._stack.currentIndex()].refresh()
         self.timeline.show_position(playback.position_ns)
+        self.timeline.show_outline(playback.outline)
         self._frame += 1
         if self._frame % SLOW == 1:
             self._refresh_words()

@@ -18,7 +18,7 @@ from PySide6.QtWidgets import (
 )
 
 from gateway.amounts import size
-from gateway.plain import plain
+from gateway.plain_text import plain
 from ml.store.labels import utc_ns
 from ml.store.sessions import Session
 from server_gui.core.archive.archive import Archive
@@ -258,7 +258,7 @@ def _when(time: datetime | None) -> str:
 
 
 def _told(session: Session | None, tape: Tape | None, problem: str, held: Sequence[str]) -> str:
-    """What is known of it, as text."""
+    """Return what is known of it, as text."""
     if session is None:
         return "Choose a recording to see what is in it; with Ctrl a second one, to ask what changed."
     known = {

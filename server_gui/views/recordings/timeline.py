@@ -1,14 +1,16 @@
-"""The whole of a recording as a bar: where it is played, what happened when, its labels, the chosen span."""
+"""The whole of a recording as a bar: what went on, where it is played, what happened when, its labels."""
 
 from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from typing import Final
 
-from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
+import numpy as np
+from PySide6.QtCore import QLineF, QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from ml.store.labels import Label, utc_ns
+from server_gui.core.archive.outline import Outline
 from server_gui.core.cloud.tape import Tape
 from server_gui.core.desk.flags import TOLD, Flag
 from server_gui.views.marks import Mark, draw
@@ -26,6 +28,8 @@ STEPS: Final = {
 TICKS_S: Final = (1, 2, 5, 10, 30, 60, 120, 300, 600, 1800, 3600, 7200, 14400, 43200, 86400)
 # Paul Tol's light scheme, for labels: no two of them alike to those who see fewer colours.
 HUES: Final = ("#77aadd", "#ee8866", "#eedd88", "#ffaabb", "#99ddff", "#44bb99", "#bbcc33", "#aaaa00")
+BAR: Final = 40  # high, at text of 100 %
+LABELLED: Final = 0.42  # of which labels take so much, at its bottom
 MISSING: Final = Mark("triangle", "warn", "something is missing")
 
 
@@ -51,6 +55,8 @@ class Timeline(QWidget):
         self._position_ns = 0
         self._labels: Sequence[Label] = ()
         self._flags: Sequence[Flag] = ()
+        self._outline: Outline | None = None
+        self._outlined = -1  # its revision
         self._dragged_from_ns: int | None = None
         self.span_ns: tuple[int, int] | None = None
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
@@ -61,7 +67,7 @@ class Timeline(QWidget):
         theme.changed.connect(self.updateGeometry)
 
     def sizeHint(self) -> QSize:
-        return QSize(400, self._theme.px(66))
+        return QSize(400, self._theme.px(34 + BAR))
 
     def show_tape(self, tape: Tape) -> None:
         """Show another recording."""
@@ -84,6 +90,12 @@ class Timeline(QWidget):
         """Show what happened when."""
         self._flags = flags
         self.update()
+
+    def show_outline(self, outline: Outline) -> None:
+        """Show what went on all the time."""
+        if outline.revision != self._outlined:
+            self._outline, self._outlined = outline, outline.revision
+            self.update()
 
     def choose(self, begin_ns: int, end_ns: int) -> None:
         """Choose a span."""
@@ -162,6 +174,7 @@ class Timeline(QWidget):
         bar = self._bar()
         painter.fillRect(bar, self._theme.colour("field"))
         self._draw_span(painter, bar)
+        self._draw_outline(painter, bar)
         self._draw_labels(painter, bar)
         painter.setPen(self._theme.colour("accent" if self.hasFocus() else "border"))
         painter.drawRect(bar)
@@ -183,12 +196,44 @@ class Timeline(QWidget):
             colour.setAlpha(70)
             painter.fillRect(QRectF(left, bar.top(), max(right - left, 2.0), bar.height()), colour)
 
+    def _draw_outline(self, painter: QPainter, bar: QRectF) -> None:
+        """Above the labels: how far each knee bent; where nothing was recorded there is nothing."""
+        if self._outline is None:
+            return
+        high = bar.height() * (1 - LABELLED) - 4
+        painter.save()
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing, on=False)
+        for name, least in self._outline.least.items():
+            most = self._outline.most[name]
+            known = np.flatnonzero(~np.isnan(least))
+            if not len(known):
+                continue
+            bottom, span = np.nanmin(least), np.nanmax(most) - np.nanmin(least)
+            scale = high / span if span > 0 else 0.0
+            colour = self._theme.side(name)
+            colour.setAlpha(150)
+            wide = bar.width() / len(least)
+            pen = QPen(colour, max(wide, 1.0))
+            pen.setCapStyle(Qt.PenCapStyle.FlatCap)
+            painter.setPen(pen)
+            floor = bar.top() + 2 + high
+            places = bar.left() + (known + 0.5) * wide
+            tops, bottoms = floor - (most[known] - bottom) * scale, floor - (least[known] - bottom) * scale
+            painter.drawLines(
+                [
+                    QLineF(x, top, x, max(low, top + 1))
+                    for x, top, low in zip(places, tops, bottoms, strict=True)
+                ]
+            )
+        painter.restore()
+
     def _draw_labels(self, painter: QPainter, bar: QRectF) -> None:
         painter.setFont(self._theme.text_font(0.85))
         names = sorted({label.label for label in self._labels})
         for label in self._labels:
             left, right = self._x(label.began_utc_ns), self._x(label.ended_utc_ns)
-            box = QRectF(left, bar.center().y(), max(right - left, 2.0), bar.height() / 2)
+            high = bar.height() * LABELLED
+            box = QRectF(left, bar.bottom() - high, max(right - left, 2.0), high)
             painter.fillRect(box, QColor(HUES[names.index(label.label) % len(HUES)]))
             painter.setPen(QColor("#101010"))
             painter.drawText(box.adjusted(3, 0, 0, 0), Qt.AlignmentFlag.AlignVCenter, label.label)
@@ -216,7 +261,7 @@ class Timeline(QWidget):
     # --- where an instant is
 
     def _flag_at(self, place: QPointF) -> Flag | None:
-        """What happened is pointed at above the bar."""
+        """Return what happened there; it is pointed at above the bar."""
         if place.y() > self._bar().top():
             return None
         near = self._theme.px(7)
@@ -229,7 +274,7 @@ class Timeline(QWidget):
 
     def _bar(self) -> QRectF:
         px = self._theme.px
-        return QRectF(px(16), px(13), max(self.width() - px(32), 1), px(32))
+        return QRectF(px(16), px(13), max(self.width() - px(32), 1), px(BAR))
 
     def _x(self, instant_ns: int) -> float:
         if self._tape is None:

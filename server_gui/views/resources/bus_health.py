@@ -35,11 +35,11 @@ from server_gui.views.marks import Mark
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_text
 from server_gui.views.widgets.columns import title_widths
-from server_gui.views.widgets.fitted import FittedLabel
 from server_gui.views.widgets.mark import MarkIcon
 from server_gui.views.widgets.plot import css
-from server_gui.views.widgets.whole import WholeLabel
-from server_gui.views.widgets.wrapped import Wrapped
+from server_gui.views.widgets.shrinking_label import ShrinkingLabel
+from server_gui.views.widgets.wrapping_label import WrappingLabel
+from server_gui.views.widgets.wrapping_legend import WrappingLegend
 
 READ: Final = 6  # frames between two looks
 LEVELS: Final = {
@@ -113,9 +113,9 @@ class BusCard(Card):
     def __init__(self, theme: Theme) -> None:
         super().__init__("Bus")
         self._theme = theme
-        self._icon, self.load, self._bar = MarkIcon(theme, 13), FittedLabel("title"), LoadBar(theme)
-        self._counters = Wrapped("Counters of the bus")
-        self._kinds = Wrapped("Who talks, by kind")
+        self._icon, self.load, self._bar = MarkIcon(theme, 13), ShrinkingLabel("title"), LoadBar(theme)
+        self._counters = WrappingLegend("Counters of the bus")
+        self._kinds = WrappingLegend("Who talks, by kind")
         self.table = QTableWidget(0, len(TITLES))
         self.table.setHorizontalHeaderLabels(TITLES)
         self.table.setAccessibleName("Nodes of the bus")
@@ -187,7 +187,7 @@ class BusCard(Card):
         self._fit()
 
     def _fit(self) -> None:
-        """What has no room is left out whole: no number is cut."""
+        """Leave out parts without room as a whole: no number is cut."""
         titles = title_widths(self.table)
         widths = [max(self.table.sizeHintForColumn(column), title) for column, title in enumerate(titles)]
         shown = set(range(len(TITLES)))
@@ -221,7 +221,7 @@ class BusHealthView(QWidget):
         self._frame = 0
         self.cards: list[BusCard] = []
         self.setObjectName("page")
-        self.said, self.checks = WholeLabel("banner"), WholeLabel("dim")
+        self.said, self.checks = WrappingLabel("banner"), WrappingLabel("dim")
         self._check = Card("What to check")
         self._check.body.addWidget(self.checks)
         self._column = QVBoxLayout(self)
@@ -283,7 +283,7 @@ def _kinds(bus: BusInfo) -> list[tuple[str, float]]:
 
 
 def _order(node_id: int | None, talk: Talking | None) -> tuple[float, bool, int]:
-    """The largest share first; of one and the same, as it is shown, the lowest node."""
+    """Return the largest share first; of one and the same, as it is shown, the lowest node."""
     return 0.0 if talk is None else -round(100 * talk.share), node_id is None, node_id or 0
 
 

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QBoxLayout, QGridLayout, QLineEdit, QWidget
 from gateway.wire.resource import ResourceSnapshot
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
-from server_gui.core.follow.moment import now_ns
+from server_gui.core.follow.frame_time import now_ns
 from server_gui.core.processing.process_names import told_apart
 from server_gui.core.processing.resource import DEVICES, SERIES
 from server_gui.views.marks import age_text

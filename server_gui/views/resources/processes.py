@@ -6,7 +6,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView
 
-from gateway.plain import plain
+from gateway.plain_text import plain
 from gateway.wire.resource import ProcessUse
 from server_gui.core.processing.process_names import arguments_of, command_of
 from server_gui.views.theme import Theme
@@ -63,7 +63,7 @@ class ProcessTable(RowsTable):
         self._make_room()
 
     def _make_room(self) -> None:
-        """The command tells processes apart, where not all has room."""
+        """Show the command if there is not room for all columns: it tells processes apart."""
         for column, least in ROOM.items():
             self.setColumnHidden(column, self.width() < self._theme.px(least))
 

@@ -11,7 +11,7 @@ from PySide6.QtGui import QShowEvent
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card
 from server_gui.views.widgets.plot import Curve, Plot, css
-from server_gui.views.widgets.wrapped import Wrapped
+from server_gui.views.widgets.wrapping_legend import WrappingLegend
 
 Floats = npt.NDArray[np.float64]
 LEAST_HIGH: Final = 60  # a plot, at text of 100 %: its legend leaves it so much
@@ -42,7 +42,7 @@ class Trend(Card):
         self._symbol, self._digits = symbol, digits
         self._shown: tuple[object, ...] = ()
         self._rows = object()  # another one where what is drawn is no longer only added to
-        self.legend = Wrapped(f"Values of {title}", named=True)
+        self.legend = WrappingLegend(f"Values of {title}", named=True)
         self.body.addWidget(self.legend)
         theme.scaled.connect(self._resize)
 

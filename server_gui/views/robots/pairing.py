@@ -34,7 +34,7 @@ class Attempt(QObject):
         self._thread.start()
 
     def give_up(self) -> None:
-        """It ends within some seconds, and pins nothing."""
+        """Cancel the pairing, within some seconds and without a pin."""
         self._given_up.set()
 
     def join(self, within_s: float | None = None) -> bool:

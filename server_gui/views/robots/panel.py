@@ -4,6 +4,7 @@ from typing import Final
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
+    QGridLayout,
     QHBoxLayout,
     QLineEdit,
     QPushButton,
@@ -18,16 +19,17 @@ from gateway.wire.pairing import is_link
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.settings.server_file import name_of
-from server_gui.views.ask import ask
+from server_gui.views.confirmation import ask
 from server_gui.views.marks import age_text
+from server_gui.views.predictions import doing
 from server_gui.views.robots.pairing import PairingDialog, show_pairing
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
-from server_gui.views.widgets.choosable import Choosable
+from server_gui.views.widgets.clickable_frame import ClickableFrame
 from server_gui.views.widgets.elided import ElidedLabel
-from server_gui.views.widgets.fitted import FittedLabel
 from server_gui.views.widgets.mark import MarkIcon
 from server_gui.views.widgets.plain import PlainLabel, set_tip
+from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 from server_gui.views.widgets.stop_button import StopButton
 
 # Where a card has no room for a state's own words.
@@ -35,15 +37,12 @@ SHORTER: Final = {
     "operation enabled": "enabled",
     "switch on disabled": "disabled",
     "ready to switch on": "ready",
-    "not to be believed": "not believed",
     "ANOTHER ROBOT ANSWERS": "ANOTHER ROBOT",
-    "STOP NOT CONFIRMED": "NOT CONFIRMED",
-    "component stale": "stale",
 }
 PAIRING_ENDS_S: Final = 1.0  # how long the window waits for that when it closes
 
 
-class RobotCard(Choosable):
+class RobotCard(ClickableFrame):
     """One robot; `chosen` when it is clicked, or Return or Space is pressed on it; `removed` likewise."""
 
     removed = Signal()
@@ -53,8 +52,13 @@ class RobotCard(Choosable):
         self.station = station
         self.setAccessibleName(f"Robot {station.name}")
         self._icon = MarkIcon(theme, 12)
-        self._name, self._state, self._link = ElidedLabel("title"), FittedLabel("dim"), FittedLabel("dim")
-        self._where = FittedLabel("dim")  # only where another robot is called so, too
+        self._name, self._state, self._link = (
+            ElidedLabel("title"),
+            ShrinkingLabel("dim"),
+            ShrinkingLabel("dim"),
+        )
+        self._doing = ShrinkingLabel("dim")
+        self._where = ShrinkingLabel("dim")  # only where another robot is called so, too
         self._state.setMinimumWidth(1)
         self.stop = StopButton("robot_stop")
         self.remove = QToolButton()
@@ -62,24 +66,24 @@ class RobotCard(Choosable):
         self.remove.setToolTip("Remove it from this window: nothing of it is stopped")
         self.remove.setStyleSheet("padding: 1px 3px; border: none;")
         self.remove.clicked.connect(self.removed)
-        words = QVBoxLayout()
-        words.setSpacing(1)
-        for label in (self._name, self._where, self._state, self._link):
-            words.addWidget(label)
-        row = QHBoxLayout()
-        row.addWidget(self._icon, 0, Qt.AlignmentFlag.AlignTop)
-        row.addLayout(words, 1)
-        row.addWidget(self.remove, 0, Qt.AlignmentFlag.AlignTop)
+        words = QGridLayout()
+        words.setVerticalSpacing(1)
+        words.setColumnStretch(1, 1)
+        words.addWidget(self._icon, 0, 0)
+        words.addWidget(self._name, 0, 1)
+        words.addWidget(self.remove, 0, 2)
+        for row, label in enumerate((self._where, self._state, self._doing, self._link), 1):
+            words.addWidget(label, row, 1, 1, 2)  # a state's own words have room
         column = QVBoxLayout(self)
         column.setContentsMargins(9, 7, 8, 7)
         column.setSpacing(5)
-        column.addLayout(row)
+        column.addLayout(words)
         column.addWidget(self.stop)
 
     @property
-    def texts(self) -> tuple[str, str, str]:
-        """What it says."""
-        return self.station.title, self._state.text(), self._link.text()
+    def texts(self) -> tuple[str, str, str, str]:
+        """What it says: name, state, age, what the robot does."""
+        return self.station.title, self._state.text(), self._link.text(), self._doing.text()
 
     def refresh(self, *, selected: bool) -> None:
         """Show how it is now."""
@@ -98,6 +102,7 @@ class RobotCard(Choosable):
         # One line: its STOP does not move with what is wrong.
         self._state.say(*filter(None, (*said, mark.word, short)))
         set_tip(self._state, "" if worst is None else worst.line)
+        self._doing.say(*doing(station))
         age = f"{age_text(robot.age_s())}{' old' if robot.age_s() is not None else ''}"
         live = "" if robot.is_stale() else f" · {robot.rate_text()}"
         self._link.say(*dict.fromkeys((f"{age}{live}", age)))

@@ -8,7 +8,7 @@ from gateway.wire.stop import ROBOT_RESET
 from server_gui.core.alarms.marks import ENABLED
 from server_gui.core.alarms.texts import Kind, check_of
 from server_gui.core.desk.station import Station
-from server_gui.views.ask import Question, ask
+from server_gui.views.confirmation import Question, ask
 
 DOES = "Every drive is led to “switch on disabled”. None is enabled, and nothing moves by it."
 

@@ -4,7 +4,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
 
 from server_gui.views.widgets.elided import ElidedLabel
-from server_gui.views.widgets.fitted import FittedLabel
+from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 
 
 class Card(QFrame):
@@ -18,7 +18,7 @@ class Card(QFrame):
         self._title.setText(title)
         self._title.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Preferred)
         self._title.setMinimumWidth(1)
-        self._note = FittedLabel("note")
+        self._note = ShrinkingLabel("note")
         self._note.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         head = QHBoxLayout()
         head.addWidget(self._title)

@@ -1,6 +1,6 @@
 """Names, with … in their middle where there is no room, and sentences, with … behind a whole word.
 
-Numbers alone are for `FittedLabel`.
+Numbers alone are for `ShrinkingLabel`.
 """
 
 from PySide6.QtCore import Qt

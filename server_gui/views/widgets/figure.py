@@ -155,7 +155,7 @@ class StickFigure(QWidget):
             painter.drawText(box, Qt.AlignmentFlag.AlignRight, said[row])
 
     def _font_for(self, lines: Sequence[str]) -> QFont:
-        """The usual one, or as much smaller as it takes for every number to be whole."""
+        """Return the usual one, or as much smaller as it takes for every number to be whole."""
         for factor in ANGLES_SIZES:
             font = self._theme.number_font(factor)
             if max(map(QFontMetricsF(font).horizontalAdvance, lines)) < self.width():

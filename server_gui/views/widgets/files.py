@@ -9,7 +9,7 @@ from typing import Final
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFileDialog, QMessageBox, QWidget
 
-from gateway.plain import plain
+from gateway.plain_text import plain
 
 NO_NAME: Final = r"[^\w.+-]+"  # what no file of any system should be called
 

@@ -167,7 +167,10 @@ class GaitRing(QWidget):
         return 2 * math.sqrt(max(free**2 - off**2, 0.0))
 
     def _rows(self, box: QRectF) -> tuple[list[Row], float]:
-        """The lines that have room, and how high each is; in a small ring the word has its widest part."""
+        """Return the lines that have room, and how high each is.
+
+        In a small ring the word has its widest part.
+        """
         size = min(1.6, box.width() / self._theme.px(140))
         is_short = size < SMALL
         line = max(
@@ -189,7 +192,10 @@ class GaitRing(QWidget):
         return [*words, *below, *legs][:most], line
 
     def _word_lines(self, box: QRectF, most: int) -> list[str]:
-        """The word in one line or several; without its number, which stands above the cards, if need be."""
+        """Return the word in one line or several.
+
+        Without its number, which stands above the cards, if need be.
+        """
         parts = re.split(r"\s(?=[^%])", self._word)
         names = [part for part in parts if not any(sign.isdigit() for sign in part)]
         forms = ([self._word], parts, [" ".join(names)], names)

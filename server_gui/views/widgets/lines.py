@@ -5,11 +5,11 @@ from collections.abc import Sequence
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QGridLayout, QSizePolicy, QWidget
 
-from server_gui.views.predictions import Line
+from server_gui.views.predictions import PredictionRow
 from server_gui.views.theme import Theme
-from server_gui.views.widgets.fitted import FittedLabel
 from server_gui.views.widgets.mark import MarkIcon
 from server_gui.views.widgets.plain import set_tip
+from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 
 
 class Lines(QWidget):
@@ -24,7 +24,7 @@ class Lines(QWidget):
         grid.setHorizontalSpacing(6)
         grid.setVerticalSpacing(1)
         grid.setColumnStretch(1, 1)
-        self._rows = [(MarkIcon(theme, 10), FittedLabel()) for _ in range(most)]
+        self._rows = [(MarkIcon(theme, 10), ShrinkingLabel()) for _ in range(most)]
         for row, (icon, label) in enumerate(self._rows):
             grid.addWidget(icon, row, 0, Qt.AlignmentFlag.AlignVCenter)
             grid.addWidget(label, row, 1)
@@ -34,7 +34,7 @@ class Lines(QWidget):
         """What it says."""
         return [label.text() for _, label in self._rows if not label.isHidden()]
 
-    def show_lines(self, lines: Sequence[Line]) -> None:
+    def show_lines(self, lines: Sequence[PredictionRow]) -> None:
         """Show these."""
         tips = ["\n".join(filter(None, (line.wordings[0], line.tip))) for line in lines]
         for place, (icon, label) in enumerate(self._rows):

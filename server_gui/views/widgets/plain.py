@@ -6,7 +6,7 @@ from typing import Protocol
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLabel
 
-from gateway.plain import plain
+from gateway.plain_text import plain
 
 
 class PlainLabel(QLabel):

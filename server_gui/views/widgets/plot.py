@@ -68,7 +68,7 @@ class Curves(QWidget):
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
 
     def set_behind(self, colour: QColor) -> None:
-        """What is behind the lines, also where nothing was drawn yet."""
+        """Draw the background, even before the first curve."""
         self._behind = colour
         self.update()
 

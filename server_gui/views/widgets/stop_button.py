@@ -13,7 +13,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from gateway.plain import plain
+from gateway.plain_text import plain
 
 HINT = (
     "Quick stop on every drive (F12 or Ctrl+Space). It is software over a network, NOT a safety-rated "
@@ -140,7 +140,7 @@ class StopButton(QPushButton):
 
 
 def _in_two(name: str) -> list[str]:
-    """A name, and where that is said, its address below; else halves."""
+    """Return a name, and where that is said, its address below; else halves."""
     first, at, address = name.partition(" at ")
     half = -(-len(name) // 2)
     return [first, address] if at else [name[:half], name[half:]]

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from gateway.units import Unit
 from server_gui.core.evidence.curves import Curves, Side
 from server_gui.views.theme import Theme
-from server_gui.views.widgets.framed import GAP, draw_frame
+from server_gui.views.widgets.plot_frame import GAP, draw_frame
 
 Floats = npt.NDArray[np.float64]
 
@@ -106,7 +106,7 @@ class StrideCurves(QWidget):
         painter.end()
 
     def _head(self, painter: QPainter) -> str:
-        """The title, and what is read; that alone where both have no room."""
+        """Return the title, and what is read; that alone where both have no room."""
         both = f"{self.title}  {self.read}".rstrip()
         painter.setFont(self._theme.text_font(0.85))
         has_room = painter.fontMetrics().horizontalAdvance(both) < self.width() - 2 * GAP

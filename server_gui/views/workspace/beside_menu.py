@@ -9,7 +9,7 @@ from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.workspace.alignment import Align
 from server_gui.core.workspace.scene import Scene
-from server_gui.views.ask import ask
+from server_gui.views.confirmation import ask
 from server_gui.views.workspace.curve_menus import shown
 
 MOST_S = 1e6

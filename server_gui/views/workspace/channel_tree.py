@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QAbstractItemView, QTreeWidget, QTreeWidgetItem
 from gateway.units import Units
 from gateway.wire.component import ChannelInfo
 from server_gui.core.desk.station import Station
-from server_gui.core.workspace.meaning import channels_of
+from server_gui.core.workspace.curve_binding import channels_of
 from server_gui.core.workspace.workspace import MOST_CURVES
 from server_gui.views.widgets.dragging import CURVES, dragged
 

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from PySide6.QtWidgets import QMenu
 
-from gateway.plain import plain
+from gateway.plain_text import plain
 from server_gui.core.workspace.scene import Scene
 from server_gui.core.workspace.workspace import said
 
@@ -12,7 +12,7 @@ Do = Callable[[Callable[[], object]], None]  # does it, and says why not
 
 
 def channel_menu(menu: QMenu, scene: Scene, text: str, do: Do) -> None:
-    """What can be done with a channel of the tree."""
+    """Fill the menu of a channel of the tree."""
     meant, workspace = scene.meaning(text), scene.workspace
     for place, unit in enumerate(scene.units()):
         action = menu.addAction(f"Add to plot {place + 1} ({said(unit)})")
@@ -32,7 +32,7 @@ def channel_menu(menu: QMenu, scene: Scene, text: str, do: Do) -> None:
 
 
 def plot_menu(menu: QMenu, scene: Scene, place: int, do: Do) -> None:
-    """What can be done with a plot and its curves."""
+    """Fill the menu of a plot and its curves."""
     menu.clear()
     workspace = scene.workspace
     plot = workspace.plots[place]
@@ -58,5 +58,5 @@ def plot_menu(menu: QMenu, scene: Scene, place: int, do: Do) -> None:
 
 
 def shown(name: str) -> str:
-    """A name as a menu shows it."""
+    """Return a name as a menu shows it."""
     return plain(name).replace("&", "&&")

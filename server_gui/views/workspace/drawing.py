@@ -6,7 +6,7 @@ import numpy as np
 
 from server_gui.core.desk.flags import Flag
 from server_gui.core.desk.station import Station
-from server_gui.core.workspace.meaning import BESIDE
+from server_gui.core.workspace.curve_binding import BESIDE
 from server_gui.core.workspace.scene import Scene
 from server_gui.core.workspace.series import Floats
 from server_gui.core.workspace.trigger import WINDOWS, On, State

@@ -5,9 +5,9 @@ from collections.abc import Callable, Sequence
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QCompleter, QHBoxLayout, QLineEdit, QPushButton, QSizePolicy
 
+from server_gui.core.workspace.curve_binding import CurveBinding
 from server_gui.core.workspace.expressions import FUNCTIONS
 from server_gui.core.workspace.grammar import LONGEST
-from server_gui.core.workspace.meaning import Meaning
 from server_gui.core.workspace.workspace import said
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_text
@@ -22,7 +22,7 @@ class ExpressionBar(Card):
 
     written = Signal(str)
 
-    def __init__(self, theme: Theme, meaning: Callable[[str], Meaning]) -> None:
+    def __init__(self, theme: Theme, meaning: Callable[[str], CurveBinding]) -> None:
         super().__init__("Expression")
         self._theme = theme
         self._meaning = meaning

@@ -6,9 +6,9 @@ from typing import Final
 
 from PySide6.QtWidgets import QLineEdit, QMenu, QPushButton
 
-from gateway.plain import plain
+from gateway.plain_text import plain
 from server_gui.core.workspace.layouts import Layout, LayoutError, Layouts, read, write
-from server_gui.views.ask import ask
+from server_gui.views.confirmation import ask
 from server_gui.views.widgets.files import ask_open, ask_save
 from server_gui.views.widgets.plain import set_tip
 

@@ -12,7 +12,7 @@ from server_gui.core.desk.measuring import Measured
 from server_gui.views.theme import Theme
 from server_gui.views.widgets import columns
 from server_gui.views.widgets.card import Card, set_text
-from server_gui.views.widgets.whole import WholeLabel
+from server_gui.views.widgets.wrapping_label import WrappingLabel
 
 TITLES: Final = ("Channel", "A", "B", "B − A", "Min", "Max", "Mean", "SD", "Unit")
 SPARE: Final = (7, 5, 4, 6, 8)  # left out in this order where there is less room
@@ -45,7 +45,7 @@ class Measuring(Card):
         self.table.setShowGrid(False)
         self.table.verticalHeader().hide()
         columns.prepare(self.table)
-        self.times = WholeLabel("title")
+        self.times = WrappingLabel("title")
         self.body.addWidget(self.times)
         self.body.addWidget(self.table)
         self.hide()

@@ -6,7 +6,7 @@ from PySide6.QtWidgets import QLineEdit, QWidget
 
 from server_gui.core.desk.desk import Desk
 from server_gui.core.workspace.notes import LONGEST_NOTE
-from server_gui.views.ask import ask
+from server_gui.views.confirmation import ask
 from server_gui.views.widgets.time_axis import time_text
 
 

@@ -26,7 +26,7 @@ from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.elided import ElidedLabel
 from server_gui.views.widgets.files import ask_save, save_whole
 from server_gui.views.widgets.plain import PlainLabel, set_tip
-from server_gui.views.widgets.scrolled import bring_into_sight
+from server_gui.views.widgets.scroll_area import bring_into_sight
 from server_gui.views.widgets.split import Split
 from server_gui.views.workspace.beside_menu import BesideMenu, others_of
 from server_gui.views.workspace.channel_tree import NAME_ROLE, ChannelTree

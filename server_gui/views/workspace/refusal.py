@@ -3,12 +3,12 @@
 from typing import Final
 
 from server_gui.views.widgets.card import set_text
-from server_gui.views.widgets.whole import WholeLabel
+from server_gui.views.widgets.wrapping_label import WrappingLabel
 
 MARK: Final = "▲"  # what begins with it is a refusal
 
 
-class Refusal(WholeLabel):
+class Refusal(WrappingLabel):
     """Hidden until something is refused, and again after the next thing that is told."""
 
     def __init__(self) -> None:

@@ -75,7 +75,7 @@ class Tools(QWidget):
         self._fit()
 
     def _fit(self) -> None:
-        """What is said stands where most room is left."""
+        """Place the message where most room is left."""
         lines = [line for group in self._groups for line in self._broken(group)]
         if lines == self._lines:
             return

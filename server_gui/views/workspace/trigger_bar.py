@@ -75,7 +75,7 @@ class TriggerBar(Card):
         )
 
     def show_choices(self, scene: Scene) -> None:
-        """What there is to trigger by: curves that are drawn, with their units, and drives."""
+        """List the trigger sources: drawn curves with their units, and drives."""
         meant = map(scene.meaning, [*scene.workspace.curves, self.of.currentText()])
         self._units = {one.text: one.unit for one in meant if one.unit is not None}
         self._components = scene.drives

@@ -9,11 +9,11 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QHBoxLayout, QMenu, QToolButton, QWidget
 
 from gateway.units import Unit, rounded
-from server_gui.core.workspace.legible import places
+from server_gui.core.workspace.decimals import places
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.dragging import TakesCurves
 from server_gui.views.widgets.plot import Curve, Mouse, Plot, css
-from server_gui.views.widgets.wrapped import Wrapped
+from server_gui.views.widgets.wrapping_legend import WrappingLegend
 
 # Of what is neither the first left nor the first right channel of its plot.
 OTHERS: Final = ("green", "pink", "vermilion", "yellow", "violet", "lime")
@@ -29,7 +29,7 @@ class Drawn:
     problem: str = ""
 
 
-def legend_row(theme: Theme, legend: Wrapped, menu: QMenu, name: str) -> QHBoxLayout:
+def legend_row(theme: Theme, legend: WrappingLegend, menu: QMenu, name: str) -> QHBoxLayout:
     """Return a plot's legend, with a button for all that can be done with the plot."""
     button = QToolButton()
     button.setText("⋯")
@@ -76,7 +76,7 @@ class UnitPlot(TakesCurves):
         self.plot.setAccessibleName(self.accessibleName())
         self._places = unit.digits
         self._names = {curve.text: curve.name for curve in curves}
-        self._legend = Wrapped(f"Values of {self.accessibleName()}")
+        self._legend = WrappingLegend(f"Values of {self.accessibleName()}")
         self.body.addLayout(legend_row(theme, self._legend, self.menu, f"Plot {place + 1}: curves and kind"))
         self.body.addWidget(self.plot)
         self.setMinimumHeight(theme.px(120))
@@ -113,7 +113,7 @@ class EmptyPlot(TakesCurves):
     def __init__(self, theme: Theme, place: int, curves: Sequence[Drawn]) -> None:
         super().__init__(f"{place + 1} · nothing to draw here")
         self.menu = QMenu(self)
-        self.legend = Wrapped(f"What plot {place + 1} lacks")
+        self.legend = WrappingLegend(f"What plot {place + 1} lacks")
         self.body.addLayout(legend_row(theme, self.legend, self.menu, f"Plot {place + 1}: curves and kind"))
         bad = css(theme, "bad")
         self.legend.say([(bad, "▲", f"{one.name}: {one.problem}") for one in curves])
@@ -121,7 +121,7 @@ class EmptyPlot(TakesCurves):
 
 
 def _title(place: int, unit: Unit, curves: Sequence[Drawn]) -> str:
-    """What is measured, and in which unit: a unit alone says too little."""
+    """Return what is measured, and in which unit: a unit alone says too little."""
     quantities = dict.fromkeys(_quantity(curve) for curve in curves if not curve.problem)
     said = ", ".join(quantities).capitalize()
     return f"{place + 1} · {said} ({unit.symbol})" if unit.symbol else f"{place + 1} · {said}"

@@ -14,7 +14,7 @@ from server_gui.views.theme import Theme
 from server_gui.views.widgets.dragging import TakesCurves
 from server_gui.views.widgets.plot import css
 from server_gui.views.widgets.value_axis import ValueAxis
-from server_gui.views.widgets.wrapped import Wrapped
+from server_gui.views.widgets.wrapping_legend import WrappingLegend
 from server_gui.views.workspace.unit_plot import Drawn, colours_of, legend_row
 
 Floats = npt.NDArray[np.float64]
@@ -37,7 +37,7 @@ class XYPlot(TakesCurves):
         self.over, self.curves, self.menu = x, tuple(curves), QMenu(self)
         self.drawn = tuple(curve.text for curve in curves if not curve.problem)
         self._theme, self._frame = theme, 0
-        self._legend = Wrapped(f"Values of {self.accessibleName()}")
+        self._legend = WrappingLegend(f"Values of {self.accessibleName()}")
         self.plot = pg.PlotWidget(enableMenu=False, axisItems={"left": ValueAxis()})
         self.plot.setAccessibleName(self.accessibleName())
         self.plot.getPlotItem().hideButtons()
@@ -104,7 +104,7 @@ class XYPlot(TakesCurves):
 
 
 def _faded(ink: QColor, band: int) -> QColor:
-    """The colour of the oldest band is the faintest."""
+    """Return a band's colour; the oldest is the faintest."""
     faded = QColor(ink)
     faded.setAlphaF(FAINTEST + (1.0 - FAINTEST) * (band + 1) / BANDS)
     return faded

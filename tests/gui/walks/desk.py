@@ -139,9 +139,8 @@ def replay(bench: Bench) -> None:
     hand.insist(today, lambda: hand.can_see("Play"), place=-1)
     hand.insist("Play", lambda: hand.reads("PLAYBACK, not live"), exactly=True)
     hand.misses("reading …", within_s=AGAIN_S)
-    hand.keep("replay")
-    hand.click("Play", exactly=True)
     hand.sees("steps/min", within_s=AGAIN_S)
+    hand.keep("replay")
     hand.reveal("The span is the whole recording", "Labels")
     hand.click("The span is the whole recording")
     hand.click("Label span")
@@ -175,11 +174,14 @@ def learning(bench: Bench) -> None:
     hand.keep("train")
     hand.click("Start training")
     hand.sees("Better: F1", within_s=AGAIN_S)
+    hand.sees("Train a model")  # the form is gone, and its result in sight
     hand.keep("trained")
-    hand.click("Train a model")
     hand.insist("Promote…", lambda: hand.reads("Serves now"))
     hand.keep("promote")
+    hand.reach("Change nothing")
     hand.click("Change nothing")
+    hand.reach("Probabilities are off by")
+    hand.keep("compared")
 
 
 def store_gone(bench: Bench) -> None:

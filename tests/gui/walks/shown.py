@@ -31,7 +31,7 @@ from PySide6.QtWidgets import (
 from gateway.main import main
 from server_gui.views.frame.application import application
 from server_gui.views.frame.main_window import MainWindow
-from server_gui.views.widgets.fitted import FittedLabel
+from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 from tests.gui import rules
 
 PAINTED_S: Final = 5.0
@@ -70,7 +70,7 @@ def texts() -> list[str]:
     """Everything that can be read."""
     found = []
     for widget in visible():
-        if isinstance(widget, FittedLabel):
+        if isinstance(widget, ShrinkingLabel):
             found.append(widget.shown)
         elif isinstance(widget, QLabel):
             found.append(widget.text())

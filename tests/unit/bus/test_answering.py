@@ -4,9 +4,9 @@ import random
 
 import pytest
 
-from drivers.bus.arrivals import FEWEST, Arrivals
+from drivers.bus.frame_losses import FEWEST, FrameLosses
 from drivers.bus.sdo.round_trips import RoundTrips
-from drivers.noted import Noted
+from drivers.findings import FindingState
 from drivers.samples import Finding
 
 MS = 1_000_000
@@ -14,13 +14,13 @@ SECOND_NS = 1000 * MS
 
 
 def test_another_check_is_another_finding_with_its_own_beginning() -> None:
-    noted = Noted()
+    noted = FindingState()
     for at, words, check in ((1, "a", "x"), (2, "b", "x"), (3, "c", "y")):
         noted.note(at, words, check)
         assert noted.finding == Finding({1: 1, 2: 1, 3: 3}[at], words, check)
 
 
-def text(trips: RoundTrips | Arrivals, now_ns: int = 0) -> str:
+def text(trips: RoundTrips | FrameLosses, now_ns: int = 0) -> str:
     found = trips.findings if isinstance(trips, RoundTrips) else (trips.finding,)
     return "; ".join(one.text(now_ns) for one in found if one is not None)
 
@@ -61,7 +61,7 @@ def test_an_answer_that_nobody_waits_for_any_more_is_late_until_several_are_in_t
 
 
 def arriving(
-    arrivals: Arrivals, seconds: float, kept: float = 1.0, late_ms: float = 0.0, begin_s: float = 0.0
+    arrivals: FrameLosses, seconds: float, kept: float = 1.0, late_ms: float = 0.0, begin_s: float = 0.0
 ) -> None:
     """Frames each 10 ms, of which a share comes, each up to so much too late."""
     chance, last_ns = random.Random(1), 0
@@ -75,7 +75,7 @@ def arriving(
 
 @pytest.mark.parametrize("kept", [0.8, 0.9])
 def test_missing_frames_are_told_with_their_share_until_they_come_again(kept: float) -> None:
-    arrivals = Arrivals()
+    arrivals = FrameLosses()
     arriving(arrivals, 5.0, kept)
     assert arrivals.missing == pytest.approx(1 - kept, abs=0.05)
     assert "% of its PDOs are missing" in text(arrivals)
@@ -86,13 +86,13 @@ def test_missing_frames_are_told_with_their_share_until_they_come_again(kept: fl
 
 @pytest.mark.parametrize("late_ms", [0.0, 3.0, 9.0])
 def test_frames_that_come_unevenly_are_not_missing(late_ms: float) -> None:
-    arrivals = Arrivals()
+    arrivals = FrameLosses()
     arriving(arrivals, 20.0, late_ms=late_ms)
     assert text(arrivals) == ""
 
 
 def test_what_has_no_pace_is_not_judged() -> None:
-    arrivals = Arrivals()
+    arrivals = FrameLosses()
     arrivals.stamps.extend(round(SECOND_NS * number**2) for number in range(FEWEST * 3))
     arrivals.look(SECOND_NS)
     arrivals.look(3 * SECOND_NS)

@@ -9,7 +9,7 @@ import pytest
 from drivers.bus.bus import CanBus
 from drivers.bus.device import CanDevice
 from drivers.bus.sdo.channel import OUT_OF_SYNC
-from drivers.bus.sdo.doubles import CLEAN, RECENT
+from drivers.bus.sdo.duplicate_answers import CLEAN, RECENT
 from drivers.bus.settings import DeviceSettings
 from drivers.errors import DeviceTimeout, NotPermitted
 from eds import Description

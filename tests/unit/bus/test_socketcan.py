@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from drivers.bus.frames import ERROR, EXTENDED, REMOTE
 from drivers.bus.interfaces.link_report import blocking_problem, missing_link, warning
-from drivers.bus.interfaces.netlink import Link, link_request, parse_link, read_link
+from drivers.bus.interfaces.netlink import NetworkInterface, link_request, parse_link, read_link
 from drivers.bus.interfaces.opening import open_transport
 from drivers.bus.interfaces.socketcan import SocketCanTransport, filters
 from drivers.bus.settings import CanSettings
@@ -137,7 +137,9 @@ def link_message(up: bool = True, bitrate: int = 500_000, restart_ms: int = 100,
 
 def test_a_can_link_is_read_out_of_the_kernels_answer() -> None:
     link = parse_link(link_message(state=2))
-    assert link == Link(up=True, kind="can", bitrate=500_000, restart_ms=100, state="error passive")
+    assert link == NetworkInterface(
+        up=True, kind="can", bitrate=500_000, restart_ms=100, state="error passive"
+    )
     down = parse_link(link_message(up=False))
     assert down is not None
     assert not down.up
@@ -163,27 +165,27 @@ def test_the_kernel_answers_for_a_link_that_is_always_there() -> None:
     assert len(link_request(1)) == 32
 
 
-CAN = Link(up=True, kind="can", bitrate=500_000, restart_ms=100, state="error active")
+CAN = NetworkInterface(up=True, kind="can", bitrate=500_000, restart_ms=100, state="error active")
 
 
 @pytest.mark.parametrize(
     ("link", "bitrate", "line"),
     [
         (
-            Link(False, "can", None, 0, "stopped"),
+            NetworkInterface(False, "can", None, 0, "stopped"),
             500_000,
             "sudo ip link set can0 up type can bitrate 500000 restart-ms 100",
         ),
         (
-            Link(False, "can", None, 0, "stopped"),
+            NetworkInterface(False, "can", None, 0, "stopped"),
             None,
             "sudo ip link set can0 up type can bitrate 1000000 restart-ms 100",
         ),
-        (Link(False, "vcan", None, None, None), None, "sudo ip link set can0 up"),
+        (NetworkInterface(False, "vcan", None, None, None), None, "sudo ip link set can0 up"),
     ],
 )
 def test_a_link_that_is_down_comes_with_the_line_that_mends_it(
-    link: Link, bitrate: int | None, line: str
+    link: NetworkInterface, bitrate: int | None, line: str
 ) -> None:
     assert blocking_problem("can0", link, bitrate) == f"can0 is down; run: {line}"
 
@@ -195,10 +197,10 @@ def test_another_bitrate_and_no_restart_are_warned_about_and_block_nothing() -> 
         in str(warning("can0", CAN, 1_000_000))
     )
     assert "stays off after bus off (restart-ms 0)" in str(
-        warning("can0", Link(True, "can", 500_000, 0, None), None)
+        warning("can0", NetworkInterface(True, "can", 500_000, 0, None), None)
     )
     assert warning("can0", CAN, 500_000) is None
-    assert warning("can0", Link(True, "vcan", None, None, None), 500_000) is None
+    assert warning("can0", NetworkInterface(True, "vcan", None, None, None), 500_000) is None
 
 
 PASSES = {0x182: True, 0x183: False, 0x702: True, 0x733: True, 0x700 | REMOTE: False, 0x80000733: False}

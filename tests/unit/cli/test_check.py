@@ -102,7 +102,7 @@ def test_without_a_file_it_is_wrong_usage(capsys: pytest.CaptureFixture[str]) ->
     with pytest.raises(SystemExit) as ended:
         main([])
     assert ended.value.code == 2
-    assert "name a file, or say --schema" in capsys.readouterr().err
+    assert "name a file, or use --schema" in capsys.readouterr().err
 
 
 def test_a_program_reads_the_same_as_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -240,7 +240,7 @@ def test_a_trial_that_nobody_keeps_is_taken_back(
 def test_nothing_to_change_is_done_without_asking(robot: Served, capsys: pytest.CaptureFixture[str]) -> None:
     Path("a.toml").write_text('[parameters]\n"gait.step_length" = 0.4\n')
     assert robot.run("params", "apply", "a.toml") == 0
-    assert capsys.readouterr().out == "the robot holds all that the file says\n"
+    assert capsys.readouterr().out == "the robot holds all values of the file\n"
     assert robot.bench.gait.node.written() == []
 
 

@@ -16,8 +16,8 @@ from gateway.wire import framing
 from gateway.wire.control import JournalProof, SignedHead
 from server_gui.core.cloud.witnesses import witnesses
 from server_gui.core.follow.events import Journalled
+from server_gui.core.follow.journal_witness import signed_head
 from server_gui.core.follow.validation import Unfit, Validator
-from server_gui.core.follow.witnessing import signed_head
 from server_gui.core.recording.recorder import Recorder
 from server_gui.core.recording.spool import Spool
 from tests.support.journals import RobotsJournal

@@ -15,13 +15,14 @@ from gateway.wire.component import QualityInfo, Snapshot
 from gateway.wire.control import JournalEntries
 from gateway.wire.robot import GuardInfo, GuardRuleInfo
 from gateway.wire.stop import Reset, Stopped
+from server_gui.core.alarms.alarm import Alarm
 from server_gui.core.alarms.marks import STATES
 from server_gui.core.alarms.texts import TEXTS, Kind
 from server_gui.core.desk import station as station_module
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.events import BusesSeen, Described, Event, Journalled, LinkChanged, Looked
-from server_gui.core.follow.moment import one_moment
+from server_gui.core.follow.frame_time import one_moment
 from server_gui.core.follow.news import News, NewsKind
 from tests.support.desk import JOINTS, Bench, described, looked, telemetry, walking
 
@@ -83,6 +84,33 @@ def test_what_the_robot_advises_is_said_once_in_place_of_what_is_usual(bench: Be
     alarm = bench.station.alarms.active[0].alarm
     assert alarm.line.endswith("no heartbeat for 3 s")
     assert alarm.check == "check the cable"
+
+
+def test_what_is_wrong_twice_is_said_as_such_and_so_is_what_to_check(bench: Bench) -> None:
+    twice = "its heartbeat is missing: check its power; it goes on; its position jumped: check its encoder"
+    bench.station.take([looked(state="lost", problem=twice)])
+    alarm = bench.station.alarms.active[0].alarm
+    assert alarm.what == "its heartbeat is missing; its position jumped"
+    assert alarm.check == "check its power; it goes on; check its encoder"
+    bench.station.take([looked(state="stale", problem="this computer stood still: see what keeps it busy")])
+    alarm = bench.station.alarms.active[0].alarm
+    assert (alarm.what, alarm.check) == ("this computer stood still", "see what keeps it busy")
+
+
+def test_what_else_is_wrong_with_a_drive_in_fault_is_to_be_checked_as_well(bench: Bench) -> None:
+    more = "7 % of its PDOs are missing: check its cable"
+    problem = f"the drive is in fault: {CAUSE}; {more}"
+    bench.station.take([states(5.0, left_knee=7.0), looked(state="fault", problem=problem)])
+    (alarm,) = (one for one in bench.station.alarms.each if one.kind is Kind.FAULT)
+    assert alarm.what == f"{CAUSE}; 7 % of its PDOs are missing"
+    assert alarm.check == f"{error_check(0x2310)}; check its cable"
+
+
+def test_a_word_has_one_mark_whatever_it_explains_that_is_as_bad() -> None:
+    """Lost is a cross, also where what follows from it is a square of the same colour."""
+    own = TEXTS[Kind.LOST].mark
+    for as_bad in (kind for kind in Kind if TEXTS[kind].mark.colour == own.colour):
+        assert Alarm(Kind.LOST, "left_knee", "silent", under=(Alarm(as_bad, "gait", "jumped"),)).mark == own
 
 
 def test_a_drive_that_tells_its_code_alone_is_put_into_words(bench: Bench) -> None:

@@ -17,7 +17,7 @@ from server_gui.core.follow.events import LinkChanged
 from server_gui.core.prediction.news import turn
 from server_gui.core.prediction.robot_predictor import RobotPredictor
 from server_gui.core.recording.batching import EventKind
-from server_gui.terminal.foreseeing import Foreseeing
+from server_gui.terminal.danger_prediction import DangerPrediction
 from tests.support.desk import Bench, described, looked, walking
 from tests.support.terminal_robot import a_station, screen
 from tests.unit.prediction.endangered import HOT, endangered
@@ -137,7 +137,7 @@ def test_what_breaks_while_it_foresees_is_told_once_and_ends_nothing_else(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     told: list[str] = []
-    one = Foreseeing(ROBOT, told.append)
+    one = DangerPrediction(ROBOT, told.append)
 
     def broken(*_: object) -> None:
         raise ZeroDivisionError

@@ -11,7 +11,7 @@ from gateway.wire.control import Lease
 from gateway.wire.stop import Reset
 from server_gui.core.follow.events import LinkChanged
 from server_gui.core.follow.network import Network
-from server_gui.core.tuning.link import LEASE_S, Link
+from server_gui.core.tuning.link import LEASE_S, CommandLink
 from tests.support.desk import Bench
 
 
@@ -45,8 +45,8 @@ def client() -> FakeClient:
 
 
 @pytest.fixture
-def link(client: FakeClient) -> Link:
-    made = Link(cast("Network", None), Address.parse("127.0.0.1:1"), lambda _event: None, lambda: None)
+def link(client: FakeClient) -> CommandLink:
+    made = CommandLink(cast("Network", None), Address.parse("127.0.0.1:1"), lambda _event: None, lambda: None)
     made._client = cast("Any", client)
     return made
 
@@ -59,12 +59,12 @@ def test_a_robot_that_is_seen_again_can_be_commanded_again(bench: Bench) -> None
     assert commands.dials == dials + 1
 
 
-def test_a_reset_gives_control_back_at_once(link: Link, client: FakeClient) -> None:
+def test_a_reset_gives_control_back_at_once(link: CommandLink, client: FakeClient) -> None:
     asyncio.run(link._reset())
     assert client.asked == ["acquire", "reset", "release"]
 
 
-def test_a_reset_that_fails_gives_it_back_too(link: Link, client: FakeClient) -> None:
+def test_a_reset_that_fails_gives_it_back_too(link: CommandLink, client: FakeClient) -> None:
     client.fails = NotConnected("gone")
     with pytest.raises(NotConnected):
         asyncio.run(link._reset())
@@ -73,14 +73,14 @@ def test_a_reset_that_fails_gives_it_back_too(link: Link, client: FakeClient) ->
 
 @pytest.mark.parametrize("first", ["take", "write"])
 def test_control_that_was_ours_before_stays_ours_and_with_it_what_is_on_trial(
-    link: Link, client: FakeClient, first: str
+    link: CommandLink, client: FakeClient, first: str
 ) -> None:
     asyncio.run(link._take() if first == "take" else link._write({"gait.step_length": 0.4}, 30.0))
     asyncio.run(link._reset())
     assert "release" not in client.asked
 
 
-def test_a_write_that_comes_while_it_resets_keeps_control(link: Link, client: FakeClient) -> None:
+def test_a_write_that_comes_while_it_resets_keeps_control(link: CommandLink, client: FakeClient) -> None:
     async def both() -> None:
         reset = client.reset
 
@@ -97,7 +97,7 @@ def test_a_write_that_comes_while_it_resets_keeps_control(link: Link, client: Fa
 
 
 @pytest.mark.parametrize("how", ["released", "refused"])
-def test_what_is_no_longer_ours_is_given_back_again(link: Link, client: FakeClient, how: str) -> None:
+def test_what_is_no_longer_ours_is_given_back_again(link: CommandLink, client: FakeClient, how: str) -> None:
     async def refused(ttl_s: float) -> Lease:
         raise NotConnected("gone")
 
@@ -117,7 +117,7 @@ def test_what_is_no_longer_ours_is_given_back_again(link: Link, client: FakeClie
 
 
 def test_control_that_went_with_the_link_in_mid_write_is_no_longer_ours(
-    link: Link, client: FakeClient
+    link: CommandLink, client: FakeClient
 ) -> None:
     async def lost(ttl_s: float) -> Lease:
         link._state_changed(ConnectionState.WAITING)
@@ -135,7 +135,7 @@ def test_control_that_went_with_the_link_in_mid_write_is_no_longer_ours(
     assert client.asked[-3:] == ["acquire", "reset", "release"]
 
 
-def test_of_two_resets_the_last_gives_control_back(link: Link, client: FakeClient) -> None:
+def test_of_two_resets_the_last_gives_control_back(link: CommandLink, client: FakeClient) -> None:
     async def both() -> None:
         reset, first = client.reset, asyncio.Event()
 

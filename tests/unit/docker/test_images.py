@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from gateway.main import COMMANDS
-from gateway.missing import help_of
+from gateway.missing_extras import help_of
 from tests.support.extras import EXTRAS, ROOT
 from tests.support.waiting import until
 from tests.unit.docker.dockerfile import Step, read

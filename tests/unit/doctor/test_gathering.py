@@ -8,7 +8,7 @@ import pytest
 
 from gateway.config.reading import load
 from gateway.config.robot import RobotConfig
-from gateway.doctor.gathering import silent
+from gateway.doctor.gathering import without_gateway
 from gateway.doctor.gathering.computer import computer
 from gateway.doctor.gathering.gather import How, gather
 from gateway.doctor.observations import Observations, Samples
@@ -44,7 +44,7 @@ DRIVE = {
 
 @pytest.fixture(autouse=True)
 def _no_settling(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(silent, "SETTLE_S", 0.3)
+    monkeypatch.setattr(without_gateway, "SETTLE_S", 0.3)
 
 
 @pytest.fixture
@@ -84,7 +84,10 @@ def test_a_device_that_somebody_else_asks_is_left_alone(config: RobotConfig, dri
         beginning = other.bus.send_periodic(_question(), 0.02)
         seen = gather(config, How(seconds=0.5, active=False))
         beginning.stop()
-        assert silent.objects(config, seen.nodes(), seen.descriptions, {"main": frozenset({5})}, _wait) == {}
+        assert (
+            without_gateway.objects(config, seen.nodes(), seen.descriptions, {"main": frozenset({5})}, _wait)
+            == {}
+        )
     assert {"second_sdo_client", "heartbeat"} <= found(seen)
 
 

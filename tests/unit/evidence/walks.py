@@ -8,12 +8,12 @@ from typing import Any, Final
 
 from gateway.client import Batch
 from gateway.wire.control import JournalEntries
-from hil_sim.bare import BareExoskeleton
 from hil_sim.channels import UNITS, reported
 from hil_sim.clock import SECOND_NS
 from hil_sim.drive import objects
 from hil_sim.drive.drive import JointDrive
 from hil_sim.exoskeleton import Exoskeleton, Scenario
+from hil_sim.without_bus import BareExoskeleton
 from server_gui.core.follow.events import Event, Journalled, Telemetry
 from tests.support.desk import described
 

@@ -17,7 +17,7 @@ from server_gui.core.fleet.link_statistics import LinkStatistics
 from server_gui.core.recording.recorder import Alarm, AlarmKind, RecorderState
 from server_gui.core.recording.uploader import UploaderState
 from server_gui.core.settings.server_file import Upload
-from server_gui.processes.ending import Ended
+from server_gui.processes.shutdown_signals import ShutdownRequested
 
 HEAVY = ("PySide6", "pyqtgraph", "sklearn", "duckdb")
 
@@ -123,7 +123,7 @@ def test_rows_that_are_lost_and_no_event_tells_are_in_the_exit_status(
             pass
 
         def wait(self, _within_s: float) -> None:
-            raise Ended(signal.SIGTERM)
+            raise ShutdownRequested(signal.SIGTERM)
 
     monkeypatch.setattr("server_gui.cli.collect.Collector", Lossy)
     monkeypatch.setattr("server_gui.cli.collect._log_to_stderr", lambda: None)

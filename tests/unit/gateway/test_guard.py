@@ -20,7 +20,7 @@ from gateway.cli.describe import main as describe
 from gateway.connections.listeners import listen
 from gateway.daemon import Daemon
 from gateway.guard import alarms
-from gateway.guard.armings import Armings
+from gateway.guard.armed_drives import ArmedDrives
 from tests.support.waiting import WAIT_S, until
 from tests.unit.gateway.harness import ENABLED, ROBOT, Bench, Client, config, serving
 
@@ -394,11 +394,11 @@ class TestOpen:
         monkeypatch.setattr("gateway.always_on.AGAIN_S", 0.2)
         works = False
 
-        def start(_armings: Armings) -> None:
+        def start(_armings: ArmedDrives) -> None:
             if not works:
                 raise OSError("no such thing")
 
-        monkeypatch.setattr(Armings, "start", start)
+        monkeypatch.setattr(ArmedDrives, "start", start)
         with guarding(tmp_path, LIMIT) as client:
             until(lambda: "no such thing" in str(guard(client)["problem"]), "it is told")
             works = True

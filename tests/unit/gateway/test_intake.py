@@ -14,8 +14,8 @@ from typing import Any
 import pytest
 
 from gateway.access.identity import ANYBODY
-from gateway.connections import inlet, intake, pace, stop_lines
-from gateway.connections.inlet import ON_THE_WAY, RECEIVE_BYTES, UNKNOWN_BYTES, Heard, Inlet
+from gateway.connections import incoming_bytes, intake, pace, stop_lines
+from gateway.connections.incoming_bytes import ON_THE_WAY, RECEIVE_BYTES, UNKNOWN_BYTES, Heard, IncomingBytes
 from gateway.connections.listeners import listen
 from gateway.connections.pace import Pace
 from gateway.connections.session import Session
@@ -51,7 +51,7 @@ class Turned:
             self.asked.append(reason)
             return answer
 
-        self.inlet = Inlet(
+        self.inlet = IncomingBytes(
             self.front,
             self.loop,
             accepted,
@@ -151,7 +151,7 @@ def test_a_flood_of_stops_that_costs_much_rests_no_less(turned: Turned) -> None:
 def test_of_what_a_closed_connection_still_holds_only_so_much_is_looked_through(
     turned: Turned, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(inlet, "LAST_NS", 0)
+    monkeypatch.setattr(incoming_bytes, "LAST_NS", 0)
     turned.holds(STOP % b"early" + NO_STOP)
     turned.inlet.finish()
     assert turned.asked == []
@@ -160,7 +160,7 @@ def test_of_what_a_closed_connection_still_holds_only_so_much_is_looked_through(
 def test_the_last_stop_of_a_closed_connection_acts_however_slow_the_computer_is(
     turned: Turned, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(inlet, "LAST_NS", 0)
+    monkeypatch.setattr(incoming_bytes, "LAST_NS", 0)
     turned.holds(STOP % b"early" + NO_STOP * 200 + CLOCK % 1 * 500 + STOP % b"last" + CLOCK % 1 * 500)
     turned.inlet.finish()
     assert turned.asked == ["last"]
@@ -169,7 +169,9 @@ def test_the_last_stop_of_a_closed_connection_acts_however_slow_the_computer_is(
 def test_what_others_take_of_the_processor_is_no_time_of_the_last_look(
     turned: Turned, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    clock = itertools.count(0, 10 * inlet.LAST_NS)  # each time that it is read, others have had their turn
+    clock = itertools.count(
+        0, 10 * incoming_bytes.LAST_NS
+    )  # each time that it is read, others have had their turn
     monkeypatch.setattr(time, "monotonic_ns", lambda: next(clock))
     turned.holds(STOP % b"early" + NO_STOP * 5)
     turned.inlet.finish()

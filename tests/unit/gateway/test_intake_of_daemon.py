@@ -11,7 +11,7 @@ from typing import Any, cast
 
 import pytest
 
-from gateway.connections.inlet import ON_THE_WAY
+from gateway.connections.incoming_bytes import ON_THE_WAY
 from gateway.connections.listeners import listen
 from gateway.connections.session import Session
 from gateway.daemon import Daemon

@@ -12,8 +12,8 @@ import msgspec
 import pytest
 
 from gateway.connections import stop_lines
+from gateway.connections.fair_queue import FairQueue
 from gateway.connections.session import Session
-from gateway.connections.turns import Turns
 from gateway.handlers import Handlers, on
 from gateway.process.loop import Loop
 from gateway.registry import MODULES, Context
@@ -106,13 +106,13 @@ def test_what_asks_devices_or_the_kernel_does_so_in_turn(
     bench: Bench, connect: Callable[[], Client], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     waited: list[str] = []
-    add = Turns.add
+    add = FairQueue.add
 
     def recorded(turns: Any, client: Any, item: Any) -> None:
         waited.append(current)
         add(turns, client, item)
 
-    monkeypatch.setattr(Turns, "add", recorded)
+    monkeypatch.setattr(FairQueue, "add", recorded)
     client = connect()
     in_turn = set()
     for current in METHODS:

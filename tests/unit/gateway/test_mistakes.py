@@ -9,7 +9,7 @@ import pytest
 
 from gateway.config.checks import complaints
 from gateway.config.reading import examine as examine_robot
-from gateway.config.remains import remains
+from gateway.config.usable_parts import remains
 from gateway.tables.finding import Finding, Severity
 from gateway.tables.finding import mistakes as only_mistakes
 from gateway.tables.reading import Unreadable, read

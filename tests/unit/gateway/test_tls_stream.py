@@ -8,7 +8,7 @@ from typing import Any, cast
 
 import pytest
 
-from drivers.urgency import PRIORITY
+from drivers.realtime_priority import PRIORITY
 from gateway.connections.tls import TlsStream
 from tests.support.waiting import WAIT_S, until
 

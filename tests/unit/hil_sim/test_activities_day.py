@@ -5,11 +5,11 @@ from itertools import islice
 
 import pytest
 
-from hil_sim.bare import BareExoskeleton
 from hil_sim.controller import ControllerState
 from hil_sim.exoskeleton import Exoskeleton, Scenario
 from hil_sim.gait.activity import Activity, Label
 from hil_sim.gait.timetable import Entry, day, timetable
+from hil_sim.without_bus import BareExoskeleton
 
 
 def test_a_round_of_a_day_holds_everything_and_ends_with_a_fall() -> None:

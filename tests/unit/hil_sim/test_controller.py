@@ -6,12 +6,12 @@ from itertools import pairwise
 
 import pytest
 
-from hil_sim.bare import BareExoskeleton
 from hil_sim.bus.can_bus import Frame
 from hil_sim.controller import ControllerState
 from hil_sim.drive.power_state import PowerState
 from hil_sim.exoskeleton import Exoskeleton, Scenario
 from hil_sim.gait.activity import Activity, Label
+from hil_sim.without_bus import BareExoskeleton
 from tests.unit.hil_sim.bench import Heard
 
 USUAL = ((0x2001, 400, 2), (0x2002, 1600, 2), (0x2003, 60, 2), (0x2004, 0, 2), (0x2005, 1, 1))

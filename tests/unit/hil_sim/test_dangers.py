@@ -2,11 +2,11 @@
 
 import pytest
 
-from hil_sim.bare import BareExoskeleton
 from hil_sim.dangerous_course import Course
 from hil_sim.dangers import DANGERS
 from hil_sim.exoskeleton import Scenario
 from hil_sim.faults.registry import FAULTS
+from hil_sim.without_bus import BareExoskeleton
 
 SECOND = 1_000_000_000
 

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from hil_sim.bare import BareExoskeleton
 from hil_sim.exoskeleton import Scenario
 from hil_sim.faults.injector import Faults
 from hil_sim.gait.mishaps import FallState
+from hil_sim.without_bus import BareExoskeleton
 
 SECOND = 1_000_000_000
 

@@ -10,9 +10,9 @@ from typing import NamedTuple
 import pytest
 import serial
 
-from hil_sim.bare import BareExoskeleton
 from hil_sim.faults.fault import FaultRefused
 from hil_sim.robot import SimulatedRobot
+from hil_sim.without_bus import BareExoskeleton
 from tests.unit.hil_sim.outside import Outside
 
 FRAMES_PER_S = 100

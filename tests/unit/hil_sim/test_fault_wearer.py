@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from hil_sim.bare import BareExoskeleton
+from hil_sim.without_bus import BareExoskeleton
 from tests.unit.hil_sim.outside import Outside
 
 STRIDE_S = 1.8  # more than one

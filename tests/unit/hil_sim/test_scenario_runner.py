@@ -15,7 +15,7 @@ from hil_sim.scenario import gateway, runner
 from hil_sim.scenario.expectation import Condition, Expectation, Moment, Timing, Track, When
 from hil_sim.scenario.gateway import GatewayProcess
 from hil_sim.scenario.lateness import Lateness
-from hil_sim.scenario.script import Line
+from hil_sim.scenario.script import ScriptStep
 
 NEVER = Condition("is never so", lambda _: False)
 OBSERVED = {Track.TRUTH: [Moment(5.0, {"x": 1.0})]}
@@ -44,7 +44,7 @@ def test_a_failure_is_in_doubt_since_the_last_thing_that_happened(
     timing: Timing, asked: tuple[float, float]
 ) -> None:
     lateness = Asked()
-    lines = tuple(Line("", time_s, {}) for time_s in (2.0, 3.0, 6.0))
+    lines = tuple(ScriptStep("", time_s, {}) for time_s in (2.0, 3.0, 6.0))
     expectation = Expectation(Track.TRUTH, "x", NEVER, timing)
     verdict = runner._judge(expectation, lines, OBSERVED, lateness)
     assert (verdict.doubt, lateness.asked) == ("too slow", [asked])

@@ -9,7 +9,6 @@ from typing import Any
 
 import pytest
 
-from hil_sim.bare import BareExoskeleton
 from hil_sim.errors import SimulatorError
 from hil_sim.exoskeleton import Exoskeleton, Scenario
 from hil_sim.gait.activity import Activity
@@ -17,6 +16,7 @@ from hil_sim.gait.timetable import Entry
 from hil_sim.gait.wearer import GRAVITY
 from hil_sim.robot import SimulatedRobot
 from hil_sim.truth import COLUMNS, TruthFile
+from hil_sim.without_bus import BareExoskeleton
 from tests.support.waiting import until
 
 Row = dict[str, Any]

@@ -4,7 +4,7 @@ import pytest
 
 from drivers.losses import Losses
 from drivers.parsing import Counters
-from drivers.standstill import Standstill
+from drivers.reader_stalls import ReaderStalls
 
 SECOND_NS = 1_000_000_000
 
@@ -30,7 +30,7 @@ def fed(
 
 @pytest.mark.parametrize("step_s", [0.01, 0.016, 0.5])
 def test_fewer_frames_than_before_are_told_until_as_many_come(step_s: float) -> None:
-    losses, counters = Losses(Standstill()), Counters()
+    losses, counters = Losses(ReaderStalls()), Counters()
     now_s = fed(losses, counters, 0.0, 30.0, 100.0, step_s)
     assert list(losses.findings) == []
     now_s = fed(losses, counters, now_s, 20.0, 80.0, step_s)
@@ -43,7 +43,7 @@ def test_fewer_frames_than_before_are_told_until_as_many_come(step_s: float) -> 
 
 
 def test_what_the_port_had_kept_at_first_is_no_rate() -> None:
-    losses, counters = Losses(Standstill()), Counters()
+    losses, counters = Losses(ReaderStalls()), Counters()
     counters.frames = 1
     losses.update(0, counters, numbered=False)
     counters.frames = 100  # at once, what had waited
@@ -52,7 +52,7 @@ def test_what_the_port_had_kept_at_first_is_no_rate() -> None:
 
 
 def test_a_stall_of_ours_is_no_loss() -> None:
-    losses, counters = Losses(Standstill()), Counters()
+    losses, counters = Losses(ReaderStalls()), Counters()
     now_s = fed(losses, counters, 0.0, 20.0, 100.0)
     counters.frames += 300  # three seconds, delivered together
     fed(losses, counters, now_s + 3.0, 20.0, 100.0)
@@ -60,7 +60,7 @@ def test_a_stall_of_ours_is_no_loss() -> None:
 
 
 def test_a_line_that_was_plugged_in_anew_begins_anew() -> None:
-    losses, counters = Losses(Standstill()), Counters()
+    losses, counters = Losses(ReaderStalls()), Counters()
     fed(losses, counters, 0.0, 20.0, 100.0)
     losses.restart()
     fed(losses, counters, 30.0, 20.0, 50.0)
@@ -68,7 +68,7 @@ def test_a_line_that_was_plugged_in_anew_begins_anew() -> None:
 
 
 def test_a_sensor_that_numbers_its_frames_may_send_fewer_and_is_told_of_each_gap() -> None:
-    losses, counters = Losses(Standstill()), Counters()
+    losses, counters = Losses(ReaderStalls()), Counters()
     now_s = fed(losses, counters, 0.0, 20.0, 100.0, numbered=True)
     now_s = fed(losses, counters, now_s, 20.0, 50.0, numbered=True)
     assert list(losses.findings) == []

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from drivers.build_context import BuildContext
 from drivers.calibration_file import mark
 from drivers.errors import SettingsError
 from drivers.imu import rotation, zero
@@ -13,7 +14,6 @@ from drivers.imu.formats import FORMATS
 from drivers.imu.frame import ImuFrame
 from drivers.imu.motion import TILT, TrunkMotion
 from drivers.imu.settings import ImuSettings
-from drivers.site import Site
 
 
 def up(forward: float, left: float) -> rotation.Vector:
@@ -64,7 +64,7 @@ def test_file_keeps_the_zero(tmp_path: Path) -> None:
     path.write_text(zero.text(measured, "2026-11-22T08:00:00Z"))
     assert mark(path) != before, "another file is taken for the one before"
     told = build_imu(
-        "trunk", ImuSettings(port="-", zero=path.name), Site(tmp_path / "robot.toml")
+        "trunk", ImuSettings(port="-", zero=path.name), BuildContext(tmp_path / "robot.toml")
     ).calibration
     assert told == mark(path)
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import pytest
 
 from drivers.joint.drive import JointDrive
-from drivers.joint.pairs import join_joints
+from drivers.joint.leg_pairs import join_joints
 from drivers.samples import Quality, State
 from tests.support.waiting import until
 from tests.unit.bus.fake_node import FakeNode

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from drivers.joint import mirror
+from drivers.joint import mirror_check
 from drivers.joint.plausibility import JUMP_SHOWN_S, LOADED_S, JointCheck, Motion
 from hil_sim.exoskeleton import Scenario
 from tests.unit.joint.watched import WatchedRobot
@@ -19,7 +19,7 @@ GAIT_S = 4.0  # of the fewest strides that the two legs can be compared by
 @pytest.fixture
 def compared_soon(monkeypatch: pytest.MonkeyPatch) -> None:
     """Fewer strides are compared than usual, and so more often."""
-    monkeypatch.setattr(mirror, "GAIT_S", GAIT_S)
+    monkeypatch.setattr(mirror_check, "GAIT_S", GAIT_S)
 
 
 @pytest.mark.usefixtures("compared_soon")

@@ -5,12 +5,12 @@ from pathlib import Path
 
 from drivers.joint.cia402 import DriveState, drive_state
 from drivers.joint.plausibility import JointCheck, Motion
-from hil_sim.bare import BareExoskeleton
 from hil_sim.clock import MILLISECOND_NS, SECOND_NS
 from hil_sim.drive import objects as od
 from hil_sim.drive.drive import JointDrive
 from hil_sim.exoskeleton import JOINTS, Exoskeleton, Scenario
 from hil_sim.faults.injector import Faults
+from hil_sim.without_bus import BareExoskeleton
 
 COUNTS = 4096 * 100 / math.tau  # per rad at the joint
 RATED = 40.0  # N·m

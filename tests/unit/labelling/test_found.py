@@ -11,7 +11,7 @@ import pytest
 
 from gateway import main
 from ml.store import Store
-from ml.store.labels import Label, Source
+from ml.store.labels import Label, LabelSource
 from ml.store.sessions import Session, find
 from ml.training.recorded import recorded
 from server_gui.core.archive.label_sources import from_events, from_table, from_truth
@@ -100,7 +100,7 @@ def test_the_simulators_truth_becomes_stretches_and_instants(
         ("walk", at(1.0), at(2.0)),
         ("stand", at(2.0), at(3.0)),
     ]
-    assert {each.source for each in found} == {Source.SIMULATOR}
+    assert {each.source for each in found} == {LabelSource.SIMULATOR}
 
 
 @pytest.mark.parametrize(
@@ -132,7 +132,7 @@ def test_steps_that_the_recording_shows_become_instants(store: Store, session: S
     strikes = [each.began_utc_ns for each in found if each.label == "left_heel_strike"]
     assert np.diff(strikes) == pytest.approx(STRIDE_S * S, abs=20 * MS)
     assert len(strikes) >= 8
-    assert {each.source for each in found} == {Source.SENSORS}
+    assert {each.source for each in found} == {LabelSource.SENSORS}
 
 
 def test_a_table_names_the_line_that_is_wrong(session: Session, tmp_path: Path) -> None:
@@ -174,7 +174,7 @@ def test_the_command_labels_lists_and_takes_back(config: str, capsys: pytest.Cap
 @pytest.mark.parametrize(
     ("arguments", "status", "words"),
     [
-        (["--from", "1"], 2, "say LABEL and --from, or one of"),
+        (["--from", "1"], 2, "give LABEL and --from, or one of"),
         (["walk", "--from", "soon"], 2, "'soon' is no time"),
         (["walk", "--from", "1", "--to", "100"], 1, "lies outside the session"),
         (["walk", "--from", "100"], 1, "lies outside the session"),

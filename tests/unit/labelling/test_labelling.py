@@ -8,7 +8,7 @@ import msgspec
 import pytest
 
 from ml.store import Store, StoreUnreachable
-from ml.store.labels import Label, Source, holding
+from ml.store.labels import Label, LabelSource, holding
 from ml.store.query import query
 from ml.store.sessions import NoSuchSession, rows_of
 from ml.store.tables import LABELS
@@ -225,7 +225,7 @@ def test_what_cannot_be_so_is_refused_and_nothing_is_kept(
         label("walk", 15, 25),  # says the same
         label("new insoles", 0, 60),  # no activity
         label("right_heel_strike", 15, 15),
-        msgspec.structs.replace(label("sit", 15, 25), source=Source.PSEUDO),
+        msgspec.structs.replace(label("sit", 15, 25), source=LabelSource.PSEUDO),
     ],
 )
 def test_what_contradicts_nobody_is_kept(labelling: Labelling, other: Label) -> None:

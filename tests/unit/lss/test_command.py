@@ -19,7 +19,7 @@ from drivers.bus.settings import CanSettings
 from drivers.cli import bit_rate
 from drivers.cli.lss import main
 from drivers.errors import NotPermitted, SettingsError
-from drivers.lss.surroundings import Surroundings, listen
+from drivers.lss.preconditions import BusSurvey, listen
 from hil_sim.bus.can_bus import CanBus
 from hil_sim.bus.virtual import VirtualBridge
 from hil_sim.clock import Clock
@@ -62,8 +62,8 @@ def run(channel: str, *words: str) -> int:
 def hears(monkeypatch: pytest.MonkeyPatch, nodes: set[int], since: threading.Event | None = None) -> None:
     """The command listens as long as a busy computer keeps these devices from talking, from an event on."""
 
-    def until_heard(bus: Bus, seconds: float, wait: Callable[[float], object]) -> Surroundings:
-        def again() -> Surroundings | None:
+    def until_heard(bus: Bus, seconds: float, wait: Callable[[float], object]) -> BusSurvey:
+        def again() -> BusSurvey | None:
             found = listen(bus, seconds, wait)
             return found if (since is not None and not since.is_set()) or nodes <= set(found.nodes) else None
 

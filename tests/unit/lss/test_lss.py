@@ -12,7 +12,7 @@ from drivers.lss import master as lss
 from drivers.lss.change import Device, give_bitrate, give_node_id, inquire
 from drivers.lss.fastscan import unconfigured
 from drivers.lss.master import UNCONFIGURED, Identity, LssMaster
-from drivers.lss.surroundings import Surroundings
+from drivers.lss.preconditions import BusSurvey
 from drivers.scan.traffic import Traffic
 from hil_sim.bus.can_bus import Frame
 from hil_sim.node.lss import State
@@ -262,11 +262,11 @@ def test_a_bit_rate_that_cannot_be_stored_is_put_back(tmp_path: Path) -> None:
 # Whether at all
 
 
-def heard(*frames: tuple[int, str]) -> Surroundings:
+def heard(*frames: tuple[int, str]) -> BusSurvey:
     traffic = Traffic()
     for stamp, (can_id, data) in enumerate(frames):
         traffic.take(stamp, can_id, bytes.fromhex(data))
-    return Surroundings("can0", 3.0, traffic)
+    return BusSurvey("can0", 3.0, traffic)
 
 
 @pytest.mark.parametrize(

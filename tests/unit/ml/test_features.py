@@ -14,6 +14,7 @@ from ml.features.gait_status import GAIT_STATUS
 from ml.features.gaps import mended
 from ml.features.signals import along, length, up
 from ml.features.terrain import TERRAIN
+from ml.features.terrain import mirrored as other_side
 from tests.unit.ml import plain_falling, recordings
 
 RECIPES = (GAIT_STATUS, GAIT_CONTEXT, LEFT_PHASE, RIGHT_PHASE, LEFT_EVENTS, RIGHT_EVENTS, FALLING, TERRAIN)
@@ -136,6 +137,15 @@ def test_the_right_foot_is_the_left_one_in_a_mirror() -> None:
     assert np.array_equal(mirrored(mirrored(window)), window)
     assert np.array_equal(RIGHT_PHASE.compute(window), LEFT_PHASE.compute(mirrored(window)))
     assert not np.array_equal(RIGHT_PHASE.compute(window), LEFT_PHASE.compute(window))
+
+
+def test_a_step_of_the_right_leg_on_the_ground_is_the_left_ones_in_a_mirror() -> None:
+    window = walk(TERRAIN, TERRAIN.look_back).T[None]
+    assert np.array_equal(other_side(other_side(window)), window)
+    assert np.array_equal(TERRAIN.compute(window), TERRAIN.compute(other_side(window)))
+    one_leg = window.copy()
+    one_leg[:, [0, 2]] += 0.5  # whichever leads, the other leg's part is not its own
+    assert not np.array_equal(TERRAIN.compute(window), TERRAIN.compute(one_leg))
 
 
 @pytest.mark.parametrize("recipe", [GAIT_STATUS, GAIT_CONTEXT], ids=lambda recipe: recipe.name)

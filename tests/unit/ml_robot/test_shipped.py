@@ -10,14 +10,14 @@ from hil_sim.exoskeleton import Exoskeleton, Scenario
 from hil_sim.gait.activity import Activity
 from hil_sim.gait.gaits import LEFT, RIGHT
 from hil_sim.gait.timetable import Entry
-from ml.registry.card import Source
+from ml.registry.card import DataSource
 from ml.registry.registry import SHIPPED, Registry
 from ml.robot.groups import unit
 from ml.robot.learned import Learned
 from ml.robot.task import STRIDE, TASKS
 from ml.serving.predictor import Prediction, replayed
 from ml.training.shipping import held_out
-from ml.training.simulated import Session
+from ml.training.simulated import SimulatedSession
 
 PERSON = 77  # whom no model has seen
 PACE = (0.47, 1.2)  # another one than usual
@@ -41,7 +41,7 @@ def test_a_robot_without_models_is_served_by_a_sound_one_that_says_simulated(
 ) -> None:
     card, state = registry.load(serving(registry, task))
     learned = Learned.restored(state)
-    assert card.source is Source.SIMULATED
+    assert card.source is DataSource.SIMULATED
     assert card.robot == ""
     assert card.classes == learned.classes == TASKS[task].classes(learned.recipe)
     assert card.units == {name: unit(name) for name in learned.recipe.channels} == _units(card.channels)
@@ -61,8 +61,8 @@ def test_one_in_four_of_those_who_walk_alike_is_held_out_of_all_of_his_walks() -
     assert held_out(sessions) == {"4", "8", "19"}
 
 
-def _session(person: str, walks: str) -> Session:
-    return Session(
+def _session(person: str, walks: str) -> SimulatedSession:
+    return SimulatedSession(
         "", person, (), np.zeros(0, np.int64), np.zeros((0, 0)), np.zeros(0, str), np.zeros((0, 2)), walks
     )
 

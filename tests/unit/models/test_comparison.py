@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from ml.registry.card import Bin, Card, ClassScore, Metrics, Source
+from ml.registry.card import Bin, Card, ClassScore, DataSource, Metrics
 from server_gui.core.models.catalogue import Catalogue, Entry
 from server_gui.core.models.comparison import (
     Row,
@@ -33,7 +33,7 @@ def card(model: str = "activity-0123456789ab", **changes: Any) -> Card:
         "channels": ("left_hip.position",),
         "units": {"left_hip.position": "rad"},
         "features_hash": "",
-        "source": Source.RECORDED,
+        "source": DataSource.RECORDED,
         "seed": 0,
         "made": MADE,
         "versions": {},

@@ -6,15 +6,15 @@ from drivers.insole.device import Insole, layout_of, line_for
 from drivers.insole.settings import InsoleSettings
 from drivers.losses import Losses
 from drivers.parsing import Counters
+from drivers.reader_stalls import ReaderStalls
 from drivers.samples import State
-from drivers.standstill import Standstill
 from tests.unit.insole.encode import Sender
 
 MS = 1_000_000
 BEGAN_MS, STOOD_MS = 12_000, 900
 
 
-def told(standstill: Standstill, *, watched: bool, numbered: bool) -> list[str]:
+def told(standstill: ReaderStalls, *, watched: bool, numbered: bool) -> list[str]:
     """What is said after a minute of 100 frames a second, of which those of a standstill were lost."""
     losses, frames, missed, said = Losses(standstill), 0, 0, []
     for ms in range(10, 40_000, 10):
@@ -32,12 +32,12 @@ def told(standstill: Standstill, *, watched: bool, numbered: bool) -> list[str]:
 
 @pytest.mark.parametrize("numbered", [True, False])
 def test_frames_that_were_lost_in_a_standstill_are_not_the_sensors(numbered: bool) -> None:
-    assert told(Standstill(), watched=True, numbered=numbered) == []
-    assert told(Standstill(), watched=False, numbered=numbered), "nobody has seen that it stood still"
+    assert told(ReaderStalls(), watched=True, numbered=numbered) == []
+    assert told(ReaderStalls(), watched=False, numbered=numbered), "nobody has seen that it stood still"
 
 
 def test_a_silence_is_told_as_the_standstill_that_it_was() -> None:
-    standstill, settings = Standstill(), InsoleSettings(port="-")
+    standstill, settings = ReaderStalls(), InsoleSettings(port="-")
     line = line_for(settings, layout_of(settings.format, None), standstill=standstill)
     line._port.opened_ns = 1  # as if it were open
     insole, sender = Insole("left_insole", settings, line), Sender()

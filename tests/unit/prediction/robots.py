@@ -17,7 +17,7 @@ from gateway import signatures
 from gateway.certificates import der_of, fingerprint
 from gateway.client import Batch, ClockOffset
 from gateway.wire.component import ChannelInfo
-from ml.registry.card import Card, Source
+from ml.registry.card import Card, DataSource
 from ml.registry.code import features_hash, versions
 from ml.registry.pointers import Sign
 from ml.registry.registry import Registry
@@ -95,7 +95,7 @@ def card(model: Learned, **changes: Any) -> Card:
         "channels": model.recipe.channels,
         "units": dict.fromkeys(model.recipe.channels, "rad"),
         "features_hash": features_hash(model.recipe),
-        "source": Source.SIMULATED,
+        "source": DataSource.SIMULATED,
         "seed": 0,
         "made": datetime.now(UTC),
         "versions": versions(),

@@ -7,7 +7,7 @@ import pytest
 
 from ml.registry.registry import SHIPPED, Registry
 from ml.robot.learned import Learned
-from ml.store.labels import Source
+from ml.store.labels import LabelSource
 from server_gui.core.prediction.state import Quality
 from server_gui.core.prediction.track_record import Stretch, TrackRecord
 from tests.unit.prediction.lab import SESSION, Lab
@@ -48,7 +48,7 @@ def test_nothing_is_claimed_where_nobody_has_labelled_anything(lab: Lab) -> None
     assert figures(lab) == {}
     lab.label("wearer Ada", 0, 500)
     lab.label("sit", 0, 500)  # no class of this model
-    lab.label("walk", 0, 500, source=Source.PSEUDO)
+    lab.label("walk", 0, 500, source=LabelSource.PSEUDO)
     lab.label("walk", 0, 500, robot="exo-02")
     assert figures(lab) == {}
 

@@ -31,6 +31,7 @@ def robot(*buses: BusInfo, at_ns: int | None = None) -> Robot:
     ("bus", "bad"),
     [
         (BUS, Level.GOOD),
+        (replace(BUS, load_percent=None), Level.UNKNOWN),
         (replace(BUS, load_percent=100.0), Level.ALARM),
         (replace(BUS, load_percent=104.7), Level.ALARM),
         (replace(BUS, load_percent=85.0, findings=[BUSY]), Level.WARNING),

@@ -6,7 +6,7 @@ import tracemalloc
 import pytest
 
 from server_gui.core.processing.component import ComponentProcessing
-from server_gui.core.processing.gait_events import Leg, Source
+from server_gui.core.processing.gait_events import EventSource, Leg
 from tests.unit.processing.footfalls import force, pitch_rate, stamps
 
 FORCES = ("left_insole.force", "right_insole.force")
@@ -56,7 +56,7 @@ def test_an_insole_that_is_not_trusted_gives_no_events() -> None:
         for event in processing.take([stamp_ns], {name: row(stamp_ns / 1e9)[name] for name in FORCES}).events
     ]
     assert {event.leg for event in events} == {Leg.RIGHT}
-    assert processing.shown().sources == {Leg.LEFT: None, Leg.RIGHT: Source.PRESSURE}
+    assert processing.shown().sources == {Leg.LEFT: None, Leg.RIGHT: EventSource.PRESSURE}
 
 
 def test_an_imu_on_the_foot_gives_events_where_there_is_no_insole() -> None:
@@ -66,7 +66,7 @@ def test_an_imu_on_the_foot_gives_events_where_there_is_no_insole() -> None:
         rate = pitch_rate(stamp_ns / 1e9)
         processing.take([stamp_ns], {columns[0]: [rate], columns[1]: [rate]})
     assert len(processing.shown().events) >= 8
-    assert processing.shown().sources[Leg.LEFT] is Source.FOOT_IMU
+    assert processing.shown().sources[Leg.LEFT] is EventSource.FOOT_IMU
 
 
 def test_memory_stays_the_same_however_long_it_goes_on() -> None:

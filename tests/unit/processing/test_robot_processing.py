@@ -6,7 +6,7 @@ from gateway.wire.robot import Clock, Description, GuardInfo
 from gateway.wire.stop import StopInfo
 from server_gui.core.follow.events import Described, Failed, LinkChanged, Looked, Resources, Telemetry
 from server_gui.core.processing.communication import Health
-from server_gui.core.processing.gait_events import Leg, Source
+from server_gui.core.processing.gait_events import EventSource, Leg
 from server_gui.core.processing.robot_processing import RobotProcessing
 from tests.unit.processing.footfalls import force, stamps
 from tests.unit.processing.test_resource import look
@@ -56,10 +56,10 @@ def test_a_robot_that_was_started_again_is_seen_anew() -> None:
 
 def test_an_insole_in_fault_is_not_believed_until_it_is_well() -> None:
     processing = RobotProcessing()
-    for state, source in (("fault", None), ("ok", Source.PRESSURE)):
+    for state, source in (("fault", None), ("ok", EventSource.PRESSURE)):
         processing.apply(Looked(Snapshot(0, {}, {}, {"left_insole": {"state": state}}), None, 0))
         walked(processing, 1.0, begin_s=2.0 if source else 0.0)
-        assert processing.derived().sources == {Leg.LEFT: source, Leg.RIGHT: Source.PRESSURE}
+        assert processing.derived().sources == {Leg.LEFT: source, Leg.RIGHT: EventSource.PRESSURE}
 
 
 def test_what_was_refused_changes_nothing() -> None:

@@ -9,7 +9,7 @@ import pytest
 from hil_sim.gait.activity import Activity
 from hil_sim.gait.timetable import Entry
 from server_gui.core.processing.component import ComponentProcessing
-from server_gui.core.processing.gait_events import EventKind, GaitEvent, Leg, Source
+from server_gui.core.processing.gait_events import EventKind, EventSource, GaitEvent, Leg
 from server_gui.core.processing.kinematic_events import KinematicEvents
 from server_gui.core.processing.recording import summarise
 from tests.unit.hil_sim.moving import Moving
@@ -107,7 +107,7 @@ def test_live_and_recorded_give_the_very_same_events(walk: Walk) -> None:
         row = rows.stop
     expected = summarise(walk.stamps_ns, walk.columns)
     assert sorted(events, key=str) == sorted(expected.events, key=str)
-    assert processing.shown().sources == dict.fromkeys(Leg, Source.PRESSURE)
+    assert processing.shown().sources == dict.fromkeys(Leg, EventSource.PRESSURE)
 
 
 def test_joints_take_over_from_an_insole_that_falls_silent(walk: Walk) -> None:

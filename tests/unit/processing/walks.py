@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from hil_sim.bare import BareExoskeleton
 from hil_sim.gait.timetable import Entry
 from hil_sim.truth import TruthFile
+from hil_sim.without_bus import BareExoskeleton
 from server_gui.core.processing.gait_events import GaitEvent
 
 FORCES = ("left_insole.force", "right_insole.force")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
 
-from ml.registry.card import Card, Source
+from ml.registry.card import Card, DataSource
 from ml.registry.code import features_hash, versions
 from ml.robot import learn as learning
 from ml.robot.groups import GROUPS
@@ -49,7 +49,7 @@ def card(model: Learned, **changes: Any) -> Card:
         "channels": model.recipe.channels,
         "units": dict.fromkeys(model.recipe.channels, "m/s²"),
         "features_hash": features_hash(model.recipe),
-        "source": Source.RECORDED,
+        "source": DataSource.RECORDED,
         "seed": 0,
         "made": datetime.now(UTC),
         "versions": versions(),

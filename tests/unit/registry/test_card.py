@@ -19,8 +19,8 @@ from ml.features.gait_status import GAIT_STATUS
 from ml.features.recipe import Recipe
 from ml.registry import code
 from ml.registry.card import age_days, check_robot, content_id, decoded, encoded
+from ml.registry.classifier_scores import judged
 from ml.registry.code import features_hash
-from ml.registry.judged import judged
 from tests.unit.registry.models import card, learned
 
 

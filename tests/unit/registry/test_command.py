@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from gateway.main import main
-from ml.registry.card import Card, Source, TableVersion
-from ml.registry.judged import judged
+from ml.registry.card import Card, DataSource, TableVersion
+from ml.registry.classifier_scores import judged
 from ml.registry.registry import CARD, FOLDER, Registry
 from ml.store.objects import Objects
 from tests.unit.registry.models import card, features, learned
@@ -53,7 +53,7 @@ def desk(
 ) -> Desk:
     shipped = tmp_path / "shipped"
     model = learned(seed=2)
-    Registry(shipped.as_uri(), NOWHERE).publish(model.state(), card(model, source=Source.SIMULATED))
+    Registry(shipped.as_uri(), NOWHERE).publish(model.state(), card(model, source=DataSource.SIMULATED))
     monkeypatch.setattr(Registry.__init__, "__defaults__", (shipped,))
     return Desk(tmp_path, capsys)
 

@@ -13,7 +13,7 @@ import pytest
 
 from ml.errors import Overtaken, UnusableModel
 from ml.registry import archive
-from ml.registry.card import Card, Metrics, Source, TableVersion, content_id, encoded
+from ml.registry.card import Card, DataSource, Metrics, TableVersion, content_id, encoded
 from ml.registry.pointers import Pointers
 from ml.registry.registry import CARD, FOLDER, SKOPS, Registry
 from ml.robot.learned import Learned
@@ -421,7 +421,7 @@ def test_of_two_who_roll_back_at_once_one_is_told(in_folder: Registry) -> None:
 @pytest.fixture
 def shipped(tmp_path: Path) -> Path:
     folder = tmp_path / "shipped"
-    published(Registry(folder.as_uri(), NOWHERE), source=Source.SIMULATED)
+    published(Registry(folder.as_uri(), NOWHERE), source=DataSource.SIMULATED)
     return folder
 
 

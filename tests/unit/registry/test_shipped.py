@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ml.features import FeatureStream
-from ml.registry.card import Source
+from ml.registry.card import DataSource
 from ml.registry.registry import SHIPPED, Registry
 from ml.robot.groups import GROUPS
 from ml.robot.learned import Learned
@@ -20,7 +20,7 @@ def test_a_robot_with_every_sensor_is_served(task: str, folder_url: str) -> None
     model = registry.serving(task, "exo-01", EVERY_CHANNEL)
     assert model in registry.shipped()
     card, state = registry.load(model)
-    assert (card.task, card.source) == (task, Source.SIMULATED)
+    assert (card.task, card.source) == (task, DataSource.SIMULATED)
     assert "simulated" in card.notes
     assert card.held_out
     learned = Learned.restored(state)

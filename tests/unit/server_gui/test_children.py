@@ -13,7 +13,7 @@ import pytest
 from server_gui.cli.demo import demo
 from server_gui.processes import children
 from server_gui.processes.children import Child, ChildFailed
-from server_gui.processes.ending import Ended, Ending
+from server_gui.processes.shutdown_signals import ShutdownRequested, ShutdownSignals
 from tests.support.waiting import WAIT_S, until
 
 
@@ -70,10 +70,10 @@ def test_child_that_will_not_end_is_killed(tmp_path: Path, monkeypatch: pytest.M
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_signal_is_noticed_between_two_steps(number: signal.Signals) -> None:
     before = signal.getsignal(number)
-    with Ending() as ending:
+    with ShutdownSignals() as ending:
         ending.check()
         os.kill(os.getpid(), number)
-        with pytest.raises(Ended) as ended:
+        with pytest.raises(ShutdownRequested) as ended:
             until(lambda: ending.check())
         assert ended.value.status == 128 + number
     assert signal.getsignal(number) is before

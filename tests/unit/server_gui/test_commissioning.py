@@ -12,9 +12,9 @@ from server_gui.core.commissioning.commissioning import (
     STOP_S,
     STOPPER_S,
 )
-from server_gui.core.commissioning.spoken import understood
+from server_gui.core.commissioning.messages import understood
+from server_gui.core.commissioning.request import CommissioningRequest
 from server_gui.core.commissioning.stages import LOOKS, Stage
-from server_gui.core.commissioning.wish import Wish
 from tests.support import commissioning as playing
 from tests.support.commissioning import BEND, FILE, MOVES, WISH, Played, asks, lives, stopped, written
 
@@ -232,7 +232,7 @@ def test_a_command_that_does_not_start_says_why(played: Played) -> None:
 
 
 def test_a_connection_that_is_gone_is_a_death_and_one_that_never_was_a_failure(played: Played) -> None:
-    there = Wish("exo.toml", "can0", computer="ada@exo-01")
+    there = CommissioningRequest("exo.toml", "can0", computer="ada@exo-01")
     played.start(there)
     played.end(255, "Permission denied")
     assert stage(played) is Stage.FAILED
@@ -245,21 +245,23 @@ def test_a_connection_that_is_gone_is_a_death_and_one_that_never_was_a_failure(p
 @pytest.mark.parametrize(
     ("wish", "words"),
     [
-        (Wish("", "can0"), "name the robot's file"),
-        (Wish("exo", "can0"), "ends with .toml"),
-        (Wish("exo.toml", " "), "name its CAN bus"),
-        (Wish("exo.toml", "can0", bitrate="fast"), "the bit rate is a number"),
-        (Wish("exo.toml", "can0", computer="-oProxyCommand=x"), "a computer is named"),
+        (CommissioningRequest("", "can0"), "name the robot's file"),
+        (CommissioningRequest("exo", "can0"), "ends with .toml"),
+        (CommissioningRequest("exo.toml", " "), "name its CAN bus"),
+        (CommissioningRequest("exo.toml", "can0", bitrate="fast"), "the bit rate is a number"),
+        (CommissioningRequest("exo.toml", "can0", computer="-oProxyCommand=x"), "a computer is named"),
     ],
 )
-def test_what_is_missing_is_said_before_anything_starts(played: Played, wish: Wish, words: str) -> None:
+def test_what_is_missing_is_said_before_anything_starts(
+    played: Played, wish: CommissioningRequest, words: str
+) -> None:
     with pytest.raises(ValueError, match=words):
         played.start(wish)
     assert played.talkers == []
 
 
 def test_the_command_is_told_all_of_the_wish() -> None:
-    wish = Wish("exo.toml", "can0", "500000", ("a b", "c"), ("/dev/x",), "Ada")
+    wish = CommissioningRequest("exo.toml", "can0", "500000", ("a b", "c"), ("/dev/x",), "Ada")
     assert wish.arguments("--json") == [
         *("commission", "--json", "--bitrate=500000", "--eds=a b", "--eds=c", "--serial=/dev/x", "--who=Ada"),
         *("--", "exo.toml", "can0"),

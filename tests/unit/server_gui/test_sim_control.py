@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from server_gui.processes.children import Child
-from server_gui.processes.own_robot import OwnRobot
+from server_gui.processes.demo_robot import DemoRobot
 from server_gui.processes.sim_control import SimControl, SimulatorRefuses
 from server_gui.processes.simulated import Part
 from tests.support.waiting import until
@@ -44,7 +44,7 @@ def test_a_simulator_that_is_gone_is_named(tmp_path: Path) -> None:
 
 
 def test_a_robot_of_ours_says_which_of_its_parts_are_ready_and_lets_go_of_both(tmp_path: Path) -> None:
-    with OwnRobot("stand", tmp_path) as own:
+    with DemoRobot("stand", tmp_path) as own:
         until(lambda: own.address is not None or own.problem)
         own.check()
         assert own.ready == (Part.SIMULATOR, Part.GATEWAY)
@@ -55,6 +55,6 @@ def test_a_robot_of_ours_says_which_of_its_parts_are_ready_and_lets_go_of_both(t
 
 
 def test_a_robot_of_ours_that_cannot_start_says_why(tmp_path: Path) -> None:
-    with OwnRobot("hover", tmp_path) as own:
+    with DemoRobot("hover", tmp_path) as own:
         until(lambda: not own.is_running)
         assert "invalid choice: 'hover'" in own.problem

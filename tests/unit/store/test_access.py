@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import ClassVar
 
 import pytest
+from obstore.exceptions import GenericError
 
 from ml.store import Store, StoreError, StoreRefused, StoreUnreachable, UnsafeStore
 from ml.store.objects import Objects
@@ -162,7 +163,20 @@ def test_a_folder_that_cannot_be_used_is_named(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     said = refused((tmp_path / "file" / "store").as_uri())
     assert str(tmp_path / "file" / "store") in str(said.value)
-    assert str(said.value).endswith("check the folder and its disk")
+    assert str(said.value).endswith("Not a directory; check the folder and its disk")
+
+
+@pytest.mark.parametrize(
+    "raised",
+    [
+        NotADirectoryError(20, "Not a directory", "/x/store.json#1763233"),
+        GenericError("Generic LocalFileSystem error: Unable to walk dir: /x: Not a directory (os error 20)"),
+    ],
+)
+def test_what_the_computer_says_of_a_folder_is_told_without_its_number(raised: Exception) -> None:
+    with pytest.raises(StoreUnreachable) as said, translated("file:///x cannot be written"):
+        raise raised
+    assert str(said.value) == "file:///x cannot be written: Not a directory; check the folder and its disk"
 
 
 def test_keys_are_in_no_object_of_ours(backend: SeaweedFS | None, store_url: str, tmp_path: Path) -> None:

@@ -5,7 +5,7 @@ from datetime import UTC, datetime
 import pytest
 
 from ml.store import StoreError
-from ml.store.labels import Label, Source
+from ml.store.labels import Label, LabelSource
 
 ROW = {
     "robot": "exo-01",
@@ -20,7 +20,7 @@ ROW = {
 
 def test_a_row_is_a_label() -> None:
     label = Label.of(ROW)
-    assert (label.label, label.author, label.source) == ("walk", "", Source.PERSON)
+    assert (label.label, label.author, label.source) == ("walk", "", LabelSource.PERSON)
     assert label.ended_utc_ns - label.began_utc_ns == 60 * 10**9
 
 

@@ -5,7 +5,7 @@ import pytest
 import eds
 from drivers.bus.frames import ERROR, EXTENDED, REMOTE
 from drivers.errors import SettingsError
-from drivers.trace.decoding import Decoder, Kind, Line
+from drivers.trace.decoding import DecodedFrame, Decoder, Kind
 from drivers.trace.devices import Device, Devices
 from drivers.trace.files import Captured
 from drivers.trace.load import Meter
@@ -20,7 +20,7 @@ def decoder() -> Decoder:
     return Decoder(Devices([Device(2, "left_knee", description)]))
 
 
-def line(can_id: int, data: str = "", by: Decoder | None = None) -> Line:
+def line(can_id: int, data: str = "", by: Decoder | None = None) -> DecodedFrame:
     return (by or decoder()).take(Captured(0, can_id, bytes.fromhex(data)))
 
 

@@ -11,7 +11,7 @@ from ml.features.recipe import features
 from ml.robot.task import recipe_named
 from ml.serving.grid import on_grid
 from ml.store import Store
-from ml.store.labels import REGRESSION, Label, Source
+from ml.store.labels import REGRESSION, Label, LabelSource
 from ml.training.dataset import Ask, LeftOut, Part, part, versions
 from server_gui.core.recording import records
 from server_gui.core.recording.spool import Spool
@@ -72,20 +72,24 @@ def test_phases_are_known_where_legs_step_and_where_they_stand(folder_url: str, 
 
 def test_who_wore_the_robot_and_the_regression_set_are_labels_too(folder_url: str, spool: Path) -> None:
     made = day("s", 1, wearer="P03")
-    found = had(folder_url, spool, replace(made, said=[*made.said, (0.0, 24.0, REGRESSION, Source.PERSON)]))
+    found = had(
+        folder_url, spool, replace(made, said=[*made.said, (0.0, 24.0, REGRESSION, LabelSource.PERSON)])
+    )
     assert (found.group, found.regression) == ("p3", True)
     assert found.named
 
 
 def test_a_wearer_is_one_however_he_is_spelled(folder_url: str, spool: Path) -> None:
     made = day("s", 1, wearer="P-03")
-    found = had(folder_url, spool, replace(made, said=[*made.said, (0.0, 1.0, "wearer p03 ", Source.PERSON)]))
+    found = had(
+        folder_url, spool, replace(made, said=[*made.said, (0.0, 1.0, "wearer p03 ", LabelSource.PERSON)])
+    )
     assert (found.group, found.named) == ("p3", True)
 
 
 def test_two_wearers_at_once_are_refused(folder_url: str, spool: Path) -> None:
     made = day("s", 1, wearer="P03")
-    told = replace(made, said=[*made.said, (0.0, 1.0, "wearer P04", Source.PERSON)])
+    told = replace(made, said=[*made.said, (0.0, 1.0, "wearer P04", LabelSource.PERSON)])
     assert why(folder_url, spool, told) == "it has labels of several wearers: P03, P04; take all but one back"
 
 

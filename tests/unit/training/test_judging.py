@@ -34,13 +34,18 @@ def better(metrics: Metrics = USUAL, **figures: float) -> Metrics:
 def test_what_is_better_and_nowhere_much_worse_may_serve() -> None:
     decision = decide(ACTIVITY, judged(better(), USUAL), judged(USUAL, USUAL, "regression set"))
     assert decision.better
-    assert decision.why == ("macro_f1 on held-out people: 0.82, the serving model's 0.8",)
+    assert decision.why == ("macro_f1 on held-out people: 82.0 %, the serving model's 80.0 %",)
+
+
+def test_figures_that_differ_a_little_are_told_with_digits_enough_to_see_it() -> None:
+    decision = decide(ACTIVITY, judged(better(macro_f1=0.8002), USUAL), None)
+    assert decision.why == ("macro_f1 on held-out people: 80.02 %, the serving model's 80.00 %",)
 
 
 def test_as_good_is_not_better() -> None:
     decision = decide(ACTIVITY, judged(USUAL, USUAL), None)
     assert not decision.better
-    assert "0.8: not better" in decision.why[0]
+    assert "80.0 %: not better" in decision.why[0]
 
 
 WORSE_CLASS = {"walk": ClassScore(0.9, 0.9, 0.9, 100), "stand": ClassScore(0.7, 0.7, 0.7, 100)}
@@ -49,10 +54,10 @@ WORSE_CLASS = {"walk": ClassScore(0.9, 0.9, 0.9, 100), "stand": ClassScore(0.7, 
 @pytest.mark.parametrize(
     ("new", "words"),
     [
-        (replace(better(), per_class=WORSE_CLASS), "F1 of stand falls by 0.100"),
-        (replace(better(), per_subject={"ada": 0.9, "bob": 0.7}), "bob loses 0.1"),
-        (replace(better(), calibration_error=0.2), "calibration_error rises by 0.170"),
-        (better(abstained=0.4), "abstained rises by 0.350"),
+        (replace(better(), per_class=WORSE_CLASS), "F1 of stand falls by 10.0 points"),
+        (replace(better(), per_subject={"ada": 0.9, "bob": 0.7}), "bob loses 10.0 points"),
+        (replace(better(), calibration_error=0.2), "calibration_error rises by 17.0 points"),
+        (better(abstained=0.4), "abstained rises by 35.0 points"),
     ],
 )
 @pytest.mark.parametrize("where", ["held-out people", "regression set"])
@@ -78,14 +83,14 @@ def test_of_a_phase_the_error_must_fall() -> None:
     assert decide(PHASE, judged(new, WALKING), None).better
     assert not decide(PHASE, judged(WALKING, new), None).better
     worse = replace(new, per_subject={"ada": 8.0})
-    assert "ada loses 2 %" in decide(PHASE, judged(worse, WALKING), None).why[1]
+    assert "ada loses 2.0 points" in decide(PHASE, judged(worse, WALKING), None).why[1]
 
 
 @pytest.mark.parametrize(("figures", "serves"), [({"macro_f1": 0.3}, True), ({"macro_f1": 0.2}, False)])
 def test_the_first_model_must_know_more_than_nothing(figures: Any, serves: bool) -> None:
     decision = decide(ACTIVITY, judged(better(**figures), None), None)
     assert decision.better is serves
-    assert "saying always the same has 0.2; no model that was promoted serves yet" in decision.why[0]
+    assert "saying always the same has 20.0 %; no model that was promoted serves yet" in decision.why[0]
 
 
 def test_where_nothing_could_be_judged_nothing_is_promoted() -> None:

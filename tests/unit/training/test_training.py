@@ -8,9 +8,9 @@ import pytest
 from msgspec import structs
 
 from ml.errors import UnusableData, UnusableModel
-from ml.registry.card import Source as Origin
+from ml.registry.card import DataSource
 from ml.registry.registry import Registry
-from ml.store.labels import REGRESSION, Source
+from ml.store.labels import REGRESSION, LabelSource
 from ml.training.material import Wish
 from ml.training.training import Trained, train
 from tests.unit.training.walkers import CHANNELS, MOTIONS, Made, day, late_walk, put
@@ -68,7 +68,7 @@ def test_its_card_says_from_what_it_was_made(trained: Trained, url: str) -> None
         (url, "labels"),
         (url, "sessions"),
     }
-    assert card.source is Origin.RECORDED
+    assert card.source is DataSource.RECORDED
     assert card.notes == "learned from decisions labelled by: person 880"
     assert card.metrics.per_subject.keys() == {HELD_OUT}
     low, high = card.ranges["left_knee.position"]
@@ -111,7 +111,7 @@ def test_pseudo_labels_are_marked_and_never_judge(
 def test_other_sessions_judge_and_teach_and_a_rare_class_is_left_out(
     people: list[Made], tmp_path: Path
 ) -> None:
-    fixed = [*people[4].said, (0.0, 24.0, REGRESSION, Source.PERSON)]
+    fixed = [*people[4].said, (0.0, 24.0, REGRESSION, LabelSource.PERSON)]
     (_, _, stand, person), *others = people[0].said
     rare = [(0.0, 4.0, stand, person), (4.0, 5.0, "stairs_up", person), (5.0, 8.0, stand, person), *others]
     mine = stored(

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from ml.robot.task import TASKS
-from ml.store.labels import ACTIVITIES, Source
+from ml.store.labels import ACTIVITIES, LabelSource
 from ml.training.truth import NOBODY, Said, activities, phases
 
 S = 10**9
 
 
-def said(begin: float, end: float, label: str, source: Source = Source.PERSON) -> Said:
+def said(begin: float, end: float, label: str, source: LabelSource = LabelSource.PERSON) -> Said:
     return Said(round(begin * S), round(end * S), label, source)
 
 
@@ -26,9 +26,9 @@ def test_a_label_holds_from_its_beginning_up_to_its_end() -> None:
 
 def test_the_most_trusted_says_what_is_so() -> None:
     told = [
-        said(0, 4, "sit", Source.PSEUDO),
-        said(0, 3, "stand", Source.SIMULATOR),
-        said(0, 2, "walk", Source.PERSON),
+        said(0, 4, "sit", LabelSource.PSEUDO),
+        said(0, 3, "stand", LabelSource.SIMULATOR),
+        said(0, 2, "walk", LabelSource.PERSON),
     ]
     names, sources = activities(told, at(1, 2.5, 3.5))
     assert names.tolist() == ["walk", "stand", "sit"]
@@ -36,7 +36,7 @@ def test_the_most_trusted_says_what_is_so() -> None:
 
 
 def test_where_two_differ_nobody_knows_not_even_a_less_trusted_one() -> None:
-    told = [said(0, 3, "walk"), said(2, 4, "turn_left"), said(0, 4, "walk", Source.SIMULATOR)]
+    told = [said(0, 3, "walk"), said(2, 4, "turn_left"), said(0, 4, "walk", LabelSource.SIMULATOR)]
     names, _ = activities(told, at(1, 2.5, 3.5))
     assert names.tolist() == ["walk", NOBODY, "turn_left"]
 
@@ -63,8 +63,8 @@ def test_what_is_no_stride_has_no_phase(length_s: float) -> None:
 
 def test_of_each_leg_one_source_alone_tells_the_strikes() -> None:
     right = [said(t, t, "right_heel_strike") for t in (0, 1, 2)]
-    left = [said(t, t, "left_heel_strike", Source.SIMULATOR) for t in (0, 1, 2)]
-    seen = [said(t + 0.5, t + 0.5, "left_heel_strike", Source.SENSORS) for t in (0, 1)]
+    left = [said(t, t, "left_heel_strike", LabelSource.SIMULATOR) for t in (0, 1, 2)]
+    seen = [said(t + 0.5, t + 0.5, "left_heel_strike", LabelSource.SENSORS) for t in (0, 1)]
     found, sources = phases([*right, *left, *seen], at(0.5, 1.25))
     np.testing.assert_allclose(found, [[0.5, 0.5], [0.25, 0.25]])
     assert set(sources) == {"simulator"}  # no better than the less trusted of both legs

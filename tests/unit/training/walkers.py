@@ -11,7 +11,7 @@ import numpy.typing as npt
 from ml.features.windows import Samples
 from ml.robot.groups import GROUPS, unit
 from ml.store import Store
-from ml.store.labels import WEARER, Label, Source
+from ml.store.labels import WEARER, Label, LabelSource
 from server_gui.core.recording import records
 from server_gui.core.recording.records import Facts, Worn
 from server_gui.core.recording.rows import Layout, Record, Run
@@ -24,7 +24,7 @@ BEGAN_UTC: Final = 1_800_000_000 * S
 CHANNELS: Final = (*GROUPS["hips"], *GROUPS["knees"])
 STRIDE_S: Final = 1.2
 
-Said = tuple[float, float, str, Source]  # seconds from the session's beginning
+Said = tuple[float, float, str, LabelSource]  # seconds from the session's beginning
 
 
 @dataclass(frozen=True)
@@ -126,7 +126,7 @@ def day(
     seed: int,
     order: Sequence[str] = ("stand", "walk", "sit"),
     each_s: float = 8.0,
-    source: Source = Source.PERSON,
+    source: LabelSource = LabelSource.PERSON,
     wearer: str = "",
     strikes: bool = False,
     motions: Mapping[str, Motion] = MOTIONS,
@@ -143,7 +143,7 @@ def day(
     return Made(name, values, said, wearer=wearer)
 
 
-def _strikes(begin_s: float, length_s: float, source: Source) -> list[Said]:
+def _strikes(begin_s: float, length_s: float, source: LabelSource) -> list[Said]:
     times = np.arange(0.0, length_s - 1e-6, STRIDE_S)
     left = [(begin_s + t, begin_s + t, "left_heel_strike", source) for t in times.tolist()]
     later = [t for t in (times + STRIDE_S / 2).tolist() if t < length_s]

@@ -11,8 +11,8 @@ from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.flags import Flag, FlagKind
 from server_gui.core.desk.station import Station
 from server_gui.core.workspace.alignment import Align, offset_text, shift_ns
+from server_gui.core.workspace.curve_binding import CurveBinding, meaning, with_beside
 from server_gui.core.workspace.expressions import Block, Floats
-from server_gui.core.workspace.meaning import Meaning, meaning, with_beside
 from server_gui.core.workspace.series import HELD_S, Beside, Series, joined
 from server_gui.core.workspace.workspace import MOST_CURVES, MOST_PLOTS, Refused, Workspace
 from tests.support.desk import Bench, described, telemetry
@@ -23,7 +23,7 @@ KNEE, TORQUE = "left_knee.position", "left_knee.torque"
 CHANNELS = {info.name: info for info in described().description.channels}
 
 
-def meant(text: str) -> Meaning:
+def meant(text: str) -> CurveBinding:
     return meaning(text, CHANNELS, Units())
 
 

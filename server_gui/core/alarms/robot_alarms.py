@@ -1,0 +1,422 @@
+"""A robot's alarms, from what is known of it. What is not known is an alarm too."""
+
+import re
+import time
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+from gateway.client import ConnectionState
+from gateway.wire.bus import CLOSED
+from gateway.wire.robot import GuardRuleInfo
+from ml.danger.levels import Level
+from server_gui.core.alarms.alarm import Alarm
+from server_gui.core.alarms.causes import Stall, stood_still
+from server_gui.core.alarms.marks import ENABLED, age_text
+from server_gui.core.alarms.texts import Kind, check_of, error_check, error_text
+from server_gui.core.follow.robot import Part, Robot
+from server_gui.core.prediction.current import ShownDanger
+from server_gui.core.processing import bus_health
+from server_gui.core.tuning.stop import StopProgress, StopState
+
+MOVES: Final = 0.1  # rad/s: what turns faster is not at rest
+SOON_NS: Final = 3_000_000_000  # for so long a link without a row is nothing strange
+_QUICK_STOP: Final = "quick stop active"
+_IN_FAULT: Final = ("fault", "fault reaction active")
+_CODE: Final = re.compile(r"0x([0-9A-Fa-f]{4})\b")
+_PREFIX: Final = re.compile(r"^(the drive is in fault: |it reports )")
+_LASTING: Final = re.compile(r" \(for \d+ s\)")  # an alarm says by itself since when
+_ADVICE: Final = re.compile(r": (?=(?:check|plug|see) )")  # with which what the robot says of a part may end
+# What shows it best, by the code's beginning; else the position.
+_SHOWN_BY: Final = (
+    ("2", ("current", "torque")),
+    ("3", ("voltage", "current")),
+    ("4", ("temperature",)),
+    ("71", ("torque", "current")),
+    ("83", ("torque", "current")),
+    ("84", ("velocity",)),
+    ("86", ("following_error", "target", "position")),
+)
+_KINDS: Final = {
+    "fault": Kind.IMPLAUSIBLE,
+    "lost": Kind.LOST,
+    "stale": Kind.PART_STALE,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Facts:
+    """What alarms are found in; `journal` is the robot's, oldest first."""
+
+    robot: Robot
+    stopping: StopProgress
+    address: str
+    journal: Iterable[Mapping[str, Any]] = ()
+    stalls: Sequence[Stall] = ()
+    danger: ShownDanger | None = None
+
+
+def alarms(facts: Facts) -> Iterator[Alarm]:
+    """Yield what is wrong now, in no order."""
+    robot = facts.robot
+    yield from _of_stop(robot, facts.stopping)
+    if not robot.is_recording:
+        yield from _of_link(robot, facts.address)
+    for name in robot.names("joint"):
+        yield from _of_drive(robot, name, facts.stopping)
+    for part in robot.parts.values():
+        if not part.comes_up:
+            yield from _of_part(robot, part, facts.stopping)
+    yield from _of_those_that_come_up(robot)
+    yield from _of_guard(facts)
+    yield from _of_buses(robot)
+    yield from _of_danger(facts)
+    if not robot.is_recording:
+        yield from stood_still(facts.stalls)
+
+
+# --- STOP
+
+
+def _of_stop(robot: Robot, stopping: StopProgress) -> Iterator[Alarm]:
+    if stopping.state is StopState.NOT_CONFIRMED:
+        now, moving = _after_unconfirmed(robot), _is_live(robot) and _moving(robot)
+        what = f"still moving: STOP again; the STOP before failed: {stopping.why}" if moving else stopping.why
+        check = remedy(robot)
+        yield Alarm(Kind.NOT_STOPPED, "", what, did=now, check=check, since_s=stopping.since_s)
+    elif stopping.held:
+        what, by = stopping.said
+        yield Alarm(
+            Kind.STOPPED,
+            "",
+            what,
+            did=_after_stop(robot, stopping),
+            check=check_of(Kind.STOPPED),
+            since_s=stopping.since_s,
+            aside=by,
+        )
+    elif stopping.was_ended and not any_enabled(robot):
+        yield Alarm(
+            Kind.RESET, "", "every drive is off", check=check_of(Kind.RESET), since_s=stopping.since_s
+        )
+
+
+def remedy(robot: Robot) -> str:
+    """Return what to do after a STOP that nobody has confirmed."""
+    is_off = _is_live(robot) and None not in _words(robot).values() and not _moving(robot)
+    return "STOP again to be sure" if is_off else "use the hardware stop"
+
+
+def _after_stop(robot: Robot, stopping: StopProgress) -> str:
+    """Return what the drives' states have shown; where not all have shown it, how they are."""
+    shown = set(stopping.proofs) >= set(robot.names("joint")) and not any_enabled(robot)
+    return stopping.proof if shown else "; ".join(filter(None, (stopping.proof, _drives_did(robot))))
+
+
+def _after_unconfirmed(robot: Robot) -> str:
+    """Return what the robot does after a STOP that nobody has confirmed."""
+    if not _is_live(robot):
+        return "what it does now is not known"
+    moving = _moving(robot)
+    if moving:
+        return f"enabled or moving: {_listed(moving)}"
+    return _drives_did(robot)
+
+
+def any_enabled(robot: Robot) -> bool:
+    """Whether some drive is, as far as is known."""
+    return ENABLED in _words(robot).values()
+
+
+def _moving(robot: Robot) -> list[str]:
+    """Joints whose drive is enabled, or that turn."""
+    words = _words(robot)
+    return [
+        joint
+        for joint in robot.names("joint")
+        if words[joint] == ENABLED or abs(robot.values.get(f"{joint}.velocity") or 0.0) > MOVES
+    ]
+
+
+def _drives_did(robot: Robot) -> str:
+    words = _words(robot)
+    if not words:
+        return ""
+    if not _is_live(robot):
+        return "what its drives do now is not known"
+    enabled = [joint for joint, word in words.items() if word == ENABLED]
+    if None in words.values():
+        return (
+            f"the state of {_listed([joint for joint, word in words.items() if word is None])} is not known"
+        )
+    if enabled:
+        return f"{len(enabled)} of {len(words)} drives are enabled still"
+    states = dict.fromkeys(str(word) for word in words.values())
+    return f"no drive is enabled: {', '.join(_counted(words, state, len(states)) for state in states)}"
+
+
+def _counted(words: Mapping[str, str | None], state: str, states: int) -> str:
+    count = list(words.values()).count(state)
+    return f"all {state}" if states == 1 else f"{count} {state}"
+
+
+def _did(robot: Robot, stopping: StopProgress) -> str:
+    """Return what the robot did about it, as far as is known."""
+    held = f"STOP is held ({stopping.reason})" if stopping.held and stopping.reason else ""
+    held = held or ("STOP is held" if stopping.held else "")
+    return "; ".join(filter(None, (held, _drives_did(robot))))
+
+
+# --- the link
+
+
+def _of_link(robot: Robot, address: str) -> Iterator[Alarm]:
+    link = robot.link
+    since_s = _utc_s(link.since_ns) if link.since_ns else None
+    shown = f"what is shown is {age_text(robot.age_s())} old" if robot.age_s() is not None else ""
+    if link.state is not ConnectionState.CONNECTED:
+        kind = Kind.NO_LINK if link.links else Kind.NEVER_REACHED
+        kind = Kind.ANOTHER if link.is_another else kind
+        what = link.problem or f"{address} does not answer yet"
+        did = "what it does now is not known" + (f"; {shown}" if shown else "")
+        yield Alarm(kind, "", what, did=did, check=check_of(kind), since_s=since_s if link.links else None)
+    elif robot.age_s() is None:
+        what = "linked, but no value has come"
+        yield Alarm(Kind.NO_DATA, "", what, check=check_of(Kind.NO_DATA), since_s=since_s)
+    elif robot.is_stale():
+        since_s = robot.now_s() - (robot.age_s() or 0.0)
+        yield Alarm(
+            Kind.STALE, "", "nothing new comes", did=shown, check=check_of(Kind.STALE), since_s=since_s
+        )
+
+
+# --- drives and sensors
+
+
+def _of_drive(robot: Robot, name: str, stopping: StopProgress) -> Iterator[Alarm]:
+    word, part = robot.word(f"{name}.state"), robot.parts[name]
+    if word not in _IN_FAULT and not (part.state == "fault" and "in fault" in (part.problem or "")):
+        return
+    said, code = _cause(robot, part)
+    what, more = _advised(said)
+    check = check_of(Kind.FAULT) if code is None else error_check(code)
+    yield Alarm(
+        Kind.FAULT,
+        name,
+        what,
+        where=_where(robot, name),
+        did=_did(robot, stopping),
+        check="; ".join(filter(None, (check, more))),
+        channel=_channel(robot, name, code),
+        clears=not robot.is_recording,
+        is_now=not robot.is_stale(),
+    )
+
+
+def _cause(robot: Robot, part: Part) -> tuple[str, int | None]:
+    """Why a drive is in fault, and its code: as the robot says, else by the code that the drive tells."""
+    said = _LASTING.sub("", _PREFIX.sub("", part.problem or ""))
+    found = _CODE.search(said)
+    if found is not None:
+        return said, int(found[1], 16)
+    told = robot.values.get(f"{part.name}.error_code")
+    if told:
+        return error_text(int(told)), int(told)
+    return said or "the drive does not say why", None
+
+
+def _of_part(robot: Robot, part: Part, stopping: StopProgress) -> Iterator[Alarm]:
+    if robot.is_recording:
+        return
+    where, problem = _where(robot, part.name), _LASTING.sub("", part.problem or "")
+    kind = _KINDS.get(part.state)
+    channel = _channel(robot, part.name, None)
+    is_now = not robot.is_stale()
+    if part.state == "ok":
+        found = _CODE.search(problem)
+        if problem.startswith("it reports ") and found is not None:
+            check = error_check(int(found[1], 16))
+            what = _PREFIX.sub("", problem)
+            yield Alarm(
+                Kind.REPORTS, part.name, what, where, check=check, channel=channel, clears=True, is_now=is_now
+            )
+        return
+    if part.kind == "joint" and (robot.word(f"{part.name}.state") in _IN_FAULT or "in fault" in problem):
+        return  # told as the drive's fault
+    if kind is None:
+        what = problem or f"the robot says {part.state!r} of it"
+        yield Alarm(Kind.UNKNOWN, part.name, what, where, check=check_of(Kind.UNKNOWN), is_now=is_now)
+        return
+    did = _did(robot, stopping) if part.kind == "joint" else ""
+    what, advice = _advised(problem)
+    since_s = None if part.age_ms is None or not is_now else time.time() - part.age_ms / 1000
+    yield Alarm(
+        kind,
+        part.name,
+        what or "it does not say why",
+        where,
+        did,
+        advice or check_of(kind, part.kind),  # who says what is wrong knows best
+        since_s if kind is not Kind.IMPLAUSIBLE else None,
+        channel,
+        is_now=is_now,
+        node=_bus(robot, part.name),
+    )
+
+
+def _advised(problem: str) -> tuple[str, str]:
+    """Split a problem into what is wrong and what to check: `this: check that; it goes on; more: …`."""
+    things, advice = list[str](), list[str]()
+    for clause in problem.split("; "):
+        thing, *check = _ADVICE.split(clause, maxsplit=1)
+        if not check and advice:
+            advice[-1] += f"; {clause}"
+        else:
+            things.append(thing)
+            advice += check
+    return "; ".join(things), "; ".join(dict.fromkeys(advice))
+
+
+def _of_those_that_come_up(robot: Robot) -> Iterator[Alarm]:
+    """One alarm, not one a device, while a gateway that was asked just now begins to read."""
+    names = [part.name for part in robot.parts.values() if part.comes_up]
+    if names and not robot.is_recording:
+        yield Alarm(
+            Kind.NO_DATA,
+            "devices",
+            f"not read yet: {_listed(names)}",
+            check=check_of(Kind.NO_DATA),
+            is_now=not robot.is_stale(),
+        )
+
+
+# --- guard and buses
+
+
+def _of_guard(facts: Facts) -> Iterator[Alarm]:
+    robot, description = facts.robot, facts.robot.description
+    if description is None or not description.guard.configured:
+        return
+    if description.guard.problem is not None:
+        why = f"it does not run: {description.guard.problem}"
+        yield Alarm(Kind.BLIND, "guard", why, "the guard", check=check_of(Kind.BLIND), is_now=False)
+    for rule in description.guard.rules:
+        word = robot.word(f"guard.{rule.name}")
+        kind = {"tripped": Kind.GUARD, "blind": Kind.BLIND}.get(word or rule.state)
+        if kind is not None:
+            yield _of_rule(kind, rule, facts, is_now=word is not None and not robot.is_stale())
+
+
+def _of_rule(kind: Kind, rule: GuardRuleInfo, facts: Facts, *, is_now: bool) -> Alarm:
+    blind = "; ".join(rule.problems) if kind is Kind.BLIND else ""
+    why = _told(facts.journal, rule.name) or rule.reason or blind or f"{rule.watch} {rule.limit}"
+    actions = ", ".join(action.replace("_", " ") for action in rule.actions)
+    did = f"the rule's actions: {actions}" if kind is Kind.GUARD and actions else ""
+    drives = _drives_did(facts.robot) if kind is Kind.GUARD else ""
+    on = next((name for name in rule.on if name in facts.robot.parts), None)
+    channel = None if on is None else _channel(facts.robot, on, None, (rule.watch,))
+    did = "; ".join(filter(None, (did, drives)))
+    where = f"rule {rule.name}"
+    return Alarm(kind, f"guard.{rule.name}", why, where, did, check_of(kind), None, channel, is_now=is_now)
+
+
+def _told(journal: Iterable[Mapping[str, Any]], rule: str) -> str:
+    """Return what the guard last wrote of one of its rules."""
+    found = ""
+    for entry in journal:
+        if entry.get("who") == "guard" and entry.get("about") == rule and entry.get("what") == "alarm":
+            found = str(entry.get("reason") or "")
+    return found
+
+
+def _of_buses(robot: Robot) -> Iterator[Alarm]:
+    """As they are now; where nobody looks at them, as the robot has told it once with the link."""
+    if robot.is_recording or robot.description is None:
+        return
+    now = bus_health.seen(robot)
+    for bus in robot.description.buses if now is None else now:
+        said = bus_health.trouble(bus)
+        if said is None or (bus.state == CLOSED and bus.problem is None):
+            continue
+        what, check = said
+        kind = Kind.BUS_FAILS if bus_health.level(bus) is bus_health.Level.ALARM else Kind.BUS
+        where, is_now = bus.name, now is not None
+        yield Alarm(kind, f"bus.{bus.name}", what, where, check=check or check_of(kind), is_now=is_now)
+
+
+# --- danger
+
+
+def undriven(robot: Robot, stopping: StopProgress) -> str:
+    """Return why what the robot does now is no sign of anything: it does not drive its wearer."""
+    words = [(word or "").lower() for word in _words(robot).values()]
+    if stopping.held:
+        return "a stop is held"
+    if _QUICK_STOP in words:
+        return "drives stop"
+    if any(word in _IN_FAULT for word in words):
+        return "a drive is in fault"
+    return "no drive is enabled" if words and all(words) and ENABLED not in words else ""
+
+
+def _of_danger(facts: Facts) -> Iterator[Alarm]:
+    """From advice on; what was so when it was known last does not end by being unknown."""
+    shown = facts.danger
+    known = None if shown is None else shown.known
+    if shown is None or known is None or known.level < Level.ADVICE:
+        return
+    if undriven(facts.robot, facts.stopping):
+        return
+    kind = Kind.DANGER if known.level >= Level.ALARM else Kind.DANGER_ADVICE
+    did = "" if shown.is_known else "whether it is so still is not known"
+    level = f"level {known.level.word}"
+    yield Alarm(kind, "danger", known.reasons, level, did, check_of(kind), is_now=shown.is_known)
+
+
+# --- small things
+
+
+def _where(robot: Robot, name: str) -> str:
+    """`left knee, node 2 on can0`."""
+    spoken, bus = name.replace("_", " "), _bus(robot, name)
+    return f"{spoken}, node {_device(robot, name)['node_id']} on {bus}" if bus else spoken
+
+
+def _bus(robot: Robot, name: str) -> str:
+    """Return the bus of a component that is a node."""
+    device = _device(robot, name)
+    return str(device.get("bus", "its bus")) if "node_id" in device else ""
+
+
+def _device(robot: Robot, name: str) -> Mapping[str, Any]:
+    known = () if robot.description is None else robot.description.components
+    device = next((part.device for part in known if part.name == name), None)
+    return device if isinstance(device, dict) else {}
+
+
+def _channel(robot: Robot, name: str, code: int | None, first: tuple[str, ...] = ()) -> str | None:
+    """Return the channel that shows what is wrong with a component, of those that the robot has."""
+    known = () if robot.description is None else robot.description.channels
+    names = [channel.name for channel in known if channel.component == name and not channel.enum]
+    told = "" if code is None else f"{code:04X}"
+    wanted = next((shown for begin, shown in _SHOWN_BY if told.startswith(begin)), ()) if told else ()
+    for quantity in (*first, *wanted, "position", "force", "tilt_forward"):
+        if f"{name}.{quantity}" in names:
+            return f"{name}.{quantity}"
+    return names[0] if names else None
+
+
+def _words(robot: Robot) -> dict[str, str | None]:
+    return {joint: robot.word(f"{joint}.state") for joint in robot.names("joint")}
+
+
+def _is_live(robot: Robot) -> bool:
+    return robot.link.state is ConnectionState.CONNECTED and not robot.is_stale()
+
+
+def _listed(names: list[str]) -> str:
+    return ", ".join(name.replace("_", " ") for name in names)
+
+
+def _utc_s(monotonic_ns: int) -> float:
+    return time.time() - (time.monotonic_ns() - monotonic_ns) / 1e9

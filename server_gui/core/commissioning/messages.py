@@ -1,0 +1,109 @@
+"""The messages of `gwrms commission --json`, a line each; an unknown one is shown as it is."""
+
+from typing import Final
+
+import msgspec
+
+from gateway.units import with_minus
+
+ENTER: Final = " Then press Enter."
+
+
+class Reading(msgspec.Struct, frozen=True):
+    """What a device tells while a question waits; `value` is `None` where it tells nothing."""
+
+    name: str
+    value: float | str | None
+    unit: str = ""
+
+    @property
+    def text(self) -> str:
+        """The value with its unit; a dash where there is none."""
+        if self.value is None:
+            return f"— {self.unit}".rstrip()
+        told = self.value if isinstance(self.value, str) else with_minus(f"{self.value:.10g}")
+        return f"{told} {self.unit}".rstrip()
+
+
+class Step(msgspec.Struct, frozen=True):
+    """One step: of which part of the robot, and whether it is done, now, next or passed."""
+
+    part: str
+    title: str
+    state: str
+
+
+class Written(msgspec.Struct, frozen=True):
+    """What became of the robot's file."""
+
+    file: str
+    text: str
+    findings: tuple[tuple[str, str], ...] = ()
+    usable: bool = False
+    unfinished: tuple[str, ...] = ()
+    not_journaled: str = ""
+
+
+class Stopped(msgspec.Struct, frozen=True):
+    """What came of a stop."""
+
+    confirmed: bool
+    words: str
+    drives: dict[str, str] = {}
+
+
+class Error(msgspec.Struct, frozen=True):
+    """Why it cannot go on at all."""
+
+    message: str
+
+
+class Message(msgspec.Struct, frozen=True):
+    """Any line: of these, what it has."""
+
+    say: str | None = None
+    file: str = ""
+    ask: str | None = None
+    number: int = 0
+    choices: tuple[str, ...] = ()
+    default: str | None = None
+    unit: str = ""
+    bounds: tuple[float, float] | None = None
+    press: bool = False
+    refused: str = ""
+    live: tuple[Reading, ...] | None = None
+    problem: str = ""
+    moving: str | msgspec.UnsetType | None = msgspec.UNSET  # a joint is under power; None: no longer
+    steps: tuple[Step, ...] | None = None
+    written: Written | None = None
+    stopped: Stopped | None = None
+    error: Error | None = None
+
+    @property
+    def question(self) -> str:
+        """What is asked, without what only a terminal needs."""
+        return (self.ask or "").removesuffix(ENTER)
+
+    @property
+    def range(self) -> str:
+        """Between which numbers an answer is."""
+        if self.bounds is None:
+            return ""
+        low, high = self.bounds
+        return f"{low:g} to {high:g} {self.unit}".rstrip()
+
+
+def understood(text: str) -> Message:
+    """Return a line; one that is not understood says what it is."""
+    try:
+        return msgspec.json.decode(text, type=Message)
+    except (msgspec.DecodeError, UnicodeDecodeError):
+        return Message(say=text)
+
+
+def answer(text: str, number: int) -> str:
+    """Return the line that answers the question of this number, and no other."""
+    return msgspec.json.encode({"answer": text, "number": number}).decode()
+
+
+STOP: Final = '{"stop": true}'

@@ -1,0 +1,83 @@
+"""Confidence in a prediction, in words that a wearer's therapist understands."""
+
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from enum import Enum
+from typing import Final
+
+from ml.registry.card import DataSource
+from ml.serving.trust import Level
+from server_gui.core.alarms.robot_alarms import undriven
+from server_gui.core.desk.station import Station
+from server_gui.core.models.names import told_name
+from server_gui.core.prediction.current import Recalled, Shown, Told
+from server_gui.core.prediction.state import Quality
+
+NOT_SEEN: Final = ("lost", "stale")
+SOURCES: Final = {
+    DataSource.SIMULATED: "learned in the simulator",
+    DataSource.RECORDED: "learned from recordings",
+    DataSource.MIXED: "learned from recordings and the simulator",
+}
+
+
+class Worth(Enum):
+    """What it is worth."""
+
+    CHECKED = "checked"  # people have labelled of late what this model was to say
+    UNCHECKED = "not checked"
+    DOUBTFUL = "doubtful"
+
+
+@dataclass(frozen=True, slots=True)
+class Confidence:
+    """`wordings` say it, the fullest first."""
+
+    worth: Worth
+    wordings: tuple[str, ...]
+
+
+def belief(told: Told) -> Confidence:
+    """Return the confidence in what a model says."""
+    if isinstance(told, Recalled):
+        return Confidence(Worth.UNCHECKED, (f"said then by {told_name(told.prediction.model)}", "said then"))
+    predicted = told.predicted
+    if predicted.trust.level is Level.DRIFTED:
+        return Confidence(Worth.DOUBTFUL, (_drifted(told), "unlike its learning", "do not rely on it"))
+    if predicted.trust.level is Level.UNSURE:
+        return Confidence(Worth.DOUBTFUL, ("mostly unsure here: do not rely on it", "mostly unsure"))
+    quality = predicted.quality
+    if quality is None or not quality.labelled:
+        card = predicted.card
+        about = f"{SOURCES[card.source]} {_ago(card.made)}"
+        if predicted.learned_from:
+            about = f"learned from {predicted.learned_from}"
+        return Confidence(Worth.UNCHECKED, (f"not yet checked on this robot, {about}", "not yet checked"))
+    return Confidence(Worth.CHECKED, _checked(quality))
+
+
+def not_judged(station: Station) -> str:
+    """Return why what the robot does now is no sign of anything: it does not drive its wearer."""
+    return undriven(station.robot, station.stopping)
+
+
+def blind(station: Station) -> str:
+    """Return which components a model does not see now: without them nothing is like what it has learned."""
+    missing = [part.name.replace("_", " ") for part in station.robot.not_ok() if part.state in NOT_SEEN]
+    return f"nothing comes from {', '.join(missing)}" if missing else ""
+
+
+def _checked(quality: Quality) -> tuple[str, ...]:
+    right = 100 * quality.right / quality.labelled
+    short = f"right {right:.0f} % last week"
+    return f"{short} ({quality.labelled} checked)", short
+
+
+def _drifted(told: Shown) -> str:
+    channels = ", ".join(told.predicted.trust.drifted[:2])
+    return f"unlike what it has learned{f' ({channels})' if channels else ''}: do not rely on it"
+
+
+def _ago(made: datetime) -> str:
+    days = (datetime.now(UTC) - made).days
+    return "today" if days < 1 else "yesterday" if days == 1 else f"{days} days ago"

@@ -1,0 +1,48 @@
+"""Reverted trials: reported once the old values have been read back, not before."""
+
+import time
+from collections.abc import Callable, Mapping
+from typing import Final
+
+from gateway.wire.method import Number
+from server_gui.core.follow.news import NewsKind
+from server_gui.core.follow.robot import Robot
+from server_gui.core.tuning.writing import WriteProgress, WriteState
+
+OVERDUE_S: Final = 2.0  # after its end values are looked at again
+BACK: Final = "taken back: the values from before are held again"
+OTHERS: Final = "taken back, but other values are held: look at them"
+
+
+class RevertedTrials:
+    """Of one robot; `tell` notes what came of it."""
+
+    def __init__(self, robot: Robot, writing: WriteProgress, tell: Callable[[NewsKind, str], None]) -> None:
+        self._robot = robot
+        self._writing = writing
+        self._tell = tell
+        self._awaited: tuple[Mapping[str, Number], int] | None = None
+
+    def began(self, before: Mapping[str, Number]) -> None:
+        """Take the robot's report that these are in force again."""
+        self._awaited = before, time.monotonic_ns()
+        self._writing.reverting()
+
+    def forget(self) -> None:
+        """Something else was written since."""
+        self._awaited = None
+
+    def look(self) -> None:
+        """Values have come; those that were asked for before the robot's answer may be the trial's still."""
+        read_ns = self._robot.parameters_at_ns
+        if self._awaited is None or read_ns is None or read_ns <= self._awaited[1]:
+            return
+        before, at_ns = self._awaited
+        if self._robot.holds(before):
+            self._awaited = None
+            self._writing.reverted(BACK)
+            self._tell(NewsKind.PARAMETER, BACK)
+        elif read_ns - at_ns > OVERDUE_S * 1e9:
+            self._awaited = None
+            self._writing.say(WriteState.UNKNOWN, OTHERS)
+            self._tell(NewsKind.WARNING, OTHERS)

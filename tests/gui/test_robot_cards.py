@@ -1,0 +1,52 @@
+"""A robot's card: whose its STOP is, how it is and what it does, in the words of the header."""
+
+import time
+
+from gateway.client import ConnectionState, NotConnected
+from server_gui.core.follow.events import LinkChanged
+from server_gui.views.frame.main_window import MainWindow
+from tests.gui.fakes import Around, Bench
+from tests.gui.test_alarms import fault, settle
+from tests.support.desk import described, looked, walking
+
+
+def test_each_stop_names_its_robot_and_all_says_all(around: Around, bench: Bench) -> None:
+    other = bench.add("a-robot-with-quite-a-long-name-of-its-own", 7421)
+    other.is_named = True
+    other.take([described()])
+    settle(around, bench)
+    first, second = around.robots.cards
+    assert first.stop.text() == "STOP  exo-01"
+    assert second.stop.text().startswith("STOP  a-robot")
+    assert second.stop.accessibleName() == "STOP a-robot-with-quite-a-long-name-of-its-own"
+    assert around.robots.all_stop.text() == "STOP  ALL"
+
+
+def test_a_card_says_what_its_robot_does_also_beside_an_alarm_and_nothing_of_the_past(
+    around: Around, bench: Bench
+) -> None:
+    other = bench.add("exo-02", 7421)
+    other.take([described(), walking(300), looked()])
+    fault(bench)
+    settle(around, bench)
+    first, second = around.robots.cards
+    assert first.texts[3].endswith("0 of 6 enabled")
+    assert second.texts[3].endswith("6 of 6 enabled")
+    assert second._doing.is_whole
+    first.resize(200, first.height())
+    assert "·" in first._doing.shown, (
+        "what the wearer does is left out where there is room for it in few words"
+    )
+    other.take([LinkChanged(ConnectionState.WAITING, "gone", time.monotonic_ns())])
+    settle(around, bench)
+    assert second.texts[3] == "what it does is not known"
+
+
+def test_a_card_has_the_same_word_as_the_header_where_it_is_narrow(window: MainWindow, bench: Bench) -> None:
+    bench.station.stop("test")
+    bench.first.fail(NotConnected("there is no link"))
+    settle(window, bench)
+    assert window.width() >= 1300
+    card = window.robots.cards[0]
+    assert "STOP NOT CONFIRMED" in card._state.shown
+    assert card._state.is_whole
