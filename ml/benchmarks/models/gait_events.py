@@ -42,7 +42,7 @@ class EventModel:
         self.settings = settings or EventSettings()
 
     def learned(self, apart: Integers) -> npt.NDArray[np.bool_]:
-        """Which moments to learn from; they are `apart` (n, kinds) samples from the nearest event of each kind.
+        """Which moments to learn from, by how far `apart` (n, kinds) the nearest event of each kind is.
 
         Raises:
             UnusableData: none of them is near an event.
