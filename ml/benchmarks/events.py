@@ -117,8 +117,12 @@ def _fold(
 def _fitted(feet: Sequence[Foot], settings: EventSettings) -> EventModel:
     if not feet:
         raise UnusableData("nobody is left to learn from")
-    columns = np.concatenate([foot.features for foot in feet])
-    return EventModel(settings).fit(columns, np.concatenate([foot.apart() for foot in feet]))
+    apart = np.concatenate([foot.apart() for foot in feet])
+    model = EventModel(settings)
+    rows = model.learned(apart)
+    of_feet = np.split(rows, np.cumsum([len(foot.at) for foot in feet])[:-1])
+    columns = np.concatenate([foot.features[own] for foot, own in zip(feet, of_feet, strict=True)])
+    return model.fit(columns, apart[rows])
 
 
 def _counted(model: EventModel, foot: Foot, share: float) -> Iterator[Key]:

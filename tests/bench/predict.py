@@ -4,8 +4,8 @@ First the models of the benchmarks, then a robot's own, on their way through a s
 features, judging. `danger` is a row of all its channels, once its memory is full; it knows no batches:
 fifty robots take fifty times as long, which is told and not limited. The time is what this thread used of a
 core, so that other work does not count; and a busy computer's caches do not either: what is allowed is a
-multiple of a yardstick in the same run, which is scikit-learn's plain `predict` of the model of `ipol-
-status`, of one row and of fifty.
+multiple of a yardstick in the same run, which is scikit-learn's plain `predict` of trees and one network on
+two seconds, of one row and of fifty.
 """
 
 import copy

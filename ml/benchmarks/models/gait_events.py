@@ -41,20 +41,24 @@ class EventModel:
     def __init__(self, settings: EventSettings | None = None) -> None:
         self.settings = settings or EventSettings()
 
-    def fit(self, x: Features, apart: Integers) -> Self:
-        """Learn from moments that are `apart` (n, kinds) samples from the nearest event of each kind.
+    def learned(self, apart: Integers) -> npt.NDArray[np.bool_]:
+        """Which moments to learn from, by how far `apart` (n, kinds) the nearest event of each kind is.
 
         Raises:
             UnusableData: none of them is near an event.
 
         """
-        tuned, near = self.settings, (apart <= NEAR).any(axis=1)
+        near: npt.NDArray[np.bool_] = (apart <= NEAR).any(axis=1)
         if not near.any():
             raise UnusableData("too few feet step: some have nobody to learn from")
-        rows = near | (np.random.default_rng(0).random(len(x)) < tuned.elsewhere)
+        return near | (np.random.default_rng(0).random(len(apart)) < self.settings.elsewhere)
+
+    def fit(self, x: Features, apart: Integers) -> Self:
+        """Learn from the moments that were chosen."""
+        tuned = self.settings
         self.scale_: Pipeline = scaled()
-        inputs = self.scale_.fit_transform(x[rows])
-        bumps = np.exp(-0.5 * (apart[rows] / tuned.width) ** 2).astype(np.float32)
+        inputs = self.scale_.fit_transform(x)
+        bumps = np.exp(-0.5 * (apart / tuned.width) ** 2).astype(np.float32)
         self.networks_ = [
             _network(tuned, seed, len(inputs)).fit(inputs, bumps) for seed in range(tuned.networks)
         ]
