@@ -132,7 +132,7 @@ def _rates(path: Path) -> npt.NDArray[np.int16]:
 
 
 def _moving(steps: Sequence[tuple[int, int]], rows: int) -> npt.NDArray[np.int8]:
-    """Return 1 while the foot moves; between two steps that overlap in the labels a row on the ground stays."""
+    """Return 1 while the foot moves; between two steps that overlap in the labels a row stays 0."""
     moving = np.zeros(rows, dtype=np.int8)
     for begin, end in steps:
         moving[begin:end] = 1

@@ -27,7 +27,7 @@ class KneeTape:
 
     def read(self, begin_ns: int, end_ns: int, channels: list[str]) -> Rows:
         self.asked += 1
-        utc_ns = np.arange(max(begin_ns, self.first_ns), min(end_ns, self.last_ns + 1), SECOND_NS // 10)
+        utc_ns = np.arange(max(begin_ns, BEGIN_NS), min(end_ns, self.last_ns + 1), SECOND_NS // 10)
         since_s = (utc_ns - BEGIN_NS) / SECOND_NS
         kept = (since_s < 240) | (since_s >= 300)
         utc_ns, since_s = utc_ns[kept], since_s[kept]
