@@ -1,7 +1,6 @@
 """Active alarms in sight: above the tabs, among the events, on cards; their buttons; robots that go."""
 
 import time
-from types import SimpleNamespace
 
 import pytest
 from PySide6.QtCore import QRect, Qt
@@ -364,33 +363,6 @@ def test_the_signal_of_a_fault_is_shown_and_it_is_cleared_after_a_question_that_
     assert "STILL ENABLED, and without torque then: right hip" in asked.words.text()
     asked.act.click()
     assert [name for name, _ in bench.first.asked if name != "show_processes"] == ["reset"]
-
-
-def test_an_event_leads_to_its_instant_in_the_signals_that_are_shown(
-    window: MainWindow, bench: Bench, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    station, signals = bench.station, window.tabs.signals
-    station.take([walking(400)])
-    bench.desk.news.add(NewsKind.PARAMETER, station.title, "gait.step_length 400 → 430 mm")
-    bench.desk.news.add(NewsKind.WARNING, "recording", "the disk is full")
-    window.tabs.look_at(signals)
-    bench.draw(window)
-    before = signals.chosen
-    window.tabs.setCurrentIndex(0)
-    events = window.events
-    (written,) = (place for place, line in enumerate(events.lines) if "430 mm" in line.text)
-    (disk,) = (place for place, line in enumerate(events.lines) if "disk" in line.text)
-    written_s = events.lines[written].utc_s or 0.0
-    two_later = SimpleNamespace(time=lambda: written_s + (station.robot.age_s() or 0.0) + 2.0)
-    monkeypatch.setattr("server_gui.views.alarms.events_panel.time", two_later)
-    events.table.activated.emit(events.table.model().index(disk, 0))
-    assert window.tabs.currentIndex() == 0, "it is of no robot"
-    events.table.activated.emit(events.table.model().index(written, 0))
-    assert window.tabs.currentIndex() == 1
-    assert signals.pause.isChecked(), "the instant runs away"
-    assert signals.chosen == before
-    left, right = signals.plots[0].plot.window_s
-    assert left <= -2.0 <= right
 
 
 def test_what_is_acknowledged_is_one_line_until_it_is_over(around: Around, bench: Bench) -> None:
