@@ -1,4 +1,4 @@
-"""The recipe for standing, walking and turning in context: `GAIT_STATUS`, and six seconds at 10 Hz.
+"""The recipe for standing, walking and turning in context: `GAIT_STATUS`, and six seconds at 20 Hz.
 
 A pause of two seconds is the end of a walk, or a breath after a turn: the newest two seconds cannot tell.
 """
@@ -16,10 +16,10 @@ from ml.features.signals import GRAVITY, along, length, up
 from ml.features.windows import Samples
 
 LOOK_BACK: Final = 600
-COARSE: Final = 10  # one sample of so many is taken: 10 Hz
-STRETCH: Final = 5  # of these, of which the mean is taken: 0.5 s
-SECOND: Final = 10  # of these
-TURNED: Final = range(25, LOOK_BACK // COARSE + 1, 5)  # of these, over which a heading is compared
+COARSE: Final = 5  # one sample of so many is taken: 20 Hz
+STRETCH: Final = 10  # of these, of which the mean is taken: 0.5 s
+SECOND: Final = 20  # of these
+TURNED: Final = range(50, LOOK_BACK // COARSE + 1, 10)  # of these, over which a heading is compared
 
 
 def _compute(windows: Samples) -> Features:

@@ -48,10 +48,11 @@ class EventModel:
             UnusableData: none of them is near an event.
 
         """
-        near: npt.NDArray[np.bool_] = np.any(apart <= NEAR, axis=1)
+        near: npt.NDArray[np.bool_] = np.asarray((apart <= NEAR).any(axis=1))
         if not near.any():
             raise UnusableData("too few feet step: some have nobody to learn from")
-        return near | np.less(np.random.default_rng(0).random(len(apart)), self.settings.elsewhere)
+        near |= np.random.default_rng(0).random(len(apart)) < self.settings.elsewhere
+        return near
 
     def fit(self, x: Features, apart: Integers) -> Self:
         """Learn from the moments that were chosen."""
