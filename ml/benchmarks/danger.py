@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Final
 
@@ -109,12 +110,17 @@ def _fit(seen: Sequence[Seen]) -> Parts:
 def _counts(one: Seen) -> Floats:
     """How much each moment of a danger counts: its later half, one in all."""
     counts = np.zeros(len(one.danger))
-    bounds = np.flatnonzero(np.diff(one.danger)) + 1
-    for begin, end in zip(bounds, [*bounds[1:], len(counts)], strict=True):
+    for begin, end in _spans(one.danger):
         if one.coming[begin] and one.danger[begin] in _foreseeable(one):
             middle = (begin + end) // 2
             counts[middle:end] = 1.0 / (end - middle)
     return counts
+
+
+def _spans(danger: Floats) -> Iterator[tuple[int, int]]:
+    """From where on and up to where each danger is, and each time between two; not what is there first."""
+    changes = (np.flatnonzero(np.diff(danger)) + 1).tolist()
+    return pairwise([*changes, len(danger)])
 
 
 def _foreseeable(one: Seen) -> set[float]:
@@ -167,8 +173,7 @@ def judge(one: Seen, calibration: Calibration) -> Judged:
 def events(judged: Judged, least: Level) -> Iterator[Event]:
     """Every danger that did harm, and when its level was first reached."""
     danger = judged.seen.danger
-    bounds = np.flatnonzero(np.diff(danger)) + 1
-    for begin, end in zip(bounds, [*bounds[1:], len(danger)], strict=True):
+    for begin, end in _spans(danger):
         number = danger[begin]
         if number < 1.0 or number % 1.0 or end >= len(danger) or danger[end] != number + 0.5:
             continue
