@@ -52,10 +52,12 @@ class Daemon:
         local: socket.socket | None = None,
         *,
         ends_idle: bool = False,
+        rested_without_keys: bool = False,
     ) -> None:
         """`classic` is where the paper's own exchange is served, `local` a Unix socket.
 
-        With `ends_idle`, `run` returns too when nobody has needed the gateway for its `linger_s`.
+        With `ends_idle`, `run` returns too when nobody has needed the gateway for its `linger_s`. Where
+        it has `rested_without_keys`, it is served without them again.
 
         Raises:
             DoorProblem: one of these sockets must not be served.
@@ -77,7 +79,11 @@ class Daemon:
         self._sockets = [listener] if local is None else [listener, local]
         folder = AccessFolder(config.access)
         self._entrance = Authentication(
-            self._sockets, folder, self._complain, lambda: self._loop.post(self._left)
+            self._sockets,
+            folder,
+            self._complain,
+            lambda: self._loop.post(self._left),
+            rested_without_keys=rested_without_keys,
         )
         self._known: Known | None = None  # of the last look, while somebody is there by a key or account
         doors, registry = self._entrance.doors, self._service.registry
@@ -99,6 +105,11 @@ class Daemon:
         """Host and port that clients connect to."""
         host, port = self._listener.getsockname()[:2]
         return host, port
+
+    @property
+    def has_keys(self) -> bool:
+        """Whether it is served with them."""
+        return self._entrance.has_keys
 
     @property
     def told(self) -> bool:

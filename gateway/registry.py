@@ -131,9 +131,9 @@ class Registry:
         return slot.module if slot.phase is Phase.RUNNING else None
 
     def use(self, name: str, user: Hashable | None) -> "Future[Module]":
-        """Return the running module; `user` keeps it (and what it needs) until `leave`. No user.
+        """Return the running module; `user` keeps it (and what it needs) until `leave`.
 
-        It lingers only.
+        Without a user it lingers only.
         """
         slot = self._slots[name]
         if self.ending:

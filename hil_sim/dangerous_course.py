@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Final
 
-from hil_sim.dangers import DANGERS, LONGEST_S, Seen, healthy
+from hil_sim.dangers import DANGERS, EVERYWHERE, LEVEL, LONGEST_S, Seen, healthy
 from hil_sim.exoskeleton import Exoskeleton
 from hil_sim.faults.injector import Faults
 from hil_sim.gait.activity import Activity
@@ -20,7 +20,8 @@ RESTS_S: Final = 5.0  # after a danger: what follows counts as healthy again
 class Course:
     """Leads `robot` from its first cycle of the sensors on; `now` says in which danger it is.
 
-    `healthy_s` of healthy walking come before the first danger, and between two of them a visit more.
+    `healthy_s` of healthy walking come before the first danger, and between two of them a visit more; where
+    there are no `dangers`, all of it is on level ground.
     """
 
     def __init__(self, robot: Exoskeleton, seed: int, healthy_s: float, dangers: Sequence[str]) -> None:
@@ -30,7 +31,7 @@ class Course:
         self._faults = Faults(robot, Path(), seed)
         self._dangers = list(dangers)
         self._source.shuffle(self._dangers)
-        self._ways = healthy(self._source)
+        self._ways = healthy(self._source, EVERYWHERE if dangers else LEVEL)
         self._course = self._steps(healthy_s)
         self._waits = next(self._course)
         robot.measured.insert(0, self._step)

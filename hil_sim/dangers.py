@@ -5,7 +5,7 @@ Harm is defined by what the body and the machine really do, never by what a sens
 
 import math
 import random
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -165,20 +165,18 @@ DANGERS: Final[Mapping[str, Danger]] = {
 LONGEST_S: Final = 25.0  # without harm a danger is ended, and counts as none
 
 
-def healthy(source: random.Random) -> Iterator[Entry]:
-    """Yield a wearer's own day on foot, without end.
-
-    Walking, turning, ramps, stairs, standing and sitting.
-    """
+def healthy(source: random.Random, among: Sequence[Activity]) -> Iterator[Entry]:
+    """Yield a wearer's own day on foot, without end: visits `among` these, each once a round."""
     while True:
-        visits = [*_VISITS]
+        visits = [*among]
         source.shuffle(visits)
         for activity in visits:
             pace = source.uniform(0.30, 0.55), source.uniform(1.4, 2.4)
             yield Entry(activity, source.uniform(5.0, 11.0), pace)
 
 
-_VISITS: Final = (
+LEVEL: Final = (*(Activity.WALK,) * 6, Activity.STAND, Activity.TURN_LEFT, Activity.TURN_RIGHT)
+EVERYWHERE: Final = (
     *(Activity.WALK,) * 6,
     Activity.STAND,
     Activity.SIT,

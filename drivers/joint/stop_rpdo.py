@@ -43,9 +43,9 @@ class StopRpdo:
         return self.node.bus.send_urgent(self.rpdo.can_id, self.rpdo.frame(values))
 
     def _held(self, object_: Object) -> bytes | None:
-        """Return what the device holds of an object now, as far as it has confirmed that; `None`.
+        """Return what the device holds of an object now, as far as it has confirmed that.
 
-        Nobody knows.
+        `None`: nobody knows.
         """
         return self.node.channel.known(*object_, self.values[object_])
 

@@ -130,7 +130,7 @@ class _Descent:
                     self._axis.command(controlword)
 
     def _may_step(self, state: DriveState) -> bool:
-        """Return an axis that brakes is not let go limp, and a fault is not reset again too soon."""
+        """Return whether to go on: an axis that brakes is not let go limp, no fault reset too soon."""
         if state is DriveState.QUICK_STOP_ACTIVE:
             return self._stands()
         if state is DriveState.FAULT:

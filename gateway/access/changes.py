@@ -1,11 +1,12 @@
 """What is changed in a robot's access folder: keys made, clients added and taken away."""
 
 import contextlib
+import os
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 
-from gateway.access.folder import CERTIFICATE, KEY, AccessFolder
+from gateway.access.folder import KEYS, AccessFolder
 from gateway.certificates import NAME, KeyProblem, der_of, fingerprint, pem_of
 from gateway.key_making import alone_in, make, write_file
 from gateway.tables.entries import NoSuchLine, with_entry, without_entry
@@ -24,13 +25,19 @@ may = []   # "reset", "enable"
 """
 
 
-def ensure_keys(folder: AccessFolder, robot: str) -> bool:
-    """Make the robot's key where it has none; whether it was made now. Raises `KeyProblem`."""
+def ensure_keys(folder: AccessFolder, robot: str) -> AccessFolder:
+    """Return the folder with the keys that it pairs with; they are made where there are none.
+
+    A robot's first key waits beside the folder of its keys until `admit` puts it there: a pairing that was
+    cancelled, killed or in vain has changed nothing, and the next one goes on with the same key.
+
+    Raises `KeyProblem`.
+    """
     with _alone(folder):
-        if folder.key.exists() and folder.certificate.exists():
-            return False
-        make(_file_name(robot), folder.folder / "keys" / KEY, folder.folder / "keys" / CERTIFICATE)
-        return True
+        pairing = folder.for_pairing
+        if not (pairing.key.exists() and pairing.certificate.exists()):
+            make(_file_name(robot), pairing.key, pairing.certificate)
+        return pairing
 
 
 def own_fingerprint(folder: AccessFolder) -> str:
@@ -50,6 +57,47 @@ def add(folder: AccessFolder, name: str, der: bytes, role: Role) -> None:
     """
     with _alone(folder):
         _add(folder, name, der, role)
+
+
+def admit(pairing: AccessFolder, own: str, name: str, der: bytes, role: Role) -> bool:
+    """Make a desk known that has seen the robot's key `own`; whether that is the robot's from now on only.
+
+    The desk comes first, then the key, in one step: at no moment has the robot a key that lets nobody in.
+    Where two pair at once, both have seen the same key.
+
+    Raises:
+        KeyProblem: as `add`; or the robot has another key meanwhile, or none.
+
+    """
+    with _alone(pairing):
+        now = pairing.for_pairing
+        if own_fingerprint(now) != own:
+            raise KeyProblem(f"the robot has another key in {now.keys} meanwhile; pair again")
+        _add(now, name, der, role)
+        if now.waits:
+            _publish(now, name)
+        return now.waits
+
+
+def _publish(waiting: AccessFolder, first: str) -> None:
+    """Make the key that waits the robot's own; where that fails, the first desk is not known either."""
+    keys = waiting.folder / KEYS
+    try:
+        waiting.keys.rename(keys)
+        _sync(waiting.folder)
+    except OSError as error:
+        with contextlib.suppress(KeyProblem):
+            _without_certificates(waiting, first)
+        raise KeyProblem(f"{keys} cannot be made: {error.strerror or error}") from error
+
+
+def _sync(folder: Path) -> None:
+    """Have what was renamed there outlast a loss of power."""
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 def check_free(folder: AccessFolder, name: str) -> None:

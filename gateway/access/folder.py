@@ -1,7 +1,8 @@
 """Where a robot's keys, its clients' certificates and their roles are: beside its file, as in /etc/gwrms.
 
 keys/robot.key and keys/robot.crt are the robot's own, clients/NAME.crt those who are known, access.toml says
-what each may do.
+what each may do. A key that was made for a first desk waits in keys.pairing/ until that desk is let in
+(`changes.admit`): a gateway does not look there.
 """
 
 import os
@@ -10,6 +11,7 @@ from pathlib import Path
 from typing import Final
 
 KEY, CERTIFICATE = "robot.key", "robot.crt"
+KEYS, WAITING = "keys", "keys.pairing"
 CREDENTIALS: Final = "CREDENTIALS_DIRECTORY"  # where systemd puts what LoadCredential= names
 
 Stamp = tuple[tuple[str, int, int, int], ...]
@@ -24,7 +26,19 @@ class AccessFolder:
         self.table = folder / "access.toml"
         credentials = environ.get(CREDENTIALS)
         handed = Path(credentials) if credentials else None
-        self.keys = handed if handed is not None and (handed / KEY).exists() else folder / "keys"
+        self.keys = handed if handed is not None and (handed / KEY).exists() else folder / KEYS
+
+    @property
+    def for_pairing(self) -> "AccessFolder":
+        """The same on the disk; where it has no keys, with those that wait for the first desk."""
+        other = AccessFolder(self.folder, {})
+        other.keys = other.keys if other.has_keys else self.folder / WAITING
+        return other
+
+    @property
+    def waits(self) -> bool:
+        """Whether its keys are such as wait."""
+        return self.keys.name == WAITING
 
     @property
     def has_keys(self) -> bool:

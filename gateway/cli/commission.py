@@ -54,9 +54,10 @@ def main(argv: list[str]) -> int:
     if missing:
         parser.error(f"--eds {', '.join(missing)}: there is no such folder")
     with alone(options.file), ending(), ExitStack() as ends:
-        draft = Draft(options.file)
         bench = CanBench(name, settings)
         ends.callback(bench.close)
+        bench.check_opens()
+        draft = Draft(options.file)
         if not options.json:
             return _lead(draft, bench, settings, options, Terminal(), None)
         lines = ends.enter_context(Lines(stdin()))

@@ -4,7 +4,7 @@ import re
 import textwrap
 import time
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 
 from gateway.amounts import NONE
 from gateway.cli import describe_buses
@@ -17,6 +17,7 @@ from gateway.wire.parameter import ParameterInfo
 from gateway.wire.robot import Description, GuardInfo, GuardRuleInfo, Hello
 from gateway.wire.stop import StopInfo
 
+HELD = "held"  # the word of a controller that waits to be started
 PAGE = 100  # columns
 LOAD_S, LOOK_S = 2.0, 0.2  # how long a bus that has just been opened is given, and how often it is looked
 
@@ -31,10 +32,12 @@ def main(argv: list[str]) -> int:
     ).parse_args(argv)
     with connect(arguments, "describe") as robot:
         description, hello = _measured(robot), robot.hello
+        names = holding_channels(description)
+        values = robot.components(*names).values if names else {}
     if arguments.json:
         say_json(description)
     else:
-        say("\n".join([*_you(hello), *_chapters(description)]))
+        say("\n".join([*_you(hello), *held(description, values), *_chapters(description)]))
     return 0
 
 
@@ -54,6 +57,24 @@ def _you(hello: Hello | None) -> Iterator[str]:
     if hello is not None:
         not_for_you = f"; not for you: {', '.join(hello.refused)}" if hello.refused else ""
         yield textwrap.fill(f"you are {hello.who}{not_for_you}", PAGE, subsequent_indent="  ") + "\n"
+
+
+def holding_channels(robot: Description) -> list[str]:
+    """Return the states of controllers, where one of them is `held`."""
+    controllers = (one for one in robot.channels if one.component in robot.stop.controllers)
+    return [one.name for one in controllers if one.enum and HELD in one.enum.values()]
+
+
+def held(robot: Description, values: Mapping[str, float | None]) -> Iterator[str]:
+    """Tell of controllers whose own state is `held`: they move nothing until somebody starts them."""
+    words = {one.name: one.enum for one in robot.channels if one.enum}
+    for name in holding_channels(robot):
+        value = values.get(name)
+        if value is not None and words[name].get(f"{value:.0f}") == HELD:
+            yield (
+                f"{name} is {HELD}, as after a lost joint: it moves nothing until it is started again\n"
+                "(a simulated robot's: gwrms sim-fault --controller start)\n"
+            )
 
 
 def _chapters(robot: Description) -> Iterator[str]:

@@ -57,7 +57,7 @@ def main(argv: Sequence[str]) -> int:
         say("".join(f"{rule.name:<18} {rule.meaning}; {rule.looks}\n" for rule in RULES))
         return 0
     if options.file is None:
-        parser.error("name the robot's file")
+        parser.error("name the robot's file: gwrms doctor /etc/gwrms/robot.toml")
     if options.fix and options.json:
         parser.error("--fix asks people, --json is for machines: say one of both")
     if options.yes and not options.fix:

@@ -36,8 +36,9 @@ gwrms keys COMMAND --help says more.
 """
 _PAIR = """\
 Shows HOST:PORT and a code. On the desk, `gwrms pair HOST:PORT` asks for it and proves to know it; then you
-say here how that desk is called and what it may do. The robot's own key is made where it has none: from
-its gateway's next start on, every TCP connection is TLS.
+say here how that desk is called and what it may do. With its first desk the robot gets a key of its own: from
+its gateway's next start on, every TCP connection is TLS. Until a desk is let in nothing changes, also if this
+is cancelled.
 """
 
 
@@ -65,18 +66,18 @@ def pair(argv: list[str]) -> int:
     robot, folder = _robot(arguments)
     if arguments.name:
         changes.check_free(folder, arguments.name)
-    if changes.ensure_keys(folder, robot.robot.name):
-        say(f"The robot's key was made in {folder.keys}. Start its gateway again: it speaks TLS only then.\n")
     host = arguments.host or robot.gateway.host
     with listen(host, arguments.port, "--host and --port") as listener:
-        code, own = new_code(), changes.own_fingerprint(folder)
-        pairing = Pairing(folder, listener, code, own)
+        _warn_of_loopback(listener, arguments)
+        keys = changes.ensure_keys(folder, robot.robot.name)
+        code, own = new_code(), changes.own_fingerprint(keys)
+        pairing = Pairing(keys, listener, code, own)
         _show(listener, code, own)
         candidate = pairing.wait()
     try:
         name, role = _confirmed(candidate, arguments, folder)
         candidate.check_waits()
-        changes.add(folder, name, candidate.der, role)
+        is_first = changes.admit(keys, own, name, candidate.der, role)
     except KeyProblem as error:
         candidate.answer(Reply(problem=str(error)))
         raise
@@ -89,7 +90,21 @@ def pair(argv: list[str]) -> int:
         )
     )
     say(f"{name} is let in from now on, as {role.value}.\n")
+    if is_first:
+        say(f"The robot's key is in {folder.keys} now.\n")
+        say(f"Start its gateway again: {name} reaches it only then.\n")
     return 0
+
+
+def _warn_of_loopback(listener: socket.socket, arguments: argparse.Namespace) -> None:
+    """Before a code is shown that no other desk could use."""
+    if is_loopback(listener.getsockname()):
+        warn(
+            "keys",
+            "only a desk on this computer can use the address below: it is this computer's own. "
+            'For other desks press Ctrl-C, set host = "0.0.0.0" under [gateway] in '
+            f"{arguments.config}, and begin again",
+        )
 
 
 def _show(listener: socket.socket, code: str, own: str) -> None:
@@ -100,11 +115,6 @@ def _show(listener: socket.socket, code: str, own: str) -> None:
     say(f"  gwrms pair {where}\n\nIt asks for this code:\n\n  {code}\n\n")
     say("".join(f"{one}\n" for one in _drawn(link(where, code))))
     say(f"This robot's key: {grouped(own)}\n")
-    if is_loopback(listener.getsockname()):
-        warn(
-            "keys",
-            "this listens on this computer only; for other desks set host in [gateway], or give --host",
-        )
 
 
 def _drawn(text: str) -> list[str]:

@@ -81,12 +81,15 @@ def _typed(arguments: argparse.Namespace) -> tuple[Address, str]:
     Raises:
         ValueError: one is none.
         NobodyToAsk: nobody has typed it.
+        Unreachable: a person would type a code for nobody.
 
     """
     robot = arguments.robot or _asked("HOST:PORT, or the robot's link: ", arguments)
     if arguments.code or is_link(robot):
         return pairing.typed(robot, arguments.code)
     where = pairing.place(robot)
+    if sys.stdin.isatty():
+        pairing.check_waits(where)
     while True:
         try:
             return where, normal(_asked("The code that the robot shows: ", arguments))
@@ -109,5 +112,5 @@ def _asked(question: str, arguments: argparse.Namespace) -> str:
         asking.flush()
     line = sys.stdin.buffer.readline(_MOST)
     if not line:
-        raise NobodyToAsk(f"nothing was typed: {question.rstrip(': ')}")
+        raise NobodyToAsk(f"nothing was typed; it was asked for: {question.rstrip(': ')}")
     return line.decode("utf-8", "replace").strip()

@@ -2,6 +2,7 @@
 
 import argparse
 import contextlib
+import dataclasses
 import gc
 import logging
 import os
@@ -49,7 +50,8 @@ Where [guard] heartbeat_ms has armed the drives, they are freed first, and the e
 while one is enabled: gwrms stop, then end it.
 
 Without keys it is served on 127.0.0.1 and its Unix socket only. `gwrms keys pair CONFIG` makes
-them: from then on every TCP connection is TLS, and lets in only whose key is known (gwrms docs pair).
+them with the first desk: from the gateway's next start on every TCP connection is TLS, and lets in
+only whose key is known (gwrms docs pair).
 
 exit status: 0 ended by a signal; 1 the address cannot be used, or CONFIG is wrong; 2 usage
 """
@@ -93,7 +95,14 @@ def main(arguments: Sequence[str]) -> int:
     by_hand, watched = handed is None or handed.woken, notify.watchdog_s()
     idle = watched is None
     try:
-        daemon = Daemon(robot, sockets.port, classic=sockets.classic, local=sockets.local, ends_idle=idle)
+        daemon = Daemon(
+            robot,
+            sockets.port,
+            classic=sockets.classic,
+            local=sockets.local,
+            ends_idle=idle,
+            rested_without_keys=sockets.without_keys,
+        )
     except (DoorProblem, KeyProblem) as error:
         if handed is None:
             sockets.close()
@@ -106,7 +115,7 @@ def main(arguments: Sequence[str]) -> int:
         daemon.run(ready=lambda: _announce(daemon, anew=not sockets.woken))
         signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)
         if by_hand and not daemon.told:
-            rest(sockets)
+            rest(dataclasses.replace(sockets, without_keys=not daemon.has_keys))
     return 0
 
 
@@ -144,8 +153,9 @@ def _listeners(robot: config.RobotConfig, handed: Listeners | None) -> Listeners
         except OSError:
             port.close()
             raise
-    local = _local(robot) if handed is None else handed.local
-    return Listeners(port, classic, local, woken=handed is not None and handed.woken)
+    if handed is not None:
+        return dataclasses.replace(handed, classic=classic)
+    return Listeners(port, classic, _local(robot))
 
 
 def _local(robot: config.RobotConfig) -> socket.socket | None:

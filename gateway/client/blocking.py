@@ -136,9 +136,9 @@ class Robot:
         return self._wait(self._client.read(*names))
 
     def objects(self, component: str, search: str = "") -> ObjectList:
-        """Return what an EDS says of a component's objects; `search`.
+        """Return what an EDS says of a component's objects.
 
-        An address, a range, or words of the name.
+        `search`: an address, a range, or words of the name.
         """
         return self._wait(self._client.objects(component, search))
 

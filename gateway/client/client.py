@@ -168,9 +168,9 @@ class Client:
         return await self.link.call(PARAMETER_READ, ParameterParams(list(names) or None), WRITE_TIMEOUT_S)
 
     async def objects(self, component: str, search: str = "") -> ObjectList:
-        """Return what an EDS says of a component's objects; `search`.
+        """Return what an EDS says of a component's objects.
 
-        An address, a range, or words of the name.
+        `search`: an address, a range, or words of the name.
         """
         return await self.link.call(OBJECT_LIST, ObjectListParams(component, search))
 

@@ -90,17 +90,31 @@ def pair(
     context.check_hostname = False
     context.verify_mode = ssl.CERT_NONE  # the proof is bound to the certificate, whichever it is
     try:
-        plain = socket.create_connection((where.host, where.port), SAY_S)
-        with plain, context.wrap_socket(plain) as secured:
+        with _connected(where) as plain, context.wrap_socket(plain) as secured:
             return _paired(secured, where, code, pem, name or own_name(), given_up)
     except ClientError:
         raise
     except OSError as error:
-        reason = error.strerror or str(error)
-        raise Unreachable(
-            f"no robot pairs at {where} ({reason}): does `gwrms keys pair` wait there, and is it the address "
-            "that it shows?"
-        ) from error
+        raise _nobody(where, error) from error
+
+
+def check_waits(where: Address) -> None:
+    """Raise `Unreachable` where nobody pairs, before a person types a code; it costs no try."""
+    try:
+        _connected(where).close()
+    except OSError as error:
+        raise _nobody(where, error) from error
+
+
+def _connected(where: Address) -> socket.socket:
+    return socket.create_connection((where.host, where.port), SAY_S)
+
+
+def _nobody(where: Address, error: OSError) -> Unreachable:
+    return Unreachable(
+        f"no robot pairs at {where} ({error.strerror or error}): does `gwrms keys pair` wait there, and is "
+        "it the address that it shows?"
+    )
 
 
 def _paired(

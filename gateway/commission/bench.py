@@ -73,6 +73,11 @@ class CanBench:
         self._nodes: frozenset[int] = frozenset()  # that were heard, or answered
         self._heard: frozenset[int] = frozenset()  # identifiers that are somebody's
 
+    def check_opens(self) -> None:
+        """Raise `Unavailable` where the bus is not there: before a person is asked anything."""
+        self._open()
+        self.close()
+
     def nodes(self) -> Found:
         found = scan(self._settings, LISTEN_S, threading.Event().wait, active=True)
         self._nodes = frozenset(found.nodes)

@@ -32,7 +32,7 @@ def commission(
     yield Say(BEGIN)
     yield At(ROBOT, "name")
     if not draft.has("robot", "name"):
-        name = yield from word("How is the robot called (as exo-01)?", check=_name_problem)
+        name = yield from word("What is the robot called (for example exo-01)?", check=_name_problem)
         draft.put("robot", "name", name)
     yield At(ROBOT, "bus")
     found, told = yield from nodes.scanned(bench)

@@ -61,7 +61,7 @@ def _about_host(config: RobotConfig) -> Iterator[Finding]:
     if (host in _EVERYWHERE or not _LOCAL.match(host)) and not AccessFolder(config.access).has_keys:
         text = (
             f"{host!r} is open to other computers, and this robot has no keys yet: until `gwrms keys pair "
-            f"{config.path}` has made them, it is not served there"
+            f"{config.path}` has let a desk in, it is not served there"
         )
         yield warning("[gateway]", "host", text)
 

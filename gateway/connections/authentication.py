@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from gateway.access.folder import AccessFolder
 from gateway.access.identity import ANYBODY, Identity
-from gateway.connections.doors import Kind, Stream, kind_of
+from gateway.connections.doors import Kind, Stream, has_keys_at_start, kind_of
 from gateway.connections.intake import Admit, Came
 from gateway.wire import framing
 
@@ -31,6 +31,8 @@ class Authentication:
         folder: AccessFolder,
         complain: Callable[[str, str], object],
         finished: Callable[[], object],
+        *,
+        rested_without_keys: bool = False,
     ) -> None:
         """`complain` of an address, and `finished` after each handshake, are called in any thread.
 
@@ -45,7 +47,8 @@ class Authentication:
         self._people: Access | None = None
         self._accounts: Accounts | None = None
         self._admit: Admit = _nobody
-        kinds = {one: kind_of(one, has_keys=folder.has_keys) for one in listeners}
+        self.has_keys = has_keys_at_start(now=folder.has_keys, rested_without=rested_without_keys)
+        kinds = {one: kind_of(one, has_keys=self.has_keys) for one in listeners}
         self._handshakes = self._made(finished) if Kind.TLS in kinds.values() else None
         came = {Kind.PLAIN: self._came_plainly, Kind.TLS: self._came_for_tls, Kind.UNIX: self._came_locally}
         self.doors: Mapping[socket.socket, Came] = {one: came[kind] for one, kind in kinds.items()}

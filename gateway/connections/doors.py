@@ -2,6 +2,10 @@
 
 With keys every TCP connection is TLS. Without, TCP is for this computer alone. A Unix socket is for the
 people on it.
+
+Whether a robot has keys is asked once, when its gateway is started; to rest and to wake is no start
+(`has_keys_at_start`). So whoever could stop the robot before a desk was let in still can, until somebody
+starts its gateway again. And it has none before its first desk is let in (`access/changes.py`, `admit`).
 """
 
 import socket
@@ -35,6 +39,11 @@ class Stream(Protocol):
     def close(self) -> None: ...
 
 
+def has_keys_at_start(*, now: bool, rested_without: bool) -> bool:
+    """Whether a gateway serves with keys: as it began, also where its first one was made while it rested."""
+    return now and not rested_without
+
+
 def kind_of(listener: socket.socket, *, has_keys: bool) -> Kind:
     """Return what comes in there; by the address that it listens on, whoever has opened it.
 
@@ -65,7 +74,7 @@ def without_keys(where: str) -> str:
     return (
         f"this robot has no keys, and {where} is open to other computers: without keys it is served on "
         "127.0.0.1 and its Unix socket only. Two commands lead on: `gwrms keys pair ROBOT.toml` here, which "
-        "makes its key and shows a code, then `gwrms pair HOST:PORT` on the desk"
+        "shows a code, then `gwrms pair HOST:PORT` on the desk; the first desk gives it its key"
     )
 
 

@@ -18,6 +18,7 @@ from gateway.process import resting
 BACKLOG = 1024  # who comes while it wakes up; where there is no room, TCP tries again a second later
 PORT, CLASSIC, LOCAL = "port", "classic_port", "socket"  # how they are named; the last by what it is
 _NUMBER, _PROCESS, _NAMES, _RESTING = "LISTEN_FDS", "LISTEN_PID", "LISTEN_FDNAMES", "GWRMS_RESTING"
+_KEYED, _KEYLESS = "1", "without keys"  # how it rests
 _SPARE = 64  # above every number that sockets are handed over with
 
 
@@ -29,13 +30,14 @@ class HandoverError(Exception):
 class Listeners:
     """The gateway's own port, the paper's and the Unix socket where it has them.
 
-    `woken` where it has rested with them.
+    `woken` where it has rested with them, and `without_keys` where it did so before the robot had any.
     """
 
     port: socket.socket
     classic: socket.socket | None = None
     local: socket.socket | None = None
     woken: bool = False
+    without_keys: bool = False
 
     @property
     def named(self) -> dict[str, socket.socket]:
@@ -113,7 +115,7 @@ def inherited(environ: MutableMapping[str, str]) -> Listeners | None:
 
     """
     number, process = environ.pop(_NUMBER, "0"), environ.pop(_PROCESS, "")
-    names, woken = environ.pop(_NAMES, "").split(":"), environ.pop(_RESTING, "") != ""
+    names, resting_as = environ.pop(_NAMES, "").split(":"), environ.pop(_RESTING, "")
     if process != str(os.getpid()) or not number.isdecimal() or not int(number):
         return None
     found: dict[str, socket.socket] = {}
@@ -129,7 +131,9 @@ def inherited(environ: MutableMapping[str, str]) -> Listeners | None:
         found[name] = adopted
     if PORT not in found:
         raise HandoverError(f"no socket was handed over as {PORT}; give one ListenStream= that name")
-    return Listeners(found[PORT], found.get(CLASSIC), found.get(LOCAL), woken)
+    return Listeners(
+        found[PORT], found.get(CLASSIC), found.get(LOCAL), resting_as != "", resting_as == _KEYLESS
+    )
 
 
 def _adopted(descriptor: int) -> socket.socket:
@@ -165,7 +169,7 @@ def rest(listeners: Listeners) -> None:
         _NUMBER: str(len(spare)),
         _PROCESS: str(os.getpid()),
         _NAMES: ":".join(listeners.named),
-        _RESTING: "1",
+        _RESTING: _KEYLESS if listeners.without_keys else _KEYED,
     }
     ourselves = [sys.executable, *sys.orig_argv[1:]]
     sys.stdout.flush()

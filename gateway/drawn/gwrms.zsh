@@ -35,7 +35,7 @@ _shtab_gwrms_commands() {
     joint-test:'test a joint on a bench: step, chirp, friction, relay'
     journal:'show and verify the robot'"'"'s journal'
     keys:'on the robot: admit and revoke clients'
-    label:'Label label the activities in a recorded session.'
+    label:'Label the activities in a recorded session.'
     lss:'Find CANopen devices without a node id; set node ids and bit rates (CiA 305).'
     models:'inspect, promote, roll back and export models'
     od:'Search a device'"'"'s object dictionary: names, types, limits, values.'
@@ -572,7 +572,7 @@ _shtab_gwrms_enable_defaults_added=0
 
 _shtab_gwrms_evaluate_options=(
   "(- : *)"{-h,--help}"[show this help message and exit]"
-  "--benchmark[a benchmark from the list below]:NAME:(ipol-status ipol-phase ipol-adapt ipol-events sisfall-prefall aust-mode ipol-danger sisfall-danger sim-activity sim-phase sim-walks sim-falling sim-danger sim-danger-shipped)"
+  "--benchmark[a benchmark from the list below]:NAME:(ipol-status ipol-phase ipol-adapt ipol-events impaired-phase sisfall-prefall aust-mode ipol-danger sisfall-danger sim-activity sim-phase sim-walks sim-falling sim-danger sim-danger-shipped)"
   "--data[the recordings]:FILE:_files"
   "--json[print the figures, including groups, as a JSON object in the last line]"
   "--report[also write a page with tables and pictures]:FILE.html:_files"
@@ -1299,7 +1299,7 @@ _shtab_gwrms_sim_record_options=(
   "--out[output file\; replaced if it exists]:FILE:_files"
   "--minutes[duration for each wearer (default\: 6)]:M:"
   "--subjects[number of the wearer (default\: 0)]:N[-N]:"
-  "--scenario[default\: practice]:scenario:(practice dangers walk stand sit sit_to_stand stairs_up stairs_down ramp_up ramp_down turn_left turn_right stumble fall day)"
+  "--scenario[default\: practice]:scenario:(practice dangers healthy walk stand sit sit_to_stand stairs_up stairs_down ramp_up ramp_down turn_left turn_right stumble fall day)"
   "--walks[how they walk\: ordinary, slow, hemiparetic, crouch, steppage, crutches_two_point, crutches_three_point (default\: ordinary)]:NAME:(ordinary slow hemiparetic crouch steppage crutches_two_point crutches_three_point)"
   "--assists[the only leg with a robot, left or right]:SIDE:(left right)"
   "--seed[same seed, same recording (default\: 0)]:S:"

@@ -254,7 +254,7 @@ class Journal:
 
     @contextlib.contextmanager
     def _as_before_if_it_fails(self, file: BinaryIO) -> Iterator[None]:
-        """Return an entry that is reported lost stands neither in the journal nor in its head."""
+        """Take back what fails: an entry reported lost stands neither in the journal nor in its head."""
         size = file.seek(0, os.SEEK_END)
         try:
             yield

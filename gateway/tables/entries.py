@@ -48,9 +48,9 @@ def without_entry(text: str, table: str, key: str) -> str:
 
 
 def _without(text: str, table: str, key: str) -> tuple[list[str], int | None]:
-    """Return the lines without the entry, and where in them one of that table could stand; None.
+    """Return the lines without the entry, and where in them one of that table could stand.
 
-    It is not there.
+    None: it is not there.
     """
     named = re.compile(rf"""\s*["']?{re.escape(key)}["']?\s*=""")
     kept: list[str] = []

@@ -45,6 +45,8 @@ scenarios
                    robot has no bus, and torque, following error and temperature of each joint are written
                    too, and `danger`: 0 none, -1 one is over, else its number in `dangers`, and .5 more once
                    it has done harm
+  healthy          the same robot and columns without a danger: walking, standing and turning on level ground,
+                   to count false alarms on
   and those of `gwrms sim`.
 
 exit status
@@ -57,6 +59,8 @@ examples
 
 PRACTICE: Final = "practice"
 DANGEROUS: Final = "dangers"
+HEALTHY: Final = "healthy"
+BARE: Final = (DANGEROUS, HEALTHY)  # of a robot without a bus, with what danger looks at
 DANGER_COLUMNS: Final = {**JOINT_UNITS, "danger": ""}
 HEALTHY_SHARE: Final = 0.2  # of a dangerous session's time, before the first danger
 COLUMNS: Final = {"time": "ns", "label": "", "left_phase": "stride", "right_phase": "stride", **UNITS}
@@ -87,17 +91,18 @@ class Recording:
         # Every wearer has strides, noise and an order of things of their own.
         own = seed * 1000 + person
         self._file = file
-        self._dangerous = scenario == DANGEROUS
+        self._bare = scenario in BARE
+        self._dangers = list(DANGERS) if scenario == DANGEROUS else []
         self._seed = own
-        self._robot = (BareExoskeleton if self._dangerous else Exoskeleton)(
-            Scenario.STAND if scenario in (PRACTICE, DANGEROUS) else Scenario(scenario),
+        self._robot = (BareExoskeleton if self._bare else Exoskeleton)(
+            Scenario.STAND if scenario in (PRACTICE, *BARE) else Scenario(scenario),
             own,
             person=person,
             walk=walk,
             assists=assists,
         )
         self._course: Course | None = None
-        columns = {**COLUMNS, **(DANGER_COLUMNS if self._dangerous else {})}
+        columns = {**COLUMNS, **(DANGER_COLUMNS if self._bare else {})}
         self._kept = [name.partition(".")[0] not in self._robot.absent for name in columns]
         self._entries = practice(self._robot, own) if scenario == PRACTICE else None
         self._write(
@@ -110,7 +115,7 @@ class Recording:
                 "walks": walk,
                 "columns": list(compress(columns, self._kept)),
                 "units": list(compress(columns.values(), self._kept)),
-                **({"dangers": list(DANGERS)} if self._dangerous else {}),
+                **({"dangers": self._dangers} if self._bare else {}),
                 "wearer": asdict(self._robot.controller.generator.wearer),
             }
         )
@@ -119,15 +124,15 @@ class Recording:
     def run(self, seconds: float) -> None:
         """Let so much simulated time pass from switching on."""
         self._robot.power_on()
-        if self._dangerous:
-            self._course = Course(self._robot, self._seed, HEALTHY_SHARE * seconds, list(DANGERS))
+        if self._bare:
+            self._course = Course(self._robot, self._seed, HEALTHY_SHARE * seconds, self._dangers)
         if self._entries is not None:
             self._robot.follow(self._entries)
         self._robot.clock.run_until(round(seconds * SECOND_NS))
 
     def _record(self) -> None:
         robot = self._robot
-        if robot.controller.controller_state is not ControllerState.RUNNING and not self._dangerous:
+        if robot.controller.controller_state is not ControllerState.RUNNING and not self._bare:
             return
         values = zip(reported(robot), _ROUNDED, strict=True)
         rounded = (None if value is None else round(value, digits) for value, digits in values)
@@ -201,7 +206,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--scenario",
-        choices=[PRACTICE, DANGEROUS, *map(str, Scenario)],
+        choices=[PRACTICE, *BARE, *map(str, Scenario)],
         default=PRACTICE,
         help="default: %(default)s",
     )
@@ -217,8 +222,8 @@ def main(argv: list[str]) -> int:
     parser = _parser()
     try:
         arguments = parser.parse_args(argv)
-        if arguments.scenario == DANGEROUS and arguments.assists is not None:
-            parser.error("--scenario dangers is of robots on both legs: no --assists")
+        if arguments.scenario in BARE and arguments.assists is not None:
+            parser.error(f"--scenario {arguments.scenario} is of robots on both legs: no --assists")
     except SystemExit as leave:
         return 2 if leave.code else 0
     with _opened(arguments.out) as file:

@@ -44,7 +44,7 @@ def _wave(mean_deg: float, swing_deg: float, top: float, phase: float) -> float:
 
 
 def ramp_up(phase: float, step_length: float, leg_length: float) -> Leg:
-    """Return the foot meets the ground higher.
+    """Return a leg on a ramp upwards, where the foot meets the ground higher.
 
     Hip and knee are bent more then, the ankle all through stance.
     """

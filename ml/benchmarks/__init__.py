@@ -2,6 +2,7 @@
 
 catalogue.py                their names, questions and goals
 status.py, phase.py, adapt.py, fall.py, terrain.py    one each
+impaired_phase.py           of patients, by groups: on impaired.py, impaired_strides.py, impaired_groups.py
 ipol.py, sisfall.py, arrays.py    how recordings are read and checked
 ipol_danger.py, sisfall_danger.py    the danger number on recorded people; danger_trunk.py: how it sees them
 sim_activity.py, sim_phase.py, sim_falling.py    those on simulated people, one each

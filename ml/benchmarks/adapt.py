@@ -12,7 +12,7 @@ from ml.benchmarks.models.gait_phase import PhaseModel, PhaseSettings
 from ml.benchmarks.outcome import Outcome
 from ml.benchmarks.phase import WHY, WITHIN, errors_of, fitted, percent
 from ml.benchmarks.search import Search, chosen, told
-from ml.benchmarks.strides import Decisions, decisions, lessons
+from ml.benchmarks.strides import Decisions, decisions, lessons, own_lessons
 from ml.errors import UnusableData
 from ml.features.gait_status import RATE_HZ
 
@@ -20,8 +20,8 @@ MINUTE_S: Final = 60.0  # of walking
 SETTINGS: Final = PhaseSettings()
 GRID: Final = (
     SETTINGS,
-    PhaseSettings(personal_epochs=8),
-    PhaseSettings(personal_epochs=40),
+    PhaseSettings(personal_epochs=6),
+    PhaseSettings(trust=1.0),
     PhaseSettings(general_share=1.0),
 )
 
@@ -41,11 +41,16 @@ def evaluate(path: Path, search: Search) -> Outcome:
     ]
     if not people:
         raise UnusableData(f"{path}: nobody walks on in a later trial after {MINUTE_S:.0f} s of walking")
-    every = {0.0: data} | {share: decisions(ipol.lossy(trials, share)) for share in losses.SHARES}
+    walks = {0.0: trials} | {share: ipol.lossy(trials, share) for share in losses.SHARES}
+    every = {share: decisions(walked) for share, walked in walks.items()}
 
     def work_of(person: int) -> tuple[Pairs, PhaseSettings]:
-        own = {share: one.of(one.subject == person) for share, one in every.items()}
-        return _fold(taught, minute, own, search)
+        own = {
+            share: (_minute(walked, person, minute), every[share].of((data.subject == person) & late))
+            for share, walked in walks.items()
+        }
+        others = taught.of(taught.subject != person)
+        return _fold(others, minute, own, search)
 
     work = folds.over(work_of, people)
     judged = [data.of((data.subject == person) & late) for person in people]
@@ -70,10 +75,18 @@ def _minutes(trials: list[ipol.Trial]) -> dict[int, int]:
     return ends
 
 
+def _minute(trials: list[ipol.Trial], person: int, minute: dict[int, int]) -> Decisions:
+    """Return what is learned from a person's first minute."""
+    return own_lessons([one for one in trials if one.subject == person and one.number <= minute[person]])
+
+
 def _fold(
-    taught: Decisions, minute: dict[int, int], own: Mapping[float, Decisions], search: Search
+    others: Decisions,
+    minute: dict[int, int],
+    own: Mapping[float, tuple[Decisions, Decisions]],
+    search: Search,
 ) -> tuple[Pairs, PhaseSettings]:
-    others = taught.of(taught.subject != own[0.0].subject[0])
+    """`own`: a person's first minute, and what comes later."""
     settings = chosen(
         SETTINGS,
         GRID,
@@ -82,12 +95,10 @@ def _fold(
         lambda one, rows, judge: _cut(others.of(rows), minute, others.of(judge), one),
     )
     model = fitted(others, settings)
-    return {share: _both(model, minute, one) for share, one in own.items()}, settings
+    return {share: _both(model, early, later) for share, (early, later) in own.items()}, settings
 
 
-def _both(model: PhaseModel, minute: dict[int, int], own: Decisions) -> Pair:
-    late = _late(own, minute)
-    early, later = own.of(~late), own.of(late)
+def _both(model: PhaseModel, early: Decisions, later: Decisions) -> Pair:
     personal = model.personal(early.features, early.phase, early.stride)
     return errors_of(model, later), errors_of(personal, later)
 
@@ -96,7 +107,8 @@ def _cut(others: Decisions, minute: dict[int, int], judge: Decisions, settings: 
     """For a search: how much of the error adaptation takes away, over these people."""
     people = [judge.of(judge.subject == person) for person in np.unique(judge.subject)]
     model = fitted(others, settings)
-    pairs = [_both(model, minute, own) for own in people if _late(own, minute).any()]
+    parts = [(own, _late(own, minute)) for own in people]
+    pairs = [_both(model, own.of(~late), own.of(late)) for own, late in parts if late.any()]
     before, after = (np.mean([metrics.rms(pair[which]) for pair in pairs]) for which in (0, 1))
     return float(1.0 - after / before)
 

@@ -17,7 +17,7 @@ from ml.benchmarks.models.falling import FallDetector, probability_of
 from ml.benchmarks.models.gait_status import status_model
 from ml.features import features
 from ml.features.falling import FALLING, RATE_HZ
-from ml.features.gait_status import GAIT_STATUS
+from ml.features.gait_context import GAIT_CONTEXT
 
 Floats = npt.NDArray[np.float64]
 Causes = Mapping[str, Sequence[tuple[float, float]]]
@@ -137,10 +137,10 @@ def _told_falling(
 
 def _of_walk(model: Any, trial: ipol.Trial) -> Told:
     ends = np.arange(status.FIRST, len(trial.samples), IPOL_STEP)
-    found = model.predict_proba(features(GAIT_STATUS, trial.samples, ends))
+    found = model.predict_proba(features(GAIT_CONTEXT, trial.samples, ends))
     said = {ipol.STATUSES[number]: found[:, at] for at, number in enumerate(model.classes_)}
-    length_s = len(trial.samples) / GAIT_STATUS.rate_hz
-    return Told(str(trial.subject), ends / GAIT_STATUS.rate_hz, said, length_s, _spells(trial))
+    length_s = len(trial.samples) / GAIT_CONTEXT.rate_hz
+    return Told(str(trial.subject), ends / GAIT_CONTEXT.rate_hz, said, length_s, _spells(trial))
 
 
 def _spells(trial: ipol.Trial) -> Causes:
@@ -148,6 +148,6 @@ def _spells(trial: ipol.Trial) -> Causes:
     bounds = [0, *(np.flatnonzero(np.diff(trial.status)) + 1), len(trial.status)]
     found: dict[str, list[tuple[float, float]]] = {name: [] for name in ipol.STATUSES}
     for begin, end in pairwise(bounds):
-        spell = (begin / GAIT_STATUS.rate_hz, end / GAIT_STATUS.rate_hz)
+        spell = (begin / GAIT_CONTEXT.rate_hz, end / GAIT_CONTEXT.rate_hz)
         found[ipol.STATUSES[trial.status[begin]]].append(spell)
     return found

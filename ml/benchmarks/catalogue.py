@@ -10,6 +10,7 @@ from ml.benchmarks import (
     danger,
     events,
     fall,
+    impaired_phase,
     ipol_danger,
     phase,
     sim_activity,
@@ -24,9 +25,10 @@ from ml.benchmarks.outcome import Goal, Outcome
 from ml.benchmarks.sim import WHOLE, recipe_of
 from ml.features import Recipe
 from ml.features.falling import FALLING
+from ml.features.foot_rates import PHASES
+from ml.features.gait_context import GAIT_CONTEXT
 from ml.features.gait_events import LEFT_EVENTS
 from ml.features.gait_phase import LEFT_PHASE
-from ml.features.gait_status import GAIT_STATUS
 from ml.features.terrain import TERRAIN
 from ml.robot.task import ACTIVITY, FALLING_TASK, GAIT_PHASE
 
@@ -53,7 +55,7 @@ BENCHMARKS: Final = {
         Benchmark(
             "ipol-status",
             "standing, walking or turning, 200 ms ago; leave one subject out",
-            GAIT_STATUS,
+            GAIT_CONTEXT,
             status.evaluate,
             {
                 "macro_f1": Goal(0.955, stretch=0.97),
@@ -84,6 +86,13 @@ BENCHMARKS: Final = {
             LEFT_EVENTS,
             events.evaluate,
             {"heel_strike_f1": Goal(0.97, stretch=0.99), "toe_off_f1": Goal(0.97, stretch=0.98)},
+        ),
+        Benchmark(
+            "impaired-phase",
+            "where in the stride patients' feet are, by models of healthy people, and of both",
+            PHASES[0],
+            impaired_phase.evaluate,
+            {"healthy_worst_third_adaptation_cut": Goal(0.5)},
         ),
         Benchmark(
             "sisfall-prefall",

@@ -1,7 +1,8 @@
 """`sim-danger`: dangers foreseen on simulated wearers never seen, and what that costs in false alarms."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Final
 
@@ -10,10 +11,18 @@ import numpy.typing as npt
 
 from ml.benchmarks.danger_data import SUDDEN, WALKS, Seen, read
 from ml.benchmarks.outcome import Outcome
-from ml.danger.budget import BLOCK_S, BUDGETS, rate_interval, rule_of_three, share_interval, thresholds
+from ml.danger.budget import (
+    BLOCK_S,
+    BUDGETS,
+    extrapolated,
+    rate_interval,
+    rule_of_three,
+    share_interval,
+    thresholds,
+)
 from ml.danger.combine import Calibration, calibrated, evidence, fit, load, tails
 from ml.danger.detector import DETECTORS
-from ml.danger.levels import Level, Levels
+from ml.danger.levels import Level, Levels, held
 from ml.danger.now import CHANNELS
 from ml.features.recipe import Features, Recipe
 from ml.features.windows import Samples
@@ -30,7 +39,8 @@ WHY: Final = (
     " (sim-danger) or by those that ship (sim-danger-shipped,"
     " learned from 301-318 of seed 23 and 401-410 of 24)."
     " Foreseen: advice at least 0.3 s before harm in the simulator's truth. …_low and …_high: 95 % intervals;"
-    " stops_per_100_h_upper is the one-sided 95 % bound (3 / hours where none was seen)."
+    " stops_per_100_h_upper is the one-sided 95 % bound (3 / hours where none was seen);"
+    " …_extrapolated what an exponential tail of this recording's own healthy blocks makes of it."
 )
 
 
@@ -100,12 +110,17 @@ def _fit(seen: Sequence[Seen]) -> Parts:
 def _counts(one: Seen) -> Floats:
     """How much each moment of a danger counts: its later half, one in all."""
     counts = np.zeros(len(one.danger))
-    bounds = np.flatnonzero(np.diff(one.danger)) + 1
-    for begin, end in zip(bounds, [*bounds[1:], len(counts)], strict=True):
+    for begin, end in _spans(one.danger):
         if one.coming[begin] and one.danger[begin] in _foreseeable(one):
             middle = (begin + end) // 2
             counts[middle:end] = 1.0 / (end - middle)
     return counts
+
+
+def _spans(danger: Floats) -> Iterator[tuple[int, int]]:
+    """From where on and up to where each danger is, and each time between two; not what is there first."""
+    changes = (np.flatnonzero(np.diff(danger)) + 1).tolist()
+    return pairwise([*changes, len(danger)])
 
 
 def _foreseeable(one: Seen) -> set[float]:
@@ -114,10 +129,11 @@ def _foreseeable(one: Seen) -> set[float]:
 
 
 def _out_of_fold(seen: Sequence[Seen]) -> list[Floats]:
-    odds = []
-    for at, one in enumerate(seen):
-        others = [other for number, other in enumerate(seen) if number % FOLDS != at % FOLDS]
-        odds.append(Calibration(DETECTORS, *_fit(others or seen), (), (), {}, {}, "").log_odds(one.above))
+    odds: list[Floats] = [np.empty(0)] * len(seen)
+    for fold in range(min(FOLDS, len(seen))):
+        others = [one for at, one in enumerate(seen) if at % FOLDS != fold]
+        known = Calibration(DETECTORS, *_fit(others or seen), (), (), {}, {}, "")
+        odds[fold::FOLDS] = [known.log_odds(one.above) for one in seen[fold::FOLDS]]
     return odds
 
 
@@ -128,10 +144,10 @@ def walking(one: Seen) -> Flags:
 
 
 def _maxima(one: Seen, odds: Floats) -> Floats:
-    """Return the largest odds of each block of healthy walking."""
+    """Return the highest threshold that each block of healthy walking would have reached."""
     rows = walking(one)
     block = (one.at_s[rows] // BLOCK_S).astype(np.int_)
-    said = np.nan_to_num(odds[rows])
+    said = held(np.nan_to_num(odds))[rows]
     return np.array([said[block == number].max() for number in np.unique(block)])
 
 
@@ -157,8 +173,7 @@ def judge(one: Seen, calibration: Calibration) -> Judged:
 def events(judged: Judged, least: Level) -> Iterator[Event]:
     """Every danger that did harm, and when its level was first reached."""
     danger = judged.seen.danger
-    bounds = np.flatnonzero(np.diff(danger)) + 1
-    for begin, end in zip(bounds, [*bounds[1:], len(danger)], strict=True):
+    for begin, end in _spans(danger):
         number = danger[begin]
         if number < 1.0 or number % 1.0 or end >= len(danger) or danger[end] != number + 0.5:
             continue
@@ -192,9 +207,12 @@ def evaluate(path: Path, search: bool) -> Outcome:  # noqa: ARG001 - there is no
 
 
 def evaluate_shipped(path: Path, search: bool) -> Outcome:  # noqa: ARG001 - there is nothing to choose
-    """Return the calibration that ships, on wearers from whom it was not learned."""
-    calibration = load()
-    return outcome([judge(one, calibration) for one in read(path)])
+    """Judge the calibration that ships, on wearers from whom it was not learned."""
+    calibration, seen = load(), read(path)
+    found = outcome([judge(one, calibration) for one in seen])
+    maxima = np.concatenate([_maxima(one, calibration.log_odds(one.above)) for one in seen])
+    stops = 100.0 * extrapolated(maxima, _hours(seen), calibration.by_level[Level.STOP])
+    return replace(found, figures={**found.figures, "stops_per_100_h_extrapolated": stops})
 
 
 def cross_judged(seen: Sequence[Seen]) -> list[Judged]:

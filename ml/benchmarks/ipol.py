@@ -117,10 +117,12 @@ def strikes(in_air: npt.NDArray[np.bool_]) -> npt.NDArray[np.intp]:
     return np.flatnonzero(in_air[:-1] & ~in_air[1:]) + 1
 
 
-def phase(strikes: npt.NDArray[np.intp], rows: int) -> npt.NDArray[np.float64]:
+def phase(
+    strikes: npt.NDArray[np.intp], rows: int, stride_s: tuple[float, float] = STRIDE_S
+) -> npt.NDArray[np.float64]:
     """Each row's gait phase: 0 at a heel strike, linear to the next one; NaN outside strides."""
     result = np.full(rows, np.nan)
-    shortest, longest = (seconds * RATE_HZ for seconds in STRIDE_S)
+    shortest, longest = (seconds * RATE_HZ for seconds in stride_s)
     for begin, end in itertools.pairwise(strikes):
         if shortest <= end - begin <= longest:
             result[begin:end] = np.arange(end - begin) / (end - begin)

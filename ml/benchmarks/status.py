@@ -14,7 +14,7 @@ from ml.benchmarks.outcome import Outcome
 from ml.benchmarks.search import Search, chosen, told
 from ml.errors import UnusableData
 from ml.features import features
-from ml.features.gait_status import GAIT_STATUS
+from ml.features.gait_context import GAIT_CONTEXT
 
 FIRST: Final = 50  # the first sample of a trial that is judged, and then each STEP later
 STEP: Final = 20
@@ -52,7 +52,7 @@ def _of_trial(trial: ipol.Trial) -> tuple[Any, ...]:
     changes = np.flatnonzero(np.diff(trial.status)) + 1
     near = (np.abs(judged[:, None] - changes) <= NEAR).any(axis=1)
     return (
-        features(GAIT_STATUS, trial.samples, ends),
+        features(GAIT_CONTEXT, trial.samples, ends),
         trial.status[judged],
         np.full(len(ends), trial.subject),
         ~near,

@@ -17,6 +17,8 @@ from ml.features.gaps import mended
 STEP: Final = 10  # samples between decisions: 100 ms
 PACES: Final = (0.8, 1.25)  # of duration: people are slower and faster than the few who were recorded
 PACES_STEP: Final = 20  # samples between decisions that are learned at another pace
+OWN_PACES: Final = (0.9, 1.1)  # a wearer's own minute is little, and he never walks quite like that again
+OWN_STEP: Final = 3  # samples between decisions that are learned of it, and twice that at another pace
 FEET: Final = tuple(
     (recipe, CHANNELS.index(f"{side}_foot.angular_velocity_y"))
     for side, recipe in (("left", LEFT_PHASE), ("right", RIGHT_PHASE))
@@ -24,6 +26,7 @@ FEET: Final = tuple(
 SWUNG: Final = 1.5  # rad/s of pitch that a foot surely reaches in its swing
 AT_LEAST: Final = 45  # samples between two heel strikes of a foot
 LABELLED_LATER: Final = 3  # samples: the labels put the foot on the ground this much after its rate's zero
+TOO_FEW: Final = "fewer than two subjects have strides of 0.7 to 2.0 s: nothing can be learned"
 AGREE: Final = 12  # samples that the labels and the foot's own signal may lie apart
 
 
@@ -44,16 +47,13 @@ class Decisions:
 
 
 def lessons(trials: Sequence[ipol.Trial]) -> Decisions:
-    """Return what is learned from.
+    """Return what is learned from: every trial, and each as if somebody slower or faster had walked it."""
+    return _joined(decisions(trials), decisions(_paced(trials, PACES), PACES_STEP))
 
-    Every trial as it was, and as slower and faster people would have walked it.
-    """
-    stretched = (ipol.stretched(trial, factor) for factor in PACES for trial in trials)
-    other = [one for one in stretched if len(one.samples)]  # of a single sample, faster, none is left
-    made = (decisions(trials), decisions(other, PACES_STEP))
-    columns = {field.name: [getattr(one, field.name) for one in made] for field in fields(Decisions)}
-    stride = _apart(columns.pop("stride"))
-    return Decisions(**{name: np.concatenate(column) for name, column in columns.items()}, stride=stride)
+
+def own_lessons(trials: Sequence[ipol.Trial]) -> Decisions:
+    """Return what is learned from one wearer's trials."""
+    return _joined(_decisions(trials, OWN_STEP), _decisions(_paced(trials, OWN_PACES), 2 * OWN_STEP))
 
 
 def decisions(trials: Sequence[ipol.Trial], step: int = STEP) -> Decisions:
@@ -63,15 +63,33 @@ def decisions(trials: Sequence[ipol.Trial], step: int = STEP) -> Decisions:
         UnusableData: there is none of which to learn.
 
     """
+    made = _decisions(trials, step)
+    if len(np.unique(made.subject)) < 2:
+        raise UnusableData(TOO_FEW)
+    return made
+
+
+def _decisions(trials: Sequence[ipol.Trial], step: int) -> Decisions:
     parts = [part for trial in trials for part in _of_trial(trial, step) if len(part[0])]
-    if len({part[-2][0] for part in parts}) < 2:
-        raise UnusableData("fewer than two subjects have strides of 0.7 to 2.0 s: nothing can be learned")
+    if not parts:
+        raise UnusableData(TOO_FEW)
     columns: list[Any] = [np.concatenate(column) for column in zip(*parts, strict=True)]
-    columns[2] = _apart([part[2] for part in parts])
+    columns[2] = apart([part[2] for part in parts])
     return Decisions(*columns)
 
 
-def _apart(numbers: Sequence[npt.NDArray[np.int_]]) -> npt.NDArray[np.int_]:
+def _paced(trials: Sequence[ipol.Trial], paces: Sequence[float]) -> list[ipol.Trial]:
+    made = (ipol.stretched(trial, factor) for factor in paces for trial in trials)
+    return [one for one in made if len(one.samples)]  # of a single sample, faster, none is left
+
+
+def _joined(*made: Decisions) -> Decisions:
+    columns = {field.name: [getattr(one, field.name) for one in made] for field in fields(Decisions)}
+    stride = apart(columns.pop("stride"))
+    return Decisions(**{name: np.concatenate(column) for name, column in columns.items()}, stride=stride)
+
+
+def apart(numbers: Sequence[npt.NDArray[np.int_]]) -> npt.NDArray[np.int_]:
     """Numbers counted on from list to list, so that no two lists share one."""
     sizes = [int(own.max()) + 1 for own in numbers]
     offsets = np.cumsum([0, *sizes[:-1]])

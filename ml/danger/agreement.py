@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from ml.danger.detector import Floats
-from ml.danger.now import JOINTS, Now, spoken
+from ml.danger.now import JOINTS, Now, or_zero, spoken
 
 SLOW: Final = 0.1  # of the newest sample
 HOLDS: Final = 0.94  # of a jump is left a sample later
@@ -36,7 +36,7 @@ class Agreement:
         if now.step_s == 0.0:
             return np.full(8, np.nan)
         jump = np.abs(step[:6] - now.step_s * middle[6:12])
-        self._jump = np.maximum(HOLDS * self._jump, np.nan_to_num(jump))
+        self._jump = np.maximum(HOLDS * self._jump, or_zero(jump))
         turned = abs(float(step[12]) - now.step_s * float(middle[14]))
         self._turned = max(HOLDS * self._turned, 0.0 if math.isnan(turned) else turned)
         return np.concatenate(

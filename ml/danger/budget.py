@@ -29,9 +29,7 @@ APART: Final = 0.1  # log odds between two levels at least
 def thresholds(maxima: Floats, hours: float) -> dict[Level, float]:
     """Log odds by level, from the `maxima` of the blocks of so many healthy hours."""
     ordered = np.sort(maxima)[::-1]
-    count = max(int(TAIL * len(ordered)), min(5, len(ordered)))
-    base = ordered[count - 1]
-    scale = max(float(np.mean(ordered[:count] - base)), APART)
+    count, base, scale = _tail(ordered)
     found: dict[Level, float] = {}
     least = -np.inf
     for level in URGENT:
@@ -41,6 +39,19 @@ def thresholds(maxima: Floats, hours: float) -> dict[Level, float]:
         seen = ordered[allowed] if allowed < len(ordered) else ordered[-1]
         found[level] = least = float(max(tail, seen + 1e-6, least + APART))
     return found
+
+
+def extrapolated(maxima: Floats, hours: float, odds: float) -> float:
+    """How often an hour such log odds would be reached, by the same tail."""
+    count, base, scale = _tail(np.sort(maxima)[::-1])
+    return float(count / hours * np.exp(min((base - odds) / scale, 0.0)))
+
+
+def _tail(ordered: Floats) -> tuple[int, float, float]:
+    """How many of the maxima, the largest first, are the tail; where it begins, and its scale."""
+    count = max(int(TAIL * len(ordered)), min(5, len(ordered)))
+    base = float(ordered[count - 1])
+    return count, base, max(float(np.mean(ordered[:count] - base)), APART)
 
 
 def rate_interval(events: int, hours: float) -> tuple[float, float]:

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from ml.danger.detector import DETECTORS
 from ml.danger.levels import URGENT, Level
+from ml.danger.now import or_zero
 from ml.errors import UnusableModel
 
 Floats = npt.NDArray[np.float64]
@@ -61,7 +62,7 @@ def evidence(above: Floats, floor: Sequence[float], scale: Sequence[float]) -> F
     Below `floor`, which a tenth of all healthy blocks exceeds, nothing is said; from there on it is counted
     in `scale`, the mean by which these blocks exceed it: one number means the same of each detector.
     """
-    beyond = np.maximum((np.nan_to_num(above) - np.array(floor)) / np.array(scale), 0.0)
+    beyond = np.maximum((or_zero(above) - np.array(floor)) / np.array(scale), 0.0)
     worst: Floats = np.partition(beyond, -2, axis=-1)[..., :-3:-1]
     return worst
 

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from ml.danger.detector import Floats
-from ml.danger.now import JOINTS, Now, spoken
+from ml.danger.now import JOINTS, Now, or_zero, spoken
 
 FORGETS_S: Final = 6.0  # a time after which a third is left of what an angle has crept
 
@@ -33,7 +33,7 @@ class Creep:
         self._before = now.joint[:2].copy()
         if now.step_s == 0.0:
             return np.full(6, np.nan)
-        self._crept += np.nan_to_num(apart) - now.step_s / FORGETS_S * self._crept
+        self._crept += or_zero(apart) - now.step_s / FORGETS_S * self._crept
         return np.where(np.isfinite(apart), np.abs(self._crept), np.nan)
 
     def words(self, key: str) -> str:

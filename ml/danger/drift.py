@@ -5,7 +5,7 @@ from typing import Final
 import numpy as np
 
 from ml.danger.detector import Floats
-from ml.danger.now import JOINTS, Now, spoken
+from ml.danger.now import JOINTS, Now, or_zero, spoken
 
 AHEAD_S: Final = 15.0  # how far ahead it is looked
 WARM_C: Final = 40.0  # below that nothing is said
@@ -28,7 +28,7 @@ class Drift:
         before = np.where(np.isnan(self._warm), heat, self._warm)
         self._warm = np.where(np.isnan(heat), before, before + 0.1 * (heat - before))
         if now.step_s:
-            self._rise += 0.04 * (np.nan_to_num((self._warm - before) / now.step_s) - self._rise)
+            self._rise += 0.04 * (or_zero((self._warm - before) / now.step_s) - self._rise)
         coming = np.maximum(self._warm + AHEAD_S * np.maximum(self._rise, 0.0), WARM_C)
         return np.where(np.isfinite(heat), coming, np.nan)
 

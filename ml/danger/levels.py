@@ -4,6 +4,9 @@ from collections.abc import Mapping
 from enum import IntEnum
 from typing import Final
 
+import numpy as np
+import numpy.typing as npt
+
 RELEASE: Final = 0.7  # below its threshold (log odds) a level ends …
 CALM_S: Final = 1.5  # … after so long
 HOLD: Final = 2  # samples one after the other at which a level begins
@@ -34,6 +37,14 @@ _WORDS: Final = {
     Level.STOP: "stop",
 }
 URGENT: Final = (Level.EARLY, Level.ADVICE, Level.ALARM, Level.STOP)
+
+
+def held(odds: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Return the highest threshold at which a level would begin (n,): what `HOLD` moments all reached."""
+    found = odds.copy()
+    for before in range(1, HOLD):
+        np.minimum(found[before:], odds[:-before], out=found[before:])
+    return found
 
 
 class Levels:

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ml.danger.detector import Floats
-from ml.danger.now import JOINTS, SIDES, Now, spoken
+from ml.danger.now import JOINTS, SIDES, Now, or_zero, spoken
 
 KEPT: Final = 1000  # moments
 FEWEST: Final = 150  # moments, before one is looked up
@@ -68,7 +68,7 @@ class Memory:
             return self.said
         self._due_s = now.at_s + EVERY_S
         position, velocity, torque, error = now.joint[:4]
-        target = position + np.nan_to_num(error)
+        target = position + or_zero(error)
         values = np.concatenate([target, torque, now.foot[0], now.trunk[6:7]])
         self.alike = True
         self.said = self._asked(now.at_s, np.concatenate([target, velocity]), values, learn=learn)

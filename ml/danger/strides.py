@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from ml.danger.detector import Floats
-from ml.danger.now import JOINTS, SIDES, Now, spoken
+from ml.danger.now import JOINTS, SIDES, Now, or_zero, spoken
 
 KEPT: Final = 160  # strides of each side; newer ones take the place of older ones
 FEWEST: Final = 14  # strides, before there is anything to compare with
@@ -64,7 +64,7 @@ class _Side:
         self._sums[6:12] += now.joint[2] ** 2
         self._sums[12:14] += now.foot[0] * down
         self._sums[14:16] += down
-        self._sums[16:18] += np.nan_to_num(now.foot[1]) * down
+        self._sums[16:18] += or_zero(now.foot[1]) * down
         self._sums[18:20] += now.trunk[6:8]
 
     def stride(self) -> Floats:
@@ -98,7 +98,7 @@ class _Side:
             return np.full(len(PARTS), np.nan)
         kept = self.kept[: min(self.count, KEPT)]
         off = (kept - stride) / np.maximum(self.spread, _LEAST)
-        square = np.nan_to_num(np.minimum(off * off, FARTHEST))
+        square = or_zero(np.minimum(off * off, FARTHEST))
         of_part = square @ _IN_PART.T
         others = of_part.sum(axis=1, keepdims=True) - of_part
         near = np.argpartition(others, NEIGHBOURS, axis=0)[:NEIGHBOURS]
@@ -149,7 +149,7 @@ class Strides:
         stride = side.stride()
         found = side.compare(stride)
         if learn and np.isfinite(stride).any():
-            side.learn(np.nan_to_num(stride))
+            side.learn(or_zero(stride))
         self._last = [self._last[1], found]
         self._told, self._told_s = np.minimum(*self._last), at_s
 

@@ -5,7 +5,7 @@ from typing import Final
 import numpy as np
 
 from ml.danger.detector import Floats
-from ml.danger.now import JOINTS, Now, spoken
+from ml.danger.now import JOINTS, Now, or_zero, spoken
 
 TERMS: Final = 8
 SOLVE_EVERY: Final = 125  # samples
@@ -64,8 +64,8 @@ class Torque:
 
     @staticmethod
     def _terms(now: Now, position: Floats, velocity: Floats, acceleration: Floats) -> Floats:
-        load = np.nan_to_num(now.foot[0][LEG]) / 1000.0
-        lever = np.nan_to_num(now.foot[1][LEG]) * 10.0
+        load = or_zero(now.foot[0][LEG]) / 1000.0
+        lever = or_zero(now.foot[1][LEG]) * 10.0
         sine = np.sin(position)
         terms: Floats = np.stack(
             [

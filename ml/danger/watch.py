@@ -17,7 +17,7 @@ from ml.danger.detector import DETECTORS, Detector
 from ml.danger.drift import Drift
 from ml.danger.levels import Level, Levels
 from ml.danger.memory import Memory, kinds
-from ml.danger.now import CHANNELS, Now
+from ml.danger.now import CHANNELS, Now, or_zero
 from ml.danger.rhythm import Rhythm
 from ml.danger.strides import Strides
 from ml.danger.support import Support
@@ -103,7 +103,7 @@ class Evidence:
 
     def why(self, above: Floats) -> tuple[str, ...]:
         """Return the reasons of the last moment, the worst first."""
-        order = np.argsort(-np.nan_to_num(above))[:TOLD].tolist()
+        order = np.argsort(-or_zero(above))[:TOLD].tolist()
         return tuple(self._words(at) for at in order if above[at] >= TELLING)
 
     def _words(self, at: int) -> str:

@@ -6,7 +6,7 @@ recipe.py     what a model wants to know: rate, look-back, channels, and how its
 gaps.py       samples that never came
 signals.py    signals that do not depend on how a sensor is worn
 blocks.py     signals of windows → columns
-gait_status.py, gait_phase.py, falling.py, terrain.py    the recipes
+gait_status.py, gait_context.py, gait_phase.py, gait_events.py, falling.py, terrain.py    the recipes
 """
 
 from ml.features.recipe import Recipe, features

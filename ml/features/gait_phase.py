@@ -46,14 +46,14 @@ def _compute(windows: Samples) -> Features:
         bins(that[:, :1], 5, 40),
         bins(that[:, 1:], 10, 15),
         bins(body, 5, 24),
-        _timing(foot_spin[:, 1], other_spin[:, 1]),
-        _vigour(foot_spin[:, 1], other_spin[:, 1]),
+        timing(foot_spin[:, 1], other_spin[:, 1]),
+        vigour(foot_spin[:, 1], other_spin[:, 1]),
         yaw[:, -100:].mean(axis=-1, keepdims=True),
     ]
     return np.concatenate(columns, axis=1, dtype=np.float32)
 
 
-def _timing(this: Samples, other: Samples) -> Samples:
+def timing(this: Samples, other: Samples) -> Samples:
     """When each foot last struck, pushed off and lay flat: in samples and in strides; and their lengths."""
     events = [_events(pitch_rate) for pitch_rate in (this, other)]
     ago = np.concatenate(events, axis=1)
@@ -77,7 +77,7 @@ def _between(events: Samples, at: int) -> Samples:
     return np.where(older < LOOK_BACK - 2, older - newer, 0.0)
 
 
-def _vigour(this: Samples, other: Samples) -> Samples:
+def vigour(this: Samples, other: Samples) -> Samples:
     columns = [pitch[:, -samples:].std(axis=-1) for samples in (100, LOOK_BACK) for pitch in (this, other)]
     return np.stack(columns, axis=1)
 

@@ -216,7 +216,7 @@ def _of_classes(
     verdicts: Sequence[Verdicts],
     people: npt.NDArray[Any],
 ) -> Metrics:
-    """Return a class that the model does not know is one that it never says."""
+    """Return its probabilities of these classes; a class that the model does not know, it never says."""
     place = np.array([*(every.index(name) for name in known), NONE])
     probabilities = np.zeros((len(truth), len(every)))
     probabilities[:, place[:-1]] = np.concatenate([one.probabilities for one in verdicts])

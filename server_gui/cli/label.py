@@ -139,7 +139,7 @@ def _length(label: Label) -> str:
 
 
 def _parser() -> argparse.ArgumentParser:
-    made = parser("label", "Label label the activities in a recorded session.", EPILOG)
+    made = parser("label", "Label the activities in a recorded session.", EPILOG)
     made.add_argument("session", metavar="SESSION", help="its name, which may be abbreviated")
     made.add_argument("label", metavar="LABEL", nargs="?", help="the activity")
     made.add_argument("--robot", metavar="NAME", help="needed if sessions of two robots have one name")

@@ -31,13 +31,11 @@ from server_gui.cli.sessions_changed import changed
 from server_gui.cli.sessions_gait import gait
 from server_gui.cli.sessions_resources import compare, resources
 from server_gui.core.cloud import exports
+from server_gui.core.cloud.actions import FORMATS
 from server_gui.core.cloud.configuration_changes import DIGITS
-from server_gui.core.cloud.mcap import write_mcap
 from server_gui.core.cloud.recordings import Recorded, Recordings
 from server_gui.core.cloud.selection import Choice, choose
-from server_gui.core.cloud.tabular import write_csv, write_parquet
 
-FORMATS: Final = {"csv": write_csv, "parquet": write_parquet, "mcap": write_mcap}
 HEADER: Final = ("SESSION", "ROBOT", "BEGAN (UTC)", "LENGTH", "ROWS", "SIZE", "", "OPERATOR", "NOTES")
 USAGE: Final = """usage: gwrms sessions COMMAND …
 

@@ -31,7 +31,10 @@ def draw(station: Station, controls: Controls, where: str, size: tuple[int, int]
     look = panels.WIDE if columns >= WIDE_COLUMNS and lines >= WIDE_LINES else panels.NARROW
     learned = station.predictions.elsewhere
     above, below = (3 if look.roomy else 1) + bool(learned), 2
-    room, footer = lines - above - below, panels.footer(station, controls, where)
+    unknown = not station.robot.parts  # nothing else explains what is there to do
+    if unknown:
+        below = 1 + min(panels.news_lines(station, controls, where, columns), lines // 3)
+    room, footer = lines - above - below, panels.footer(station, controls, where, in_full=unknown)
     if room <= 0:
         return footer
     page = Layout()

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rich import box
-from rich.console import Group, RenderableType
+from rich.console import Console, Group, RenderableType
 from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
@@ -297,8 +297,8 @@ def resources(station: Station, look: Look) -> RenderableType:
     return _panel(grid, "Computer", robot, _age(robot.resources_at_ns))
 
 
-def footer(station: Station, controls: Controls, where: str) -> Group:
-    """Return the keys, grey where one may not, and the last thing that was said."""
+def footer(station: Station, controls: Controls, where: str, *, in_full: bool = False) -> Group:
+    """Return the keys, grey where one may not, and the last thing that was said, `in_full` or cut."""
     change, reset = (OLD if no else "" for no in (controls.no_change, controls.no_reset))
     keys = Text.assemble(
         (" s ", "bold white on red"),
@@ -315,9 +315,14 @@ def footer(station: Station, controls: Controls, where: str) -> Group:
         " quit",
     )
     news = _news(station, controls, where)
-    for text in (keys, news):
+    for text in (keys,) if in_full else (keys, news):
         text.no_wrap, text.overflow = True, "ellipsis"
     return Group(keys, news)
+
+
+def news_lines(station: Station, controls: Controls, where: str, columns: int) -> int:
+    """Return how many lines the last thing that was said takes in full."""
+    return len(_news(station, controls, where).wrap(Console(width=columns), columns))
 
 
 def _news(station: Station, controls: Controls, where: str) -> Text:

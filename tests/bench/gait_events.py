@@ -2,6 +2,7 @@
 
     python -m tests.bench.gait_events                 # simulator: pressure and kinematics; about two minutes
     python -m tests.bench.gait_events --data FILE     # foot IMUs: ipol_gait_dev.npz (IPOL 2023/497)
+    python -m tests.bench.gait_events --data FILE     # or patients: of tools.impaired_gait (IPOL 2019/265)
 
 F1 counts an event that is found within ±50 ms of a true one of its kind and foot.
 """
@@ -23,6 +24,7 @@ from server_gui.core.processing.component import ComponentProcessing
 from server_gui.core.processing.foot_imu_events import FootImuEvents
 from server_gui.core.processing.gait_events import EventKind, GaitEvent, Leg
 from server_gui.core.processing.recording import summarise
+from tests.bench._impaired_feet import against_groups
 from tests.unit.processing.scoring import Score, matched
 from tests.unit.processing.walks import FORCES, Walk, kind_of, record
 
@@ -48,9 +50,11 @@ Scores = dict[tuple[str, str], Score]
 def main(argv: Sequence[str] = ()) -> int:
     """Exit code: 1 where pressure is found worse than it must be, or processing costs too much."""
     parser = argparse.ArgumentParser(prog="tests.bench.gait_events")
-    parser.add_argument("--data", type=Path, metavar="FILE", help="ipol_gait_dev.npz")
+    parser.add_argument("--data", type=Path, metavar="FILE", help="ipol_gait_dev.npz, or patients")
     data = parser.parse_args(argv).data
-    return against_feet(data) if data is not None else against_truth()
+    if data is None:
+        return against_truth()
+    return against_groups(data) if "group" in np.load(data, allow_pickle=False) else against_feet(data)
 
 
 # --- the simulator

@@ -1,12 +1,16 @@
 """`./dev bench predict`: from a robot's samples to a prediction, for one robot and for fifty in one batch.
 
 First the models of the benchmarks, then a robot's own, on their way through a server: row, grid, window,
-features, judging. The time is what this thread used of a core, so that other work does not count; and a
-busy computer's caches do not either: what is allowed is a multiple of a yardstick in the same run, which is
-scikit-learn's plain `predict` of the model of `ipol-status`, of one row and of fifty.
+features, judging. `danger` is a row of all its channels, once its memory is full; it knows no batches:
+fifty robots take fifty times as long, which is told and not limited. The time is what this thread used of a
+core, so that other work does not count; and a busy computer's caches do not either: what is allowed is a
+multiple of a yardstick in the same run, which is scikit-learn's plain `predict` of trees and one network on
+two seconds, of one row and of fifty.
 """
 
+import copy
 import functools
+import math
 import sys
 import tempfile
 import time
@@ -21,12 +25,16 @@ from threadpoolctl import threadpool_limits
 
 from ml.benchmarks.models.falling import FallSettings, fall_trees
 from ml.benchmarks.models.gait_phase import PhaseModel, PhaseSettings
-from ml.benchmarks.models.gait_status import status_model
+from ml.benchmarks.models.gait_status import StatusSettings, status_model
 from ml.benchmarks.models.quick import QuickTerrain, probabilities, scaled_rows
 from ml.benchmarks.models.terrain import TerrainSettings, terrain_model
 from ml.benchmarks.models.trees import QuickTrees
+from ml.danger.combine import load
+from ml.danger.now import CHANNELS
+from ml.danger.watch import Watch
 from ml.features import FeatureStream, Recipe, features
 from ml.features.falling import FALLING
+from ml.features.gait_context import GAIT_CONTEXT
 from ml.features.gait_phase import LEFT_PHASE
 from ml.features.gait_status import GAIT_STATUS
 from ml.features.terrain import TERRAIN
@@ -48,6 +56,8 @@ ONE_MS, ALL_MS = 2.0, 8.0  # the 99th percentiles that are allowed where the yar
 YARDSTICKS_MS = (2.4, 2.9)  # medians for one row and for fifty, on a computer that does little else
 PROMOTER = "tester"
 LEARNED = 1800  # rows that the models have learned from
+FULL = 3000  # rows after which danger's memory is full
+DANGER_NS = 40_000_000
 
 Predict = Callable[[npt.NDArray[np.float32]], Any]
 
@@ -64,6 +74,7 @@ def main() -> int:
     lines = [(recipe.name, functools.partial(_times, recipe, predict)) for recipe, predict in models]
     lines += [(f"own {task}", functools.partial(_served, learned)) for task, learned in _own().items()]
     over = [_line(name, times, yardsticks, allowed) for name, times in lines]
+    over.append(_line("danger", _watched, yardsticks, (allowed[0], math.inf)))
     sys.stdout.write(
         f"plain predict: {yardsticks[0]:.2f} and {yardsticks[1]:.2f} ms; allowed, 99th percentiles:"
         f" {allowed[0]:.2f} ms for one robot (ratio {ONE_MS / YARDSTICKS_MS[0]:.2f}),"
@@ -99,12 +110,12 @@ def _models() -> tuple[list[tuple[Recipe, Predict]], Pair]:
     """Each recipe with a model of full size; and the yardsticks, ms."""
     made: list[tuple[Recipe, Predict]] = []
     with fixed_epochs(), threadpool_limits(limits=1):
-        for recipe in (GAIT_STATUS, LEFT_PHASE, FALLING, TERRAIN):
+        for recipe in (GAIT_CONTEXT, LEFT_PHASE, FALLING, TERRAIN):
             x = features(recipe, _samples(recipe, LEARNED, 1), np.arange(LEARNED))
             made.append((recipe, _fitted(recipe, x)))
-            if recipe is GAIT_STATUS:
-                vote = status_model().fit(x, _classes(x, 3))
-                yardsticks = [_median_ms(vote.predict, x[:rows]) for rows in (1, ROBOTS)]
+        x = features(GAIT_STATUS, _samples(GAIT_STATUS, LEARNED, 1), np.arange(LEARNED))
+        vote = status_model(StatusSettings(networks=1)).fit(x, _classes(x, 3))
+        yardsticks = [_median_ms(vote.predict, x[:rows]) for rows in (1, ROBOTS)]
     return made, yardsticks
 
 
@@ -136,8 +147,16 @@ def _fitted(recipe: Recipe, x: npt.NDArray[np.float32]) -> Predict:
         sets = [fall_trees(model).fit(x, _classes(x, 3) == one) for one in range(model.folds)]
         return QuickTrees(sets).predict_proba
     vote = status_model().fit(x, _classes(x, 3))
-    trees, network = QuickTrees([vote.named_estimators_["trees"]]), vote.named_estimators_["network"]
-    return lambda rows: trees.predict_proba(rows)[0] + probabilities(network[-1], scaled_rows(network, rows))
+    trees, *networks = vote.estimators_
+    quick, scale = QuickTrees([trees]), networks[0]  # the rows are scaled alike for every network
+
+    def votes(rows: npt.NDArray[np.float32]) -> Any:
+        inputs = scaled_rows(scale, rows)
+        return quick.predict_proba(rows)[0] + np.mean(
+            [probabilities(one[-1], inputs) for one in networks], axis=0
+        )
+
+    return votes
 
 
 def _times(recipe: Recipe, predict: Predict, robots: int) -> list[float]:
@@ -188,6 +207,34 @@ def _served(learned: Learned, robots: int) -> list[float]:
         judged("model", learned, due)
         times.append(1e3 * (time.thread_time() - began))
     return times[recipe.look_back + WARM :]
+
+
+def _watched(robots: int) -> list[float]:
+    """Milliseconds from a row of each robot, of somebody who walks, to what is said of danger."""
+    first = Watch(load())
+    for at in range(FULL):
+        first.take(*_walking(at))
+    watches = [copy.deepcopy(first) for _ in range(robots)]
+    times = []
+    for at in range(FULL, FULL + ROUNDS):
+        row = _walking(at)
+        began = time.thread_time()
+        for one in watches:
+            one.take(*row)
+        times.append(1e3 * (time.thread_time() - began))
+    return times
+
+
+def _walking(at: int) -> tuple[int, list[float | None]]:
+    """A stamp (ns) and the row of all of danger's channels; no two strides are alike."""
+    phase = math.tau * at / 30.0
+    swing = np.sin(phase + np.arange(len(CHANNELS))) + np.random.default_rng(at).normal(
+        0, 0.03, len(CHANNELS)
+    )
+    row = dict(zip(CHANNELS, swing.tolist(), strict=True))
+    row |= {"left_insole.force": 400.0 * (1.0 + math.sin(phase))}
+    row |= {"right_insole.force": 400.0 * (1.0 - math.sin(phase))}
+    return at * DANGER_NS, [row[name] for name in CHANNELS]
 
 
 def _stopping() -> list[float]:

@@ -5,9 +5,10 @@ import re
 from dataclasses import fields
 
 import pytest
-from PySide6.QtGui import QColor
+from PySide6.QtGui import QColor, QPalette
+from PySide6.QtWidgets import QLineEdit, QPlainTextEdit
 
-from server_gui.views.theme import PALETTES, STYLE, Colours, Look
+from server_gui.views.theme import PALETTES, STYLE, Colours, Look, Theme
 from tests.gui.test_window import contrast
 
 TEXT, GRAPHIC = 4.5, 3.0  # WCAG 2.2: 1.4.3 and 1.4.11
@@ -60,3 +61,18 @@ def test_fields_and_buttons_have_an_edge_that_is_seen() -> None:
     for kind in ("QLineEdit, QAbstractSpinBox, QComboBox", "QPushButton, QToolButton {"):
         rule = STYLE[STYLE.index(kind) :].partition("}}")[0]
         assert re.search(r"border: 1px solid \{edge\}", rule), kind
+
+
+@pytest.mark.parametrize("look", Look)
+@pytest.mark.parametrize("kind", [QLineEdit, QPlainTextEdit])
+def test_what_an_empty_field_asks_for_can_be_read(
+    theme: Theme, look: Look, kind: type[QLineEdit | QPlainTextEdit]
+) -> None:
+    theme.set(look)
+    field = kind()
+    field.setPlaceholderText("Filter events")
+    field.ensurePolished()
+    hint = field.palette().color(QPalette.ColorRole.PlaceholderText)
+    assert hint.alpha() == 255
+    assert contrast(hint.name(), theme.colours.field) >= TEXT
+    field.deleteLater()

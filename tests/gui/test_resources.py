@@ -169,7 +169,8 @@ def test_a_pid_that_another_program_has_now_is_another_row(view: Resources, benc
 
 
 def test_who_causes_what_monitoring_costs_is_told_until_the_link_drops(view: Resources, bench: Bench) -> None:
-    clients = [client("watch", 1.5), client("gwrms gui", 3.25), client("new", None)]
+    watch = replace(client("watch", 1.5), sent_bytes_per_s=None)
+    clients = [watch, client("gwrms gui", 3.25), client("new", None)]
     cost = GatewayCost(0, 5.0, 20 << 20, 3, 410.2, {}, {}, clients, BudgetInfo(8.0, 4))
     bench.station.take([resources(), Costs(cost)])
     show(view, bench, use("python3", 7, 1.0))
@@ -177,7 +178,7 @@ def test_who_causes_what_monitoring_costs_is_told_until_the_link_drops(view: Res
     at = told.index("Monitoring wakes the computer 410 times a second; for")
     assert told[at + 1 : at + 3] == [
         "   gwrms gui: 3.2 % of a core, 12 KiB/s",
-        "   watch: 1.5 % of a core, 12 KiB/s",
+        "   watch: 1.5 % of a core, – KiB/s",
     ]
     assert told[at + 3] == "▲ To keep to its budget the robot sends one row of 4"
     bench.station.take([LinkChanged(ConnectionState.WAITING, "no route", time.monotonic_ns())])

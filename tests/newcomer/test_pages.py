@@ -35,7 +35,7 @@ NOT_TYPED: Final[Mapping[str, tuple[str, ...]]] = {
         "a dialogue with hands at a simulated one",
     ),
     "how-to/containers.md": ("Docker", "Docker", "Docker"),
-    "how-to/first-robot.md": ("two computers, and root",),
+    "how-to/first-robot.md": ("root", "root", "two computers, and root"),
     "how-to/judge-an-edit.md": ("a walk of minutes, before and after an edit",),
     "how-to/what-changed.md": ("two recorded walks of minutes, some days apart",),
     "how-to/try-two-values.md": (
@@ -140,7 +140,7 @@ def _a_clone_and_a_vendors_file(newcomer: Newcomer) -> None:
 # What a page takes for granted.
 GIVEN: Final[Mapping[str, Callable[[Newcomer], None]]] = {
     "README.md: One command": Newcomer.clone,
-    "README.md: You have a robot and want it monitored": _a_robot_with_files,
+    "README.md: You have a robot and want to monitor it": _a_robot_with_files,
     "README.md: You write software": _a_robot_that_is_served,
     "how-to/add-an-imu.md": _a_sensor,
     "how-to/bench.md": _a_recorded_robot,
@@ -154,7 +154,7 @@ GIVEN: Final[Mapping[str, Callable[[Newcomer], None]]] = {
 
 # What a page names that only a real robot has, and what is here in its place.
 STAND_INS: Final[Mapping[str, Mapping[str, str]]] = {
-    "README.md: You have a robot and want it monitored": {"ROBOT:": "127.0.0.1:", "/etc/gwrms": "~/robot"},
+    "README.md: You have a robot and want to monitor it": {"ROBOT:": "127.0.0.1:", "/etc/gwrms": "~/robot"},
     "how-to/bench.md": {"/dev/ttyUSB0": "sensor/left_insole"},
     "how-to/first-robot.md": {"/opt/gwrms": "~/opt"},
     "how-to/install.md": {"[server]": "[sim]"},

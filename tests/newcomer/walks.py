@@ -9,7 +9,7 @@ DEVELOPER: Final = "developer"  # changes, tries, compares, records, plots, lear
 
 WALKS: Final[Mapping[str, tuple[str, ...]]] = {
     INTEGRATOR: (
-        "README.md: You have a robot and want it monitored",
+        "README.md: You have a robot and want to monitor it",
         "how-to/install.md",
         "how-to/first-robot.md",
         "how-to/wire-a-joint.md",

@@ -9,7 +9,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ml.benchmarks import events, fall, ipol, status, strides
-from ml.benchmarks.models.gait_events import NONE
 from ml.benchmarks.sisfall import Recording
 from ml.errors import UnusableData
 from tests.support.examples import examples
@@ -70,12 +69,12 @@ def test_feet_of_walks_of_any_length_have_their_moments_also_with_packets_lost(
     walks: list[ipol.Trial],
 ) -> None:
     for some in (walks, ipol.lossy(walks, 0.2)):
-        for feet in events.feet_of(some).values():
-            assert len(feet) == 2 * len(walks)
-            for foot in feet:
-                assert len(foot.features) == len(foot.at) == len(foot.offset)
-                assert np.isfinite(foot.features).all()
-                assert (foot.offset != NONE).sum() <= len(foot.true)
+        feet = events.feet_of(some)
+        assert len(feet) == 2 * len(walks)
+        for foot in feet:
+            assert len(foot.features) == len(foot.at) == len(foot.apart())
+            assert np.isfinite(foot.features).all()
+            assert all(seen <= len(true) for seen, true in zip(foot.seen, foot.true, strict=True))
 
 
 @settings(max_examples=examples(40))

@@ -171,9 +171,9 @@ class _Offer:
 
 
 def own_lock(index: int, *, is_led: bool) -> Lock | None:
-    """Return what locks an object by what it is, whoever describes it; `is_led`.
+    """Return what locks an object by what it is, whoever describes it.
 
-    An RPDO of the EDS brings it.
+    `is_led`: an RPDO of the EDS brings it.
     """
     index = _of_first_axis(index)
     if index == CONTROLWORD:

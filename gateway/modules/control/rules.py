@@ -60,7 +60,7 @@ class Rules:
         return device.bus, device.node_id, parameter.index, parameter.subindex
 
     def device(self, of: OfComponent) -> str:
-        """Return what is one device is one name, whichever tables of the robot's file describe it."""
+        """Return a name for the device, the same whichever tables of the robot's file describe it."""
         device = self._devices[of.component]
         return f"node {device.node_id} on {device.bus}"
 

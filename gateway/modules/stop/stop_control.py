@@ -370,7 +370,7 @@ class StopControl:
         return answer
 
     def _explained(self, who: str, joints: list[str], enabling: Enabling) -> "Future[Enabled]":
-        """Return what cannot be journaled is not begun."""
+        """Begin what could be journaled: nothing else is begun."""
         entry = gather(
             {"journal": back(self._loop, self._journal.append(who, "enabling", Share.ASKED, joints=joints))}
         )

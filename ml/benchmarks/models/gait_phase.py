@@ -25,12 +25,13 @@ class PhaseSettings:
 
     hidden: tuple[int, int] = (96, 48)
     penalty: float = 1e-3
-    networks: int = 2
+    networks: int = 4
     first_epochs: int = 5  # on every stride
     epochs: int = 8  # on those that are not doubtful
     doubtful: float = 0.15  # cycles: a stride with a larger mean error is not believed
-    personal_epochs: int = 20
+    personal_epochs: int = 12
     general_share: float = 0.5  # of samples of other people beside each personal one
+    trust: float = 0.75  # in what the networks have become: how far they go there from the general ones
 
 
 class PhaseModel(RegressorMixin, BaseEstimator):  # type: ignore[misc]  # scikit-learn ships no types
@@ -77,6 +78,8 @@ class PhaseModel(RegressorMixin, BaseEstimator):  # type: ignore[misc]  # scikit
             ]
             for network in own.networks_:
                 network.set_params(batch_size=min(BATCH, len(mixed[0]))).partial_fit(*mixed)
+        for network, general in zip(own.networks_, self.networks_, strict=True):
+            _come_back(network, general, 1.0 - self.settings.trust)
         return own
 
     def _believed(self, x: Features, phase: Phases, stride: npt.NDArray[np.int_]) -> npt.NDArray[np.bool_]:
@@ -100,6 +103,13 @@ def _network(settings: PhaseSettings, seed: int) -> Any:
 def _train(networks: list[Any], inputs: Features, targets: Features, epochs: int) -> None:
     for network in networks:
         network.set_params(max_iter=epochs, batch_size=min(BATCH, len(inputs))).fit(inputs, targets)
+
+
+def _come_back(network: Any, general: Any, share: float) -> None:
+    """Move a network's weights that share of the way back to what they were."""
+    for now, then in ((network.coefs_, general.coefs_), (network.intercepts_, general.intercepts_)):
+        for weights, before in zip(now, then, strict=True):
+            weights += share * (before - weights)
 
 
 def _on_circle(phase: Phases) -> Features:

@@ -1,4 +1,4 @@
-"""Standing, walking, turning: boosted trees and a small neural network, which err in different places."""
+"""Standing, walking, turning: boosted trees and small neural networks, which err in different places."""
 
 from dataclasses import dataclass
 
@@ -17,11 +17,12 @@ class StatusSettings:
     leaves: int = 15
     penalty: float = 1.0
     epochs: int = 12
+    networks: int = 4  # of other seeds: of a person unlike the others one alone is right by luck
     turn_weight: float = 2.0  # of a turn's probability: they are rare, and count as much in a macro-F1
 
 
 def status_model(settings: StatusSettings | None = None) -> VotingClassifier:
-    """Features of `GAIT_STATUS` → class; the mean of both probabilities decides."""
+    """Features of `GAIT_CONTEXT` → class; the trees' probability counts as much as all networks' together."""
     tuned = settings or StatusSettings()
     trees = HistGradientBoostingClassifier(
         learning_rate=tuned.learning_rate,
@@ -30,13 +31,22 @@ def status_model(settings: StatusSettings | None = None) -> VotingClassifier:
         min_samples_leaf=40,
         l2_regularization=1.0,
         max_features=0.3,  # of the columns a split looks at: as good, and trees that differ
+        max_bins=63,
         early_stopping=False,
         random_state=0,
     )
-    network = MLPClassifier(
-        hidden_layer_sizes=(64,), alpha=tuned.penalty, batch_size=128, max_iter=tuned.epochs, random_state=0
-    )
+    networks = [
+        MLPClassifier(
+            hidden_layer_sizes=(64,),
+            alpha=tuned.penalty,
+            batch_size=128,
+            max_iter=tuned.epochs,
+            random_state=seed,
+        )
+        for seed in range(tuned.networks)
+    ]
     return VotingClassifier(
-        [("trees", trees), ("network", scaled(network))],
+        [("trees", trees), *((f"network_{seed}", scaled(one)) for seed, one in enumerate(networks))],
         voting="soft",
+        weights=[len(networks), *(1 for _ in networks)],
     )

@@ -22,6 +22,7 @@ class TimelineEvents:
         self.problem = ""  # why not everything is known
         self.until_ns = 0  # up to here the drives' states have been looked through
         self._tape: Tape | None = None
+        self._watch = StateWatch()
         self._read = read
         self._deliver = deliver
 
@@ -30,7 +31,8 @@ class TimelineEvents:
         self._tape, self.problem, self.until_ns = tape, "", tape.first_ns
         self.flags.clear()
         self.flags.add(*of_events(tape.events))
-        self._look(tape, words, StateWatch())
+        self._watch = StateWatch()
+        self._look(tape, words, self._watch)
 
     def tell(self, entries: Iterable[Entry]) -> None:
         """Take what the robot's journal tells, as far as it was while it was recorded."""
@@ -62,16 +64,16 @@ class TimelineEvents:
             self._read(lambda: tape.read(begin_ns, begin_ns + PIECE_NS, states)),
             self._deliver,
             lambda rows: self._looked(tape, words, watch, rows),
-            lambda error: self._failed(tape, error),
+            lambda error: self._failed(watch, error),
         )
 
     def _looked(self, tape: Tape, words: Words, watch: StateWatch, rows: Rows) -> None:
-        if tape is self._tape:
+        if watch is self._watch:  # what was asked before the same recording was opened again is not
             columns = {name: column.tolist() for name, column in rows.columns.items()}
             self.flags.add(*watch.take(rows.utc_ns.tolist(), columns, words))
             self.until_ns += PIECE_NS
             self._look(tape, words, watch)
 
-    def _failed(self, tape: Tape, error: Exception) -> None:
-        if tape is self._tape:
+    def _failed(self, watch: StateWatch, error: Exception) -> None:
+        if watch is self._watch:
             self.problem = str(error)

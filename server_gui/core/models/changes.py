@@ -18,6 +18,7 @@ KEYLESS: Final = (
     f"This desk has no key, so it is {UNSIGNED}: no rule stops a robot by it. gwrms models key makes one."
 )
 OWN: Final = "A robot with a model of its own keeps that."
+UNPROMOTED: Final = "no promoted model; until then a robot is served by what came with GWRMS and fits it"
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +71,7 @@ class Change:
 
     def _told(self, card: Card | None) -> str:
         if card is None:
-            return f"no model {'of its own' if self.robot else 'that somebody has promoted'}"
+            return "no model of its own" if self.robot else UNPROMOTED
         return f"{self.names[card.id]} ({headline(card)} on people never seen)"
 
 

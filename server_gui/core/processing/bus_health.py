@@ -91,7 +91,7 @@ def worst(robot: Robot) -> tuple[Level, tuple[str, ...]]:
         return Level.UNKNOWN, ("no CAN bus", "no bus")
     bus = max(buses, key=lambda one: (ORDER.index(level(one)), one.load_percent or 0.0))
     load = f"CAN {bus.name} {load_text(bus)}"
-    most = next((one for one in talking(bus) if one.names), None)
+    most = next(iter(talking(bus)), None)
     who = "" if most is None else f" · most: {_names(most)}"
     if (why := reason(bus)) is not None:
         why = tuple(one.removesuffix(f": {load_text(bus)} {TAKEN}") for one in why)
@@ -169,7 +169,9 @@ def talking(bus: BusInfo) -> list[Talking]:
 
 
 def _names(one: Talking) -> str:
-    return f"{', '.join(name.replace('_', ' ') for name in one.names)} {100 * one.share:.0f} %"
+    known = ", ".join(name.replace("_", " ") for name in one.names)
+    nameless = "frames of no node" if one.node_id is None else f"node {one.node_id}"
+    return f"{known or nameless} {100 * one.share:.0f} %"
 
 
 def _joined(texts: Iterable[str]) -> str:

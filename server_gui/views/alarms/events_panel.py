@@ -1,6 +1,7 @@
 """What happened, newest first, with what still lasts on top: links, faults, writes, stops, control."""
 
 import datetime
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final
@@ -40,6 +41,9 @@ CHOICES: Final[dict[str, frozenset[NewsKind]]] = {
 }
 
 
+At = tuple[Station, str, int]  # a robot, a channel or none, and an instant on the axis of its signals
+
+
 @dataclass(frozen=True, slots=True)
 class EventRow:
     """A row: when, of what sort, of which robot, what; and what is seen of it in the signals."""
@@ -48,7 +52,8 @@ class EventRow:
     mark: Mark
     robot: str
     text: str
-    at: tuple[Station, str, int] | None = None  # robot, channel, instant
+    at: At | None = None
+    utc_s: float | None = None  # of what is over
 
 
 class NewsModel(QAbstractTableModel):
@@ -83,6 +88,16 @@ class NewsModel(QAbstractTableModel):
         self.pinned = len(active)
         self.lines = [*active, *(line for line in news if self._has_words(line))]
         self.endResetModel()
+
+    def instant(self, line: EventRow) -> At | None:
+        """Return where a line is seen in the signals; None: it is of no robot, or nothing came from it."""
+        station = next((one for one in self._desk.stations if one.title == line.robot), None)
+        if line.at is not None or line.utc_s is None or station is None:
+            return line.at
+        newest_ns, age_s = station.rings.newest_ns, station.robot.age_s()
+        if newest_ns is None or age_s is None:
+            return None
+        return station, "", newest_ns - round(max(0.0, time.time() - age_s - line.utc_s) * 1e9)
 
     @property
     def only(self) -> Station | None:
@@ -143,7 +158,7 @@ class EventsPanel(QWidget):
         self.kinds.currentIndexChanged.connect(self._choose)
         self.table = QTableView()
         self.table.setModel(self._news)
-        self.table.setAccessibleName("Events of all robots; Return shows the signal of an active alarm")
+        self.table.setAccessibleName("Events of all robots; Return shows the signals at that instant")
         self.table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
         self.table.setTabKeyNavigation(False)
         self.table.setShowGrid(False)
@@ -190,7 +205,7 @@ class EventsPanel(QWidget):
         self._news.choose(CHOICES[self.kinds.currentText()], self.words.text().lower().split())
 
     def _activated(self, index: QModelIndex) -> None:
-        at = self._news.lines[index.row()].at
+        at = self._news.instant(self._news.lines[index.row()])
         if at is not None:
             self.shown.emit(*at)
 
@@ -210,7 +225,8 @@ def _of_alarm(station: Station, one: Active) -> EventRow:
 
 def _of_item(item: Item) -> EventRow:
     again = "" if item.first_s is None else f"  ({item.count} times since {_clock(item.first_s)})"
-    return EventRow(_clock(item.utc_s), NEWS[item.kind], item.robot, f"{item.text}{again}")
+    text = f"{item.text}{again}"
+    return EventRow(_clock(item.utc_s), NEWS[item.kind], item.robot, text, utc_s=item.utc_s)
 
 
 def _clock(utc_s: float) -> str:

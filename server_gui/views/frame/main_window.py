@@ -213,12 +213,12 @@ class MainWindow(QMainWindow):
         self.tabs.look_at(self.tabs.signals)
 
     def show_around(self, station: Station, channel: str, at_ns: int) -> None:
-        """Show a channel some seconds before and after an instant of a robot's signals."""
+        """Show a channel, or those that are shown, before and after an instant of a robot's signals."""
         self._desk.select(station)
         signals = self.tabs.signals
         self.tabs.look_at(signals)
         signals.refresh()
-        signals.show_around((channel,), at_ns)
+        signals.show_around((channel,) if channel else (), at_ns)
 
     def closeEvent(self, event: QCloseEvent) -> None:
         if self._commissioning is not None and self._commissioning.runs and not self._is_ending:

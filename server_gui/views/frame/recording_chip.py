@@ -57,7 +57,7 @@ def ask_recording(parent: QWidget, recording: Recording) -> None:
         return
     text = (
         "Stop recording every robot of this window?\n\nRobots are shown as before, and their journals are "
-        "kept; nothing else of what they send is, until it is started again."
+        "still kept; nothing else that they send is kept until you start recording again."
     )
     ask(parent, "Stop recording", text, "Stop recording", recording.pause)
 

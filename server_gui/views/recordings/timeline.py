@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 from PySide6.QtCore import QLineF, QPointF, QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPen
+from PySide6.QtGui import QBrush, QColor, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from ml.store.labels import Label, utc_ns
@@ -197,11 +197,13 @@ class Timeline(QWidget):
             painter.fillRect(QRectF(left, bar.top(), max(right - left, 2.0), bar.height()), colour)
 
     def _draw_outline(self, painter: QPainter, bar: QRectF) -> None:
-        """Above the labels: how far each knee bent; where nothing was recorded there is nothing."""
-        if self._outline is None:
+        """Above the labels: how far each knee bent; hatched where it was not read."""
+        if self._outline is None or not self._outline.least:
             return
         high = bar.height() * (1 - LABELLED) - 4
         painter.save()
+        unread = bar.adjusted(bar.width() * self._outline.read_share, 0, 0, -bar.height() * LABELLED)
+        painter.fillRect(unread, QBrush(self._theme.colour("old"), Qt.BrushStyle.BDiagPattern))
         painter.setRenderHint(QPainter.RenderHint.Antialiasing, on=False)
         for name, least in self._outline.least.items():
             most = self._outline.most[name]
@@ -261,7 +263,7 @@ class Timeline(QWidget):
     # --- where an instant is
 
     def _flag_at(self, place: QPointF) -> Flag | None:
-        """Return what happened is pointed at above the bar."""
+        """Return what happened there; it is pointed at above the bar."""
         if place.y() > self._bar().top():
             return None
         near = self._theme.px(7)

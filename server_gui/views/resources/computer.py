@@ -49,8 +49,8 @@ def _costs(cost: GatewayCost | None) -> list[str]:
     known = [one for one in cost.clients if one.cpu_percent is not None]
     clients = sorted(known, key=lambda one: -(one.cpu_percent or 0.0))
     for one in clients[:CLIENTS]:
-        sent_bytes = one.sent_bytes_per_s or 0.0
-        lines.append(f"   {one.who}: {one.cpu_percent or 0.0:.1f} % of a core, {sent_bytes / KIB:.0f} KiB/s")
+        sent = "–" if one.sent_bytes_per_s is None else f"{one.sent_bytes_per_s / KIB:.0f}"
+        lines.append(f"   {one.who}: {one.cpu_percent or 0.0:.1f} % of a core, {sent} KiB/s")
     if cost.budget is not None and cost.budget.shed > 1:
         lines.append(f"▲ To keep to its budget the robot sends one row of {cost.budget.shed}")
     return lines

@@ -160,8 +160,9 @@ class Signals(QWidget):
         self._build()
 
     def show_around(self, names: Sequence[str], at_ns: int) -> None:
-        """Choose these, and stand still with the seconds around an instant of the robot's clock in sight."""
-        self.choose(names)
+        """Choose these, if any, and stand still with the seconds around an instant of the robot's clock."""
+        if names:
+            self.choose(names)
         self.pause.setChecked(False)  # else it would be what was seen before
         if not self.show_at(at_ns):
             self.pause.setChecked(False)  # nothing else is shown in its place as if it were that

@@ -45,11 +45,11 @@ def _answered(hand: Hand) -> bool:
     """Answer whatever is asked with what it offers, until a joint is to be bent."""
     if hand.reads("Bend the left hip", "keep it there"):
         return True
-    if hand.reads("How is the robot called") and hand.can_see("Answer: How is the robot called"):
-        hand.click("Answer: How is the robot called")
+    if hand.reads("What is the robot called") and hand.can_see("Answer: What is the robot called"):
+        hand.click("Answer: What is the robot called")
         hand.type("exo-01")
         hand.key("Return")
-        hand.misses("How is the robot called")
+        hand.misses("What is the robot called")
     elif hand.can_see("Answer: "):
         hand.key("Return")
     return False

@@ -8,6 +8,7 @@ from tests.support.waiting import until
 
 AGAIN_S: Final = 100.0  # until a simulated robot walks again, on a machine that does much else
 ENABLED: Final = ("6 of 6 enabled", "6/6 enabled")
+STOPPED: Final = ("0 of 6 enabled", "0/6 enabled")
 
 
 def alive(bench: Bench) -> None:
@@ -85,7 +86,8 @@ def two_robots(bench: Bench) -> None:
     hand.keep("two-robots")
     hand.key("F12")
     hand.sees("STOPPED", "confirmed by all 6 drives")
-    none_enabled(hand)
+    until(lambda: any(map(hand.reads, STOPPED)), "showed that the second is off", AGAIN_S)
+    until(lambda: any(map(hand.reads, ENABLED)), "showed the first one's card, as it walks", AGAIN_S)
     hand.keep("second-stopped")
     hand.key("ctrl+1")
     until(lambda: any(map(hand.reads, ENABLED)), "showed that the first still walks", AGAIN_S)

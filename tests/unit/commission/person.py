@@ -53,7 +53,7 @@ class Person:
         joint = next((name for name in JOINTS if name.replace("_", " ") in asked), "")
         if "Are these all" in asked:
             return "all" if asked.startswith("6 ") else "again"
-        if "How is the robot called" in asked:
+        if "What is the robot called" in asked:
             return "exo-01"
         if asked.startswith("Bend the"):
             self._move(joint, 60.0)

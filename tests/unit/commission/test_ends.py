@@ -10,6 +10,8 @@ from typing import Any
 
 import pytest
 
+from gateway.main import main
+
 Process = subprocess.Popen[str]
 
 
@@ -53,12 +55,23 @@ def test_a_question_that_waits_is_left_in_order(
         for said in process.stdout:
             if "ask" in (line := _read(said)):
                 break
-        assert line["ask"].startswith("How is the robot called")
+        assert line["ask"].startswith("What is the robot called")
         end(process)
         rest = process.stdout.read()
     assert process.returncode == status, rest
     assert words in rest
     assert [one.name for one in tmp_path.iterdir()] == ["exo-01.toml.commission"]
+
+
+def test_a_bus_that_is_not_there_is_said_before_anything_is_asked_and_leaves_no_file(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """It asked for the robot's name first, and left a draft with nothing found."""
+    assert main(["commission", "--json", str(tmp_path / "exo-01.toml"), "socketcan:none9"]) == 1
+    said = capfd.readouterr()
+    assert "none9" in said.err
+    assert "ask" not in said.out
+    assert list(tmp_path.iterdir()) == []
 
 
 def _read(said: str) -> dict[str, Any]:

@@ -27,7 +27,7 @@ class KneeTape:
 
     def read(self, begin_ns: int, end_ns: int, channels: list[str]) -> Rows:
         self.asked += 1
-        utc_ns = np.arange(max(begin_ns, self.first_ns), min(end_ns, self.last_ns + 1), SECOND_NS // 10)
+        utc_ns = np.arange(max(begin_ns, BEGIN_NS), min(end_ns, self.last_ns + 1), SECOND_NS // 10)
         since_s = (utc_ns - BEGIN_NS) / SECOND_NS
         kept = (since_s < 240) | (since_s >= 300)
         utc_ns, since_s = utc_ns[kept], since_s[kept]
@@ -60,14 +60,30 @@ def test_the_whole_recording_is_in_it_piece_by_piece_and_a_gap_is_no_value() -> 
     nothing = np.flatnonzero(np.isnan(least)) * a_stretch_s
     assert (nothing[0], nothing[-1] + a_stretch_s) == pytest.approx((240, 300), abs=1.1 * a_stretch_s)
     assert tape.asked == 1 + LENGTH_S * SECOND_NS // PIECE_NS
+    assert outline.read_share == 1.0
 
 
-def test_what_cannot_be_read_is_left_out() -> None:
-    class Away(KneeTape):
+def test_what_cannot_be_read_is_not_known_and_not_taken_for_nothing_recorded() -> None:
+    class GoesAway(KneeTape):
         def read(self, begin_ns: int, end_ns: int, channels: list[str]) -> Rows:
-            raise OSError("the store is away")
+            if self.asked:
+                raise OSError("the store is away")
+            return super().read(begin_ns, end_ns, channels)
 
-    assert np.isnan(opened(Away()).least["left_knee.position"]).all()
+    outline = opened(GoesAway())
+    assert outline.read_share == pytest.approx(PIECE_NS / (LENGTH_S * SECOND_NS))
+    known = np.flatnonzero(~np.isnan(outline.least["left_knee.position"])) / STRETCHES
+    assert known.max() < outline.read_share
+
+
+def test_a_clock_that_jumped_by_decades_makes_no_more_reads_than_there_are_stretches() -> None:
+    late: list[Callable[[], None]] = []
+    outline, tape = Outline(at_once, late.append), KneeTape(first_ns=0)
+    outline.open(cast("Tape", tape))
+    while late:
+        late.pop(0)()
+    assert outline.read_share == 1.0
+    assert tape.asked <= STRETCHES + 1
 
 
 def test_rows_of_a_recording_that_is_no_longer_shown_are_not_drawn_into_another() -> None:
@@ -78,6 +94,30 @@ def test_rows_of_a_recording_that_is_no_longer_shown_are_not_drawn_into_another(
     for call in late:
         call()
     assert outline.least == {}
+
+
+def test_an_infinity_does_not_make_all_else_flat() -> None:
+    class Odd(KneeTape):
+        def read(self, begin_ns: int, end_ns: int, channels: list[str]) -> Rows:
+            rows = super().read(begin_ns, end_ns, channels)
+            odd = {
+                name: np.where(rows.stamps_ns == 0, np.inf, column) for name, column in rows.columns.items()
+            }
+            return Rows(rows.utc_ns, rows.stamps_ns, odd)
+
+    outline = opened(Odd())
+    assert np.nanmax(outline.most["left_knee.position"]) == LENGTH_S
+
+
+def test_the_same_recording_opened_twice_is_read_once_from_its_second_piece_on() -> None:
+    late: list[Callable[[], None]] = []
+    outline, tape = Outline(at_once, late.append), KneeTape()
+    outline.open(cast("Tape", tape))
+    outline.open(cast("Tape", tape))
+    while late:
+        late.pop(0)()
+    assert tape.asked == 2 + LENGTH_S * SECOND_NS // PIECE_NS
+    assert outline.most["left_knee.position"][-1] == LENGTH_S
 
 
 @pytest.mark.parametrize(

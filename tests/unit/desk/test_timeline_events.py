@@ -112,3 +112,14 @@ def test_a_drive_in_fault_and_a_sensor_without_a_value_are_not_ok_in_a_recording
     robot.values["left_knee.state"] = 7.0
     robot.judge()
     assert robot.parts["left_knee"].problem == "error code 0x2310"
+
+
+def test_the_same_recording_opened_twice_tells_each_fault_once() -> None:
+    late: list[Callable[[], None]] = []
+    twice = TimelineEvents(at_once, late.append)
+    tape = FaultTape()
+    for _ in range(2):
+        twice.open(cast("Tape", tape), {"left_knee.state": DRIVE_STATES})
+    while late:
+        late.pop(0)()
+    assert [flag.at_ns for flag in twice.flags] == [flag.at_ns for flag in found(FaultTape()).flags]

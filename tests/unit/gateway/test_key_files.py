@@ -114,6 +114,97 @@ def test_what_is_no_certificate_is_known_for_none_in_no_time(tmp_path: Path) -> 
         der_of(b"-----BEGIN CERTIFICATE-----" + b" " * 400_000)
 
 
+# The robot's first key is its own once its first desk is let in
+
+
+def der(name: str) -> bytes:
+    return der_of(keys.pair(name)[1].read_bytes())
+
+
+def begun(path: Path) -> tuple[AccessFolder, str]:
+    """A pairing that has shown the robot's key, and that key."""
+    shown = changes.ensure_keys(AccessFolder(path, {}), "exo-01")
+    return shown, changes.own_fingerprint(shown)
+
+
+def test_a_pairing_that_lets_nobody_in_leaves_the_robot_without_keys(tmp_path: Path) -> None:
+    """It left keys, and a gateway that woke let nobody in who could stop the robot before."""
+    _, own = begun(tmp_path)
+    assert not AccessFolder(tmp_path, {}).has_keys
+    assert begun(tmp_path)[1] == own, "the next one goes on with the same key"
+
+
+def test_the_first_desk_gives_the_robot_its_key_and_the_second_changes_it_not(tmp_path: Path) -> None:
+    shown, own = begun(tmp_path)
+    assert changes.admit(shown, own, "anna", der("anna"), Role.OPERATOR)
+    folder = AccessFolder(tmp_path, {})
+    assert (folder.has_keys, changes.own_fingerprint(folder), shown.keys.exists()) == (True, own, False)
+    assert stat.S_IMODE(folder.keys.stat().st_mode) == 0o700
+    assert not changes.admit(*begun(tmp_path), "eve", der("eve"), Role.VIEWER)
+    assert changes.own_fingerprint(folder) == own
+
+
+def test_two_that_pair_at_once_are_both_let_in_by_the_same_key(tmp_path: Path) -> None:
+    one, other = begun(tmp_path), begun(tmp_path)
+    assert changes.admit(*one, "anna", der("anna"), Role.OPERATOR)
+    assert not changes.admit(*other, "eve", der("eve"), Role.VIEWER)
+    assert changes.own_fingerprint(AccessFolder(tmp_path, {})) == one[1] == other[1]
+
+
+def test_a_desk_that_has_seen_another_key_is_not_let_in(tmp_path: Path) -> None:
+    shown, own = begun(tmp_path)
+    shutil.rmtree(shown.keys)
+    with pytest.raises(KeyProblem, match="cannot be read"):
+        changes.admit(shown, own, "anna", der("anna"), Role.OPERATOR)
+    keyed(tmp_path, {})
+    with pytest.raises(KeyProblem, match=r"another key .* meanwhile; pair again"):
+        changes.admit(shown, own, "anna", der("anna"), Role.OPERATOR)
+    assert known_in(shown).by_key == {}
+
+
+@pytest.mark.parametrize("where", ["_add", "_publish"])
+def test_who_is_killed_while_the_first_desk_is_let_in_leaves_no_key_that_lets_nobody_in(
+    where: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Killed(BaseException):
+        """As by kill -9: nothing more of the command runs."""
+
+    def killed(*_: object) -> None:
+        raise Killed
+
+    shown, own = begun(tmp_path)
+    as_it_is = getattr(changes, where)
+    monkeypatch.setattr(changes, where, killed)
+    with pytest.raises(Killed):
+        changes.admit(shown, own, "anna", der("anna"), Role.OPERATOR)
+    monkeypatch.setattr(changes, where, as_it_is)
+    folder = AccessFolder(tmp_path, {})
+    assert not folder.has_keys
+    if where == "_publish":
+        changes.remove(folder, "anna")  # as the message says that pairing her again gives
+    assert changes.admit(*begun(tmp_path), "anna", der("anna"), Role.OPERATOR)
+
+
+def test_where_the_key_cannot_be_put_in_its_place_nobody_is_let_in(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shown, own = begun(tmp_path)
+
+    def full(_self: Path, _to: Path) -> Path:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(changes, "_add", lambda *_: shutil.copy(keys.pair("anna")[1], _clients(tmp_path)))
+    monkeypatch.setattr(Path, "rename", full)
+    with pytest.raises(KeyProblem, match="keys cannot be made: No space left"):
+        changes.admit(shown, own, "anna", der("anna"), Role.OPERATOR)
+    assert (shown.files(), AccessFolder(tmp_path, {}).has_keys) == ([], False)
+
+
+def _clients(folder: Path) -> Path:
+    (folder / "clients").mkdir()
+    return folder / "clients" / "anna.crt"
+
+
 # Two at once, and what others may not read
 
 
@@ -131,22 +222,22 @@ def test_two_that_begin_at_once_make_one_key(tmp_path: Path, monkeypatch: pytest
     folder = AccessFolder(tmp_path, {})
     with ThreadPoolExecutor(2) as pool:
         begun = [pool.submit(changes.ensure_keys, folder, "exo-01") for _ in range(2)]
-        assert sorted(one.result() for one in begun) == [False, True]
-    ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(folder.certificate, folder.key)
+        one, other = (found.result() for found in begun)
+    assert one.key == other.key
+    ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(one.certificate, one.key)
 
 
 def test_who_was_killed_between_key_and_certificate_goes_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "desk"))
-    folder = AccessFolder(tmp_path, {})
-    assert changes.ensure_keys(folder, "exo-01")
+    folder = changes.ensure_keys(AccessFolder(tmp_path, {}), "exo-01")
     desk.own_certificate()
     own = keys_folder() / "desk.key", keys_folder() / "desk.crt"
     before = folder.key.read_bytes(), own[0].read_bytes()
     for left_out in (folder.certificate, own[1]):
         left_out.unlink()
-    assert changes.ensure_keys(folder, "exo-01")
+    assert changes.ensure_keys(folder, "exo-01").key == folder.key
     desk.own_certificate()
     assert (folder.key.read_bytes(), own[0].read_bytes()) == before, "who is known by it stays known"
     for key, certificate in ((folder.key, folder.certificate), own):

@@ -1,6 +1,7 @@
 """`gwrms keys pair` and `gwrms pair`: what is typed where, and what a terminal shows."""
 
 import io
+import signal
 import threading
 from argparse import Namespace
 from collections.abc import Iterator
@@ -20,6 +21,7 @@ from gateway.cli.keys import _show as show
 from gateway.client import Address, NotPaired
 from gateway.client.keys import pin_of
 from gateway.client.pairing import pair, typed
+from gateway.connections.listeners import listen
 from gateway.main import main
 from gateway.wire.pairing import Reply, link, normal
 from gateway.wire.role import Role
@@ -82,11 +84,23 @@ def test_a_person_who_mistypes_the_code_is_asked_again(
 
 @pytest.mark.parametrize("is_terminal", [False, True])
 def test_who_types_nothing_is_not_waited_for(
-    is_terminal: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    is_terminal: bool, shown: Shown, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     types(monkeypatch, "0123\n" if is_terminal else "", is_terminal=is_terminal)
-    assert main(["pair", "192.0.2.7"]) == 1
+    assert main(["pair", str(shown.where)]) == 1
     assert "nothing was typed" in capsys.readouterr().err
+
+
+def test_nobody_is_asked_for_a_code_where_no_robot_pairs(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with listen("127.0.0.1", 0) as listener:
+        where = Address("127.0.0.1", listener.getsockname()[1])
+    types(monkeypatch, f"{CODE}\n", is_terminal=True)
+    assert main(["pair", str(where)]) != 0
+    captured = capsys.readouterr()
+    assert f"no robot pairs at {where}" in captured.err
+    assert "code" not in captured.out
 
 
 @pytest.mark.parametrize("lines", ["0123\n", "\n", "\N{BLACK HEART SUIT}" * 16 + "\n"])
@@ -199,6 +213,24 @@ def test_a_name_that_is_taken_is_said_before_a_code_is_shown(
 
 
 # From beginning to end
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+def test_a_pairing_that_is_shown_and_ended_leaves_the_robot_without_keys(
+    number: signal.Signals, tmp_path: Path
+) -> None:
+    """It locked whoever could stop the robot before out of it, without letting a desk in."""
+    file = tmp_path / "robot.toml"
+    file.write_text('[robot]\nname = "exo-01"\n', encoding="utf-8")
+    options = ("--port", "0", "--name", "anna", "--role", "operator", "--yes")
+    with processes.process(*processes.GATEWAY[:-1], "keys", "pair", str(file), *options) as robot:
+        assert robot.stdout is not None
+        assert robot.stderr is not None
+        assert "only a desk on this computer" in robot.stderr.readline(), "before a code is shown"
+        next(line for line in robot.stdout if line.startswith("  gwrms pair"))
+        robot.send_signal(number)
+        robot.wait()
+    assert not AccessFolder(tmp_path, {}).has_keys
 
 
 def test_two_commands_let_a_desk_in_and_a_third_sends_it_away(

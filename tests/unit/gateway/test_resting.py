@@ -1,5 +1,6 @@
 """A gateway that nobody needs becomes a small process that waits, and is back for whoever comes."""
 
+import contextlib
 import signal
 import socket
 import subprocess
@@ -11,12 +12,16 @@ from typing import Any
 
 import pytest
 
+from gateway.access import changes
+from gateway.access.folder import AccessFolder
+from gateway.certificates import der_of
 from gateway.connections.listeners import listen
 from gateway.daemon import Daemon
 from gateway.process.loop import Loop
 from gateway.registry import Registry
+from gateway.wire.role import Role
 from tests.support.waiting import WAIT_S, until
-from tests.unit.gateway import processes
+from tests.unit.gateway import keyed, processes
 from tests.unit.gateway.harness import HEAD, ROBOT, Bench, Client, config
 
 Running = subprocess.Popen[str]
@@ -97,6 +102,46 @@ def test_a_file_that_was_broken_meanwhile_is_told_to_who_comes(running: Running,
     until(lambda: processes.rests(running.pid), "it rests again")
     with Client(address) as client:
         assert client.call("clock.read")
+
+
+# Where the robot's first desk is let in meanwhile
+
+
+def serves_in_plain(address: tuple[str, int]) -> bool:
+    """As `gwrms stop` needs it here, without a key."""
+    with socket.create_connection(address, WAIT_S) as one, contextlib.suppress(ConnectionResetError):
+        one.sendall(CLOCK)
+        return one.makefile().readline().startswith('{"id":1,"result"')
+    return False
+
+
+@pytest.mark.parametrize("is_let_in", [False, True])
+def test_whoever_could_stop_it_still_can_until_it_is_started_again(
+    is_let_in: bool, running: Running, tmp_path: Path
+) -> None:
+    """A pairing that was shown and cancelled locked every local client out of it, `gwrms stop` too."""
+    address = processes.address(running)
+    until(lambda: processes.rests(running.pid), "it rests")
+    pairing = changes.ensure_keys(AccessFolder(tmp_path, {}), "exo-test")
+    if is_let_in:
+        der = der_of(keyed.pair("anna")[1].read_bytes())
+        changes.admit(pairing, changes.own_fingerprint(pairing), "anna", der, Role.OPERATOR)
+    for _ in range(2):
+        assert serves_in_plain(address)
+        until(lambda: processes.rests(running.pid), "it rests again")
+    with processes.process(*processes.GATEWAY, str(tmp_path / "robot.toml")) as anew:
+        assert serves_in_plain(processes.address(anew)) is not is_let_in
+
+
+def test_with_keys_it_rests_and_wakes_with_them(tmp_path: Path) -> None:
+    file = keyed.keyed(tmp_path) / "robot.toml"
+    file.write_text(processes.RESTS_SOON, encoding="utf-8")
+    with processes.process(*processes.GATEWAY, str(file)) as running:
+        address = processes.address(running)
+        for _ in range(2):
+            until(lambda: processes.rests(running.pid), "it rests")
+            with keyed.KeyedClient(address, "operator") as client:
+                assert client.call("clock.read")
 
 
 # What keeps it

@@ -10,7 +10,7 @@ import pytest
 
 from gateway.main import main
 from hil_sim.channels import UNITS
-from hil_sim.cli.record import COLUMNS, Recording
+from hil_sim.cli.record import COLUMNS, DANGER_COLUMNS, Recording
 from hil_sim.controller import objects
 from hil_sim.exoskeleton import Exoskeleton, Scenario
 from hil_sim.gait.activity import Activity
@@ -46,6 +46,14 @@ def test_a_robot_on_one_leg_has_that_legs_joints_both_insoles_and_both_phases() 
     last = dict(zip(head["columns"], lines[-1], strict=True))
     assert {"right_knee.position", "left_insole.force", "right_insole.force"} <= set(last)
     assert None not in (last["left_phase"], last["right_phase"])
+
+
+def test_healthy_level_walking_has_the_columns_of_dangers_and_no_danger() -> None:
+    head, *lines = (json.loads(line) for line in recorded("healthy", 12.0))
+    assert head["dangers"] == []
+    assert head["columns"] == [*COLUMNS, *DANGER_COLUMNS]
+    assert {line[1] for line in lines} <= {"stand", "walk", "turn_left", "turn_right"}
+    assert {line[-1] for line in lines} == {0.0}
 
 
 def test_who_stands_has_no_phase() -> None:
@@ -93,6 +101,7 @@ def test_the_command_writes_every_wearer(tmp_path: Path, capsys: pytest.CaptureF
         ["--walks", "moonwalk"],
         ["--assists", "both"],
         ["--assists", "left", "--scenario", "dangers"],
+        ["--assists", "left", "--scenario", "healthy"],
     ],
 )
 def test_wrong_usage_is_refused(wrong: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ml.benchmarks import ipol, sisfall, terrain
+from ml.benchmarks import impaired, ipol, sisfall, terrain
 
 Arrays = dict[str, npt.NDArray[Any]]
 STAND, WALK, TURN = range(3)
@@ -58,6 +58,53 @@ def gait(subjects: int = 3, trials: int = 2, seconds: float = 8.0) -> Arrays:
         "trial": np.repeat([one[5] for one in made], rows).astype(np.int16),
         "rate": np.array(100),
     }
+
+
+def patients(healthy: int = 3, limping: int = 3, trials: int = 2, seconds: float = 8.0) -> Arrays:
+    """Feet of healthy people, and of some who hardly lift their heels and swing for longer; two sensors."""
+    noise = np.random.default_rng(3)
+    made = []
+    for person in range(healthy + limping):
+        limps = person >= healthy
+        for number in range(trials):
+            rates, moving = feet(seconds, 1.0 + 0.02 * person, limps=limps)
+            rates = rates + noise.normal(0, 0.02, rates.shape)
+            made.append((rates, moving, person, number, int(limps), person % 2))
+    rows = [len(one[0]) for one in made]
+    moving = np.concatenate([one[1] for one in made]).astype(np.int8)
+    about = [np.repeat([one[at] for one in made], rows) for at in range(2, 6)]
+    return {
+        "x": (np.concatenate([one[0] for one in made]) * 1000).astype(np.int16),
+        "scale": np.full(6, 0.001),
+        "channels": np.array(impaired.CHANNELS),
+        "subject": about[0].astype(np.int16),
+        "trial": about[1].astype(np.int16),
+        "group": about[2].astype(np.int8),
+        "group_names": np.array([impaired.HEALTHY, "limping"]),
+        "sensor": about[3].astype(np.int8),
+        "sensor_names": np.array(["even", "odd"]),
+        "left_moving": moving[:, 0],
+        "right_moving": moving[:, 1],
+        "rate": np.array(100),
+    }
+
+
+def feet(
+    seconds: float, stride: float, *, limps: bool
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.bool_]]:
+    """Angular velocity (rows, 6) and whether each foot moves (rows, 2): stand 2 s, walk, stand 1 s."""
+    walks = np.repeat([False, True, False], [200, int(100 * seconds), 100])
+    phase = np.cumsum(np.where(walks, 0.01 / stride, 0.0)) % 1.0
+    rates = np.zeros((len(walks), 6))
+    moving = np.zeros((len(walks), 2), dtype=bool)
+    begin = 0.4 if limps else 0.6  # of the stride, where the heel leaves the ground
+    for place, one in enumerate((phase, (phase + 0.5) % 1.0)):
+        share = np.clip((one - begin) / (1.0 - begin), 0.0, 1.0)
+        pitch = np.where(share < 0.5, -(2.0 if limps else 6.0), 5.0) * np.abs(np.sin(2 * np.pi * share))
+        rates[:, 3 * place + 1] = np.where(walks & (one > begin), pitch, 0.0)
+        rates[:, 3 * place + 1] -= np.where(walks & (one < 0.08), 1.0, 0.0)  # the foot comes down on its heel
+        moving[:, place] = walks & ((one > begin) | (one < 0.08))
+    return rates, moving
 
 
 def fall(noise: np.random.Generator) -> tuple[npt.NDArray[np.float64], int]:

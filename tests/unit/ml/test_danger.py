@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ml.danger.budget import BUDGETS, rate_interval, rule_of_three, share_interval, thresholds
+from ml.danger.budget import BUDGETS, extrapolated, rate_interval, rule_of_three, share_interval, thresholds
 from ml.danger.combine import Calibration, load
 from ml.danger.detector import DETECTORS
-from ml.danger.levels import CALM_S, URGENT, Level, Levels
+from ml.danger.levels import CALM_S, HOLD, URGENT, Level, Levels, held
 from ml.danger.now import CHANNELS
 from ml.danger.usual import FEWEST, WAITS, Usual
 from ml.danger.watch import Watch
@@ -104,6 +104,23 @@ def test_thresholds_rise_with_the_level_and_keep_the_budget_on_what_was_seen() -
     assert list(found.values()) == sorted(found.values())
     for level, budget in BUDGETS.items():
         assert (maxima >= found[level]).sum() <= max(budget * hours, 1)
+
+
+@given(st.lists(st.floats(-3.0, 9.0), min_size=HOLD, max_size=40))
+def test_a_level_begins_where_what_is_held_reaches_its_threshold(odds: list[float]) -> None:
+    reached = float(held(np.array(odds))[HOLD - 1 :].max())
+    for threshold, begins in ((reached, True), (reached + 1e-6, False)):
+        levels = Levels(dict.fromkeys(URGENT, threshold))
+        found = [levels.take(0.04 * at, one) for at, one in enumerate(odds)]
+        assert (max(found) > Level.NONE) is begins
+
+
+def test_the_tail_says_how_often_odds_beyond_all_that_was_seen_are_reached() -> None:
+    hours, source = 20.0, np.random.default_rng(0)
+    maxima = source.exponential(1.0, int(hours * 360))
+    for beyond in (6.0, 12.0):
+        assert extrapolated(maxima, hours, beyond) == pytest.approx(360.0 * math.exp(-beyond), rel=0.5)
+    assert extrapolated(maxima, hours, -5.0) <= 36.0
 
 
 def test_intervals_of_rates_and_shares_are_the_known_ones() -> None:

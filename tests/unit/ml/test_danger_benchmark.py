@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -134,6 +135,15 @@ def test_what_is_no_such_recording_is_refused_with_its_name(tmp_path: Path) -> N
         read(recording(file, 1))
     with pytest.raises(UnusableData, match="dangers writes"):
         read(recording(file, 1, 2, columns=CHANNELS[1:]))
+
+
+def test_where_nobody_is_in_danger_false_alarms_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    calm = [replace(one, danger=np.zeros_like(one.danger)) for one in (seen("1"), seen("2", is_seen=False))]
+    monkeypatch.setattr(danger, "read", lambda _path: calm)
+    found = danger.evaluate_shipped(Path("healthy.jsonl"), search=False)
+    assert found.figures["events"] == 0.0
+    assert found.figures["advice_per_hour"] * found.figures["healthy_hours"] == pytest.approx(1.0)
+    assert found.figures["stops_per_100_h_extrapolated"] > 0.0
 
 
 def test_the_calibration_that_ships_learns_nothing_of_whom_it_judges(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from ml.benchmarks import events, ipol, losses, metrics
-from ml.benchmarks.models.gait_events import NONE, EventSettings
+from ml.benchmarks.models.gait_events import EventModel, EventSettings
 from ml.errors import UnusableData
 from ml.features.gait_status import CHANNELS
 from server_gui.cli.evaluate import main
@@ -24,16 +24,44 @@ def test_each_true_event_is_matched_once_and_as_many_as_can_be() -> None:
     assert metrics.matches(true, found[:0], 5) == 0
 
 
-def test_an_event_is_meant_by_the_nearest_moment_and_none_from_afar() -> None:
-    at = np.array([5, 22, 28, 90])
-    assert events.offsets(at, np.array([26, 60])).tolist() == [NONE, NONE, -2, NONE]
-    assert events.offsets(at[:0], np.array([26])).tolist() == []
+def test_each_moment_knows_how_far_the_nearest_event_of_each_kind_is() -> None:
+    none = np.array([], dtype=np.int_)
+    foot = events.Foot(
+        1, np.zeros((3, 1), dtype=np.float32), np.array([0, 24, 90]), (np.array([26, 60]), none), (2, 0)
+    )
+    assert foot.apart()[:, 0].tolist() == [26, 2, 30]
+    assert (foot.apart()[:, 1] > 1000).all()
+
+
+def test_an_event_is_the_top_of_a_bump_and_no_other_is_as_near_as_a_step() -> None:
+    at = np.arange(0, 400, 2)
+    tops, high = np.array([[101], [125], [251]]), np.array([[1.0], [0.6], [0.5]])
+    height = (np.exp(-0.5 * ((at - tops) / 3.0) ** 2) * high).sum(axis=0)
+    model = EventModel(EventSettings(threshold=0.4))
+    assert model.events(at, height).tolist() == [101, 251]
+    assert model.events(at[:0], height[:0]).tolist() == []
+    assert EventModel(EventSettings(threshold=0.55)).events(at, height).tolist() == [101]
+
+
+def test_a_top_is_known_60_ms_after_it() -> None:
+    at = np.arange(0, 100, 2)
+    height = np.exp(-0.5 * ((at - 51) / 3.0) ** 2)
+    model = EventModel()
+    for known in (58, 70, 98):
+        assert model.events(at[at <= known], height[at <= known]).tolist() == [51]
+
+
+def test_a_foot_at_rest_is_not_asked_about(tmp_path: Path) -> None:
+    trials = ipol.read(saved(tmp_path / "gait.npz", recordings.gait(subjects=2, trials=1)))
+    left = events.feet_of(trials)[0]
+    assert left.at.min() > 150  # two seconds of standing
+    assert left.seen == tuple(len(true) for true in left.true)
 
 
 def test_events_of_clockwork_people_are_found_also_where_packets_are_lost(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(events, "SETTINGS", EventSettings(rounds=12))
+    monkeypatch.setattr(events, "SETTINGS", EventSettings(hidden=(24, 12), networks=1, epochs=25))
     arrays = recordings.gait(subjects=2, trials=2, seconds=8.0)
     for side in ("left_event", "right_event"):  # it leaves the ground while it pushes off, not before
         arrays[side] &= np.roll(arrays[side], 5)

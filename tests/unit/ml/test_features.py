@@ -7,6 +7,7 @@ import pytest
 from ml.features import FeatureStream, Recipe, features
 from ml.features.blocks import bins, falls, moments, since
 from ml.features.falling import FALLING, moving
+from ml.features.gait_context import GAIT_CONTEXT
 from ml.features.gait_events import LEFT_EVENTS, RIGHT_EVENTS
 from ml.features.gait_phase import LEFT_PHASE, RIGHT_PHASE, SWAPPED, mirrored
 from ml.features.gait_status import GAIT_STATUS
@@ -16,7 +17,7 @@ from ml.features.terrain import TERRAIN
 from ml.features.terrain import mirrored as other_side
 from tests.unit.ml import plain_falling, recordings
 
-RECIPES = (GAIT_STATUS, LEFT_PHASE, RIGHT_PHASE, LEFT_EVENTS, RIGHT_EVENTS, FALLING, TERRAIN)
+RECIPES = (GAIT_STATUS, GAIT_CONTEXT, LEFT_PHASE, RIGHT_PHASE, LEFT_EVENTS, RIGHT_EVENTS, FALLING, TERRAIN)
 Samples = npt.NDArray[np.float64]
 
 
@@ -92,12 +93,13 @@ def test_the_future_changes_no_feature(recipe: Recipe) -> None:
 
 @pytest.mark.parametrize("recipe", RECIPES, ids=lambda recipe: recipe.name)
 def test_what_is_older_than_the_look_back_changes_no_feature(recipe: Recipe) -> None:
-    samples = walk(recipe, 400)
+    rows = recipe.look_back + 200
+    samples = walk(recipe, rows)
     other = samples.copy()
-    other[: 400 - recipe.look_back] = -7.0
-    end = np.array([399])
+    other[:200] = -7.0
+    end = np.array([rows - 1])
     assert np.array_equal(features(recipe, samples, end), features(recipe, other, end))
-    other[400 - recipe.look_back] = -7.0
+    other[200] = -7.0
     assert not np.array_equal(features(recipe, samples, end), features(recipe, other, end))
 
 
@@ -146,12 +148,13 @@ def test_a_step_of_the_right_leg_on_the_ground_is_the_left_ones_in_a_mirror() ->
     assert not np.array_equal(TERRAIN.compute(window), TERRAIN.compute(one_leg))
 
 
-def test_status_does_not_know_left_from_right_nor_which_way_it_turns() -> None:
-    window = walk(GAIT_STATUS, 200).T[None]
+@pytest.mark.parametrize("recipe", [GAIT_STATUS, GAIT_CONTEXT], ids=lambda recipe: recipe.name)
+def test_status_does_not_know_left_from_right_nor_which_way_it_turns(recipe: Recipe) -> None:
+    window = walk(recipe, recipe.look_back).T[None]
     swapped = window[:, SWAPPED]
-    assert np.allclose(GAIT_STATUS.compute(window), GAIT_STATUS.compute(swapped), atol=1e-4)
+    assert np.allclose(recipe.compute(window), recipe.compute(swapped), atol=1e-4)
     other_way = mirrored(window)[:, SWAPPED]  # back to their own sides, but turning the other way
-    assert np.allclose(GAIT_STATUS.compute(window), GAIT_STATUS.compute(other_way), atol=1e-4)
+    assert np.allclose(recipe.compute(window), recipe.compute(other_way), atol=1e-4)
 
 
 def test_a_window_of_a_walk_says_when_the_foot_last_struck() -> None:

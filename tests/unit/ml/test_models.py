@@ -1,6 +1,7 @@
 """Models: quick trees, phases without wrong labels, a wearer's own walk, alarms and their threshold."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -19,7 +20,7 @@ from ml.errors import UnusableData
 from ml.neural import fixed_epochs, scaled
 
 Floats = npt.NDArray[np.float32]
-SMALL = PhaseSettings(hidden=(16, 8), networks=1, first_epochs=15, epochs=15)
+SMALL = PhaseSettings(hidden=(16, 8), networks=1, first_epochs=15, epochs=15, personal_epochs=40)
 
 
 @pytest.fixture(autouse=True)
@@ -64,10 +65,10 @@ def test_a_quick_support_vector_machine_says_what_scikit_learns_says() -> None:
 
 def test_status_is_learned_and_repeats_itself() -> None:
     random = np.random.default_rng(0)
-    truth = random.integers(0, 3, 300)
-    x = (random.normal(size=(300, 5)) + truth[:, None] * [2, 0, 0, 0, -1]).astype(np.float32)
-    first, second = (status_model().fit(x[:200], truth[:200]).predict_proba(x[200:]) for _ in range(2))
-    assert (first.argmax(axis=1) == truth[200:]).mean() > 0.8
+    truth = random.integers(0, 3, 1200)
+    x = (random.normal(size=(1200, 5)) + truth[:, None] * [2, 0, 0, 0, -1]).astype(np.float32)
+    first, second = (status_model().fit(x[:800], truth[:800]).predict_proba(x[800:]) for _ in range(2))
+    assert (first.argmax(axis=1) == truth[800:]).mean() > 0.8
     assert np.array_equal(first, second)
 
 
@@ -103,6 +104,19 @@ def test_a_wearers_own_walk_is_learned_and_the_general_model_stays() -> None:
     assert before == pytest.approx(0.08, abs=0.03)
     assert error(personal, own_x, own_phase) < 0.6 * before
     assert error(model, own_x, own_phase) == before
+
+
+def test_networks_go_only_so_far_from_the_general_ones_as_they_are_trusted() -> None:
+    x, phase, stride = strides(60)
+    own = strides(30, shift=0.08)
+    changes = []
+    for trust in (0.0, 0.5, 1.0):
+        model = PhaseModel(replace(SMALL, trust=trust)).fit(x, phase, stride)
+        general, personal = model.networks_[0].coefs_[0], model.personal(*own).networks_[0].coefs_[0]
+        changes.append(personal - general)
+    assert np.allclose(changes[0], 0.0, atol=1e-6)
+    assert np.allclose(changes[1], 0.5 * changes[2], atol=1e-6)
+    assert np.abs(changes[2]).max() > 0.01
 
 
 def test_the_mean_of_decisions_ends_at_a_recordings_beginning() -> None:

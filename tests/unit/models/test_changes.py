@@ -39,7 +39,9 @@ def publish(registry: Registry, seed: int = 0, **changes: object) -> Card:
 def test_a_promotion_says_what_serves_now_and_what_will(registry: Registry) -> None:
     one, other = publish(registry), publish(registry, 1)
     first = promotion(registry.url, one.id, "")
-    assert first.sentences[0] == "Serves now: no model that somebody has promoted."
+    assert first.sentences[0] == (
+        "Serves now: no promoted model; until then a robot is served by what came with GWRMS and fits it."
+    )
     assert registry.history("falling") == []
     carry_out(registry.url, first, "Ada", "a test")
     second = promotion(registry.url, other.id, "")

@@ -91,7 +91,7 @@ def bench(monkeypatch: pytest.MonkeyPatch) -> Bench:
     def learned(base: Model, _robot: str, wearer: str, *_: object) -> Model:
         return replace(base, learned_from=wearer, objection="not judged")
 
-    monkeypatch.setattr(module, "Lesson", Walk)
+    monkeypatch.setattr(module, "TrainingData", Walk)
     monkeypatch.setattr(module, "learn", learned)
     monkeypatch.setattr(module, "tried", lambda *_: (Tried(3.4, 2.1, 30), True))
     made = Bench()

@@ -3,7 +3,10 @@
 import pytest
 from rich.text import Text
 
+from gateway.client import ConnectionState
 from gateway.wire.robot import Hello
+from server_gui.core.follow.events import LinkChanged
+from server_gui.core.follow.robot import Robot
 from server_gui.terminal import marks
 from server_gui.terminal.controls import Controls
 from server_gui.terminal.keys import Key
@@ -53,6 +56,18 @@ def test_what_one_may_not_is_grey_and_says_why_and_stop_is_not(
     for key in (Key.LEFT, Key.RESET):
         controls.press(key)
     assert (f"✕ {why[:60]}" in screen(station, controls, size)) == bool(why)
+
+
+@pytest.mark.parametrize("size", [(118, 27), (100, 24), (80, 24)])
+def test_why_a_robot_was_never_reached_is_read_to_its_end(size: tuple[int, int]) -> None:
+    """It was cut before it said what to do, and nothing else on the screen does."""
+    why = "this desk is not paired with it (gwrms keys pair on the robot, then gwrms pair HOST:7421 here)"
+    station = a_station()
+    station.robot = Robot()
+    station.robot.apply(LinkChanged(ConnectionState.CLOSED, why, 0))
+    shown = " ".join(screen(station, size=size).split())
+    assert why in shown
+    assert "STOP (software, not safety-rated)" in shown
 
 
 @pytest.mark.parametrize("key", [Key.LEFT, Key.RIGHT, Key.RESET])
