@@ -21,12 +21,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from msgspec.structs import replace
+from scipy.special import softmax
 from threadpoolctl import threadpool_limits
 
 from ml.benchmarks.models.falling import FallSettings, fall_trees
 from ml.benchmarks.models.gait_phase import PhaseModel, PhaseSettings
 from ml.benchmarks.models.gait_status import StatusSettings, status_model
-from ml.benchmarks.models.quick import QuickTerrain, probabilities, scaled_rows
+from ml.benchmarks.models.quick import QuickTerrain, outputs, scaled_rows
 from ml.benchmarks.models.terrain import TerrainSettings, terrain_model
 from ml.benchmarks.models.trees import QuickTrees
 from ml.danger.combine import load
@@ -152,9 +153,8 @@ def _fitted(recipe: Recipe, x: npt.NDArray[np.float32]) -> Predict:
 
     def votes(rows: npt.NDArray[np.float32]) -> Any:
         inputs = scaled_rows(scale, rows)
-        return quick.predict_proba(rows)[0] + np.mean(
-            [probabilities(one[-1], inputs) for one in networks], axis=0
-        )
+        said = softmax([outputs(one[-1], inputs) for one in networks], axis=-1)
+        return quick.predict_proba(rows)[0] + said.mean(axis=0)
 
     return votes
 
