@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from ml.danger.detector import Floats
-from ml.danger.now import SIDES, STANDING, Now
+from ml.danger.now import SIDES, STANDING, Now, or_zero
 
 FEWEST: Final = 12  # samples of a bin
 LOADED_N: Final = 100.0  # below that a centre of pressure says little
@@ -34,12 +34,13 @@ class Support:
         bins, feet = np.array(now.bins()), np.arange(2)
         place = np.where(now.foot[0] > LOADED_N, now.foot[1:], np.nan)
         count, mean = self._count[:, feet, bins], self._mean[:, feet, bins]
-        square = self._square[:, feet, bins]
-        off = place - mean
-        there = np.isfinite(off)
-        apart = np.minimum(np.abs(off) / np.sqrt(square + LEAST_M * LEAST_M), 20.0)
-        self._seen += SMOOTH * (np.where(there, apart, 0.0) - self._seen)
+        # Whoever halts puts the last foot down as it stands, and not as in a stride.
+        apart = np.fmin(self._apart(place, bins), self._apart(place, np.full(2, STANDING)))
+        self._seen += SMOOTH * (or_zero(apart) - self._seen)
         if learn:
+            square = self._square[:, feet, bins]
+            off = place - mean
+            there = np.isfinite(off)
             count = count + there
             share = np.where(there, 1.0 / np.maximum(count, 1.0), 0.0)
             moved = np.where(there, off, 0.0)
@@ -48,6 +49,13 @@ class Support:
             self._square[:, feet, bins] = square + share * (moved * moved - square)
         told = np.where(np.isfinite(now.foot[0]) & (count >= FEWEST), self._seen, np.nan).ravel()
         return np.concatenate([told, self._bearing(float(now.foot[0].sum()), learn=learn)])
+
+    def _apart(self, place: Floats, bins: Floats) -> Floats:
+        """Return how many spreads the centres of pressure are off at these phases; NaN: not known."""
+        at = slice(None), np.arange(2), bins
+        spread = np.sqrt(self._square[at] + LEAST_M * LEAST_M)
+        apart = np.minimum(np.abs(place - self._mean[at]) / spread, 20.0)
+        return np.where(self._count[at] >= FEWEST, apart, np.nan)
 
     def _bearing(self, force: float, *, learn: bool) -> Floats:
         """How much less, and more, than the weight both feet bear."""

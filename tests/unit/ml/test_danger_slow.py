@@ -12,6 +12,7 @@ import pytest
 from ml.danger.creep import Creep
 from ml.danger.memory import LOOKS, Memory, _alone
 from ml.danger.now import CHANNELS, Now
+from ml.danger.support import Support
 
 Floats = npt.NDArray[np.float64]
 Change = Callable[[float, dict[str, float]], None]
@@ -194,3 +195,33 @@ def test_an_encoder_that_slips_again_and_again_creeps() -> None:
     assert usual < 0.02
     usual, after = seen(Creep, "right_knee", encoder)
     assert np.nanmax(after) < 0.02
+
+
+def feet(at_s: float, forward_m: float) -> dict[str, float]:
+    """Somebody who walks, whose centre of pressure is so far forward from the heel's under either foot."""
+    row = {"trunk.tilt_forward": 0.0}
+    for side, phase in (("left", 0.0), ("right", math.pi)):
+        row[f"{side}_insole.force"] = 400.0 * (1.0 + math.sin(math.tau * at_s / 1.2 + phase))
+        row[f"{side}_insole.cop_x"] = forward_m
+        row[f"{side}_insole.cop_y"] = 0.0
+    return row
+
+
+def test_a_foot_put_down_as_it_stands_is_a_halt_and_elsewhere_is_told() -> None:
+    support, now = Support(), Now()
+    stands = {"left_insole.force": 400.0, "right_insole.force": 400.0}
+    stands |= {f"{side}_insole.cop_{way}": 0.1 * (way == "x") for side in ("left", "right") for way in "xy"}
+    for at_s in np.arange(0.0, 10.0, STEP_S).tolist():
+        support.measure(moment(at_s, stands, now), learn=True)
+    for at_s in np.arange(10.0, 60.0, STEP_S).tolist():
+        support.measure(moment(at_s, feet(at_s, 0.0), now), learn=True)
+    worst = {}
+    for forward_m in (0.0, 0.1, 0.2):
+        own, then = copy.deepcopy((support, now))
+        found = [
+            own.measure(moment(at_s, feet(at_s, forward_m), then), learn=False)[:2]
+            for at_s in np.arange(60.0, 61.0, STEP_S).tolist()
+        ]
+        worst[forward_m] = float(np.nanmax(found))
+    assert worst[0.1] < 2.0 < worst[0.2]
+    assert worst[0.0] < 2.0
