@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from ml.danger.levels import Level
-from ml.danger.watch import Verdict
+from ml.danger.monitor import DangerVerdict
 from ml.serving.predictor import Prediction
 from server_gui.core.follow import frame_time
 from server_gui.core.prediction.adaptation import Adapting
@@ -46,7 +46,7 @@ class ShownDanger:
 
     said: Endangered
     came_ns: int  # our monotonic clock
-    known: Verdict | None = None
+    known: DangerVerdict | None = None
 
     def is_stale(self, now_ns: int | None = None) -> bool:
         """Return whether it is too old to be called live: nothing is known then."""
@@ -141,7 +141,7 @@ class StationPredictions:
                 for task in self.by_task.keys() - news.models.keys():
                     del self.by_task[task]
 
-    def _known(self, verdict: Verdict) -> Verdict | None:
+    def _known(self, verdict: DangerVerdict) -> DangerVerdict | None:
         if verdict.level is not Level.UNKNOWN:
             return verdict
         return None if self.danger is None else self.danger.known

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Final
 
 from gateway.client import Batch
-from ml.danger.combine import Calibration
+from ml.danger.calibration import Calibration
 from ml.serving.predictor import Prediction, Row, Window, Windows
 from ml.serving.trust import Trusting
 from server_gui.core.follow.events import Described, Event, Telemetry

@@ -9,9 +9,9 @@ import pytest
 from msgspec.structs import replace
 
 from gateway.client import Batch
-from ml.danger.combine import SHIPPED, Calibration, load
+from ml.danger.calibration import SHIPPED, Calibration, load
 from ml.danger.levels import Level
-from ml.danger.now import CHANNELS
+from ml.danger.observation import CHANNELS
 from ml.errors import UnusableModel
 from server_gui.core.follow.events import Telemetry
 from server_gui.core.prediction import service as module
