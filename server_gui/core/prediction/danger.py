@@ -11,7 +11,7 @@ from ml.danger.observation import CHANNELS
 from ml.serving.predictor import Prediction
 from server_gui.core.prediction.clock import Clock
 from server_gui.core.prediction.news import Endangered, Ruled
-from server_gui.core.prediction.rules import Rule
+from server_gui.core.prediction.rules import PredictionRule
 from server_gui.core.settings.prediction import DANGER, RuleSettings
 
 EVERY_NS: Final = 40_000_000  # between two verdicts, at most as many as rows
@@ -28,7 +28,7 @@ class DangerWatch:
     def __init__(self, robot: str, calibration: Calibration, rules: Iterable[RuleSettings]) -> None:
         self._robot = robot
         self._calibration = calibration
-        self._rules = [Rule(rule, EVERY_NS) for rule in rules if rule.task == DANGER]
+        self._rules = [PredictionRule(rule, EVERY_NS) for rule in rules if rule.task == DANGER]
         self._told: DangerVerdict | None = None
         self.restart()
 
