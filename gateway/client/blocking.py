@@ -176,7 +176,7 @@ class Robot:
             self._wait(trying.__aexit__(None, None, None))
 
     def confirm(self, write: int) -> Confirmed:
-        """Keep the values on trial; raises `RemoteError` if it has ended, or they differ from those written."""
+        """Keep the values on trial; raises `RemoteError` if it has ended, or they have changed."""
         return self._wait(self._client.confirm(write))
 
     def revert(self, write: int) -> Reverted:

@@ -202,7 +202,7 @@ class Client:
         )
 
     async def confirm(self, write: int) -> Confirmed:
-        """Keep the values on trial; raises `RemoteError` if it has ended, or they differ from those written."""
+        """Keep the values on trial; raises `RemoteError` if it has ended, or they have changed."""
         number = WriteNumberParams(write)
         ended = await self.link.call(PARAMETER_CONFIRM, number, WRITE_TIMEOUT_S)
         self._trying.discard(write)
