@@ -306,7 +306,7 @@ def devices(description: Description) -> dict[str, tuple[object, object]]:
     return found
 
 
-class Outcome(StrEnum):
+class StoreOutcome(StrEnum):
     """What came of a device that was asked to store."""
 
     STORED = "stored"
@@ -315,9 +315,9 @@ class Outcome(StrEnum):
     UNASKED = "not asked"  # the link was lost before
 
 
-def refused_or_unknown(kind: str | None) -> Outcome:
+def refused_or_unknown(kind: str | None) -> StoreOutcome:
     """Return what a robot's refusal of this kind says of a device's flash."""
-    return Outcome.UNKNOWN if kind in UNSURE else Outcome.REFUSED
+    return StoreOutcome.UNKNOWN if kind in UNSURE else StoreOutcome.REFUSED
 
 
 def storing(description: Description) -> Iterator[tuple[str, ...]]:

@@ -18,7 +18,7 @@ from drivers.insole import layout as layouts
 from drivers.insole.build import insoles
 from drivers.insole.formats import FORMATS as INSOLE_FORMATS
 from drivers.insole.settings import InsoleSettings
-from drivers.samples import State
+from drivers.samples import ComponentState
 
 REFRESH_S = 0.25
 AXES = "# which of its axes point forward, left and up; here as its maker means it to sit"
@@ -110,7 +110,7 @@ def _show(components: list[Component], seconds: float | None) -> None:
         while time.monotonic() < until:
             pause.wait(REFRESH_S)
             now_ns = time.monotonic_ns()
-            there = [one for one in components if one.quality(now_ns).state is not State.LOST]
+            there = [one for one in components if one.quality(now_ns).state is not ComponentState.LOST]
             sys.stdout.write("\n".join(_line(one, now_ns) for one in there or components) + "\n")
             sys.stdout.flush()
     except KeyboardInterrupt:

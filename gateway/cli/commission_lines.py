@@ -25,7 +25,7 @@ from drivers.errors import DriverError
 from drivers.inbox import Inbox
 from gateway.cli.text import say_json
 from gateway.commission.dialogue import Ask, Live
-from gateway.commission.progress import Step
+from gateway.commission.progress import CommissionStep
 from gateway.commission.writing import Written
 
 LOOK_S = 0.03  # for a STOP, each time
@@ -129,7 +129,7 @@ class JsonFace:
     def __init__(self, lines: Lines) -> None:
         self._lines = lines
         self._number = 0
-        self._steps: tuple[Step, ...] = ()
+        self._steps: tuple[CommissionStep, ...] = ()
         self._moving_s = 0.0  # when words of a motion were told; 0: nothing moves
 
     def moving(self, text: str) -> str:
@@ -157,7 +157,7 @@ class JsonFace:
         say_json({"written": written})
         say_json({"say": written.words})
 
-    def steps(self, steps: tuple[Step, ...]) -> None:
+    def steps(self, steps: tuple[CommissionStep, ...]) -> None:
         """How far it is, where that is another than before."""
         if steps != self._steps:
             self._steps = steps

@@ -16,7 +16,7 @@ from gateway.cli import keys_push, qr_code
 from gateway.cli.connect import NobodyToAsk, choose
 from gateway.cli.text import say, say_json, table, warn
 from gateway.client.address import DEFAULT_PORT
-from gateway.connections.doors import is_loopback
+from gateway.connections.listener_kind import is_loopback
 from gateway.connections.listeners import listen
 from gateway.private import forbid_core_dumps
 from gateway.wire.pairing import PAIRING_PORT, TRIES, VALID_S, Reply, link, new_code

@@ -4,7 +4,7 @@ import re
 import tomllib
 from typing import Any
 
-from gateway.commission.draft import Found
+from gateway.commission.draft import DraftValue
 from gateway.commission.writing import line
 
 OURS = "# rad; "  # a comment of `writing` that stands above its value
@@ -14,7 +14,7 @@ class NotEdited(ValueError):
     """The file is written in another way than such values are; the message says what to write by hand."""
 
 
-def with_value(text: str, table: str, key: str, found: Found) -> str:
+def with_value(text: str, table: str, key: str, found: DraftValue) -> str:
     """Return the text with this value, line ends kept; the rest is the same by TOML's reading.
 
     Raises:

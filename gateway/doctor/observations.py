@@ -17,7 +17,7 @@ FIRST_PROFILE_OBJECT = 0x6000
 
 
 @dataclass(frozen=True, slots=True)
-class Heard:
+class IdentifierFrames:
     """The frames of one identifier while the bus was listened to."""
 
     count: int
@@ -30,7 +30,7 @@ class BusFacts:
     """One bus over `seconds`; `heard` is `None` where it was not listened to, but by a gateway elsewhere."""
 
     seconds: float
-    heard: Mapping[int, Heard] | None
+    heard: Mapping[int, IdentifierFrames] | None
     frames_per_s: float | None
     load_percent: float | None
     error_frames_per_s: float | None
@@ -105,7 +105,7 @@ class Observations:
     units: Mapping[str, tuple[float, str]] = field(default_factory=dict)  # parameter's address → scale, unit
     other_file: str | None = None  # why the gateway judges by another file than this
 
-    def heard_on(self, bus: str) -> Mapping[int, Heard] | None:
+    def heard_on(self, bus: str) -> Mapping[int, IdentifierFrames] | None:
         """By identifier, what came on a bus; `None` where it was not listened to, or nobody was heard."""
         facts = self.buses.get(bus)
         return None if facts is None or facts.is_silent else facts.heard

@@ -8,9 +8,9 @@ from msgspec import NODEFAULT, Meta
 from msgspec.structs import FieldInfo, fields
 
 from gateway.config.guard import WATCHES
-from gateway.config.guard_rules import UNIT, Rule
+from gateway.config.guard_rules import UNIT, GuardRule
 
-_COMMON = frozenset(field.name for field in fields(Rule))
+_COMMON = frozenset(field.name for field in fields(GuardRule))
 
 
 def table() -> str:

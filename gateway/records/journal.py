@@ -24,7 +24,7 @@ from drivers.inbox import Inbox
 from gateway.process.futures import failed
 from gateway.records import durable, journal_files
 from gateway.records.chain import Broken, Head, line
-from gateway.records.journal_files import Entry, Piece, Tail, head_file, read_head
+from gateway.records.journal_files import ClosedJournalFile, Entry, Tail, head_file, read_head
 from gateway.records.limits import OWN, Limits, Share, TooMany, within_limits
 from gateway.records.reading import SHORTENED, read_verified
 
@@ -367,7 +367,7 @@ class Journal:
         except OSError as error:
             log.warning("old pieces of the journal cannot be removed: %s", error.strerror or error)
 
-    def _surplus(self) -> list[Piece]:
+    def _surplus(self) -> list[ClosedJournalFile]:
         closed = journal_files.closed_pieces(self.path)
         left = self._sizes.kept
         for index in range(len(closed) - 1, -1, -1):
@@ -410,7 +410,7 @@ def _append(file: BinaryIO, data: bytes) -> None:
     os.fsync(file.fileno())
 
 
-def _last_hash(piece: Piece) -> str | None:
+def _last_hash(piece: ClosedJournalFile) -> str | None:
     """Return what the line after it refers to; `None` where the piece is damaged."""
     try:
         with piece.path.open("rb") as file:

@@ -76,7 +76,7 @@ _DIGITS: Final = {
 _ROUNDED: Final = tuple(_DIGITS[unit] for unit in UNITS.values())
 
 
-class Recording:
+class SessionRecorder:
     """One wearer's session: writes a line to `file` after each cycle of the sensors, once the robot moves."""
 
     def __init__(
@@ -228,7 +228,7 @@ def main(argv: list[str]) -> int:
         return 2 if leave.code else 0
     with _opened(arguments.out) as file:
         for person in arguments.subjects:
-            Recording(
+            SessionRecorder(
                 file, arguments.scenario, arguments.seed, person, arguments.walks, arguments.assists
             ).run(60.0 * arguments.minutes)
     return 0

@@ -53,7 +53,7 @@ _NAMED = {
 }
 
 
-class Result(StrEnum):
+class ScenarioResult(StrEnum):
     """What came of an expectation, or of a scenario."""
 
     PASSED = "passed"
@@ -121,10 +121,10 @@ class Verdict:
     doubt: str = ""
 
     @property
-    def result(self) -> Result:
+    def result(self) -> ScenarioResult:
         if self.ok:
-            return Result.PASSED
-        return Result.INCONCLUSIVE if self.doubt else Result.FAILED
+            return ScenarioResult.PASSED
+        return ScenarioResult.INCONCLUSIVE if self.doubt else ScenarioResult.FAILED
 
 
 @dataclass(frozen=True, slots=True)

@@ -49,7 +49,7 @@ class Pointer(Struct, frozen=True):
         return _KIND + msgspec.json.encode([task, robot, bare])
 
 
-class Target(NamedTuple):
+class RollbackTarget(NamedTuple):
     """Where a rollback goes: the number that it writes, a model or "", and what is before that."""
 
     number: int
@@ -107,7 +107,7 @@ class Pointers:
                 return done
         raise UnusableModel(f"{self._whose}: {ATTEMPTS} times somebody else was faster")
 
-    def target(self) -> Target:
+    def target(self) -> RollbackTarget:
         """Return what a rollback would go back to now.
 
         Raises:
@@ -119,11 +119,11 @@ class Pointers:
         if now is None or not now.model:
             raise UnusableModel(f"{self._whose} has no model of its own, and so nothing to roll back from")
         if not now.before:
-            return Target(last + 1, "", 0)
+            return RollbackTarget(last + 1, "", 0)
         back = self._read(now.before)
-        return Target(last + 1, back.model, back.before)
+        return RollbackTarget(last + 1, back.model, back.before)
 
-    def roll_back(self, target: Target, who: str, why: str, content: str = "") -> Pointer:
+    def roll_back(self, target: RollbackTarget, who: str, why: str, content: str = "") -> Pointer:
         """Let that serve which did before.
 
         Raises:

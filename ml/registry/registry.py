@@ -15,7 +15,7 @@ import msgspec
 from ml.errors import Overtaken, UnusableModel
 from ml.registry.card import Card, checked_name, content_id, decoded, digest, encoded
 from ml.registry.code import features_hash
-from ml.registry.pointers import EVERY_ROBOT, Pointer, Pointers, Sign, Target
+from ml.registry.pointers import EVERY_ROBOT, Pointer, Pointers, RollbackTarget, Sign
 from ml.registry.pointers import FOLDER as SERVING
 from ml.robot.learned import Learned
 from ml.store import Store, upkeep
@@ -251,7 +251,7 @@ class Registry:
     def _pointers(self, task: str, robot: str) -> Pointers:
         return Pointers(self._objects, task, robot, self._sign)
 
-    def _target(self, task: str, robot: str) -> Target:
+    def _target(self, task: str, robot: str) -> RollbackTarget:
         target = Pointers(self._objects, task, robot).target()
         if target.model:
             self.load(target.model)

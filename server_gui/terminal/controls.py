@@ -10,7 +10,7 @@ from gateway.wire.control import CONTROL_ACQUIRE
 from gateway.wire.parameter import PARAMETER_WRITE, ParameterInfo
 from gateway.wire.stop import ROBOT_RESET
 from server_gui.core.desk.station import Station
-from server_gui.core.tuning.edits import Change, refusal, unit_of
+from server_gui.core.tuning.edits import ReviewedEdit, refusal, unit_of
 from server_gui.core.tuning.stop import StopState
 from server_gui.core.tuning.writing import WriteState
 from server_gui.terminal.keys import Key
@@ -118,7 +118,7 @@ class Controls:
             unit = unit_of(name, info.unit, Units())
             self.note = f"writing {name} = {unit.editable(target)} {unit.symbol}"
             problem = refusal(target, value, info, unit)
-            self._station.write((Change(name, unit, value, target, elsewhere=False, problem=problem),))
+            self._station.write((ReviewedEdit(name, unit, value, target, elsewhere=False, problem=problem),))
 
     def _stop(self) -> None:
         self._station.stop("STOP key of the dashboard")

@@ -10,7 +10,7 @@ from msgspec.structs import replace
 
 from gateway.client import Address
 from gateway.wire.resource import ResourceSnapshotParams
-from ml.danger.now import CHANNELS
+from ml.danger.observation import CHANNELS
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.events import Event, Looked, Telemetry
 from server_gui.core.follow.feed import Feed, FollowSettings

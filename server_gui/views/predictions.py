@@ -8,12 +8,12 @@ from typing import Final
 from ml.danger.detector import DETECTORS
 from ml.danger.levels import Level as DangerLevel
 from ml.robot.task import ABNORMAL, UNKNOWN
-from ml.serving.trust import Level
+from ml.serving.trust import TrustLevel
 from server_gui.core.desk.confidence import belief, blind, not_judged
 from server_gui.core.desk.leg_phase import LegPhase, apart, leg_phase, phase_at
 from server_gui.core.desk.station import Station
 from server_gui.core.models.names import model_name, told_name
-from server_gui.core.prediction.adaptation import LEARNED_S, TRIED_S, Adapting, State
+from server_gui.core.prediction.adaptation import LEARNED_S, TRIED_S, AdaptationState, Adapting
 from server_gui.core.prediction.current import STALE_S, Recalled, StationPredictions, Told
 from server_gui.core.processing.gait_events import Leg
 from server_gui.views.marks import Mark, enabled_text
@@ -24,10 +24,10 @@ FEW: Final = 3  # classes of which one is true: more are no news
 LEAST: Final = 0.01  # what is less probable is not worth a word
 PROBABLE: Final = re.compile(r" \d+ %$")
 TITLES: Final = {FALLING: "Balance", GAIT_PHASE: "Stride"}
-LEARNED: Final = {state: ("ring", "dim", state.value) for state in State} | {
-    State.OFFERED: ("diamond", "accent", "offered"),
-    State.SERVING: ("disc", "accent", "serves"),
-    State.FAILED: ("triangle", "warn", "failed"),
+LEARNED: Final = {state: ("ring", "dim", state.value) for state in AdaptationState} | {
+    AdaptationState.OFFERED: ("diamond", "accent", "offered"),
+    AdaptationState.SERVING: ("disc", "accent", "serves"),
+    AdaptationState.FAILED: ("triangle", "warn", "failed"),
 }  # shape, colour and word of what is learned from the wearer
 AGREES: Final = 8.0  # % of a stride, that steps and a model may be apart
 STOPPED: Final = "stopped"
@@ -180,10 +180,13 @@ def _learning(adapting: Adapting) -> PredictionRow:
     """How it goes with what is learned from the wearer, while there is nothing to decide."""
     whom = f"from the steps of {adapting.wearer}"
     text, detail = {
-        State.UNNAMED: ("Wearer not named", adapting.text),
-        State.COLLECTING: (f"Learning {adapting.stepped_s:.0f} of {LEARNED_S:.0f} s", whom),
-        State.LEARNING: ("Learning", whom),
-        State.TRYING: (f"Trying {adapting.stepped_s:.0f} of {TRIED_S:.0f} s", f"what was learned {whom}"),
+        AdaptationState.UNNAMED: ("Wearer not named", adapting.text),
+        AdaptationState.COLLECTING: (f"Learning {adapting.stepped_s:.0f} of {LEARNED_S:.0f} s", whom),
+        AdaptationState.LEARNING: ("Learning", whom),
+        AdaptationState.TRYING: (
+            f"Trying {adapting.stepped_s:.0f} of {TRIED_S:.0f} s",
+            f"what was learned {whom}",
+        ),
     }.get(adapting.state, ("Nothing is learned", adapting.text))
     return PredictionRow(Mark(*LEARNED[adapting.state]), text, detail, "", adapting.text)
 
@@ -260,7 +263,7 @@ def _stride(station: Station, line: PredictionRow) -> PredictionRow:
 
 def _knows(shown: Told) -> bool:
     prediction = shown.prediction
-    drifted = not isinstance(shown, Recalled) and shown.predicted.trust.level is Level.DRIFTED
+    drifted = not isinstance(shown, Recalled) and shown.predicted.trust.level is TrustLevel.DRIFTED
     return prediction.label not in (UNKNOWN, ABNORMAL) and not drifted
 
 

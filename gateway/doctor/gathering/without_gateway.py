@@ -14,7 +14,7 @@ from drivers.bus.outlet import Requests
 from drivers.bus.sdo.channel import SdoChannel
 from drivers.bus.settings import Role
 from drivers.bus.values import unsigned
-from drivers.component import Component, Kind
+from drivers.component import Component, ComponentKind
 from drivers.errors import DeviceAbort, DriverError
 from drivers.imu.settings import NodeImuSettings
 from drivers.scan.asking import TIMEOUT_S
@@ -63,7 +63,9 @@ def samples(config: RobotConfig, seconds: float, wait: Wait, *, active: bool) ->
 
 def _only_listens(config: RobotConfig, component: Component) -> bool:
     imu = config.imu.get(component.name)
-    return component.kind is Kind.INSOLE or (imu is not None and not isinstance(imu, NodeImuSettings))
+    return component.kind is ComponentKind.INSOLE or (
+        imu is not None and not isinstance(imu, NodeImuSettings)
+    )
 
 
 def _columns(chosen: list[Component], seconds: float, wait: Wait) -> dict[str, tuple[float | None, ...]]:

@@ -30,7 +30,7 @@ from gateway.wire.dictionary import (
     ObjectValue,
     ObjectValues,
 )
-from gateway.wire.framing import Kind, refuse
+from gateway.wire.framing import ErrorKind, refuse
 from gateway.wire.limits import OBJECTS_LISTED
 from gateway.wire.object_search import fitting
 
@@ -117,15 +117,17 @@ class Objects:
         if component in self._tables and component in descriptions:
             return descriptions[component]
         if component in self._component.absent:
-            raise refuse(Kind.UNAVAILABLE, f"{component}: {self._component.absent[component]}")
+            raise refuse(ErrorKind.UNAVAILABLE, f"{component}: {self._component.absent[component]}")
         known = ", ".join(one for one in descriptions if one in self._tables) or "none"
-        raise refuse(Kind.UNKNOWN_NAME, f"{component!r} has no object dictionary; those that have: {known}")
+        raise refuse(
+            ErrorKind.UNKNOWN_NAME, f"{component!r} has no object dictionary; those that have: {known}"
+        )
 
     def _wanted(self, component: str, text: str, description: Description) -> Wanted:
         index, _, subindex = text.partition(":")
         wanted = Wanted(component, int(index, 16), int(subindex))
         if not description.has(wanted.index, wanted.subindex):
-            raise refuse(Kind.UNKNOWN_NAME, f"{description.path.name} has no object {wanted.name}")
+            raise refuse(ErrorKind.UNKNOWN_NAME, f"{description.path.name} has no object {wanted.name}")
         return wanted
 
     def _mapped_in(self, component: str, description: Description) -> Mapping[tuple[int, int], list[str]]:

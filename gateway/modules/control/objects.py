@@ -15,7 +15,7 @@ from drivers.errors import DeviceAbort, DeviceTimeout, DriverError
 from gateway.modules.control.parameters import Parameter
 from gateway.modules.stop.authority import Address
 from gateway.process.futures import outcome
-from gateway.wire.framing import Kind, RpcError, refuse
+from gateway.wire.framing import ErrorKind, RpcError, refuse
 
 T = TypeVar("T")
 K = TypeVar("K")
@@ -59,7 +59,7 @@ class Node(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class ObjectWrite:
     """One parameter and the bytes it shall hold."""
 
     parameter: Parameter
@@ -144,8 +144,8 @@ def download(
 
 def device_error(parameter: Parameter, doing: str, error: Exception) -> RpcError:
     """Return what a driver could not do, as an answer."""
-    kinds = ((DeviceAbort, Kind.DEVICE_ABORT), (TimeoutError, Kind.DEVICE_TIMEOUT))
-    kind = next((kind for type_, kind in kinds if isinstance(error, type_)), Kind.UNAVAILABLE)
+    kinds = ((DeviceAbort, ErrorKind.DEVICE_ABORT), (TimeoutError, ErrorKind.DEVICE_TIMEOUT))
+    kind = next((kind for type_, kind in kinds if isinstance(error, type_)), ErrorKind.UNAVAILABLE)
     return refuse(
         kind,
         f"{parameter.name}: {doing} {parameter.object}: {str(error) or 'no answer'}",

@@ -18,7 +18,7 @@ log = logging.getLogger(__name__)
 Work = Callable[[], object]
 
 
-class Ended(Exception):
+class StopThreadEnded(Exception):
     """What was asked for came too late: the module that carries out stops is ending."""
 
 
@@ -56,7 +56,7 @@ class StopThread:
         """
         with self._closing:
             if self._closed:
-                raise Ended("the stop's thread has ended; ask again")
+                raise StopThreadEnded("the stop's thread has ended; ask again")
             self._work.put(work)
 
     def _run(self) -> None:

@@ -16,7 +16,7 @@ from gateway.wire.component import ChannelInfo, ComponentInfo
 from gateway.wire.robot import Clock, Description, GuardInfo
 from gateway.wire.stop import StopInfo
 from server_gui.core.archive.outline import Outline
-from server_gui.core.archive.recorded_predictions import Said
+from server_gui.core.archive.recorded_predictions import PastPrediction
 from server_gui.core.archive.timeline_events import TimelineEvents
 from server_gui.core.cloud.tape import Rows, Tape
 from server_gui.core.desk.desk import Desk, Shown
@@ -115,7 +115,7 @@ class Piece:
     """A stretch of a recording: its rows, and what models said of them then, in time's order."""
 
     rows: Rows
-    said: Sequence[Said]
+    said: Sequence[PastPrediction]
 
     def between(self, begin_ns: int, end_ns: int) -> "Piece":
         """Return what is from `begin_ns` up to before `end_ns`."""
@@ -124,10 +124,12 @@ class Piece:
 
 
 Read = Callable[[Callable[[], Any]], "Future[Any]"]  # does it in a thread
-Recall = Callable[[int, int], Sequence[Said]]  # what was said from one instant up to before another; blocks
+Recall = Callable[
+    [int, int], Sequence[PastPrediction]
+]  # what was said from one instant up to before another; blocks
 
 
-def nothing_said(_begin_ns: int, _end_ns: int) -> Sequence[Said]:
+def nothing_said(_begin_ns: int, _end_ns: int) -> Sequence[PastPrediction]:
     """Of a recording without predictions."""
     return ()
 
@@ -154,7 +156,7 @@ class Playback:
         self._recall: Recall = nothing_said
         self.happened = TimelineEvents(read, deliver)
         self.outline = Outline(read, deliver)
-        self._said: dict[str, Said] = {}  # the newest of each task
+        self._said: dict[str, PastPrediction] = {}  # the newest of each task
         self._pieces: dict[int, Piece] = {}
         self._reading: int | None = None
         self._fed_ns: int | None = None  # up to where the station has seen the recording; None: it jumps

@@ -18,8 +18,8 @@ from server_gui.core.recording.receipts import (
     RECEIPTS,
     Altered,
     Mark,
-    Part,
     Receipt,
+    ReceiptPart,
     canonical,
     is_of_batch,
     units_told,
@@ -44,10 +44,16 @@ class Proof:
     elsewhere: int = 0  # batches that went to other stores
     problems: list[str] = field(default_factory=list)
     lacking: set[Batch] = field(default_factory=set)  # of which rows are missing
-    missing: list[tuple[Batch, Part, int]] = field(default_factory=list)  # how many rows of which parts
-    vague: list[tuple[Batch, Part]] = field(default_factory=list)  # how many retention has left nobody knows
+    missing: list[tuple[Batch, ReceiptPart, int]] = field(
+        default_factory=list
+    )  # how many rows of which parts
+    vague: list[tuple[Batch, ReceiptPart]] = field(
+        default_factory=list
+    )  # how many retention has left nobody knows
     misread: Sequence[DataFile] = ()  # files that have not the columns that they should have
-    wrong: dict[Batch, tuple[Part, ...]] = field(default_factory=dict)  # what of these is there instead
+    wrong: dict[Batch, tuple[ReceiptPart, ...]] = field(
+        default_factory=dict
+    )  # what of these is there instead
 
 
 def prove(
@@ -190,7 +196,7 @@ def _columns_gone(
             )
 
 
-def _found(claim: Claim, told: Mapping[str, Units], units: Mapping[str, Units]) -> Part:
+def _found(claim: Claim, told: Mapping[str, Units], units: Mapping[str, Units]) -> ReceiptPart:
     """Return what is there of a claim, as its receipt would say it."""
     part, there = claim.part, units.get(claim.part.location, {})
     return msgspec.structs.replace(
@@ -203,7 +209,7 @@ def _found(claim: Claim, told: Mapping[str, Units], units: Mapping[str, Units]) 
     )
 
 
-def _claim(batch: Batch, part: Part, retained: datetime | None) -> Claim:
+def _claim(batch: Batch, part: ReceiptPart, retained: datetime | None) -> Claim:
     if retained is None or part.begin_us is None or _time(part.begin_us) >= retained:
         return Claim(batch, part)
     from_us = (retained - _EPOCH) // _US

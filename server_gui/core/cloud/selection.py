@@ -51,7 +51,7 @@ class Choice:
 
 
 @dataclass(frozen=True, slots=True)
-class Recording:
+class SelectedRecording:
     """A session or a part of it. `tables` are its rows in time's order: `utc`, `stamp_ns`, the channels."""
 
     session: Session
@@ -61,7 +61,7 @@ class Recording:
     labels: Sequence[Row]
 
 
-def choose(recordings: Recordings, recorded: Recorded, choice: Choice) -> Recording:
+def choose(recordings: Recordings, recorded: Recorded, choice: Choice) -> SelectedRecording:
     """Return what is wanted of a session that was opened among these; telemetry is read while `tables` is.
 
     Raises:
@@ -75,7 +75,7 @@ def choose(recordings: Recordings, recorded: Recorded, choice: Choice) -> Record
     choice.check(session)
     channels = choice.of(recorded.channels)
     names = [each.name for each in channels]
-    return Recording(
+    return SelectedRecording(
         session,
         channels,
         recorded.telemetry(names, choice.begin, choice.end),

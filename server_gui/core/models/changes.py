@@ -22,7 +22,7 @@ UNPROMOTED: Final = "no promoted model; until then a robot is served by what cam
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class ModelChange:
     """Of what serves one robot, or all ("") that have no model of their own; None: no promoted model."""
 
     task: str
@@ -75,7 +75,7 @@ class Change:
         return f"{self.names[card.id]} ({headline(card)} on people never seen)"
 
 
-def promotion(url: str, model: str, robot: str) -> Change:
+def promotion(url: str, model: str, robot: str) -> ModelChange:
     """Return what it would change to let a model serve a robot, or all; blocks.
 
     Raises:
@@ -87,10 +87,10 @@ def promotion(url: str, model: str, robot: str) -> Change:
     card = registry.promotable(model, robot)
     now = registry.serving(card.task, robot, set(card.channels))
     anew = _signs() and _serves_unsigned(registry, card, robot)
-    return Change(card.task, robot, _card(registry, now), card, False, _names(registry), _signs(), anew)
+    return ModelChange(card.task, robot, _card(registry, now), card, False, _names(registry), _signs(), anew)
 
 
-def way_back(url: str, task: str, robot: str) -> Change:
+def way_back(url: str, task: str, robot: str) -> ModelChange:
     """Return what a rollback would change; blocks.
 
     Raises:
@@ -102,10 +102,10 @@ def way_back(url: str, task: str, robot: str) -> Change:
     before = registry.before(task, robot)
     now = registry.serving(task, robot)
     then = _card(registry, before)
-    return Change(task, robot, _card(registry, now), then, True, _names(registry), _signs())
+    return ModelChange(task, robot, _card(registry, now), then, True, _names(registry), _signs())
 
 
-def carry_out(url: str, change: Change, who: str, why: str) -> Pointer:
+def carry_out(url: str, change: ModelChange, who: str, why: str) -> Pointer:
     """Do what was confirmed; blocks.
 
     Raises:

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Final
 
 from gateway.client import Batch
-from ml.danger.combine import Calibration
+from ml.danger.calibration import Calibration
 from ml.serving.predictor import Prediction, Row, Window, Windows
 from ml.serving.trust import Trusting
 from server_gui.core.follow.events import Described, Event, Telemetry
@@ -13,7 +13,7 @@ from server_gui.core.prediction.danger import DangerWatch
 from server_gui.core.prediction.danger import News as DangerNews
 from server_gui.core.prediction.model_loading import Model
 from server_gui.core.prediction.news import Predicted, PredictionNews, Ruled, Serves
-from server_gui.core.prediction.rules import Rule
+from server_gui.core.prediction.rules import PredictionRule
 from server_gui.core.prediction.state import Quality
 from server_gui.core.settings.prediction import PredictionSettings, RuleSettings
 
@@ -30,7 +30,7 @@ class Watched:
         self._every_ns = every_ns
         self._windows = Windows(model.learned.recipe, every_ns)
         self._trusting = Trusting(model.learned.recipe.channels, model.card.ranges)
-        self._rules = [Rule(rule, every_ns) for rule in rules if rule.task == model.card.task]
+        self._rules = [PredictionRule(rule, every_ns) for rule in rules if rule.task == model.card.task]
 
     def take(self, batch: Batch) -> None:
         """Take rows; what is due then is in `due`."""

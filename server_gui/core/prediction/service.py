@@ -7,7 +7,7 @@ from typing import Final, Self, TypeVar
 
 from threadpoolctl import threadpool_limits
 
-from ml.danger.combine import Calibration, load
+from ml.danger.calibration import Calibration, load
 from ml.errors import UnusableModel
 from ml.robot.task import TASKS
 from ml.serving.predictor import judged

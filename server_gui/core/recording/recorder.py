@@ -17,7 +17,7 @@ from gateway.wire.robot import Description
 from ml.store.tables import EVENTS, LABELS, SESSIONS, TABLES, TELEMETRY
 from server_gui.core.recording import records
 from server_gui.core.recording.batching import EventKind, Notification
-from server_gui.core.recording.clocks import Moment, Reading
+from server_gui.core.recording.clocks import ClockReading, Moment
 from server_gui.core.recording.errors import NotKept, SpoolUnusable
 from server_gui.core.recording.journal_tail import Entry
 from server_gui.core.recording.losses import Losses, Part
@@ -157,7 +157,7 @@ class Recorder:
         if robot_ns is None:  # then the newest row is taken to have come without delay
             newest_ns = batch.stamps_ns[-1] if batch.stamps_ns else batch.received_ns
             robot_ns = newest_ns - batch.received_ns
-        clocks = Reading(Moment.now().to_utc_ns, robot_ns, known=clock_offset_ns is not None)
+        clocks = ClockReading(Moment.now().to_utc_ns, robot_ns, known=clock_offset_ns is not None)
         new = Notification(stream, batch, clocks)
         return self._put(robot, len(batch.stamps_ns), functools.partial(self._robots.take, robot, new))
 

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from gateway.parameter_files.comparison import Row, Verdict, compare
+from gateway.parameter_files.comparison import ComparisonVerdict, Row, compare
 from gateway.parameter_files.contents import FileProblem, Saved, Scope, WhichDevice
 from gateway.parameter_files.formats import format_of, read_file
 from gateway.records import durable
@@ -33,13 +33,13 @@ class Comparison:
             name: value for name, value in self.saved.values.items() if name in known and known[name].type
         }
         rows = compare(wanted, known, held)
-        self.rows = {row.name: row for row in rows if row.verdict is not Verdict.NOT_IN_FILE}
+        self.rows = {row.name: row for row in rows if row.verdict is not ComparisonVerdict.NOT_IN_FILE}
         self.unchangeable = tuple(name for name in self.saved.values if name not in wanted)
 
     @property
     def different(self) -> list[Row]:
         """What the robot holds otherwise."""
-        return [row for row in self.rows.values() if row.verdict is not Verdict.SAME]
+        return [row for row in self.rows.values() if row.verdict is not ComparisonVerdict.SAME]
 
 
 def open_file(path: Path, description: Description, component: str | None) -> Comparison:

@@ -22,7 +22,7 @@ from server_gui.core.workspace.curve_binding import (
 )
 from server_gui.core.workspace.layouts import Layout, PlotLayout, TriggerLayout
 from server_gui.core.workspace.series import ALL_S, HELD_S, Beside, Floats, Series
-from server_gui.core.workspace.trigger import Condition, On, State, Trigger
+from server_gui.core.workspace.trigger import Condition, On, Trigger, TriggerState
 from server_gui.core.workspace.workspace import Workspace
 
 KEPT_S: Final = 100.0  # of the past, when a view stands still
@@ -222,7 +222,7 @@ class Scene:
     def look_for_trigger(self, span_s: float) -> None:
         """Look at what has come; stands still with what was waited for, goes on where nothing comes."""
         station, trigger = self._station, self.trigger
-        if station is None or self._series is None or trigger.state is State.OFF:
+        if station is None or self._series is None or trigger.state is TriggerState.OFF:
             return
         rings = station.rings
         if rings.source is not self._source:
@@ -239,7 +239,7 @@ class Scene:
 
     def trigger_text(self) -> str:
         """How the trigger is, in words; empty where there is none."""
-        if self.trigger.state is State.OFF:
+        if self.trigger.state is TriggerState.OFF:
             return ""
         problem = self.trigger_problem(self.trigger.condition)
         return f"cannot trigger: {problem}" if problem else self.trigger.text(self._newest_s())

@@ -28,7 +28,7 @@ from server_gui.core.objects.rows import CSV_TITLES, Compared, Finder, cells, pi
 from server_gui.core.tuning.edits import unit_of
 from server_gui.views.objects.choice_bar import ChoiceBar
 from server_gui.views.objects.facts_card import FactsCard
-from server_gui.views.objects.objects_model import Shown
+from server_gui.views.objects.objects_model import ShownObjects
 from server_gui.views.objects.objects_table import ObjectsTable
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
@@ -209,7 +209,7 @@ class ObjectsPage(QWidget):
         reading = station.objects.reading
         kinds = self._finder.find(dictionary, self.bar.words.text(), compared, pinned, reading.revision)
         self.bar.count(kinds, is_reading=bool(reading.left))
-        shown = Shown(compared, station.is_linked, pinned, station.edits.staged.keys())
+        shown = ShownObjects(compared, station.is_linked, pinned, station.edits.staged.keys())
         component = None if device is None else device.component
         measured = (station, component, dictionary.revision, compared.with_component)
         self.table.take(kinds[self.bar.kind], shown, measured)

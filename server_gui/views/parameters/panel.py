@@ -21,7 +21,7 @@ from gateway.wire.parameter import PARAMETER_STORE, PARAMETER_WRITE
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.tuning.comparison import open_file, save_file, staged_as
-from server_gui.core.tuning.edits import Change, refusal, unit_of
+from server_gui.core.tuning.edits import ReviewedEdit, refusal, unit_of
 from server_gui.core.tuning.several_joints import Offer
 from server_gui.core.tuning.writing import WriteState
 from server_gui.views.parameters.control_bar import ControlBar
@@ -328,7 +328,7 @@ class ParametersPanel(QWidget):
         self._with(Station.stage_undo)
         self.begin_review()
 
-    def _write(self, changes: tuple[Change, ...], trial_s: float | None) -> None:
+    def _write(self, changes: tuple[ReviewedEdit, ...], trial_s: float | None) -> None:
         """Write what was shown, unless the robot holds something else by now: then that is shown first."""
         station = self._desk.selected
         if station is None:

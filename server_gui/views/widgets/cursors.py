@@ -37,7 +37,7 @@ FIRST: Final = (
 
 
 @dataclass(frozen=True, slots=True)
-class Shown:
+class CursorLayout:
     """Where things are, as shares of the field's width from the left, and of its height from the top."""
 
     at: tuple[float, ...] = ()  # the cursors
@@ -70,11 +70,11 @@ class Cursors(QWidget):
     def __init__(self, theme: Theme, parent: QWidget) -> None:
         super().__init__(parent)
         self._theme = theme
-        self._shown = Shown()
+        self._shown = CursorLayout()
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         self.hide()
 
-    def show_marks(self, shown: Shown) -> None:
+    def show_marks(self, shown: CursorLayout) -> None:
         """Show these from now on."""
         if shown != self._shown:
             self._shown = shown
