@@ -28,6 +28,9 @@ EMPTY: Final = (
 )
 
 
+AWAY: Final = "▲ The store is not reached, it is tried again; what was promoted there is not shown: {why}"
+
+
 class ModelsPage(QWidget):
     """Nothing here waits: the store is read in a thread, and a training is a process of its own."""
 
@@ -157,11 +160,13 @@ class ModelsPage(QWidget):
 
     def _show_state(self) -> None:
         found = self._models.found
-        lines = [f"▲ {found.problem}"] if found.problem else []
+        away = self._models.reach.problem
+        lines = [] if away is None else [AWAY.format(why=away)]
+        lines += [f"▲ {found.problem}"] if found.problem and found.problem != away else []
         lines += [f"▲ {each}" for each in found.damaged]
         if self._models.looked_s is None:
             lines.append(LOOKING)
-        elif not found.entries and not found.problem:
+        elif not found.entries and not found.problem and away is None:
             lines.append(EMPTY)
         set_text(self.state, "\n".join(lines))
         self.state.setVisible(bool(lines))
