@@ -99,7 +99,7 @@ class Models:
     def ask_promotion(self, model: str, robot: str) -> None:
         """Find out what it would change, for `change` to be confirmed."""
         judged = self.trained.get(model)
-        if judged is not None and not judged.better:
+        if judged is not None and not judged.may_serve:
             self._say(NOT_BETTER.format(why=judged.reasons), Tone.BAD)
             return
         self._ask(lambda: promotion(self.url, model, robot))

@@ -89,7 +89,9 @@ class ModelsPage(QWidget):
         self._show_state()
         self._show_learned()
         entry = self.chosen
-        self.compare.show_entry(entry, models.found)
+        trained = None if entry is None else models.trained.get(entry.card.id)
+        judged = "" if trained is None else f"Training has judged it: {trained.said}"
+        self.compare.show_entry(entry, models.found, judged)
         self.confirm.refresh()
         self.form.refresh()
         self._show_actions(entry)
