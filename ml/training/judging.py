@@ -17,7 +17,6 @@ import numpy as np
 import numpy.typing as npt
 from msgspec.structs import replace
 
-from gateway.amounts import counted
 from ml.registry.card import Metrics
 from ml.registry.classifier_scores import calibrated, judged
 from ml.robot.learned import ABNORMAL_FROM, NONE, Learned, Verdicts
@@ -125,8 +124,8 @@ def _unable(lacking: Sequence[str]) -> str:
     """Return why what came with GWRMS is not compared, which a promotion for every robot would replace."""
     named = f"{', '.join(lacking[:NAMED])}{', …' if len(lacking) > NAMED else ''}"
     return (
-        f"what came with GWRMS needs {counted(len(lacking), 'channel')} more ({named}), so it is not "
-        "compared; it serves robots that have them until this model is promoted for every robot"
+        f"channels that what came with GWRMS needs and these sessions lack: {len(lacking)} ({named}); so "
+        "it is not compared, and serves robots that have them until this model is promoted for every robot"
     )
 
 

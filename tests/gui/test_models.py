@@ -182,7 +182,7 @@ def test_a_training_shows_how_far_it_is_while_the_window_draws_and_serves_nobody
     assert page.chosen is not None
     assert list(archive.models.trained) == [page.chosen.card.id]
     assert page.said.property("tone") == "", "it is no better than anything"
-    assert "what came with GWRMS needs" in page.compare.notes.text()
+    assert "what came with GWRMS" in page.compare.notes.text()
     assert not {"▼ worse", "▲ better"} & set(itertools.chain.from_iterable(figures(page).values()))
     assert not page.form.isVisible(), "what came of it is looked at next"
     assert "F1, mean over classes, on held-out people" in page.said.text()

@@ -6,7 +6,7 @@ from pathlib import Path
 from server_gui.core.alarms.texts import Kind
 from server_gui.core.archive import library
 from server_gui.core.archive.library import Library
-from server_gui.core.desk.store_reach import AGAIN_S, KNOWN_S, LOOK_S, Reach, StoreReach
+from server_gui.core.cloud.store_reach import AGAIN_S, KNOWN_S, LOOK_S, Reach, StoreReach
 from server_gui.core.settings.server_file import ServerSettings
 from tests.gui.test_recording import AWAY, FakeKeeper, looked, report
 from tests.support.waiting import WAIT_S, until

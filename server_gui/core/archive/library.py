@@ -12,8 +12,8 @@ from ml.store import NoSuchTable, Store, StoreError
 from ml.store.objects import Object
 from ml.store.sessions import UNTOLD, Session, in_order, sessions
 from server_gui.core.cloud import spool_reader, usage
+from server_gui.core.cloud.store_reach import StoreReach
 from server_gui.core.cloud.usage import Usage
-from server_gui.core.desk.store_reach import StoreReach
 from server_gui.core.recording.errors import RecordingError
 from server_gui.core.recording.receipts import RECEIPTS, Receipts
 from server_gui.core.settings.server_file import ServerSettings

@@ -4,10 +4,10 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 from gateway.units import Units
+from server_gui.core.cloud.store_reach import StoreReach
 from server_gui.core.desk.pins import Pins
 from server_gui.core.desk.recording import By, Recording
 from server_gui.core.desk.station import Station
-from server_gui.core.desk.store_reach import StoreReach
 from server_gui.core.evidence.file import Told
 from server_gui.core.follow.news import News
 from server_gui.core.prediction.adaptation import Happening

@@ -10,7 +10,7 @@ from typing import Final, Protocol
 from gateway.amounts import size
 from server_gui.core.alarms.alarm import Alarm, Alarms
 from server_gui.core.alarms.texts import Kind, check_of
-from server_gui.core.desk.store_reach import StoreReach
+from server_gui.core.cloud.store_reach import StoreReach
 from server_gui.core.fleet.collector import CollectorReport
 from server_gui.core.fleet.link_statistics import LinkReport
 from server_gui.core.follow.frame_time import now_ns

@@ -177,9 +177,9 @@ class Station:
         """How it is, in one mark and word: the same wherever it is shown."""
         return worst(self.robot, self.alarms)
 
-    def tell(self, kind: NewsKind, text: str) -> None:
-        """Note something about this robot."""
-        self.news.add(kind, self.title, text)
+    def tell(self, kind: NewsKind, text: str, about: str = "") -> None:
+        """Note something about this robot, or about a component of it."""
+        self.news.add(kind, self.title, text, about)
 
     def flag(self, text: str, ago_s: float = 0.0) -> None:
         """Flag this instant, or the one `ago_s` before it, which somebody has marked."""

@@ -8,7 +8,6 @@ from typing import Final
 
 from msgspec.structs import asdict, replace
 
-from drivers.reader_stalls import CHECK
 from gateway.wire.bus import BusInfo, NodeInfo
 
 SOME_PERCENT: Final = 1.0  # of a node's PDOs: fewer are none
@@ -16,6 +15,7 @@ MANY_PERCENT: Final = 2.5  # told at once
 BEGINS_NS: Final = 10_000_000_000  # a few last so long, before they are told
 ENDS_NS: Final = 10_000_000_000  # without any, and it is over
 LOST_NS: Final = 5_000_000_000  # without a look: nothing lasts over that
+CHECK: Final = "see what keeps the robot's computer busy (gwrms blame), or take load from it"
 BUSY_PERCENT: Final = 90.0  # of the computer's cores
 
 

@@ -8,7 +8,7 @@ from typing import Final
 
 from gateway.user_name import user_name
 from server_gui.core.cloud.jobs import Job, Jobs, JobState, Work
-from server_gui.core.desk.store_reach import StoreReach
+from server_gui.core.cloud.store_reach import StoreReach
 from server_gui.core.models.catalogue import Catalogue, Looking
 from server_gui.core.models.changes import Change, carry_out, promotion, way_back
 from server_gui.core.models.training import BETTER, Trained, TrainingWish

@@ -23,8 +23,8 @@ from ml.store.sessions import Session
 from server_gui.core.archive.archive import Archive
 from server_gui.core.cloud.actions import check, download, upload
 from server_gui.core.cloud.credentials import endpoint_told, keys_told
+from server_gui.core.cloud.store_reach import Reach
 from server_gui.core.desk.recording import Recording
-from server_gui.core.desk.store_reach import Reach
 from server_gui.core.settings.server_file import default_file
 from server_gui.views.cloud.browser import Browser
 from server_gui.views.cloud.jobs_table import JobsTable, under_way

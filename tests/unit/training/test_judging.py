@@ -101,7 +101,7 @@ def test_what_came_with_gwrms_and_cannot_judge_these_sessions_is_named() -> None
     decision = decide(ACTIVITY, judged(better(), None), None, lacking)
     assert not decision.better
     assert (
-        "needs 4 channels more (imu.roll, imu.yaw, left_insole.force, …), so it is not compared"
+        "these sessions lack: 4 (imu.roll, imu.yaw, left_insole.force, …); so it is not compared"
         in (decision.why[1])
     )
 
