@@ -126,7 +126,7 @@ def test_a_stop_that_comes_just_before_a_question_waits_is_heard(
         late = threading.Timer(WAIT_S / 2, pipe.write, ("an answer",))
         late.start()
         pipe.write('{"stop": true}')
-        with pytest.raises(Ended):
+        with pytest.raises(MotionEnded):
             JsonFace(lines).ask(Ask("?"))
         late.cancel()
 
