@@ -78,7 +78,7 @@ def test_it_is_always_said_which_robot_is_looked_at_and_how_it_is(
         QApplication.processEvents()
         chip = header._chips["robot"]
         if state is _unconfirmed and not chip.isVisible():  # then that has the room, and STOP has the name
-            assert "".join(header.stop.lines).replace(" ", "") == f"STOP{name}"
+            assert "".join(header.stop.lines).replace(" ", "") == name
             continue
         assert chip.isVisible(), state.__name__
         assert chip.main_text == name or state is _never_reached
