@@ -10,7 +10,7 @@ from server_gui.core.alarms.texts import TEXTS, Kind
 from server_gui.core.desk.desk import Desk
 from server_gui.core.follow.events import Described, Event, Looked
 from server_gui.core.follow.news import NewsKind
-from server_gui.core.processing.bus_health import BusHealthLevel
+from server_gui.core.processing.bus_health import BusHealthLevel as Level
 from tests.support.desk import Bench, described, looked, walking
 
 MISSED = "the drive is in fault: 0x8130 life guard or heartbeat error"
@@ -47,10 +47,8 @@ def test_a_stale_drive_is_as_bad_in_its_event_as_in_its_alarm_and_at_its_bus(
     (event,) = (item for item in bench.station.news.items if item.text.startswith("left knee stale"))
     assert alarm.mark.colour == colour
     assert event_mark(event, alarms) == Mark(alarm.mark.shape, colour, "STALE")
-    assert bus_level(BusHealthLevel.WARNING, "main", alarms) is (
-        BusHealthLevel.ALARM if follows else BusHealthLevel.WARNING
-    )
-    assert bus_level(BusHealthLevel.GOOD, "other", alarms) is BusHealthLevel.GOOD
+    assert bus_level(Level.WARNING, "main", alarms) is (Level.ALARM if follows else Level.WARNING)
+    assert bus_level(Level.GOOD, "other", alarms) is Level.GOOD
     bench.look_again(
         [
             quality(
