@@ -267,6 +267,7 @@ class App:
         self._look_at_own()
         self.commissioning.look()
         self._look_at_gateway()
+        self._archive.look()
         self.window.refresh()
         self._garbage.look()
 

@@ -30,7 +30,7 @@ from gateway.commission.writing import Written
 
 LOOK_S = 0.03  # for a STOP, each time
 SHOW_S = 0.5  # between two words of a joint that moves
-LIVE_S = 0.2  # between two looks while a question waits
+LIVE_S = 0.2  # between two looks while a question waits; a signal just before a wait is heard after it
 CHUNK = 4096
 LONGEST = 65_536  # of a line; whoever sends a longer one is not heard any more
 
@@ -64,7 +64,7 @@ class Lines:
         os.close(self._wake)
         os.close(self._woken)
 
-    def get(self, number: int, within_s: float | None) -> str | None:
+    def get(self, number: int, within_s: float) -> str | None:
         """Return the answer to question `number`; `None` where none has come.
 
         Raises `EOFError` after the last.
@@ -170,7 +170,7 @@ class JsonFace:
         for key in ("choices", "default", "unit", "bounds", "press", "refused"):
             asked[key] = getattr(question, key)
         say_json(asked)
-        within_s = None if question.live is None else 0.0
+        within_s = LIVE_S if question.live is None else 0.0
         while (typed := self._lines.get(self._number, within_s)) is None:
             if question.live is not None:
                 self._show(question.live)

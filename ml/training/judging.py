@@ -1,13 +1,16 @@
 """A new model against the one that serves: on people neither may know, and on a fixed regression set.
 
 It is better where its figure over the held-out decisions is; it is much worse somewhere where one class or
-one person loses more than is allowed, there or in the regression set. Both judge the same decisions.
+one person loses more than is allowed, there or in the regression set. Both judge the same decisions. Where no
+model serves that can judge them, it is not compared, and never called better; it may serve all the same
+where it knows more than saying always the same.
 """
 
 import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from enum import Enum
 from typing import Any, Final
 
 import numpy as np
@@ -25,6 +28,7 @@ FEW: Final = 20  # decisions; a class or person with fewer is no reason
 MOST_LOST: Final = 0.05  # of a class's or a person's F1, or of the calibration
 MOST_LOST_PERCENT: Final = 1.0  # of the cycle, of a person's error
 MOST_ABSTAINED: Final = 0.1  # more than the serving model
+NAMED: Final = 3  # channels that are told
 WITHIN: Final = 0.1  # of the cycle: a phase that is right
 
 
@@ -39,12 +43,30 @@ class Judged:
     people: Mapping[str, int] = field(default_factory=dict)  # decisions of each
 
 
+class Verdict(Enum):
+    """What came of a judgement; its words are those of commands and window."""
+
+    BETTER = "better"
+    NOT_BETTER = "not better"
+    NOT_COMPARED = "not compared"  # nothing serves that could be judged by the same decisions
+
+
 @dataclass(frozen=True, slots=True)
 class Decision:
-    """Whether the new model may serve, and why, in sentences."""
+    """What the new model is, and why, in sentences."""
 
-    better: bool
+    verdict: Verdict
     why: tuple[str, ...]
+
+    @property
+    def better(self) -> bool:
+        """Whether it is than what serves."""
+        return self.verdict is Verdict.BETTER
+
+    @property
+    def may_serve(self) -> bool:
+        """Whether it may be promoted without somebody who knows better."""
+        return self.verdict is not Verdict.NOT_BETTER
 
 
 def judge(
@@ -64,14 +86,19 @@ def judge(
     return Judged(name, sum(len(each.truth) for each in parts), metrics, other, _people(parts))
 
 
-def decide(task: Task, held_out: Judged, regression: Judged | None) -> Decision:
-    """Better on the held-out decisions, and nowhere much worse."""
+def decide(task: Task, held_out: Judged, regression: Judged | None, lacking: Sequence[str] = ()) -> Decision:
+    """Better on the held-out decisions, and nowhere much worse.
+
+    `lacking` are channels of a shipped model that the sessions do not have, so that it cannot judge them.
+    """
     if not held_out.decisions:
-        return Decision(False, ("no decision of the held-out people can be judged by both models",))
+        return Decision(
+            Verdict.NOT_BETTER, ("no decision of the held-out people can be judged by both models",)
+        )
     figure = "macro_f1" if task.fold else "rmse_percent"
     new = held_out.new.figures[figure]
     if held_out.serving is None:
-        return _without_serving(task, held_out, figure)
+        return _without_serving(task, held_out, figure, lacking)
     old = held_out.serving.figures[figure]
     gain = new - old if task.fold else old - new
     ours, its = _percents(task, new, old)
@@ -80,19 +107,30 @@ def decide(task: Task, held_out: Judged, regression: Judged | None) -> Decision:
         + ("" if gain > 0 else ": not better")
     ]
     losses = [loss for each in (held_out, regression) if each is not None for loss in _losses(task, each)]
-    return Decision(gain > 0 and not losses, (*reasons, *losses))
+    is_better = gain > 0 and not losses
+    return Decision(Verdict.BETTER if is_better else Verdict.NOT_BETTER, (*reasons, *losses))
 
 
-def _without_serving(task: Task, held_out: Judged, figure: str) -> Decision:
-    """Nothing serves: so it must be better than saying always the same."""
+def _without_serving(task: Task, held_out: Judged, figure: str, lacking: Sequence[str]) -> Decision:
+    """Nothing serves: so it must know more than saying always the same, which makes it no better model."""
     new, idle = held_out.new.figures[figure], held_out.new.figures["idle"]
-    better = new > idle if task.fold else new < idle
+    knows = new > idle if task.fold else new < idle
     ours, its = _percents(task, new, idle)
     told = (
         f"{figure} on {held_out.name}: {ours}; saying always the same has {its}; "
         "no model that was promoted serves yet"
     )
-    return Decision(better, (told,))
+    verdict = Verdict.NOT_COMPARED if knows else Verdict.NOT_BETTER
+    return Decision(verdict, (told, *([_unable(lacking)] if lacking else [])))
+
+
+def _unable(lacking: Sequence[str]) -> str:
+    """Return why what came with GWRMS is not compared, which a promotion for every robot would replace."""
+    named = f"{', '.join(lacking[:NAMED])}{', …' if len(lacking) > NAMED else ''}"
+    return (
+        f"channels that what came with GWRMS needs and these sessions lack: {len(lacking)} ({named}); so "
+        "it is not compared, and serves robots that have them until this model is promoted for every robot"
+    )
 
 
 def _losses(task: Task, found: Judged) -> Iterator[str]:

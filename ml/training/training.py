@@ -107,7 +107,8 @@ def _general(registry: Registry, found: Material, wish: Wish) -> Trained:
     if not regression:
         remarks.append("there is no regression set to judge by (gwrms label SESSION --regression)")
     card = _card(found, learned, lessons, [*judges, *regression], people.new)
-    return _trained(learned, card, serving, serving, people, fixed, left_out, remarks)
+    lacking = () if serving is not None else _lacking(registry, found.task, recipe)
+    return _trained(learned, card, serving, serving, people, fixed, left_out, remarks, lacking)
 
 
 def _personal(registry: Registry, found: Material, wish: Wish) -> Trained:
@@ -159,6 +160,14 @@ def _serving(registry: Registry, task: Task, robot: str, recipe: Recipe) -> _Mod
     """Return the model that serves robots with these sensors."""
     name = registry.serving(task.name, robot, set(recipe.channels))
     return None if name is None else _loaded(registry, name)
+
+
+def _lacking(registry: Registry, task: Task, recipe: Recipe) -> Sequence[str]:
+    """Return which channels the fullest model that comes with GWRMS has, and these sessions do not."""
+    shipped = registry.shipped()
+    known = [card for card in registry.entries(task.name) if card.id in shipped]
+    fullest = max(known, key=lambda card: (len(card.channels), card.made), default=None)
+    return () if fullest is None else sorted(set(fullest.channels) - set(recipe.channels))
 
 
 def _teacher(wish: Wish, serving: _Model | None) -> tuple[str, float]:
@@ -279,6 +288,7 @@ def _trained(
     fixed: Judged,
     left_out: Sequence[LeftOut],
     remarks: Sequence[str],
+    lacking: Sequence[str] = (),
 ) -> Trained:
     known = set(() if serving is None else serving.card.learned) & set(card.held_out)
     if known:
@@ -294,7 +304,7 @@ def _trained(
         "" if over is None else over.name,
         people,
         regression,
-        decide(learned.task, people, regression),
+        decide(learned.task, people, regression, lacking),
         tuple(left_out),
         tuple(remarks),
     )

@@ -1,6 +1,7 @@
 """The page of models: listed by names, compared, trained, and promoted only when that is confirmed."""
 
 import dataclasses
+import itertools
 from pathlib import Path
 
 import pytest
@@ -176,11 +177,13 @@ def test_a_training_shows_how_far_it_is_while_the_window_draws_and_serves_nobody
     assert page.form.jobs.isVisible()
     whole.until(lambda: job.done > 0, "said how far it is")
     whole.until(lambda: job.is_over, "ended")
-    assert (job.state, job.said.split(":")[0]) == (JobState.DONE, "Better")
+    assert (job.state, job.said.split(":")[0]) == (JobState.DONE, "Not compared")
     whole.until(lambda: page.chosen, "listed and chose it")
     assert page.chosen is not None
     assert list(archive.models.trained) == [page.chosen.card.id]
-    assert page.said.property("tone") == "good"
+    assert page.said.property("tone") == "", "it is no better than anything"
+    assert "what came with GWRMS" in page.compare.notes.text()
+    assert not {"▼ worse", "▲ better"} & set(itertools.chain.from_iterable(figures(page).values()))
     assert not page.form.isVisible(), "what came of it is looked at next"
     assert "F1, mean over classes, on held-out people" in page.said.text()
     assert registry.history("activity") == []

@@ -13,9 +13,11 @@ from server_gui.views.overview.joint_table import (
     JointModel,
     JointTable,
 )
+from server_gui.views.overview.joint_words import JointWords
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card
 from server_gui.views.widgets.shrinking_label import ShrinkingLabel
+from tests.gui import rules
 from tests.gui.fakes import Bench, destroy
 from tests.support.desk import looked, telemetry, walking
 
@@ -103,3 +105,50 @@ def test_the_value_that_a_fault_is_about_is_always_shown(
     metrics = QFontMetrics(theme.text_font())
     assert table.columnWidth(ERROR) >= metrics.horizontalAdvance("0x4210")
     destroy(table)
+
+
+@pytest.mark.parametrize("scale", [1.0, 1.5])
+@pytest.mark.parametrize("width", [300, 420, 640, 1100])
+def test_the_words_of_a_fault_are_all_there(theme: Theme, bench: Bench, width: int, scale: float) -> None:
+    theme.set(scale=scale)
+    bench.station.take([walking(10), looked()])
+    newest_ns = bench.station.rings.newest_ns or 0
+    model, below = JointModel(bench.desk, theme), JointWords(theme)
+    table = JointTable(model, theme)
+    for part in (table, below):
+        part.resize(round(width * scale), 300)
+        part.show()
+    high = below.height()
+    codes: dict[str, list[float | None]] = {}
+    for joint in ("left_knee", "right_knee"):
+        codes[f"{joint}.error_code"] = [float(0x2310)]
+        bench.station.take([telemetry([newest_ns + len(codes)], codes)])
+        model.refresh()
+        below.say(table.unsaid)
+        QApplication.processEvents()
+        metrics = QFontMetrics(theme.text_font())
+        if table.unsaid:
+            assert "0x2310 continuous overcurrent at the output" in below.text()
+            assert "more" not in below.text()
+            assert rules.cut_words(below, [below]) == []
+        else:
+            assert table.columnWidth(ERROR) >= metrics.horizontalAdvance(model.errors[0][1])
+        if width >= 420:
+            assert table.columnWidth(ERROR) >= metrics.horizontalAdvance("0x2310")
+            assert joint.replace("_", " ") in below.text() or not table.unsaid
+        assert below.height() == high, "what is around has moved"
+    destroy(table)
+    destroy(below)
+
+
+def test_of_many_errors_the_first_is_whole_and_the_others_are_counted(theme: Theme) -> None:
+    below = JointWords(theme)
+    below.resize(500, 20)
+    below.show()
+    below.say([(f"joint {at}", f"0x{at:04X} something has happened to this drive") for at in range(6)])
+    assert below.text().startswith("joint 0: 0x0000 something has happened to this drive · ")
+    assert below.text().endswith(" · 5 more")
+    assert rules.cut_words(below, [below]) == []
+    below.say([])
+    assert below.text().startswith("Bars: ")
+    destroy(below)

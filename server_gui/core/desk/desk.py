@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 from gateway.units import Units
+from server_gui.core.cloud.store_reach import StoreReach
 from server_gui.core.desk.pins import Pins
 from server_gui.core.desk.recording import By, Recording
 from server_gui.core.desk.station import Station
@@ -33,6 +34,7 @@ class Desk:
         self.selected: Station | None = None
         self.news = News()
         self.shown = Shown()
+        self.reach = StoreReach()  # of the store that is recorded into, and read from
         self._recording = Recording(By.NOBODY, None, lambda call: call(), self.news)
         self.pins = Pins()
         self.keep_evidence: Callable[[str, EditEvidence], None] = lambda _robot, _told: None  # on the disk
@@ -50,6 +52,7 @@ class Desk:
     @recording.setter
     def recording(self, recording: Recording) -> None:
         self._recording = recording
+        recording.rely_on(self.reach)
         recording.on_mark.append(self._marked)
 
     def _marked(self, text: str, ago_s: float) -> None:

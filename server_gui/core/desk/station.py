@@ -19,7 +19,7 @@ from gateway.wire.robot import Description
 from gateway.wire.stop import Reset, Stopped
 from ml.danger.levels import Level
 from server_gui.core.alarms.alarm import Alarms
-from server_gui.core.alarms.causes import STOOD_S, Stalls, gathered
+from server_gui.core.alarms.causes import Stalls, gathered
 from server_gui.core.alarms.marks import Mark
 from server_gui.core.alarms.robot_alarms import Facts, any_enabled
 from server_gui.core.alarms.robot_alarms import alarms as found
@@ -177,9 +177,9 @@ class Station:
         """How it is, in one mark and word: the same wherever it is shown."""
         return worst(self.robot, self.alarms)
 
-    def tell(self, kind: NewsKind, text: str) -> None:
-        """Note something about this robot."""
-        self.news.add(kind, self.title, text)
+    def tell(self, kind: NewsKind, text: str, about: str = "") -> None:
+        """Note something about this robot, or about a component of it."""
+        self.news.add(kind, self.title, text, about)
 
     def flag(self, text: str, ago_s: float = 0.0) -> None:
         """Flag this instant, or the one `ago_s` before it, which somebody has marked."""
@@ -244,7 +244,7 @@ class Station:
             return
         received_s = self.robot.now_s() - (time.monotonic_ns() - batch.received_ns) / 1e9
         stall = self._stalls.take(event.stream, batch.stamps_ns, batch.received_ns, received_s)
-        if stall is not None and stall.lasted_s >= STOOD_S:
+        if stall is not None and self._stalls.is_news(stall):
             self.tell(NewsKind.WARNING, f"the robot's computer stood still for {stall.lasted_s:.1f} s")
 
     def _described(self, description: Description, before: Description | None) -> None:

@@ -2,7 +2,7 @@
 
 import collections
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import msgspec
@@ -24,10 +24,12 @@ from server_gui.core.follow.events import (
     Resources,
     Telemetry,
 )
+from server_gui.core.follow.missing_pdos import MissingPdos
 
 STALE_NS = 500_000_000  # older than this is shown as old
 RATE_WINDOW_NS = 2_000_000_000
 COMES_UP = "it was not read yet"  # as a gateway says of what it has asked for the first time just now
+BUSY_NS = 5_000_000_000  # what was seen of its computer before is not known now
 SLOW = 0.8  # of the rate that was asked for: below that it is said
 
 
@@ -87,6 +89,7 @@ class Robot:
     _arrivals: collections.deque[tuple[int, int]] = field(
         default_factory=lambda: collections.deque(maxlen=4096)
     )
+    _missing: MissingPdos = field(default_factory=MissingPdos)
     _dropped_seen: int = 0
     _flows_since_ns: int = 0  # the first rows of this link
     _words: dict[str, dict[str, str]] = field(default_factory=dict)
@@ -102,13 +105,19 @@ class Robot:
                 self.resources, self.resources_at_ns = event.snapshot, event.at_ns
                 self.link.round_trip_ns = event.round_trip_ns
             case BusesSeen():
-                self.buses, self.buses_at_ns = event.buses, event.at_ns
+                self.buses_at_ns = event.at_ns
+                self.buses = None if event.buses is None else self._judged(event.buses, event.at_ns)
             case LinkChanged():
                 self._link_changed(event)
             case Described():
                 self._described(event)
             case Failed():
                 self.last_failure = event
+
+    def _judged(self, buses: Sequence[BusInfo], at_ns: int) -> tuple[BusInfo, ...]:
+        is_new = self.resources_at_ns is not None and at_ns - self.resources_at_ns < BUSY_NS
+        cpu_percent = None if self.resources is None or not is_new else self.resources.cpu.percent
+        return self._missing.take(buses, at_ns, cpu_percent)
 
     def hold(self, values: Mapping[str, float]) -> None:
         """Take values just read from devices."""

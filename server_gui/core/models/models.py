@@ -8,6 +8,7 @@ from typing import Final
 
 from gateway.user_name import user_name
 from server_gui.core.cloud.jobs import Job, Jobs, JobState, Work
+from server_gui.core.cloud.store_reach import StoreReach
 from server_gui.core.models.catalogue import Catalogue, Looking
 from server_gui.core.models.changes import ModelChange, carry_out, promotion, way_back
 from server_gui.core.models.training import BETTER, Trained, TrainingWish
@@ -41,8 +42,10 @@ class Models:
         robots: Callable[[], Set[str]],
         who: str = "",
         promoters: Mapping[str, str] = MappingProxyType({}),
+        reach: StoreReach | None = None,
     ) -> None:
         self.url = url
+        self.reach = reach or StoreReach()  # of the store
         self.found = Catalogue()
         self.revision = 0
         self.looked_s: float | None = None  # when the newest look came back, on our monotonic clock
@@ -96,7 +99,7 @@ class Models:
     def ask_promotion(self, model: str, robot: str) -> None:
         """Find out what it would change, for `change` to be confirmed."""
         judged = self.trained.get(model)
-        if judged is not None and not judged.better:
+        if judged is not None and not judged.may_serve:
             self._say(NOT_BETTER.format(why=judged.reasons), Tone.BAD)
             return
         self._ask(lambda: promotion(self.url, model, robot))

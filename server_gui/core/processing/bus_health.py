@@ -9,6 +9,7 @@ from typing import Final
 from gateway.client import ConnectionState
 from gateway.wire.bus import CLOSED, BusInfo, NodeInfo
 from server_gui.core.follow.frame_time import now_ns
+from server_gui.core.follow.missing_pdos import told_percent, told_words
 from server_gui.core.follow.robot import Robot
 
 ACTIVE: Final = "error active"
@@ -16,7 +17,6 @@ OFF: Final = "bus off"
 FULL_PERCENT: Final = 95.0  # of its time: hardly a frame more has room
 TAKEN: Final = "of its time is taken"
 BUSY_PERCENT: Final = 80.0  # as the gateway finds it
-MISSING_PERCENT: Final = 1.0  # of a node's PDOs
 OLD_S: Final = 5.0  # what was seen before is not known now
 FEWER: Final = "look who sends so much, and send fewer PDOs or SYNC less often"
 UNKNOWN: Final = "bus not known"
@@ -181,7 +181,7 @@ def _joined(texts: Iterable[str]) -> str:
 
 
 def _misses(node: NodeInfo) -> bool:
-    return (node.pdos_missing_percent or 0.0) >= MISSING_PERCENT
+    return told_percent(node) > 0.0
 
 
 def _gathered(nodes: Sequence[NodeInfo]) -> Iterator[tuple[str, str]]:
@@ -190,7 +190,7 @@ def _gathered(nodes: Sequence[NodeInfo]) -> Iterator[tuple[str, str]]:
     for node in nodes:
         said = [(one.words, one.check) for one in node.findings]
         if not said and _misses(node):
-            said = [(f"{node.pdos_missing_percent or 0.0:.0f} % of its PDOs are missing", "")]
+            said = [told_words(node)]
         for words, check in said:
             same.setdefault((NUMBER.sub("#", words), check), []).append((node, words))
     for (_, check), found in same.items():

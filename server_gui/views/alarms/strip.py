@@ -157,7 +157,7 @@ class AlarmStrip(ClickableFrame):
     def _say(self, first: Told | None) -> None:
         """As much of it as has room, the cause before all; laid out only when it says something else."""
         if first is None:
-            mark, main, rest = quiet(self._desk.selected)
+            mark, main, rest = quiet(self._desk.selected, self._desk.recording)
             wordings: tuple[str, ...] = (main,)
             fuller: tuple[str, ...] = (rest,)
         else:

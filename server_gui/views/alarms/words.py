@@ -7,6 +7,7 @@ from typing import Final
 from server_gui.core.alarms.alarm import Active
 from server_gui.core.alarms.marks import age_text
 from server_gui.core.alarms.texts import Kind
+from server_gui.core.desk.recording import Recording
 from server_gui.core.desk.station import Station
 from server_gui.views.marks import Mark
 
@@ -20,7 +21,7 @@ def key_of(told: Told) -> Key:
     return "" if station is None else station.name, one.alarm.key
 
 
-def quiet(station: Station | None) -> tuple[Mark, str, str]:
+def quiet(station: Station | None, recording: Recording | None = None) -> tuple[Mark, str, str]:
     """Return that there is no alarm, where that is known."""
     if station is None:
         return Mark("ring", "dim"), "No robot", ""
@@ -31,6 +32,8 @@ def quiet(station: Station | None) -> tuple[Mark, str, str]:
     known = station.predictions
     if known.foresees and not (known.danger is not None and known.danger.is_known):
         return Mark("ring", "dim"), "No alarms", "danger is not known"
+    if recording is not None and recording.can_ask and not recording.reach.is_known:
+        return Mark("ring", "dim"), "No alarms", "the store is not known"
     return Mark("disc", "good"), "No alarms", "all ok"
 
 

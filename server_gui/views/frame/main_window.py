@@ -331,6 +331,7 @@ class MainWindow(QMainWindow):
             for part in (self.header, self.parameters):
                 part.be_short(is_narrow)
             self.panels_button.setVisible(is_narrow)
+            self.page_bar.arrange()  # now: else what is below moves a frame later
         self._panels.fit(scaled=scaled)
 
     def _hold_header(self) -> None:

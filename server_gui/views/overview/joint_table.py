@@ -57,7 +57,7 @@ CODE: Final = re.compile(r"0x[0-9A-Fa-f]{4}(?P<words> [^(;:]+)?")
 ENABLED: Final = "operation enabled"  # only then it is to be where its target is
 NONE: Final = "–"
 MOST_ERROR: Final = 280  # wide, in words
-LEAST_ERROR: Final = "0x0000 …"
+LEAST_ERROR: Final = "0x0000"  # its words stand below the table then
 BAR = Qt.ItemDataRole.UserRole + 1
 
 
@@ -112,6 +112,11 @@ class JointModel(QAbstractTableModel):
         texts.append(str(self.headerData(column, Qt.Orientation.Horizontal, Qt.ItemDataRole.DisplayRole)))
         return max(metrics.horizontalAdvance(text) for text in texts)
 
+    @property
+    def errors(self) -> list[tuple[str, str]]:
+        """Each joint with which something is wrong, and what."""
+        return [(row[JOINT].text, row[ERROR].text) for row in self._cells if row[ERROR].tip]
+
     def empty(self) -> set[int]:
         """Return the columns that say nothing yet: no stop was sent."""
         return {STOP} if all(row[STOP].text == NONE for row in self._cells) else set()
@@ -149,11 +154,21 @@ class JointModel(QAbstractTableModel):
 
 
 class BarDelegate(SentenceDelegate):
-    """Draws a cell's bar below its text: from the middle, as far as its share; errors to a whole word."""
+    """Draws a cell's bar below its text: from the middle, as far as its share.
+
+    Of an error its code where `is_short`, else all of it.
+    """
 
     def __init__(self, theme: Theme) -> None:
         super().__init__(ERROR)
         self._theme = theme
+        self.is_short = False
+
+    def initStyleOption(self, option: QStyleOptionViewItem, index: Index) -> None:
+        super().initStyleOption(option, index)
+        text = str(index.data())
+        if self.is_short and index.column() == ERROR and text.startswith("0x"):
+            option.text = text.partition(" ")[0]
 
     def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: Index) -> None:
         super().paint(painter, option, index)
@@ -177,8 +192,9 @@ class JointTable(QTableView):
         super().__init__()
         self._theme = theme
         self._model = model
+        self._bars = BarDelegate(theme)
         self.setModel(model)
-        self.setItemDelegate(BarDelegate(theme))
+        self.setItemDelegate(self._bars)
         self.setAccessibleName("Joints")
         self.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
@@ -204,6 +220,11 @@ class JointTable(QTableView):
         rows = max(self._model.rowCount(), 1) * self.verticalHeader().defaultSectionSize()
         return QSize(self._theme.px(600), rows + self.horizontalHeader().sizeHint().height() + 2)
 
+    @property
+    def unsaid(self) -> list[tuple[str, str]]:
+        """Each joint with which something is wrong, and what, where that has no room in its column."""
+        return self._model.errors if self._bars.is_short else []
+
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self._fit()
@@ -216,6 +237,24 @@ class JointTable(QTableView):
     def _fit(self) -> None:
         """Every column as wide as what is in it; what has no room is left out whole."""
         widths = [self._width(column) for column in range(len(COLUMNS))]
+        shown = self._with_room(widths)
+        room = self.viewport().width() - sum(widths[known] for known in shown if known != ERROR)
+        is_short = any(self._text_width(text) > room for _, text in self._model.errors)
+        if is_short:
+            widths[ERROR] = self._text_width(LEAST_ERROR)
+            shown = self._with_room(widths)
+        if is_short is not self._bars.is_short:
+            self._bars.is_short = is_short
+            self.viewport().update()
+        spare = max(self.viewport().width() - sum(widths[known] for known in shown), 0) // max(len(shown), 1)
+        for column, width in enumerate(widths):
+            self.setColumnHidden(column, column not in shown)
+            wanted = width + (spare if column != ERROR else 0)
+            if column in shown and column != ERROR and abs(self.columnWidth(column) - wanted) > 1:
+                self.setColumnWidth(column, wanted)
+
+    def _with_room(self, widths: list[int]) -> set[int]:
+        """Return the columns that are shown."""
         shown = set(range(len(COLUMNS))) - self._model.empty()
         for column in (column for column in SPARE if column not in self._model.at_fault):
             if sum(widths[known] for known in shown) > self.viewport().width():
@@ -226,12 +265,7 @@ class JointTable(QTableView):
                 least = sum(min(widths[known], code) if known == ERROR else widths[known] for known in shown)
                 if least > self.viewport().width():
                     shown.discard(column)
-        spare = max(self.viewport().width() - sum(widths[known] for known in shown), 0) // max(len(shown), 1)
-        for column, width in enumerate(widths):
-            self.setColumnHidden(column, column not in shown)
-            wanted = width + (spare if column != ERROR else 0)
-            if column in shown and column != ERROR and abs(self.columnWidth(column) - wanted) > 1:
-                self.setColumnWidth(column, wanted)
+        return shown
 
     def _text_width(self, text: str) -> int:
         return QFontMetrics(self._theme.text_font()).horizontalAdvance(text) + self._theme.px(16)

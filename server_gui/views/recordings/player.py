@@ -53,6 +53,7 @@ class Player(QWidget):
         self._frame = 0
         self._told: object = None  # which recording and journal have been told of
         self.overview = Overview(self._playback.desk, theme)
+        self.overview.is_numbers_first = False  # a walk is replayed for how it looked
         notes = RecordedNotes(self._playback, archive.labels)
         self.signals = Signals(self._playback.desk, theme, notes)
         self._views = (self.overview, self.signals)

@@ -180,8 +180,8 @@ class SessionsPage(QWidget):
 
     def _state(self) -> str:
         library = self._archive.library
-        if library.found.problem is not None:
-            return f"The store is not reached, it is tried again: {library.found.problem}"
+        if library.reach.problem is not None:
+            return f"The store is not reached, it is tried again: {library.reach.problem}"
         return EMPTY if library.revision and not library.found.sessions else ""
 
     def _refresh_details(self) -> None:

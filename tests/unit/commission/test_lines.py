@@ -98,12 +98,37 @@ def stopped_in(pipe: Pipe, lines: Lines, busy: Callable[[Lines], object]) -> Non
     busy(lines)
 
 
-@pytest.mark.parametrize("busy", [lambda lines: lines.get(1, None), lambda _: threading.Event().wait(WAIT_S)])
+@pytest.mark.parametrize(
+    "busy", [lambda lines: JsonFace(lines).ask(Ask("?")), lambda _: threading.Event().wait(WAIT_S)]
+)
 def test_a_stop_ends_whatever_is_done_and_once(pipe: Pipe, busy: Callable[[Lines], object]) -> None:
     with ending(), Lines(pipe.source) as lines:
         with pytest.raises(MotionEnded):
             stopped_in(pipe, lines, busy)
         assert lines.stop_asked
+
+
+def test_a_stop_that_comes_just_before_a_question_waits_is_heard(
+    pipe: Pipe, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The signal interrupted nothing, as the wait had not begun: the stop was lost until an answer came."""
+    with ending(), Lines(pipe.source) as lines:
+        wait = lines._read.get
+
+        def uninterrupted(timeout: float | None = None) -> object:
+            signal.pthread_sigmask(signal.SIG_BLOCK, ENDS)
+            try:
+                return wait(timeout)
+            finally:
+                signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDS)
+
+        monkeypatch.setattr(lines._read, "get", uninterrupted)
+        late = threading.Timer(WAIT_S / 2, pipe.write, ("an answer",))
+        late.start()
+        pipe.write('{"stop": true}')
+        with pytest.raises(MotionEnded):
+            JsonFace(lines).ask(Ask("?"))
+        late.cancel()
 
 
 def test_a_second_signal_does_not_end_what_the_first_one_ends() -> None:
