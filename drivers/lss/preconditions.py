@@ -12,7 +12,7 @@ from drivers.bus.settings import SDO_REQUEST, SDO_RESPONSE
 from drivers.bus.values import unsigned
 from drivers.errors import DeviceAbort, DriverError, NotPermitted
 from drivers.lss.master import Identity
-from drivers.scan.asking import TIMEOUT_S, sweep
+from drivers.scan.identification import TIMEOUT_S, sweep
 from drivers.scan.traffic import Traffic
 
 

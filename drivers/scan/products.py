@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import eds
-from drivers.scan.asking import NodeAnswers
+from drivers.scan.identification import NodeAnswers
 from eds import Description, EdsError
 from eds.report import pdo_rows
 from eds.shipped import SHIPPED, shipped

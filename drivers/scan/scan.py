@@ -9,7 +9,7 @@ from drivers.bus.frames import STANDARD_IDS
 from drivers.bus.interfaces.controller_state import BusState
 from drivers.bus.settings import CanSettings
 from drivers.errors import DriverError, Unavailable
-from drivers.scan.asking import NodeAnswers, ask, sweep
+from drivers.scan.identification import NodeAnswers, ask, sweep
 from drivers.scan.traffic import Traffic
 
 OPEN_S = 5.0

@@ -10,7 +10,7 @@ from concurrent.futures import Future
 
 from gateway.access.identity import Identity
 from gateway.connections.listener_kind import Stream
-from gateway.connections.pace import COSTLY_NS, FLOOD_S, Account, Pace
+from gateway.connections.rate_limit import COSTLY_NS, FLOOD_S, Account, RateLimit
 from gateway.connections.stop_lines import StopSplitter
 from gateway.process.loop import HANGUP, READ, Loop, Timer
 from gateway.wire import framing
@@ -74,7 +74,7 @@ class IncomingBytes:
         stop_now: Callable[[], StopNow | None],
         spent: Callable[[], int],
         finished: "Callable[[IncomingBytes], None]",
-        pace: Pace,
+        pace: RateLimit,
     ) -> None:
         self.socket = connection
         self.peer = peer

@@ -31,7 +31,7 @@ from gateway.guard.inputs import (
     SilenceWatcher,
     UnseenWatcher,
 )
-from gateway.guard.judging import Beside, judging
+from gateway.guard.thresholds import Beside, judging
 from gateway.guard.watcher import Watcher
 
 if TYPE_CHECKING:

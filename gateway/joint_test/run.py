@@ -28,10 +28,10 @@ from drivers.samples import Sample
 from gateway.commission.power import Power
 from gateway.commission.powered_run import PoweredRun, RunEnded
 from gateway.joint_test import parameters
+from gateway.joint_test.guard_watch import Guarding
 from gateway.joint_test.limits import JointTestLimits
 from gateway.joint_test.motion import Wish, motion
 from gateway.joint_test.recording import Row
-from gateway.joint_test.watching import Guarding
 
 POSITION_MODE, TORQUE_MODE = 8, 10
 TARGET_POSITION, TARGET_TORQUE = (0x607A, 4), (0x6071, 2)

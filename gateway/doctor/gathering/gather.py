@@ -8,7 +8,7 @@ from pathlib import Path
 
 import eds
 from drivers.bus.interfaces.opening import obstacle
-from drivers.scan.asking import NodeAnswers
+from drivers.scan.identification import NodeAnswers
 from drivers.scan.products import Library, files
 from eds.shipped import SHIPPED
 from gateway.client import Address, ClientError, LinkSettings, Robot, Unreachable

@@ -6,7 +6,7 @@ from typing import cast
 from msgspec import UNSET, UnsetType
 
 from drivers.bus.bus import CanBus
-from drivers.bus.life import NodeLife
+from drivers.bus.liveness import NodeLife
 from drivers.bus.nmt import HEARTBEAT
 from drivers.bus.node import Node
 from drivers.component import Component

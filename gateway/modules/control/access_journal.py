@@ -14,7 +14,7 @@ from gateway.records.records import Records
 from gateway.wire.role import Role
 
 if TYPE_CHECKING:
-    from gateway.access.known import KnownClients
+    from gateway.access.known_clients import KnownClients
 
 log = logging.getLogger(__name__)
 
@@ -47,7 +47,7 @@ class AccessJournal:
                 return
             self._stamp = stamp
             if stamp or self._file.exists():
-                from gateway.access.known import known_in  # for robots that know somebody
+                from gateway.access.known_clients import known_in  # for robots that know somebody
 
                 self.tell(known_in(self._folder))
         except OSError as error:

@@ -14,8 +14,8 @@ from urllib.parse import unquote, urlsplit
 
 import msgspec
 
-from ml.store import Store, StoreError, durable, forgetting
-from ml.store.forgetting import Name
+from ml.store import Store, StoreError, durable, erasure
+from ml.store.erasure import Name
 from ml.store.private import private_folder
 from server_gui.core.atomic_files import draft
 from server_gui.core.settings.server_file import exports_folder
@@ -144,7 +144,7 @@ def _store(note: _Note, wanted: Sequence[Name]) -> Exported | None:
     """Nothing where the copy has none of it."""
     try:
         store = Store.existing(note.place)
-        has_some = forgetting.counted(store, wanted) or forgetting.left(store, wanted)
+        has_some = erasure.counted(store, wanted) or erasure.left(store, wanted)
     except StoreError as error:
         parts = urlsplit(note.place)
         is_gone = parts.scheme == "file" and not Path(unquote(parts.path)).exists()

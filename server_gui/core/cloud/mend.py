@@ -25,9 +25,9 @@ from ml.store.store import Store
 from ml.store.tables import EVENTS
 from ml.store.translation import translated
 from server_gui.core.cloud import verify
-from server_gui.core.cloud.counting import Advance, Batch
 from server_gui.core.cloud.receipt_check import Proof, prove
 from server_gui.core.cloud.repeated_upload import Again, Untouched, Whose, whose
+from server_gui.core.cloud.row_counting import Advance, Batch
 from server_gui.core.recording.batching import EventKind
 from server_gui.core.recording.errors import Damaged, SpoolUnusable
 from server_gui.core.recording.receipts import RECEIPTS, Altered, Receipt, ReceiptPart, Receipts

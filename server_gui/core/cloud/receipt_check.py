@@ -13,7 +13,7 @@ from ml.store.errors import StoreError, StoreRefused, StoreUnreachable
 from ml.store.fragments import DataFile
 from ml.store.store import Store
 from ml.store.tables import TABLES
-from server_gui.core.cloud.counting import Advance, Batch, Claim, count
+from server_gui.core.cloud.row_counting import Advance, Batch, Claim, count
 from server_gui.core.recording.receipts import (
     RECEIPTS,
     Altered,

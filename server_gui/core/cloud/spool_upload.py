@@ -10,7 +10,7 @@ from ml.store.errors import StoreError, StoreRefused, StoreUnreachable
 from ml.store.objects import Objects
 from ml.store.store import ABOUT
 from server_gui.core.cloud import verify
-from server_gui.core.cloud.counting import Advance
+from server_gui.core.cloud.row_counting import Advance
 from server_gui.core.recording.errors import Damaged
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.upload import ahead, lost_batches, send

@@ -87,7 +87,7 @@ class TimeSharing:
         return now_ns < self._until_ns
 
 
-class Sharing(TimeSharing):
+class FairShare(TimeSharing):
     """One gateway's. It belongs to the loop's thread."""
 
     def __init__(self, loop: Loop) -> None:

@@ -6,7 +6,7 @@ probed by SDO where it says nothing.
 
 from drivers.bus.bus import CanBus
 from drivers.bus.frames import REMOTE
-from drivers.bus.life import NodeLife
+from drivers.bus.liveness import NodeLife
 from drivers.bus.nmt import HEARTBEAT
 from drivers.bus.sdo.channel import SdoChannel
 from drivers.bus.sdo.worker import SdoWorker

@@ -44,7 +44,7 @@ OF_OTHERS: Final = {"write": "a write", "restore": "a restore", "store": "a stor
 
 
 @dataclass(slots=True)
-class ExperimentWatch:
+class StopRules:
     """Takes what the robot tells; `why` is the first rule that was broken, None while none is.
 
     `name` is the parameter, `joints` those whose tracking error and current count. Before `begin` it only

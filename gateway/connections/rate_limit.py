@@ -2,7 +2,7 @@
 
 import time
 
-from gateway.connections.sharing import TimeSharing
+from gateway.connections.fair_share import TimeSharing
 from gateway.process.loop import Loop
 
 TURN_NS = 500_000  # what those may take together that are not known, before the others are read
@@ -14,7 +14,7 @@ FLOOD = 8  # stops at once, of a client; who sends more floods the drives with t
 FLOOD_S = 0.05  # … and is read again so much later: as many more are given to it in twice that time
 
 
-class Pace(TimeSharing):
+class RateLimit(TimeSharing):
     """What the clients of an intake share of its thread; those that are not known yet take turns."""
 
     def __init__(self, front: Loop) -> None:
