@@ -1,4 +1,4 @@
-"""What a driver can say when it cannot do what it was asked.
+"""Errors of drivers.
 
     DriverError
     ├── SettingsError      the configuration contradicts itself or the device

@@ -1,4 +1,4 @@
-"""Which format a stream of bytes is in: every parser tries, and the one that explains most of it wins."""
+"""Identification of a byte stream's format: every parser tries, and the best match wins."""
 
 import re
 from collections.abc import Callable, Iterator

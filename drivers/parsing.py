@@ -1,4 +1,4 @@
-"""How every serial format is read: frames out of a byte stream that begins anywhere and may be damaged.
+"""Framing of serial formats: frames out of a byte stream that begins anywhere and may be damaged.
 
 A parser does no I/O. `feed` takes bytes as they come and returns the frames they complete; the result does
 not depend on where the stream was cut. The memory it keeps is bounded by its format's longest frame.

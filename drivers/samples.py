@@ -1,4 +1,4 @@
-"""What the drivers give: channels, samples, quality. SI units, robot's monotonic time."""
+"""The drivers' output: channels, samples, quality. SI units, robot's monotonic time."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

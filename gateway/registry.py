@@ -1,4 +1,4 @@
-"""Which modules there are, and their lives: started on first use, stopped when the last client has left.
+"""The gateway's modules and their lives: started on first use, stopped after the last client has left.
 
 A module's code is imported only when it starts. Starting and stopping take threads of their own, because
 files are read and devices are opened and closed there, and no client waits for another's devices.

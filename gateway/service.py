@@ -1,4 +1,4 @@
-"""What the gateway answers: parameters are checked, the method's module is started, its answer given."""
+"""The gateway's service: check a request's parameters, start its module, and answer."""
 
 import logging
 import time

@@ -1,4 +1,4 @@
-"""Whether the simulator keeps the pace that it was asked for; where not, it says so, once and then seldom."""
+"""Check of real time: if the simulator falls behind, it reports this once, and then seldom."""
 
 import time
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""Whether a PDO's frames are as long as ever: other lengths mean that somebody has mapped it otherwise."""
+"""Check of PDOs' lengths: a changed length means that another master has remapped the PDO."""
 
 from collections.abc import Callable
 

@@ -1,4 +1,4 @@
-"""What a node tells about itself unasked: boot-up, heartbeat (or answers to node guarding), EMCY."""
+"""Signs of life of a node: boot-up, heartbeat (or answers to node guarding), EMCY."""
 
 from collections import deque
 from collections.abc import Callable

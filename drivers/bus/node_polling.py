@@ -1,4 +1,4 @@
-"""What a node is asked by itself while it is up: whether it lives, and whether two devices still answer.
+"""Polling of a node that is up: node guarding, and a check for two devices with one node id.
 
 One with a guard time is guarded (CiA 301 §7.2.8); one without a heartbeat, whose user gets no PDOs either, is
 probed by SDO where it says nothing.

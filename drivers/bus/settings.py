@@ -1,4 +1,4 @@
-"""What an integrator says about a CAN bus and what is on it: `[can.…]`, `[device.…]` and `[channel.…]`."""
+"""Settings of a CAN bus and its devices: `[can.…]`, `[device.…]` and `[channel.…]`."""
 
 from collections.abc import Mapping
 from enum import StrEnum

@@ -1,4 +1,4 @@
-"""How the makers of IMUs lay axes and angles."""
+"""Makers' conventions for IMU axes and angles."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

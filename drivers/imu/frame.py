@@ -1,4 +1,4 @@
-"""What any IMU format gives: one frame, in SI, in the sensor's own axes."""
+"""The common result of all IMU formats: one frame, in SI, in the sensor's own axes."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""What an integrator says about an IMU: the table `[imu.NAME]` of the robot's file, by its wiring."""
+"""Settings of an IMU: the table `[imu.NAME]` of the robot's file, by its wiring."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple

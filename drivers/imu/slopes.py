@@ -1,4 +1,4 @@
-"""What a CiA 410 inclinometer says about itself, and how its slopes become the direction of up."""
+"""A CiA 410 inclinometer's slopes, and their conversion to the direction of up."""
 
 import math
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What an integrator says about an insole: the table `[insole.NAME]` of the robot's file."""
+"""Settings of an insole: the table `[insole.NAME]` of the robot's file."""
 
 from typing import Annotated
 

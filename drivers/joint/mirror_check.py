@@ -1,4 +1,4 @@
-"""Whether a joint bends as the same joint of the other leg does: judged in gait, where both go far."""
+"""Comparison of a joint with the same joint of the other leg, in gait, where both move far."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Where each of a joint's values comes from: a TPDO, a poll by SDO, or nowhere."""
+"""The source of each of a joint's values: a TPDO, a poll by SDO, or none."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What an integrator says about a joint: the table `[joint.NAME]` of the robot's file."""
+"""Settings of a joint: the table `[joint.NAME]` of the robot's file."""
 
 import math
 from typing import Annotated, Literal

@@ -1,4 +1,4 @@
-"""Which EDS file is for a device that was found, and what of the file is not true of it."""
+"""The matching EDS file of a device that was found, and its deviations from the device."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What a scan has found, in words and as JSON."""
+"""Report of a scan, in words and as JSON."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict

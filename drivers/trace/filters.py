@@ -1,4 +1,4 @@
-"""Which lines of a trace somebody wants to see: by node, by service, by object."""
+"""Filters of a trace's lines: by node, by service, by object."""
 
 import fnmatch
 import functools

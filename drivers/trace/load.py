@@ -1,4 +1,4 @@
-"""What takes a bus's time: frames and share by node and kind, a second at a time.
+"""Bus load of a trace: frames and share by node and kind, a second at a time.
 
 Whose a frame is, and what it takes, is told as for the gateway's buses: `drivers.bus.traffic`, `health`.
 """

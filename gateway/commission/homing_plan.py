@@ -1,4 +1,4 @@
-"""What a homing rests on: what must be known before, how far and how fast it may go, and that in words."""
+"""Prerequisites and limits of a homing, also in words for the person at the robot."""
 
 import math
 from collections.abc import Iterator, Mapping

@@ -1,4 +1,4 @@
-"""How far it is: every step, whether the draft has what it finds, and which one is gone through now."""
+"""Progress of commissioning: every step, its completion by the draft, and the present one."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What a rule of the guard may say: each kind with its keys, in SI units, and when it trips in words."""
+"""The guard's kinds of rules: their keys, in SI units, and their conditions in words."""
 
 from collections.abc import Mapping
 from enum import StrEnum

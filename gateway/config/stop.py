@@ -1,4 +1,4 @@
-"""What an integrator says about the stop: `[stop]` of the robot's file."""
+"""Settings of the stop: `[stop]` of the robot's file."""
 
 from enum import StrEnum
 from typing import Annotated

@@ -1,4 +1,4 @@
-"""What clients cost the thread that reads them, and how long each is left alone for that."""
+"""Rate limit of clients: the CPU time that reading them costs, and the pause that follows for each."""
 
 import time
 

@@ -1,4 +1,4 @@
-"""What the doctor says of one thing: it is wrong, with figures and what mends it, or it cannot be judged."""
+"""The doctor's verdicts: a finding with figures and remedies, or a lack of data."""
 
 import json
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What the guard has to say: in the journal, but never as a flood, and as channels of its own."""
+"""Alarms of the guard: in the journal, without floods, and as channels of its own."""
 
 import logging
 import time

@@ -1,4 +1,4 @@
-"""What a rule compares: bands with hysteresis, and what is made of values: I²t, where they end, drift."""
+"""Conditions of rules: bands with hysteresis, and derived values: I²t, extrapolation, drift."""
 
 import math
 from collections.abc import Callable

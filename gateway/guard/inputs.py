@@ -1,4 +1,4 @@
-"""What a rule can look at: a channel, a component's signs of life, its emergency messages, or nothing."""
+"""Inputs of rules: a channel, a component's signs of life, its emergency messages, or none."""
 
 import math
 import threading

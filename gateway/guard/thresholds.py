@@ -1,4 +1,4 @@
-"""How each kind of rule judges a number: where it may lie, for how long it may not, what is said of it."""
+"""Thresholds of each kind of rule: the allowed range, the allowed time outside of it, and the words."""
 
 import math
 from collections.abc import Callable

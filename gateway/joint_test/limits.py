@@ -1,4 +1,4 @@
-"""How far, how fast and how hard a joint may be moved: the narrowest of what file and drive allow."""
+"""Limits of a joint test (range, speed, torque): the narrowest of file and drive."""
 
 import fnmatch
 import math

@@ -1,4 +1,4 @@
-"""How a joint is moved in each test: the target of each cycle, from the position in the one before.
+"""Motion of each joint test: the target of each cycle, from the position in the one before.
 
 Angles are rad of the joint, relative to where it stood; of a relay the targets are torques (N·m).
 """

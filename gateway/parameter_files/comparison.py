@@ -1,4 +1,4 @@
-"""What a file says of parameters beside what a robot holds, one verdict each."""
+"""Comparison of a file's parameters with a robot's, with one verdict each."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from enum import StrEnum

@@ -1,4 +1,4 @@
-"""What all files of parameters have in common: of which robot and device they are, and what they say."""
+"""The common contents of parameter files: their robot, device and values."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

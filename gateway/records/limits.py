@@ -1,4 +1,4 @@
-"""How much of the journal one client may fill: its flood must not push out what others did.
+"""Limits of one client's share of the journal: its flood must not push out others' entries.
 
 Each client has two accounts, of entries and of bytes: one for stops and resets, one for all else. Entries
 that go beyond are counted, and one entry sums them up (ADR 13).

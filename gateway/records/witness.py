@@ -1,4 +1,4 @@
-"""What somebody else has kept of a journal: heads that the robot signed, and what they say of it now.
+"""Witnesses of a journal: heads that the robot signed and others keep, and their comparison with it.
 
 A chain that was rewritten whole holds in itself. Only who has seen another one can tell.
 """

@@ -1,4 +1,4 @@
-"""What a feed gives: encoded batches, and each subscriber's end of it.
+"""Output of a feed: encoded batches, and each subscriber's queue.
 
 An outlet numbers its notifications and, when its client is slow, drops the oldest rows and counts them.
 """

@@ -1,4 +1,4 @@
-"""What streams and snapshots read: sources of samples, and the channels of them that somebody wants."""
+"""Sources of streams and snapshots: components' samples, and the selected channels."""
 
 import fnmatch
 import re

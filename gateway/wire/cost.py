@@ -1,4 +1,4 @@
-"""What monitoring costs the robot."""
+"""Messages on the cost of monitoring."""
 
 from msgspec import Struct
 

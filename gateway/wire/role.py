@@ -1,4 +1,4 @@
-"""Who a client is on a robot: three roles, each of which may do what those before it may."""
+"""Roles of clients on a robot: three, each with all permissions of those before it."""
 
 from enum import StrEnum
 

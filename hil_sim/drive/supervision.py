@@ -1,4 +1,4 @@
-"""What a drive watches in itself: supply, current, heat and following error, with the codes of 603Fh.
+"""Self-supervision of a drive: supply, current, heat and following error, with the codes of 603Fh.
 
 Error codes of CiA 402-2 table 17 and CiA 301 table 26.
 """

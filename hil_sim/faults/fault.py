@@ -1,4 +1,4 @@
-"""What a fault is: where it can act, with which parameters, and what it looks like from outside."""
+"""Definition of a fault: its possible targets, its parameters, and its symptoms."""
 
 import math
 import os

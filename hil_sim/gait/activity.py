@@ -1,4 +1,4 @@
-"""What a wearer can be told to do, and what a wearer is seen to do."""
+"""Activities that a wearer can be told to do, and labels of those actually done."""
 
 from enum import IntEnum, StrEnum
 

@@ -1,4 +1,4 @@
-"""How people walk who walk differently, as a table: joints, timing, load and pace of each walk.
+"""Impaired gaits, as a table: joints, timing, load and pace of each.
 
 Modelled, not measured: set by hand, so that the curves have the features, and the loads about the sizes, that
 the literature has for each walk. Nobody's recording is in it, and people differ far more than these do.

@@ -1,4 +1,4 @@
-"""What a scenario expects: something observed, a condition, and when it must hold."""
+"""Expectations of a scenario: an observed value, a condition, and its time."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Whether the computer had time for simulator and gateway: where not, what failed proves nothing.
+"""Check of the computer's spare time: without it, a failed expectation proves nothing.
 
 Measured a tenth of a second at a time: by how much the simulator's events came late, and how long the gateway
 was ready to run and waited for a processor. Only what is worth noticing counts, so that a lively computer's

@@ -1,4 +1,4 @@
-"""How long a process was ready to run while no processor was free for it, as Linux's scheduler tells."""
+"""Time that a process was ready to run without a free processor, by Linux's scheduler."""
 
 import contextlib
 from pathlib import Path

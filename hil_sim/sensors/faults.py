@@ -1,4 +1,4 @@
-"""What can be wrong with a sensor and its line: plain switches, all off, to be set while the robot runs."""
+"""Faults of a sensor and its line: plain switches, all off, to be set while the robot runs."""
 
 import math
 from dataclasses import dataclass, field

@@ -1,4 +1,4 @@
-"""What an IMU on the trunk measures, whatever language it speaks."""
+"""Measurements of an IMU on the trunk, independent of its format."""
 
 import math
 import random

@@ -1,4 +1,4 @@
-"""What models say of the benchmarks' recordings, moment by moment, never having seen who is in them.
+"""Models' output on the benchmarks' recordings, moment by moment, for people unseen in training.
 
 For rules on predictions, which are to be tried on recordings before they may act on a robot.
 """

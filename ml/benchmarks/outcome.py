@@ -1,4 +1,4 @@
-"""What an evaluation found, as plain data for a report, a table or JSON."""
+"""Outcome of an evaluation, as plain data for a report, a table or JSON."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

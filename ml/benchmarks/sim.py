@@ -1,4 +1,4 @@
-"""What the `sim-*` benchmarks share: simulated people in folds, sensors that are missing, and noise.
+"""The common part of the `sim-*` benchmarks: simulated people in folds, missing sensors, and noise.
 
 They are synthetic: they show what sensors can tell and what breaks it, not how well people are understood.
 """

@@ -1,4 +1,4 @@
-"""Which model serves, and which did before: numbered objects that are written once and never altered.
+"""Pointers to the serving model and those before it: numbered objects, written once and never altered.
 
 So two who promote at once both find their place in the history, and neither undoes the other unseen.
 """

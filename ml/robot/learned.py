@@ -1,4 +1,4 @@
-"""What has been learned for one task: scikit-learn's parts and numbers, and what they judge of features.
+"""A trained model of one task: scikit-learn's parts and numbers, and their predictions from features.
 
 A row is judged by itself: alone, among a thousand or live, its verdict has the same bits.
 """

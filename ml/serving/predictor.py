@@ -1,4 +1,4 @@
-"""What a model says of robots: live, of many at once, and of a whole recording.
+"""Predictions for robots: live, of many at once, and of a whole recording.
 
 A decision is made at each grid point that is a multiple of `every_ns`, when the window before it has no gap.
 Live and over a recording the predictions are the same, bit by bit.

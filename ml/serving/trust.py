@@ -1,4 +1,4 @@
-"""How far a robot's predictions can be trusted: whether it is still like what its model has learned from."""
+"""Trust in a robot's predictions: whether its input still resembles the training data."""
 
 import collections
 from collections.abc import Iterable, Mapping

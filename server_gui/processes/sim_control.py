@@ -1,4 +1,4 @@
-"""How a simulator of ours is asked for faults and a start: its control socket, as `gwrms sim-fault` does."""
+"""Control of our simulator (faults and start) by its socket, as `gwrms sim-fault` does."""
 
 import os
 import socket

@@ -1,4 +1,4 @@
-"""What the program that records on this computer has learned from a robot's wearer, asked now and then."""
+"""Models that this computer's collector has adapted to a robot's wearer, polled now and then."""
 
 import time
 from collections.abc import Callable

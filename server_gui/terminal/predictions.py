@@ -1,4 +1,4 @@
-"""What models say, as text: of a robot that is followed, and of a session that was predicted again."""
+"""Predictions as text: of a robot that is followed, and of a session that was predicted again."""
 
 import itertools
 from collections.abc import Iterable, Iterator, Sequence

@@ -1,4 +1,4 @@
-"""What a run showed, added up: did the joints move, did the feet alternate, was anything lost."""
+"""Summary of a run: did the joints move, did the feet alternate, was anything lost."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field

@@ -1,4 +1,4 @@
-"""What models say of a robot, in marks and words for header and overview; also that they do not know."""
+"""Predictions about a robot, in marks and words for header and overview; *unknown* too."""
 
 import re
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""What the drivers of joints and sensors say by themselves, where no other finding explains it."""
+"""Problems reported by the drivers of joints and sensors, unless another finding explains them."""
 
 from collections.abc import Iterable, Iterator
 

@@ -1,4 +1,4 @@
-"""What `robot.describe` tells of buses, of findings and of the last EMCY."""
+"""The parts of `robot.describe` on buses, findings and the last EMCY."""
 
 from collections.abc import Iterable, Mapping
 from typing import cast

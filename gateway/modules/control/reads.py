@@ -1,4 +1,4 @@
-"""Whose objects are read next: a few objects of a few devices at a time, in turn between the clients.
+"""Fair order of reads: a few objects of a few devices at a time, in turn between the clients.
 
 Everything that a robot offers is a thousand transfers on its buses, and a client may ask for it again and
 again. So what is asked waits here as it was asked, and not as a thousand jobs before the devices: a write

@@ -1,4 +1,4 @@
-"""Why an object of a device cannot be written, and the lines of the robot's file that would allow it."""
+"""Reasons why an object cannot be written, and the lines of the robot's file that would allow it."""
 
 from collections.abc import Sequence
 from collections.abc import Set as AbstractSet

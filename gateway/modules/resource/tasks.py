@@ -1,4 +1,4 @@
-"""Which threads there are, what each has run and waited to run, and how it is scheduled: Linux's procfs.
+"""Threads of this computer: run time, waiting time and scheduling policy, from Linux's procfs.
 
 A look is one read a thread, of descriptors that stay open (proc(5); sched-stats.rst in the kernel's own
 documentation): a quarter of a millisecond for 130 threads.

@@ -1,4 +1,4 @@
-"""What a stop goes to, drives and controllers alike: each can be asked, and reports what is known then."""
+"""Targets of a stop, drives and controllers alike: each takes a request and reports."""
 
 import threading
 import time

@@ -1,4 +1,4 @@
-"""What every mode of operation is made of: set-points in, motion of the servo out, bits of the statusword."""
+"""The common parts of all modes of operation: set-points in, motion of the servo out, statusword bits."""
 
 from enum import IntEnum
 

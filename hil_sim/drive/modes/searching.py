@@ -1,4 +1,4 @@
-"""What each homing method looks for, search after search, and the motion of a search (CiA 402-2 §11)."""
+"""The searches of each homing method, and the motion of a search (CiA 402-2 §11)."""
 
 import math
 from collections.abc import Callable, Iterator

@@ -1,4 +1,4 @@
-"""What store and spool hold, looked at now and then in a thread; a store that is away is tried again."""
+"""Contents of store and spool, refreshed in a thread; an unreachable store is tried again."""
 
 import time
 from collections.abc import Mapping

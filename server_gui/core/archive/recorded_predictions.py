@@ -1,4 +1,4 @@
-"""What models said of a robot while it was recorded, from the store and from what waits in the spool."""
+"""Predictions during a recording, from the store and from pending batches of the spool."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

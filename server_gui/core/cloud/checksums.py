@@ -1,4 +1,4 @@
-"""Whether what arrived is what was sent: MD5 against the entity tag that an S3 service gives."""
+"""Checks of transfers: MD5 against the entity tag of an S3 service."""
 
 import hashlib
 import re

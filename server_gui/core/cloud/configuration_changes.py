@@ -1,4 +1,4 @@
-"""What was otherwise when another session began: parameters, firmware, EDS, calibration, models, wearer.
+"""Changes between two sessions: parameters, firmware, EDS, calibration, models, wearer.
 
 What one of the two sessions does not tell is *not recorded*: it is in a list of its own, and never taken for
 unchanged.

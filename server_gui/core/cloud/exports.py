@@ -1,4 +1,4 @@
-"""What was exported or copied on this desk: a list, so that it is found where a wearer is forgotten.
+"""List of exports and copies of this desk, so that they are found when a wearer is forgotten.
 
 A file of the list for each place, in the user's own data; whatever is made is noted before it is there.
 """

@@ -1,4 +1,4 @@
-"""Whether what receipts say is in the store: each batch's rows once, and as they were sent."""
+"""Comparison of receipts with the store: each batch's rows once, and as they were sent."""
 
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence, Set

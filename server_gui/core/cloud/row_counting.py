@@ -1,4 +1,4 @@
-"""What of the rows that receipts claim is in a store's files: how many, their sum, the sum of their names."""
+"""Counts and sums of the rows in a store's files that receipts claim."""
 
 import itertools
 from collections import defaultdict

@@ -1,4 +1,4 @@
-"""What waits in a spool that nobody records into, brought to a store; what keeps one batch keeps no other."""
+"""Upload of a spool without a collector; a problem of one batch does not stop the others."""
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager

@@ -1,4 +1,4 @@
-"""What verify has found: what was looked at, what is wrong with it, and how far it is proven."""
+"""Result of `verify`: the checks, the problems, and the extent of the proof."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

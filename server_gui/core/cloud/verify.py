@@ -1,4 +1,4 @@
-"""Whether everything is there: every file of every table, every row of each batch that the spool has sent."""
+"""Check for completeness: every file of every table, every row of each batch that the spool has sent."""
 
 import contextlib
 import sys

@@ -1,4 +1,4 @@
-"""What is compared before and after an edit: each metric, its unit, the better way, what is too small."""
+"""Metrics that are compared before and after an edit: unit, better direction, smallest relevant change."""
 
 from dataclasses import dataclass
 from enum import Enum

@@ -1,4 +1,4 @@
-"""Where an experiment stands, and what comes next: a table, states by events. What is not in it is ignored.
+"""State machine of an experiment: a table of states by events. Other events are ignored.
 
 Whatever happens after the first write ends in `OVER`, where the device was read to hold the original value
 and nothing is on trial, or in `NOT_CONFIRMED`, which is an error. There is no other way out.

@@ -1,4 +1,4 @@
-"""What an experiment will do, stated before it begins: values, order, how long each is held, its bounds.
+"""Plan of an experiment, stated before it begins: values, order, dwell times and bounds.
 
 An A/B trial is pairs of both values. Which of a pair comes first is drawn, evenly from `orders`: those in
 which neither value comes early, or at both ends, much more often than the other. A sweep goes from the value

@@ -1,4 +1,4 @@
-"""The stop rules: what ends an experiment, each in words. Nothing here asks the robot anything."""
+"""Stop rules of an experiment: the conditions that end it, in words. Nothing here queries the robot."""
 
 import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence

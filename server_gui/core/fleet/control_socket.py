@@ -1,4 +1,4 @@
-"""How a collector that runs is asked: a Unix socket in its spool's folder, one JSON line in, one out."""
+"""Control of a running collector: a Unix socket in its spool's folder, one JSON line in, one out."""
 
 import asyncio
 import contextlib

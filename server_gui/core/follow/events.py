@@ -1,4 +1,4 @@
-"""What a robot's feed tells: small frozen facts, handed from the network's thread to whoever shows them."""
+"""Events of a robot's feed: small frozen facts, handed from the network's thread to their consumers."""
 
 import dataclasses
 from collections.abc import Mapping

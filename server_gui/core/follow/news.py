@@ -1,4 +1,4 @@
-"""What happened, to any robot, newest first and bounded; what repeats is one item, faults go last."""
+"""News of all robots, newest first and bounded; repetitions are one item, faults are dropped last."""
 
 import collections
 import dataclasses

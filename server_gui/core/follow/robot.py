@@ -1,4 +1,4 @@
-"""What is known of one robot now, as plain state: events go in, views read it. No Qt, no threads."""
+"""Present state of one robot: events go in, views read it. No Qt, no threads."""
 
 import collections
 import time

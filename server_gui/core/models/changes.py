@@ -1,4 +1,4 @@
-"""What a promotion or a way back would change, said before it is done; done only while that is still so."""
+"""Effect of a promotion or rollback, shown before it is done; done only while it still holds."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What devices' objects hold: asked for while somebody looks, a few at a time, the oldest first.
+"""Reads of devices' objects while they are visible: a few at a time, the oldest first.
 
 Nothing is asked that nobody wants, one question is under way at a time, and `PERIOD_S` lies between two of
 them, so that a page full of rows costs a node a fraction of its SDO channel.

@@ -1,4 +1,4 @@
-"""What becomes of a wearer's own model: the table of its states, and what is told of it.
+"""Life of a wearer's own model: the table of its states, and their reports.
 
 One walk is learned from, tried beside the general model, offered, and taken back with a word. It belongs to a
 `Context`: the wearer who is named, the recording, the robot's boot, its link and the model that serves.

@@ -1,4 +1,4 @@
-"""What robots' feeds tell, on its way to the thread that predicts: in order, and bounded."""
+"""Queue from robots' feeds to the predicting thread: in order, and bounded."""
 
 import collections
 import threading

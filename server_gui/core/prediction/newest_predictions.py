@@ -1,4 +1,4 @@
-"""What models say of one robot, as the window shows it: the newest of each task, and the rules that hold."""
+"""Newest predictions about one robot for the window, by task, and the rules that hold."""
 
 import time
 from collections.abc import Mapping

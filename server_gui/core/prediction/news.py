@@ -1,4 +1,4 @@
-"""What prediction tells of a robot: small frozen facts, handed to whoever shows or keeps them."""
+"""News of predictions about a robot: small frozen facts, to be shown or recorded."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Where in the stride both legs were: known with hindsight, from one heel strike of a foot to its next."""
+"""True gait phases of both legs, in hindsight, from heel strike to heel strike."""
 
 import collections
 import statistics

@@ -1,4 +1,4 @@
-"""What was said against what labels say was so: the one way in which predictions are right or wrong."""
+"""Comparison of predictions with labels: the only measure of right and wrong."""
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence

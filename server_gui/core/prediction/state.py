@@ -1,4 +1,4 @@
-"""How prediction goes, for `gwrms collect --status` and whoever shows it; needs no scikit-learn."""
+"""Report on prediction, for `gwrms collect --status` and others; needs no scikit-learn."""
 
 from datetime import datetime
 from typing import Final

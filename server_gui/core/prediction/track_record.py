@@ -1,4 +1,4 @@
-"""How right the predictions of the last days were, as labels say that have come into the store."""
+"""Accuracy of the last days' predictions, by labels in the store."""
 
 import itertools
 from collections import Counter

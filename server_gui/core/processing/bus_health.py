@@ -1,4 +1,4 @@
-"""How a robot's CAN buses are: what is an alarm, what a warning, and who talks how much."""
+"""Health of a robot's CAN buses: alarms, warnings, and the load of each sender."""
 
 import re
 from collections.abc import Iterable, Iterator, Sequence

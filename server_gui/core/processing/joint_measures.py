@@ -1,4 +1,4 @@
-"""What one joint does: how far it moves, and how well it follows its target."""
+"""Measures of one joint: its range of motion, and its tracking error."""
 
 import collections
 import math

@@ -1,4 +1,4 @@
-"""Which channel feeds what: found by the channels' names, once for each set of columns."""
+"""Inputs of the processing, found by the channels' names, once for each set of columns."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What comes from robots, gathered into runs and events: pure, for the recorder's thread."""
+"""Gathering of robots' data into runs and events: pure, for the recorder's thread."""
 
 import itertools
 import uuid

@@ -1,4 +1,4 @@
-"""What can go wrong while recording.
+"""Errors of recording.
 
 RecordingError
 └── SpoolUnusable   the spool's folder or one of its files cannot be used; says what to do

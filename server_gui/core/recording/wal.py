@@ -1,4 +1,4 @@
-"""What SQLite would pass over in silence: commits in a write-ahead log behind a place that is damaged.
+"""Commits in a write-ahead log behind damage, which SQLite would skip silently.
 
 A log is read up to the first frame whose checksum is wrong, as if nothing had followed. Where frames of the
 same log follow, they were written, and all but the last commit of them had been synchronised. The last one

@@ -1,4 +1,4 @@
-"""What a window can ask of one robot; tests bring their own."""
+"""Requests of a window to one robot; tests bring their own."""
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future

@@ -1,4 +1,4 @@
-"""Whether a value is in a device's flash: only where the journal shows it; a drive cannot be asked."""
+"""Presence of a value in a device's flash: by the journal only; a drive cannot be asked."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What became of a STOP: sent, then confirmed by every drive, or NOT CONFIRMED. Silence is never success."""
+"""Progress of a STOP: sent, then confirmed by every drive, or NOT CONFIRMED. Silence is never success."""
 
 import time
 from collections.abc import Collection, Iterable, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""How two robots, or a robot and a recording, come onto one axis of time."""
+"""Alignment of two robots, or a robot and a recording, on one axis of time."""
 
 from enum import Enum
 from typing import Final

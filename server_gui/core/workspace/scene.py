@@ -1,4 +1,4 @@
-"""What the signals show of one robot now: the rows that come, or those that were kept; beside another's."""
+"""The signals of one robot as shown: live or frozen rows, beside another robot's."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Which curves are in which plot; what cannot share an axis is refused, and says why."""
+"""Assignment of curves to plots; curves that cannot share an axis are refused, with the reason."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field

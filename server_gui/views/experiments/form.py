@@ -1,4 +1,4 @@
-"""What is to be tried: a parameter, its values, how long each is held; said whole before it begins."""
+"""Form for an experiment: a parameter, its values and dwell times; the plan is shown before it begins."""
 
 import random
 from typing import Final, NamedTuple

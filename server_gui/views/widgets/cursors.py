@@ -1,4 +1,4 @@
-"""What is drawn above a plot's curves: limits, flags of what happened, hover line, cursors, a box."""
+"""Overlay of a plot: limits, flags of events, hover line, cursors, a box."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
