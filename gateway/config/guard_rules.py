@@ -59,13 +59,15 @@ class Blind(StrEnum):
 
 
 class GuardRule(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What every rule has. `on` are globs of components; without them, all that have what is watched."""
+    """The common keys of all rules."""
 
-    watch: str
-    on: Annotated[tuple[str, ...], Meta(min_length=1)] | None = None
-    actions: Annotated[tuple[Action, ...], Meta(min_length=1)] = (Action.ALARM,)
-    blind: Blind = Blind.ALARM
-    clear_s: Positive = 1.0  # how long all must be well again before it is over
+    watch: str  # kind of the rule
+    on: Annotated[tuple[str, ...], Meta(min_length=1)] | None = (
+        None  # globs of components; None: all with the input
+    )
+    actions: Annotated[tuple[Action, ...], Meta(min_length=1)] = (Action.ALARM,)  # when it trips
+    blind: Blind = Blind.ALARM  # reaction to a missing input
+    clear_s: Positive = 1.0  # time without trouble until it is over
 
     def words(self, unit: str, /) -> str:
         """Return the condition on which it trips; `unit` is that of the watched quantity."""
