@@ -47,7 +47,7 @@ class LssRefusal(DriverError):
 
 
 class NotPermitted(DriverError):
-    """What may not be written now was not sent."""
+    """The write is not allowed now, and was not sent."""
 
 
 class Mismatch(DriverError):

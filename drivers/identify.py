@@ -20,7 +20,7 @@ NUMBERS_LINE = re.compile(rb"[ \t]*[^,;\t\r\n]{0,24}([,;\t]" + NUMBER_OR_FOOT + 
 
 @dataclass(frozen=True, slots=True)
 class Match:
-    """How well a format explains some bytes."""
+    """Match of a format with some bytes."""
 
     format_name: str
     layout: str | None  # the shipped layout whose description fits, for insole formats that need one

@@ -14,7 +14,7 @@ F = TypeVar("F")
 
 
 class Counters(msgspec.Struct):
-    """What a parser has seen since it was made."""
+    """Counters of a parser since it was made."""
 
     frames: int = 0  # valid ones
     bytes_dropped: int = 0  # bytes that are part of no valid frame
@@ -30,7 +30,7 @@ class Counters(msgspec.Struct):
 
 
 class Parser(Protocol[F]):
-    """What a serial device needs of a format."""
+    """Interface of a format's parser for a serial device."""
 
     @property
     def counters(self) -> Counters: ...

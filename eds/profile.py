@@ -43,7 +43,7 @@ class ProfileObject:
 
 @dataclass(frozen=True, slots=True)
 class Quirk:
-    """What a product does otherwise than others, and what follows from it."""
+    """A product's deviation from the standard, and its consequence."""
 
     text: str
     source: str

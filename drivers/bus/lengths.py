@@ -7,7 +7,7 @@ WITHIN_S = 10.0
 
 
 class Lengths:
-    """Of one PDO with at least `size` bytes, as it was read; `remapped` is called once."""
+    """Length check of one PDO with at least `size` bytes, as it was read; `remapped` is called once."""
 
     def __init__(self, size: int, remapped: Callable[[], object]) -> None:
         self.usual = 0  # of the first frame that held it all; some devices send more bytes than are mapped

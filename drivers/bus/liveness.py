@@ -16,7 +16,7 @@ SHORTEST_S = 0.02  # that is learned
 
 
 class LifeListener(Protocol):
-    """Who is told at once what a node says; in the bus's thread: returns at once, never raises."""
+    """Listener to a node's messages; in the bus's thread: returns at once, never raises."""
 
     def on_emcy(self, emcy: Emcy) -> None: ...
 

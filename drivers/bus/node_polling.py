@@ -22,7 +22,7 @@ def _ask_type(sdo: SdoChannel) -> None:
 
 
 class Asking:
-    """Of one node, by `tick` of the bus's thread; node guarding where `guard_s`, its period, is given."""
+    """Polling of one node, by `tick` of the bus's thread; node guarding if `guard_s`, its period, is set."""
 
     def __init__(
         self, bus: CanBus, node_id: int, life: NodeLife, worker: SdoWorker, guard_s: float | None

@@ -44,7 +44,9 @@ class CanSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
 
     interface: str  # python-can's name: "socketcan", "socketcand", "virtual", "slcan", …
     channel: str | int  # such as "can0"; its form depends on the interface
-    bitrate: Annotated[int, msgspec.Meta(ge=1_000, le=1_000_000, extra={"unit": "bit/s"})] | None = None
+    bitrate: Annotated[int, msgspec.Meta(ge=1_000, le=1_000_000, extra={"unit": "bit/s"})] | None = (
+        None  # the gateway checks it
+    )
     sync_period_s: Seconds | None = None  # period of the SYNC that the gateway sends; master only
     node_id: NodeId | None = None  # the gateway's own, for its heartbeat
     heartbeat_s: Seconds | None = None  # period of the gateway's heartbeat; master only

@@ -25,7 +25,7 @@ class QuantitySource:
 
 @dataclass(frozen=True, slots=True)
 class ReadPlan:
-    """How a joint is read, and what an integrator should know about it."""
+    """Sources of a joint's values, and notes for the integrator."""
 
     decoders: tuple[tuple[Tpdo, Decoder], ...]
     polled_often: tuple[QuantitySource, ...]  # position and statusword that no TPDO brings

@@ -18,7 +18,7 @@ from drivers.scan.traffic import Traffic
 
 @dataclass(frozen=True, slots=True)
 class BusSurvey:
-    """What was heard on a bus in `seconds`."""
+    """Observations of a bus over `seconds`."""
 
     bus: str
     seconds: float

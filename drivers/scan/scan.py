@@ -18,7 +18,7 @@ NODES = range(1, 128)
 
 @dataclass(frozen=True, slots=True)
 class ScanResult:
-    """What a bus has told. `told` are the nodes that answered, or why one that did could not be read."""
+    """Result of a scan. `told` has each node's answers, or the reason why it could not be read."""
 
     seconds: float
     traffic: Traffic

@@ -14,7 +14,7 @@ from drivers.trace.files import Captured
 
 @dataclass(frozen=True, slots=True)
 class Share:
-    """What one kind of one node takes; `percent` is `None` where the bit rate is not known."""
+    """Share of one kind of frame of one node; `percent` is `None` without a known bit rate."""
 
     kind: str
     node_id: int | None

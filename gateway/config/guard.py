@@ -36,7 +36,7 @@ TABLES: Mapping[str, str] = {
 
 @dataclass(frozen=True, slots=True)
 class WatchedBy:
-    """What a rule of this name watches, and what it needs for that."""
+    """A kind of rule: its condition, and the inputs that it needs."""
 
     trips: str  # when, in words; `code` stands for its keys
     rule: type[GuardRule]

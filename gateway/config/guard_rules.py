@@ -43,7 +43,7 @@ SIDED: Mapping[str, tuple[ComponentKind, str]] = {
 
 
 class Action(StrEnum):
-    """What a rule that trips leads to; in this order."""
+    """Consequences of a tripped rule; in this order."""
 
     QUICK_STOP = "quick_stop"  # on every drive, held until it is reset
     REVERT_TRIALS = "revert_trials"  # what was written on trial is taken back
@@ -52,7 +52,7 @@ class Action(StrEnum):
 
 
 class Blind(StrEnum):
-    """What a rule does that cannot see what it watches."""
+    """Reaction of a rule to a missing input."""
 
     ALARM = "alarm"
     ACT = "act"  # as if it had tripped

@@ -40,7 +40,7 @@ _NOTHING_YET = b"\r\n\0"  # of these UTF-16 and UTF-32 have the last before the 
 
 
 class ReceivedBytes:
-    """What one read has brought, on its way to the loop."""
+    """Bytes of one read, on their way to the loop."""
 
     __slots__ = ("cpu_ns", "ended", "lines", "lost", "refusals", "stamp_ns", "stop", "stopped", "stops")
 

@@ -15,7 +15,7 @@ FLOOD_S = 0.05  # … and is read again so much later: as many more are given to
 
 
 class RateLimit(TimeSharing):
-    """What the clients of an intake share of its thread; those that are not known yet take turns."""
+    """Shares of an intake's thread; clients that are not known yet take turns."""
 
     def __init__(self, front: Loop) -> None:
         super().__init__(front, TURN_NS)
@@ -35,7 +35,7 @@ class RateLimit(TimeSharing):
 
 
 class Account:
-    """What one client has cost of the thread just now, and which of its stops are not forgotten yet."""
+    """One client's recent cost for the thread, and its stops that still count."""
 
     def __init__(self) -> None:
         self.owed_ns = 0  # of the thread's time

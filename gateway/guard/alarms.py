@@ -20,7 +20,7 @@ STATE_WORDS = {int(state): state.words for state in RuleState}
 
 
 class Append(Protocol):
-    """How an entry gets into the journal."""
+    """Function that appends an entry to the journal."""
 
     def __call__(self, who: str, what: str, /, **details: Any) -> object: ...
 

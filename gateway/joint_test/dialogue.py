@@ -98,7 +98,7 @@ class Test:
 
 @dataclass(frozen=True, slots=True)
 class DriveFacts:
-    """What is known of the drive before it has power."""
+    """Facts about the drive before it has power."""
 
     angle: float
     period_s: float

@@ -44,7 +44,7 @@ READ_S = 30.0  # for its parameters to be read
 
 @dataclass(frozen=True, slots=True)
 class JointTestPlan:
-    """What is to be done, within which limits, SYNC by SYNC."""
+    """Plan of a test: motion and limits, SYNC by SYNC."""
 
     wish: Wish
     limits: JointTestLimits
@@ -55,7 +55,7 @@ class JointTestPlan:
 
 @dataclass(frozen=True, slots=True)
 class DriveSample:
-    """What the drive told after one SYNC; `None` where its PDOs do not bring it."""
+    """The drive's values after one SYNC; `None` for those that its PDOs lack."""
 
     sync_ns: int
     stamp_ns: int

@@ -10,7 +10,7 @@ from gateway.wire.parameter import ParameterInfo, ParameterValue
 
 
 class ComparisonVerdict(StrEnum):
-    """What becomes of one parameter when the file is applied."""
+    """Effect of applying the file on one parameter."""
 
     SAME = "same"
     DIFFERENT = "different"  # and may be written

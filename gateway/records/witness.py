@@ -21,7 +21,7 @@ from gateway.wire.control import SignedHead
 
 
 class WitnessVerdict(StrEnum):
-    """What is known of a journal."""
+    """Result of checking a journal."""
 
     INTACT = "intact"  # every entry is the one that a witness has seen
     BROKEN = "broken"
@@ -30,7 +30,7 @@ class WitnessVerdict(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """Of a journal; `at` is the first entry that is wrong, or of which that is not known."""
+    """Result for a journal; `at` is the first wrong or unproven entry."""
 
     verdict: WitnessVerdict
     text: str

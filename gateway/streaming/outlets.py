@@ -48,7 +48,7 @@ def encode_batch(
 
 
 class Rate(Protocol):
-    """What a feed gives: of the rows that are asked for, one of `shed`."""
+    """Rate of a feed: of the requested rows, one of `shed`."""
 
     rate_hz: float
     channels: int

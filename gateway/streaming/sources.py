@@ -46,7 +46,7 @@ class Selection:
 
 
 class Wanted:
-    """What names and globs mean, in time that does not grow with how many names there are.
+    """Set of names and globs, with lookups whose time does not grow with their number.
 
     Raises:
         RpcError: bad_params, where there are more of them than anybody needs.

@@ -8,7 +8,7 @@ from typing import Any
 
 
 class Severity(StrEnum):
-    """How bad it is."""
+    """Severity of a finding."""
 
     MISTAKE = "mistake"  # the file is refused
     WARNING = "warning"  # it can be used, and is likely not what was meant, or something is not there yet

@@ -4,7 +4,7 @@ from enum import StrEnum
 
 
 class Role(StrEnum):
-    """Of a person or program; a stop is for all of them."""
+    """Role of a person or program; every role may stop."""
 
     VIEWER = "viewer"  # looks, and stops
     OPERATOR = "operator"  # takes the lease, writes, tries

@@ -49,7 +49,7 @@ def warning(servo: Servo, supply_v: float) -> bool:
 
 
 class FollowingErrorWatch:
-    """How long the joint has been further from its reference than 6065h allows."""
+    """Timer of a following error beyond 6065h."""
 
     def __init__(self) -> None:
         self.late_s = 0.0

@@ -17,7 +17,7 @@ _MACHINE_KG = 16.0
 
 @dataclass(frozen=True, slots=True)
 class Habit:
-    """What one joint of a subject adds to the common curve (rad): an offset, two harmonics of the stride."""
+    """A subject's deviation in one joint (rad): an offset, two harmonics of the stride."""
 
     offset: float = 0.0
     first: float = 0.0

@@ -20,7 +20,7 @@ _SHARE = 0.1  # of a window that may be lost
 
 @dataclass(frozen=True, slots=True)
 class Loss:
-    """What was lost in the look that ended at `time_s` (simulated)."""
+    """Time lost before `time_s` (simulated), since the last check."""
 
     time_s: float
     simulator_s: float

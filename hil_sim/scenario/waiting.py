@@ -9,7 +9,7 @@ _DELAY = (
 
 
 class Waiting:
-    """Of the process `pid`, thread by thread."""
+    """Waiting time of the process `pid`, thread by thread."""
 
     def __init__(self, pid: int, proc: Path = Path("/proc")) -> None:
         self._tasks = proc / str(pid) / "task"

@@ -23,7 +23,7 @@ class Outcome:
 
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """What a figure should reach, and what would be better still."""
+    """Goal of a figure, and a stretch goal beyond it."""
 
     limit: float
     at_most: bool = False

@@ -39,7 +39,7 @@ Flags = npt.NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True)
 class Variant:
-    """Which sensors a robot has, and whether they are those that were learned from."""
+    """Sensors of a robot, and whether they are as in training."""
 
     name: str  # before the names of its figures; "" for the whole robot
     groups: tuple[str, ...]

@@ -15,7 +15,7 @@ CHUNK: Final = 256  # windows computed together: they stay in the processor's ca
 
 @dataclass(frozen=True, slots=True)
 class Recipe:
-    """What a model wants to know.
+    """Input of a model.
 
     `compute` takes windows (n, channels, look-back) in SI units, the newest sample last, and returns
     (n, features). A row depends on its own window alone, so that one window alone, a thousand together and

@@ -50,7 +50,7 @@ class Pointer(Struct, frozen=True):
 
 
 class RollbackTarget(NamedTuple):
-    """Where a rollback goes: the number that it writes, a model or "", and what is before that."""
+    """Target of a rollback: the number that it writes, a model or "", and the one before that."""
 
     number: int
     model: str

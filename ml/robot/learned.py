@@ -26,7 +26,7 @@ ABNORMAL_FROM: Final = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Verdicts:
-    """What is judged of n rows.
+    """Output for n rows.
 
     `probabilities` (n, classes) are calibrated. `label` (n,) is an index into the classes, or NONE where the
     model abstains. `novelty` (n,) is 0 for what is as in learning; abnormal begins at ABNORMAL_FROM.

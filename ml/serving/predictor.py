@@ -21,7 +21,7 @@ Row = tuple[int, Sequence[float | None]]  # stamp, ns; values in the order of th
 
 @dataclass(frozen=True, slots=True)
 class Prediction:
-    """What `model` makes of the window that ended at `stamp_ns` of the robot's monotonic clock.
+    """Output of `model` for the window that ended at `stamp_ns` of the robot's monotonic clock.
 
     `label` is a class of the task, UNKNOWN where the model abstains, ABNORMAL where it has learned from
     nothing like this. `probability` is the likeliest class's, also then. `novelty` is 0 for what is as in
@@ -43,7 +43,7 @@ class Prediction:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Window:
-    """What a decision is due about: (1, channels, look-back) samples, the newest at `stamp_ns`."""
+    """Input of a due decision: (1, channels, look-back) samples, the newest at `stamp_ns`."""
 
     stamp_ns: int
     samples: Samples

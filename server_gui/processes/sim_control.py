@@ -41,7 +41,7 @@ class Listed(msgspec.Struct, frozen=True):
 
 
 class SimControl:
-    """Of the simulator that runs in `folder`; each call waits for its answer.
+    """Control of the simulator in `folder`; each call waits for its answer.
 
     Raises:
         SimulatorRefuses: by every call.

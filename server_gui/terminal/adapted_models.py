@@ -25,7 +25,7 @@ class _Predicting(msgspec.Struct, frozen=True):
 
 
 class _Report(msgspec.Struct, frozen=True):
-    """Of what a collector tells, what matters here."""
+    """The needed part of a collector's report."""
 
     robots: dict[str, _Link] = {}
     prediction: _Predicting | None = None

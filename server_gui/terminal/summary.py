@@ -29,7 +29,7 @@ class Range:
 
 @dataclass(slots=True)
 class Foot:
-    """How often one foot was loaded."""
+    """Load statistics of one foot."""
 
     rows: int = 0
     loaded: int = 0

@@ -15,7 +15,7 @@ BASE_POINTS: Final = 9.0
 
 
 class Look(Enum):
-    """Which palette."""
+    """Palette."""
 
     DARK = "dark"
     LIGHT = "light"

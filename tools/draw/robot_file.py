@@ -55,8 +55,9 @@ _TABLES: Final[tuple[tuple[str, type[Struct], tuple[str, ...]], ...]] = (
 )
 _NODE: Final = "Shipped EDS files: [sources](../../eds/files/SOURCES.md)."
 _GATEWAY: Final = """With the role `observer`, another controller owns the buses: the gateway sends only
-requested SDOs, a stop, and the guard's heartbeat. As `master`, on a bench, it also starts nodes, and sends SYNC and a
-heartbeat if configured for the bus. Before you change `host`, read [security](../../SECURITY.md).
+requested SDOs, a stop, and the guard's heartbeat. As `master`, on a bench, it also starts
+nodes, and sends SYNC and a heartbeat if configured for the bus.
+Before you change `host`, read [security](../../SECURITY.md).
 `linger_s` and `max_cpu_percent` are explained in [measure the cost](../how-to/measure-the-cost.md).
 `classic_port` is for comparison with [the paper](../explanation/paper.md)."""
 _PARAMETER: Final = (
@@ -64,8 +65,8 @@ _PARAMETER: Final = (
 )
 _MAKER: Final = "[vendor-specific objects](../how-to/wire-a-joint.md#vendor-specific-objects)"
 _CHANNEL: Final = f"""The channel is named `COMPONENT.NAME`, of a joint or a device, and has the type of its
-object in the EDS. It is read from a TPDO of the node if one brings it, else by SDO at `poll_hz`. This is how a device
-gets channels, and a joint {_MAKER}."""
+object in the EDS. It is read from a TPDO of the node if one brings it, else by SDO at
+`poll_hz`. This is how a device gets channels, and a joint {_MAKER}."""
 _RULE: Final = "Every rule has these keys, and those of its kind: [the table of rules](guard.md#rules)."
 _MORE: Final[Mapping[str, str]] = {
     "`[gateway]`": _GATEWAY,

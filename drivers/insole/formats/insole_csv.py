@@ -27,7 +27,7 @@ COMMON_FEET = ("foot", "side")
 
 @dataclass(frozen=True, slots=True)
 class Columns:
-    """Where in a line everything is."""
+    """Places of all values in a line."""
 
     width: int | None  # None: the line may have any
     cells: Mapping[Foot | None, tuple[int, ...]]

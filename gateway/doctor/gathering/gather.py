@@ -26,7 +26,7 @@ OTHER = "the gateway goes by another file than this one"
 
 @dataclass(frozen=True, slots=True)
 class How:
-    """How to look: for how long, by which gateway, and what may be sent where there is none."""
+    """Options of the observation: duration, gateway, and what may be sent without one."""
 
     seconds: float = 20.0
     gateway: Address | None = None  # None: nobody is asked

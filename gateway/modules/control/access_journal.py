@@ -20,7 +20,7 @@ log = logging.getLogger(__name__)
 
 
 class Admission(Struct, frozen=True):
-    """What the journal says of one: their role, and the SHA-256 of their certificate, if they come by one."""
+    """A client in the journal: its role, and the SHA-256 of its certificate, if it has one."""
 
     role: Role
     key: str | None = None
@@ -30,7 +30,7 @@ People = Mapping[str, Admission]  # by `client NAME`, `user NAME` or `group NAME
 
 
 class AccessJournal:
-    """What was told last is kept beside the journal; an entry comes first, so that none is ever lost."""
+    """Journal of admissions. The last state is kept beside the journal; entries come first: none is lost."""
 
     def __init__(self, records: Records, folder: AccessFolder) -> None:
         self._folder = folder

@@ -24,7 +24,7 @@ SLOW_S: Final = 0.2  # a device that takes longer for these
 
 
 class Named(Protocol):
-    """What is read: a parameter, or an object."""
+    """An object to read: a parameter, or any other."""
 
     @property
     def name(self) -> str: ...

@@ -29,7 +29,7 @@ class WriteRefusal:
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Where the robot's file describes a component: its header, and what it says."""
+    """Table of a component in the robot's file: its header and settings."""
 
     component: str
     header: str

@@ -29,7 +29,7 @@ LOCKED = "it stops a controller, and a stop is held: reset it first"
 
 @dataclass(frozen=True, slots=True)
 class Permit:
-    """What one write may do: everything that it may when it is asked for, until the next stop."""
+    """Permission of one write: as of its request, until the next stop."""
 
     authority: "Authority"
     asked_ns: int  # when it came in

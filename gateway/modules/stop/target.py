@@ -13,7 +13,7 @@ from gateway.process.futures import pass_on
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """What is known about one target, and which fallback was carried out on it, in words."""
+    """Report on one target, with the fallback that was carried out, in words."""
 
     outcome: StopOutcome
     fallback: str | None = None

@@ -80,7 +80,7 @@ class Mode:
 
 
 class Dwell:
-    """Whether an error has stayed within a window for the window's time."""
+    """Timer for an error that stays within a window for the window's time."""
 
     def __init__(self) -> None:
         self._inside_s = 0.0

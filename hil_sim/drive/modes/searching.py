@@ -12,7 +12,7 @@ from hil_sim.drive.settings import Settings
 
 
 class Until(Enum):
-    """What ends a search."""
+    """End of a search."""
 
     SWITCH_CLOSED = "the limit switch behind which the search began or to which it goes is closed"
     SWITCH_OPEN = "it is open again"

@@ -26,7 +26,7 @@ AGAIN_S: Final = 5.0  # before a store that was away is tried again
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """What a look has found; `problem` says why the store's part is missing, in words."""
+    """Sessions of store and spool; `problem` is the reason, in words, if the store's part is missing."""
 
     sessions: tuple[Session, ...] = ()  # newest first
     usage: tuple[Usage, ...] = ()

@@ -22,7 +22,7 @@ _numbers = msgspec.json.Decoder(dict[str, float])
 
 @dataclass(frozen=True, slots=True)
 class PastPrediction:
-    """What a model said of the window that ended at `utc_ns`."""
+    """A model's prediction for the window that ended at `utc_ns`."""
 
     utc_ns: int
     prediction: Prediction

@@ -22,7 +22,7 @@ from server_gui.core.settings.server_file import exports_folder
 
 
 class ExportState(Enum):
-    """Of an exported file or a copy, when it is looked for again."""
+    """State of an exported file or a copy, at the next check."""
 
     AS_MADE = "as it was made"
     CHANGED = "has changed since, or was not ended"

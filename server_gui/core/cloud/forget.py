@@ -41,7 +41,7 @@ class CannotForget(Exception):
 
 @dataclass(frozen=True, slots=True)
 class ErasurePlan:
-    """What there is of somebody: sessions, rows in the store by location, and what else has some of them."""
+    """Data of a wearer: sessions, rows in the store by location, and other places with some of them."""
 
     sessions: Sequence[Name]
     rows: Mapping[str, int]
@@ -172,7 +172,7 @@ def proof(store: Store, spool: Path, known: ErasurePlan) -> list[str]:
 
 
 class _Begun(msgspec.Struct, frozen=True):
-    """What is being removed, for whoever goes on: when the tables do not tell it any more."""
+    """A removal in progress, for its continuation: the tables may not show it any more."""
 
     wearer_sha256: str
     sessions: list[Name]

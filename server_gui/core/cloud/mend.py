@@ -38,7 +38,7 @@ from server_gui.core.recording.upload import Sent, upload
 
 @dataclass(frozen=True, slots=True)
 class RepairPlan:
-    """What is to be done: files to take out, second copies to bring again, what nobody can bring."""
+    """Plan of a repair: files to take out, second copies to restore, and rows that are lost."""
 
     files: Sequence[DataFile]
     batches: Sequence[int]
@@ -55,7 +55,7 @@ class RepairPlan:
 
 @dataclass(frozen=True, slots=True)
 class Mended:
-    """What was done, and in words what could not be done."""
+    """Result of a repair, with its failures in words."""
 
     files: Sequence[DataFile]
     batches: Sequence[int]

@@ -34,7 +34,7 @@ _MINUTE: Final = timedelta(minutes=1)  # what marks are apart, if they are not l
 
 @dataclass(slots=True)
 class Proof:
-    """What was proven; `problems` name what was not, in words."""
+    """Result of the proof; `problems` are its failures, in words."""
 
     here: int = 0  # batches with a receipt of this store
     batches: int = 0  # of them, those that were found as they were sent

@@ -18,7 +18,7 @@ from server_gui.core.recording.upload import ahead, lost_batches, send
 
 @dataclass(frozen=True, slots=True)
 class Emptied:
-    """What was done; in words what is lost, what waits and why, and what else is to be known."""
+    """Result of emptying a spool: losses, pending batches with reasons, and remarks, in words."""
 
     url: str
     uploaded: int

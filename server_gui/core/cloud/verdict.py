@@ -10,7 +10,7 @@ from server_gui.core.cloud.receipt_check import Proof
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """What was looked at, and in words what is wrong with it."""
+    """The checked files, and their problems in words."""
 
     files: Sequence[DataFile]
     proof: Proof

@@ -6,7 +6,7 @@ from typing import Final
 
 
 class Better(Enum):
-    """Which way of a metric is the better one; of some nobody can say without the wearer."""
+    """Better direction of a metric; unknown for some without the wearer."""
 
     LESS = "less"
     NEARER = "nearer to zero"  # of what may be on either side of it

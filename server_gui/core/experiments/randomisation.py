@@ -25,7 +25,7 @@ TINY: Final = 1e-9  # of what binary fractions leave of nothing
 
 @dataclass(frozen=True, slots=True)
 class Randomised:
-    """Of each metric: the second value's minus the first's, its interval, p for all metrics together."""
+    """Results by metric: difference second minus first, its interval, p adjusted for all metrics."""
 
     difference: Floats
     low: Floats

@@ -15,7 +15,7 @@ _NUMBER: Final = re.compile(r"\b\d+(\.\d+)?(?= ?(?:s|ms|%|°)(?:\W|$))")
 
 
 class NewsKind(Enum):
-    """What sort of thing happened; the word is shown."""
+    """Kind of news; the word is shown."""
 
     LINK = "LINK"
     STATE = "STATE"

@@ -51,7 +51,7 @@ class FollowedComponent:
 
 @dataclass(slots=True)
 class LinkStatus:
-    """How the robot is reached, and how well."""
+    """State and quality of the link to the robot."""
 
     state: ConnectionState = ConnectionState.IDLE
     problem: str | None = None

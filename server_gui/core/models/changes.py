@@ -23,7 +23,7 @@ UNPROMOTED: Final = "no promoted model; until then a robot is served by what cam
 
 @dataclass(frozen=True, slots=True)
 class ModelChange:
-    """Of what serves one robot, or all ("") that have no model of their own; None: no promoted model."""
+    """Change of the model that serves one robot, or all ("") without their own; None: no promoted model."""
 
     task: str
     robot: str

@@ -24,7 +24,7 @@ Object = tuple[str, str]  # component, and address such as 0x6041:0
 
 @dataclass(frozen=True, slots=True)
 class ReadValue:
-    """What the device said; as old as the question (our monotonic clock, and UTC for files)."""
+    """A device's answer, with the time of the request (our monotonic clock, and UTC for files)."""
 
     told: ObjectValue
     at_ns: int

@@ -38,7 +38,7 @@ BY_EDS: Final = "EDS default"
 
 
 class RowKind(Enum):
-    """What of a device is shown."""
+    """Filter of a device's objects."""
 
     ALL = "All"
     PARAMETERS = "Parameters"

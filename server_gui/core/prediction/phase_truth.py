@@ -29,7 +29,7 @@ class Instant:
 
 
 class PhaseTruth:
-    """Of one robot; strides that are not plausible tell nothing."""
+    """True phases of one robot; implausible strides are ignored."""
 
     def __init__(self) -> None:
         self._processing = ComponentProcessing()

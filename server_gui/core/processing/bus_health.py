@@ -25,7 +25,7 @@ NUMBER: Final = re.compile(r"(?<![\w.])\d+(?:\.\d+)?(?![\w.])")
 
 
 class BusHealthLevel(Enum):
-    """How bad it is; what is not known is none of the others."""
+    """Severity; unknown is none of the others."""
 
     GOOD = "ok"
     UNKNOWN = "not known"

@@ -29,7 +29,7 @@ class Extremes:
 
 @dataclass(frozen=True, slots=True)
 class Error:
-    """How well a joint follows its target, over the last two seconds (rad)."""
+    """Tracking error of a joint, over the last two seconds (rad)."""
 
     rms: float
     largest: float

@@ -25,4 +25,4 @@ class Contradicted(Damaged):
 
 
 class NotKept(SpoolUnusable):
-    """What was to be kept cannot be written into any file, whatever the disk does."""
+    """The data cannot be written into any file, whatever the disk does."""

@@ -53,7 +53,7 @@ def lost_commits(log: Path, page_bytes: int) -> int:
 
 
 class _Place(NamedTuple):
-    """Where in a log a commit ends: with which of its frames, counted from 1."""
+    """Place of a commit's end in a log: the frame, counted from 1."""
 
     frame: int
     salts: Pair

@@ -35,7 +35,7 @@ class PredictionSettings(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Action(Enum):
-    """What a rule does."""
+    """Action of a rule."""
 
     ALARM = "alarm"  # says so, and records it
     STOP = "stop"  # also asks the robot's gateway to stop every drive

@@ -47,7 +47,7 @@ class SettingsError(ValueError):
 
 
 class Upload(Enum):
-    """When what is recorded goes to the store."""
+    """Time of uploads."""
 
     ALWAYS = "always"  # a batch at a time, as soon as each is full
     IDLE = "idle"  # while no robot sends, or before the spool takes too much of the disk

@@ -99,7 +99,7 @@ _EFFECTS: Final[Mapping[str, Callable[[_Reading, Entry], None]]] = {
 
 
 class Flash:
-    """What of a robot's parameters is known to be stored.
+    """Stored parameters of a robot, as far as known.
 
     Looks at its components tell since when, on our clock, each device is seen without a boot-up; one that is
     not seen may have had one.

@@ -14,7 +14,7 @@ HELD_BY = frozenset({"stop", "stop still held"})  # entries of the journal
 
 
 class StopState(Enum):
-    """Where the latest STOP stands."""
+    """State of the latest STOP."""
 
     IDLE = "no stop was sent"
     SENT = "sent"

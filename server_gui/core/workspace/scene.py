@@ -32,7 +32,7 @@ FAULT: Final = "fault"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frozen:
-    """What a view that stands still goes on showing; `columns` by the texts of curves."""
+    """Frozen contents of a view; `columns` by the texts of curves."""
 
     times: Floats
     columns: Mapping[str, Floats]

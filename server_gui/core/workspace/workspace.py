@@ -12,7 +12,7 @@ MOST_PLOTS: Final = 12
 
 
 class Refused(Exception):
-    """What cannot be put there; the message says why, and what can be done."""
+    """A curve cannot be placed there; with the reason, and the alternatives."""
 
 
 @dataclass(slots=True)

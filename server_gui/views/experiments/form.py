@@ -49,7 +49,7 @@ USUAL: Final = "twice what is usual"
 
 
 class Tried(NamedTuple):
-    """What was on trial: a parameter, the value from before, and the one that was tried (SI)."""
+    """A trial: a parameter, the value before, and the one on trial (SI)."""
 
     parameter: str
     before: float

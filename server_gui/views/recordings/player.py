@@ -41,7 +41,7 @@ SLOW: Final = 5  # frames between two looks at what people read
 
 
 class Player(QWidget):
-    """Of the archive's playback; `left` when somebody wants back to the list."""
+    """Player of the archive's playback; `left` is emitted to return to the list."""
 
     left = Signal()
 
