@@ -19,6 +19,8 @@ from server_gui.core.prediction.current import ShownDanger
 from server_gui.core.processing import bus_health
 from server_gui.core.tuning.stop import StopProgress, StopState
 
+EVERY_OFF: Final = "every drive is off"
+OFF: Final = frozenset({"switch on disabled"})
 MOVES: Final = 0.1  # rad/s: what turns faster is not at rest
 SOON_NS: Final = 3_000_000_000  # for so long a link without a row is nothing strange
 _QUICK_STOP: Final = "quick stop active"
@@ -96,9 +98,8 @@ def _of_stop(robot: Robot, stopping: StopProgress) -> Iterator[Alarm]:
             aside=by,
         )
     elif stopping.was_ended and not any_enabled(robot):
-        yield Alarm(
-            Kind.RESET, "", "every drive is off", check=check_of(Kind.RESET), since_s=stopping.since_s
-        )
+        what = EVERY_OFF if set(_words(robot).values()) <= OFF else _drives_did(robot) or EVERY_OFF
+        yield Alarm(Kind.RESET, "", what, check=check_of(Kind.RESET), since_s=stopping.since_s)
 
 
 def remedy(robot: Robot) -> str:
@@ -110,7 +111,10 @@ def remedy(robot: Robot) -> str:
 def _after_stop(robot: Robot, stopping: StopProgress) -> str:
     """Return what the drives' states have shown; where not all have shown it, how they are."""
     shown = set(stopping.proofs) >= set(robot.names("joint")) and not any_enabled(robot)
-    return stopping.proof if shown else "; ".join(filter(None, (stopping.proof, _drives_did(robot))))
+    every = "all " if len({proof.state for proof in stopping.proofs.values()}) == 1 else ""
+    return (
+        f"{every}{stopping.proof}" if shown else "; ".join(filter(None, (stopping.proof, _drives_did(robot))))
+    )
 
 
 def _after_unconfirmed(robot: Robot) -> str:
@@ -157,7 +161,7 @@ def _drives_did(robot: Robot) -> str:
 
 def _counted(words: Mapping[str, str | None], state: str, states: int) -> str:
     count = list(words.values()).count(state)
-    return f"all {state}" if states == 1 else f"{count} {state}"
+    return f"all {count} drives in {state}" if states == 1 else f"{count} {state}"
 
 
 def _did(robot: Robot, stopping: StopProgress) -> str:

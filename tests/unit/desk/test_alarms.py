@@ -233,7 +233,7 @@ def test_a_confirmed_stop_is_proved_drive_by_drive_and_says_how_to_go_on(bench: 
     assert all(proof.state == "quick stop active" for proof in stopping.proofs.values())
     (one,) = bench.station.alarms.active
     assert one.alarm.kind is Kind.STOPPED
-    assert "all 6 quick stop active within" in one.alarm.did
+    assert "all 6 drives confirmed in quick stop active within" in one.alarm.did
     assert "Reset stop…" in one.alarm.check
 
 
