@@ -29,6 +29,7 @@ _CODE: Final = re.compile(r"0x([0-9A-Fa-f]{4})\b")
 _PREFIX: Final = re.compile(r"^(the drive is in fault: |it reports )")
 _LASTING: Final = re.compile(r" \(for \d+ s\)")  # an alarm says by itself since when
 _ADVICE: Final = re.compile(r": (?=(?:check|plug|see) )")  # with which what the robot says of a part may end
+_ANOTHER: Final = re.compile(r"(?:it reports|the drive is|its|no|nothing|node|\d+ %|0x[0-9A-Fa-f]{4}) ?\b")
 # What shows it best, by the code's beginning; else the position.
 _SHOWN_BY: Final = (
     ("2", ("current", "torque")),
@@ -269,11 +270,14 @@ def _of_part(robot: Robot, part: Part, stopping: StopProgress) -> Iterator[Alarm
 
 
 def _advised(problem: str) -> tuple[str, str]:
-    """Split a problem into what is wrong and what to check: `this: check that; it goes on; more: …`."""
+    """Split a problem into what is wrong and what to check: `this: check that; it goes on; more: …`.
+
+    What goes on after an advice belongs to it, unless it begins as only what is wrong does.
+    """
     things, advice = list[str](), list[str]()
     for clause in problem.split("; "):
         thing, *check = _ADVICE.split(clause, maxsplit=1)
-        if not check and advice:
+        if not check and advice and not _ANOTHER.match(clause):
             advice[-1] += f"; {clause}"
         else:
             things.append(thing)
