@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from datetime import datetime
 from typing import Any, Final
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import QRect, Qt, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -13,6 +13,7 @@ from PySide6.QtWidgets import (
     QPlainTextEdit,
     QPushButton,
     QSplitter,
+    QStyle,
     QVBoxLayout,
     QWidget,
 )
@@ -28,6 +29,7 @@ from server_gui.views.recordings.timeline import SECOND_NS, clock_text
 from server_gui.views.theme import Theme
 from server_gui.views.widgets import columns
 from server_gui.views.widgets.card import Card, set_text
+from server_gui.views.widgets.elided import WrappingDelegate
 from server_gui.views.widgets.plain import PlainLabel, set_tip, tip
 from server_gui.views.widgets.rows import SORT_ROLE, Filtered, Index, RowsModel, RowsTable
 
@@ -40,6 +42,9 @@ EMPTY: Final = (
     "Nothing is recorded yet. What a robot sends while this window is open is recorded by itself: "
     "add a robot at the left, and its session appears here within seconds."
 )
+ROW: Final = 21  # high, at text of 100 %
+LINES: Final = 6  # of notes, at most
+WRAPPED: Final = Qt.TextFlag.TextWordWrap.value
 EVENTS_TOLD: Final = 200
 MARK_TWO: Final = "Mark two recordings: a click on one, a click with Ctrl on the other"
 COMPARING: Final = "What was otherwise in the later one, and what of the walk moved with it"
@@ -69,13 +74,15 @@ class SessionModel(RowsModel[Session]):
 
 
 class SessionsTable(RowsTable):
-    """What has no room is told of the chosen one beside it."""
+    """Notes stand in lines. What has no room is told of the chosen one beside it."""
 
     def __init__(self, model: Filtered, theme: Theme) -> None:
         super().__init__(model, "Recordings", BEGAN)
         self._theme = theme
+        self._lines = WrappingDelegate(NOTES)
+        self.setItemDelegate(self._lines)
         columns.prepare(self)
-        for changed in (model.dataChanged, model.rowsInserted, model.rowsRemoved):
+        for changed in (model.dataChanged, model.rowsInserted, model.rowsRemoved, model.layoutChanged):
             changed.connect(self.fit)
         theme.changed.connect(self.fit)
 
@@ -86,6 +93,19 @@ class SessionsTable(RowsTable):
     def fit(self) -> None:
         """Share what room there is."""
         columns.fit(self, {column: self._theme.px(least) for column, least in NAMES.items()}, SPARE)
+        for row in range(self.model().rowCount()):
+            if self.rowHeight(row) != (high := self._high(row)):
+                self.setRowHeight(row, high)
+
+    def _high(self, row: int) -> int:
+        """How high a row is with its notes, which are whole where they are not too long."""
+        notes, one = str(self.model().index(row, NOTES).data() or ""), self._theme.px(ROW)
+        if not notes or self.isColumnHidden(NOTES):
+            return one
+        margin = self.style().pixelMetric(QStyle.PixelMetric.PM_FocusFrameHMargin) + 1
+        box = QRect(0, 0, max(self.columnWidth(NOTES) - 2 * margin, 1), 100_000)
+        needed = self.fontMetrics().boundingRect(box, WRAPPED, notes).height()
+        return max(one, min(needed, LINES * self.fontMetrics().lineSpacing()) + self._theme.px(4))
 
 
 class SessionsPage(QWidget):
@@ -196,7 +216,7 @@ class SessionsPage(QWidget):
 
     # --- how it is put together
 
-    def _table(self) -> RowsTable:
+    def _table(self) -> SessionsTable:
         self._filter = Filtered(self.sessions)
         table = SessionsTable(self._filter, self._theme)
         table.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
@@ -223,7 +243,8 @@ class SessionsPage(QWidget):
             self.mark.clear()
 
     def _restyle(self) -> None:
-        self.table.verticalHeader().setDefaultSectionSize(self._theme.px(21))
+        self.table.verticalHeader().setDefaultSectionSize(self._theme.px(ROW))
+        self.table.fit()
         self.details.setMinimumWidth(self._theme.px(120))
 
 
