@@ -18,15 +18,19 @@ from PySide6.QtWidgets import (
 )
 
 from gateway.plain_text import plain
+from ml.store.sessions import Session
 from server_gui.core.archive.archive import Archive
 from server_gui.core.archive.playback import SPEEDS, PlayedRobot
 from server_gui.core.archive.recorded_notes import RecordedNotes
+from server_gui.core.archive.side_by_side import SideBySide
 from server_gui.core.cloud.actions import FORMATS, export
 from server_gui.core.cloud.selection import Choice
 from server_gui.core.cloud.tape import Tape, as_time
+from server_gui.core.workspace.alignment import Align
 from server_gui.views.alarms.strip import AlarmStrip
 from server_gui.views.overview.page import Overview
 from server_gui.views.predictions import status
+from server_gui.views.recordings.beside_bar import BesideBar
 from server_gui.views.recordings.label_bar import LabelBar
 from server_gui.views.recordings.timeline import SECOND_NS, Timeline, clock_text, day_text
 from server_gui.views.theme import Theme
@@ -58,7 +62,16 @@ class Player(QWidget):
         self.overview = Overview(self._playback.desk, theme)
         self.overview.is_numbers_first = False  # a walk is replayed for how it looked
         notes = RecordedNotes(self._playback, archive.labels)
-        self.signals = Signals(self._playback.desk, theme, notes)
+        deliver, reading = archive.deliver, archive.library.reading
+        self.beside = SideBySide(self._playback, archive.settings, reading.do, deliver)
+        self.signals = Signals(
+            self._playback.desk,
+            theme,
+            notes,
+            others=lambda: self.beside.second.desk.stations,
+            step=self.beside.step,
+        )
+        self.beside_bar = BesideBar(self.beside)
         self._views = (self.overview, self.signals)
         self._around: tuple[str, int] | None = None  # a channel and an instant, to be shown once it is read
         self._stack = QStackedWidget()
@@ -82,6 +95,7 @@ class Player(QWidget):
         everything.setContentsMargins(8, 8, 8, 8)
         everything.setSpacing(6)
         everything.addLayout(self._head())
+        everything.addWidget(self.beside_bar)
         everything.addWidget(self.alarms)
         everything.addWidget(self._stack, 1)
         everything.addWidget(self.timeline)
@@ -116,8 +130,16 @@ class Player(QWidget):
             self.timeline.setFocus()
             self._speed.setCurrentIndex(SPEEDS.index(self._playback.speed))
             self._around = None
+            self.beside.close()
+            self.beside_bar.refresh()
             self.alarms.list.hide()
             self.alarms.hide()
+
+    def show_beside(self, session: Session) -> None:
+        """Show another recording in the same plots: what is played goes on with it from its beginning."""
+        self.beside.open(session)
+        self.beside_bar.refresh()
+        self._choice.button(SIGNALS).click()
 
     def show_around(self, channel: str, at_ns: int) -> None:
         """Show a channel before and after an instant of its signals: what comes after it is read first."""
@@ -138,12 +160,20 @@ class Player(QWidget):
             (channel, at_ns), self._around = self._around, None
             self.signals.refresh()
             self.signals.show_around((channel,), at_ns)
+        self._refresh_beside()
         self._views[self._stack.currentIndex()].refresh()
         self.timeline.show_position(playback.position_ns)
         self.timeline.show_outline(playback.outline)
         self._frame += 1
         if self._frame % SLOW == 1:
             self._refresh_words()
+
+    def _refresh_beside(self) -> None:
+        """Bring the second recording into the plots once it is there."""
+        station, scene = self.beside.station, self.signals.scene
+        if station is not None and (scene.beside is None or scene.beside.station is not station):
+            scene.put_beside(station)
+            scene.align = Align.NOW
 
     # --- how it is put together
 
@@ -220,6 +250,7 @@ class Player(QWidget):
         self.events.setEnabled(bool(len(happened.flags)))
         self._refresh_flags(tape)
         self._refresh_alarms()
+        self.beside_bar.refresh()
         self.labels.refresh(tape)
 
     def _refresh_alarms(self) -> None:
@@ -280,6 +311,7 @@ class Player(QWidget):
         self._playback.speed = SPEEDS[place]
 
     def _back(self) -> None:
+        self.beside.close()
         self._playback.close()
         self.left.emit()
 

@@ -47,6 +47,7 @@ LINES: Final = 6  # of notes, at most
 WRAPPED: Final = Qt.TextFlag.TextWordWrap.value
 EVENTS_TOLD: Final = 200
 MARK_TWO: Final = "Mark two recordings: a click on one, a click with Ctrl on the other"
+TOGETHER: Final = "Both in the same plots, played together: aligned by their beginnings or a heel strike"
 COMPARING: Final = "What was otherwise in the later one, and what of the walk moved with it"
 
 
@@ -109,9 +110,13 @@ class SessionsTable(RowsTable):
 
 
 class SessionsPage(QWidget):
-    """`played` when the chosen session is to be played, `compared` when two that are marked are compared."""
+    """`played` when the chosen session is to be played; of two that are marked, `beside` each other.
+
+    `compared` when these are compared.
+    """
 
     played = Signal()
+    beside = Signal()
     compared = Signal()
 
     def __init__(self, archive: Archive, recording: Recording, theme: Theme) -> None:
@@ -136,6 +141,8 @@ class SessionsPage(QWidget):
         self.play.clicked.connect(self.played)
         self.compare = QPushButton("What changed?")
         self.compare.clicked.connect(self._compare)
+        self.together = QPushButton("Side by side")
+        self.together.clicked.connect(self.beside)
         self.details = QPlainTextEdit(readOnly=True)
         self.details.setAccessibleName("What is known of the chosen recording")
         self._card = Card("Recording")
@@ -145,7 +152,10 @@ class SessionsPage(QWidget):
         self._list.body.addWidget(self.words)
         self._list.body.addWidget(self.said)
         self._list.body.addWidget(self.table, 1)
-        self._list.body.addWidget(self.compare)
+        of_two = QHBoxLayout()
+        of_two.addWidget(self.compare)
+        of_two.addWidget(self.together)
+        self._list.body.addLayout(of_two)
         split = QSplitter()
         split.addWidget(self._list)
         split.addWidget(self._card)
@@ -191,6 +201,8 @@ class SessionsPage(QWidget):
         marked = self.marked
         self.compare.setEnabled(len(marked) == 2)
         set_tip(self.compare, COMPARING if len(marked) == 2 else MARK_TWO)
+        self.together.setEnabled(len(marked) == 2 and self._archive.tape is not None)
+        set_tip(self.together, TOGETHER if len(marked) == 2 else MARK_TWO)
 
     def _compare(self) -> None:
         marked = self.marked
@@ -281,7 +293,7 @@ def _when(time: datetime | None) -> str:
 def _told(session: Session | None, tape: Tape | None, problem: str, held: Sequence[str]) -> str:
     """Return what is known of it, as text."""
     if session is None:
-        return "Choose a recording to see what is in it; with Ctrl a second one, to ask what changed."
+        return "Choose a recording to see what is in it; with Ctrl a second one, to compare the two."
     known = {
         "Session": session.session,
         "Robot": session.robot,
