@@ -4,7 +4,7 @@ from drivers.samples import ComponentState
 
 
 def silence_text(age_ms: float | None) -> str:
-    """Return what there is to say of a silence whose cause nobody knows."""
+    """Return the description of a silence of unknown cause."""
     return "no sample has come yet" if age_ms is None else f"no new sample for {age_ms / 1000:.1f} s"
 
 

@@ -84,7 +84,7 @@ class CanDevice:
         return Quality(state, age_ms, words or None, counters, trouble)
 
     def boot(self, sdo: SdoChannel) -> None:
-        """Read which of its channels come by PDO."""
+        """Read which channels come by PDO."""
         if not self._objects:
             return
         tpdos, unread = self._tpdos(sdo)
@@ -94,7 +94,7 @@ class CanDevice:
                 self._objects.install(tpdos)
 
     def _tpdos(self, sdo: SdoChannel) -> tuple[tuple[Tpdo, ...], str | None]:
-        """Return what it sends; nothing, and why, where its mapping cannot be understood."""
+        """Return the device's TPDOs; none, and the reason, if their mapping cannot be understood."""
         try:
             return read_tpdos(sdo, self._description), None
         except (DeviceTimeout, Unavailable):

@@ -35,7 +35,7 @@ class BaudRateSample:
 
 
 def listen(port: str, baudrate: int | None = None) -> Iterator[BaudRateSample]:
-    """Yield what speaks at this baud rate, or at each, until one fits.
+    """Yield the result of listening at this baud rate, or at each, until a format fits.
 
     Raises:
         Unavailable: the port cannot be opened, or goes away.
@@ -55,7 +55,7 @@ def best(heard: Sequence[BaudRateSample]) -> BaudRateSample:
 
 
 def nothing(port: str, heard: Sequence[BaudRateSample]) -> str:
-    """Return what to do where no format fits."""
+    """Return a remedy if no format fits, in words."""
     if not any(one.bytes for one in heard):
         return f"{port} is silent: check the sensor's power and its TX wire, and whether it has to be started"
     rates = f"{heard[0].baudrate} baud" if len(heard) == 1 else "any usual baud rate"

@@ -66,7 +66,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def table(port: str, baudrate: int, match: Match) -> str:
-    """Return what of the robot's file wires the sensor: a table, or one for each foot."""
+    """Return the sensor's tables for the robot's file: one, or one for each foot."""
     keys = f'port = "{port}"\nbaudrate = {baudrate}\nformat = "{match.format_name}"\n'
     if match.format_name in IMU_FORMATS:
         axes = msgspec.json.encode(IMU_FORMATS[match.format_name].conventions.axes).decode()
@@ -81,7 +81,7 @@ def table(port: str, baudrate: int, match: Match) -> str:
 
 
 def _layout(match: Match) -> str | None:
-    """Return what the table has to name; `None` where the format knows where its cells are."""
+    """Return the layout that the table must name; `None` if the format knows its cells' positions."""
     if match.layout is not None or INSOLE_FORMATS[match.format_name].layout is not None:
         return match.layout
     return next(

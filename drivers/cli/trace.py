@@ -193,7 +193,7 @@ class TracePrinter:
         self._with_interface = with_interface
 
     def line(self, captured: Captured) -> str | None:
-        """Return what is shown of a frame; `None` where it is not wanted."""
+        """Return a frame's line; `None` if it is filtered out."""
         interface = captured.interface
         if interface not in self._decoders:
             self._decoders[interface] = Decoder(Devices(self._known.on(interface)))

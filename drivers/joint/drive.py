@@ -205,7 +205,7 @@ class JointDrive(PowerDrive):
                 self._undo.append(self.node.worker.repeat(1 / hz, partial(self._poll, deque(polled))))
 
     def _handler(self, decoder: Decoder) -> FrameHandler:
-        """Return what is done with each frame of a TPDO: the hot path."""
+        """Return the handler of each frame of a TPDO: the hot path."""
         indices, values = decoder.channels, decoder.values
         update, lock = self.latest.update, self._lock
         position = self._index[POSITION] in indices
@@ -259,7 +259,7 @@ class JointDrive(PowerDrive):
     # What is wrong, in words.
 
     def _notes(self, now_ns: int, findings: tuple[Finding, ...]) -> Iterator[str | None]:
-        """Yield what explains something comes before what it explains."""
+        """Yield the notes on the joint; causes come before their consequences."""
         plan = self._plan
         yield self._watch.held_off.words
         yield from () if plan is None else plan.contradictions
@@ -286,7 +286,7 @@ class JointDrive(PowerDrive):
         return "the drive is in fault and does not say why (no EMCY was seen, 603Fh is empty)"
 
     def _emcy_text(self, state: ComponentState, now_ns: int) -> str | None:
-        """Return what a drive reports that goes on all the same."""
+        """Return an emergency message of a drive that keeps working."""
         emcy = self.node.life.active_emcy
         if emcy is None or state is ComponentState.LOST or self._drive_state(now_ns) in _IN_FAULT:
             return None

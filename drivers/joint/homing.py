@@ -77,7 +77,7 @@ class HomingProgress(Enum):
 
 
 def progress(statusword: int) -> HomingProgress:
-    """Return what a statusword says of homing; true only while the axis is enabled in that mode."""
+    """Return the progress of homing by a statusword; valid only while the axis is enabled in that mode."""
     error, attained, reached = (statusword >> bit & 1 for bit in (13, 12, 10))
     return (
         HomingProgress.RESERVED

@@ -68,7 +68,7 @@ def make_plan(settings: JointSettings, found: tuple[Quantity, ...], reading: Dri
 
 
 def _fields(tpdo: Tpdo, wanted: Mapping[tuple[int, int], QuantitySource]) -> list[Field]:
-    """Return what this TPDO carries of what is wanted, as wide as its type.
+    """Return the wanted objects that this TPDO carries in full width.
 
     A part of it would be another number.
     """

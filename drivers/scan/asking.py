@@ -82,7 +82,7 @@ def _noting(answered: set[int], node: int) -> Callable[[int, bytes], None]:
 
 
 def ask(bus: CanBus, node: int) -> NodeAnswers:
-    """Read what a node is.
+    """Read the identity and abilities of a node.
 
     Raises:
         DriverError: it does not say of what type it is.

@@ -124,7 +124,7 @@ def _node_text(node: int, found: ScanResult, proposals: Sequence[Proposal]) -> I
 
 
 def _names(proposals: Sequence[Proposal]) -> Callable[[int, int], str]:
-    """Return what objects are called by the file that fits best."""
+    """Return a function that names objects, by the best-fitting file."""
     description = proposals[0].description if proposals else None
 
     def name(index: int, subindex: int) -> str:

@@ -99,7 +99,7 @@ def _lead(
 
 
 def _known_to(file: Path) -> Draft:
-    """Return what was found; where that cannot be read nothing is known, and a stop asks all."""
+    """Return the draft that was found; if it cannot be read, an empty one, so that a stop asks all drives."""
     try:
         return Draft(file)
     except SettingsError as error:

@@ -312,7 +312,7 @@ def _stop(file: Path, joint: str, *, as_json: bool) -> int:
 
 
 def _cut_off(config: RobotConfig) -> str | None:
-    """Return what a test has left that nobody leads any more, in words."""
+    """Return the changes, in words, that a test whose program has ended left in a drive."""
     folder = RecordsFolder(config.records)
     try:
         folder.open()

@@ -135,7 +135,7 @@ def _address() -> str:
 
 
 def _confirmed(candidate: Candidate, arguments: argparse.Namespace, folder: AccessFolder) -> tuple[str, Role]:
-    """Return what the person here says; raises `PairingEnded` where they refuse."""
+    """Return name and role as the person here confirms them; raises `PairingEnded` if they refuse."""
     if arguments.yes:
         return arguments.name, arguments.role
     wished = arguments.name or (candidate.name if NAME.fullmatch(candidate.name) else "")

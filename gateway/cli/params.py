@@ -157,7 +157,7 @@ def _rows(robot: Robot, scope: Scope, file: Path) -> list[Row]:
 
 
 def _changes(rows: Iterable[Row], file: Path, *, skip: bool) -> dict[str, Number]:
-    """Return what is to be written; raises `FileProblem` where the file cannot be brought about."""
+    """Return the values to be written; raises `FileProblem` if the robot cannot be made equal to the file."""
     found = Counter(row.verdict for row in rows)
     refused = sum(found[verdict] for verdict in REFUSED)
     if refused:

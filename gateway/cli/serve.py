@@ -133,7 +133,7 @@ def _robot(options: argparse.Namespace, *, tell: bool) -> config.RobotConfig:
 
 
 def _beside(robot: config.RobotConfig) -> list[Finding]:
-    """Return what `gwrms check` says of EDS files, layouts and calibrations: each costs a component only."""
+    """Return the findings about EDS files, layouts and calibrations: each costs only a component."""
     from gateway.prerequisites import beside  # all that drivers need: not for a gateway that wakes for a stop
 
     found = list(beside(robot))

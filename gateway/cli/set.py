@@ -99,7 +99,7 @@ def main(argv: list[str]) -> int:
 
 
 def _spread(robot: Robot, arguments: argparse.Namespace, description: Description) -> dict[str, Number]:
-    """Return what each joint takes; raises `NotForAll` where one cannot and is not left out by word."""
+    """Return the new values of each joint; raises `NotForAll` if one cannot take it and is not left out."""
     held = robot.read().values
     changes: dict[str, Number] = {}
     check_names("joint", arguments.leave_out, all_joints(description))

@@ -70,7 +70,7 @@ class Face(Protocol):
     def say(self, text: str) -> None: ...
 
     def ask(self, question: Ask) -> str:
-        """Return what was typed; raises `EOFError` where nothing more can be."""
+        """Return the typed answer; raises `EOFError` at the end of the input."""
         ...
 
     def moving(self, text: str) -> str:

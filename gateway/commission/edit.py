@@ -39,7 +39,7 @@ def with_value(text: str, table: str, key: str, found: DraftValue) -> str:
 
 
 def comment_of(text: str, table: str, key: str) -> str:
-    """Return what stands beside the value, or above it in the words of `writing`; "" where nothing does."""
+    """Return the comment beside the value, or above it as `writing` puts it; "" without one."""
     current, above = None, ""
     for one in text.splitlines():
         current = _head(one) or current

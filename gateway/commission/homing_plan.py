@@ -165,7 +165,7 @@ def _setup(bench: Bench, known: HomingBasis, method: int, rad_s: float) -> Setup
 def explained(
     known: HomingBasis, method: int, plan: HomingLimits, told: Mapping[int, int | None]
 ) -> Iterator[str]:
-    """Yield what will happen, line by line; `told` are the drive's objects TOLD."""
+    """Yield the plan for the person, line by line; `told` are the drive's objects TOLD."""
     one, turn = METHODS[method], known.counts_per_turn
     yield f"What will happen, to the {words(known.joint)} ({known.axis}) alone:"
     yield f"  method {method}: the drive {one.words}; its position then counts as 607Ch says"

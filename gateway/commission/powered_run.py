@@ -132,7 +132,7 @@ class PoweredRun:
             self._outcome = PoweredRunResult(problem, off, state, self._before, self._after)
 
     def _set_up(self) -> None:
-        """Write what it rests on, while the drive has no power."""
+        """Write the prerequisites, while the drive has no power."""
         raise NotImplementedError
 
     def _act(self) -> None:

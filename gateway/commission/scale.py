@@ -81,7 +81,7 @@ def near(scale: Scale) -> bool:
 
 
 def counts_at_zero(scale: Scale) -> int:
-    """Return what its encoder counts where the joint's angle is 0."""
+    """Return the encoder's count at the joint's angle 0."""
     per_count = scale.direction * math.tau / (scale.counts_per_revolution * scale.gear_ratio)
     return round(-scale.zero_offset / per_count)
 

@@ -143,7 +143,7 @@ class GuardSettings(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
 
 def limit(rule: GuardRule) -> str:
-    """Return what makes it trip, in words."""
+    """Return the condition on which it trips, in words."""
     return rule.words(WATCHES[rule.watch].unit)
 
 

@@ -106,7 +106,7 @@ def _about_numbers(where: str, rule: GuardRule) -> Iterator[Finding]:
 
 @singledispatch
 def _about(_rule: GuardRule, _where: str, _config: RobotConfig) -> Iterator[Finding]:
-    """Yield what is wrong with the keys of this kind of rule."""
+    """Yield the mistakes in the keys of this kind of rule."""
     yield from ()
 
 

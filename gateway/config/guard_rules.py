@@ -68,7 +68,7 @@ class GuardRule(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     clear_s: Positive = 1.0  # how long all must be well again before it is over
 
     def words(self, unit: str, /) -> str:
-        """Return what makes it trip, where `unit` is that of what is watched."""
+        """Return the condition on which it trips; `unit` is that of the watched quantity."""
         raise NotImplementedError
 
 
@@ -165,7 +165,7 @@ class InputRule(GuardRule, frozen=True, forbid_unknown_fields=True, kw_only=True
         return (mask(self.must_be_set) & ~now) | (mask(self.must_be_clear) & now)
 
     def says(self, wrong: float) -> str:
-        """Return what it means that these bits are wrong."""
+        """Return the meaning of these wrong bits."""
         bits = int(wrong)
         found = ((mask(self.must_be_set) & bits, "clear"), (mask(self.must_be_clear) & bits, "set"))
         told = "; ".join(f"{bit_words(some)} {state}" for some, state in found if some)

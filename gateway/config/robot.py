@@ -161,7 +161,7 @@ class RobotConfig(Struct, frozen=True, kw_only=True):
         return tuple(name for name in self.sharing(component) if name in self.joint) or tuple(self.joint)
 
     def channels_of(self, component: str) -> dict[str, ChannelSettings]:
-        """Return what `[channel."COMPONENT.NAME"]` adds to a joint or device, by the names after the dot."""
+        """Return the tables `[channel."COMPONENT.NAME"]` of a joint or device, by the names after the dot."""
         whole = ((name.partition("."), one) for name, one in self.channel.items())
         return {quantity: one for (owner, _, quantity), one in whole if owner == component}
 

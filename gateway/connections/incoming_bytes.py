@@ -117,7 +117,7 @@ class IncomingBytes:
     # In the intake's thread.
 
     def finish(self) -> None:
-        """Read what is there, for the stops in it, and close; idempotent."""
+        """Read the remaining bytes, for the stops in them, and close; idempotent."""
         if self._closed:
             return
         if not self._ended:

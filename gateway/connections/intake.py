@@ -100,7 +100,7 @@ class Intake:
         self._front.stop()
 
     def _spent(self) -> int:
-        """Return what the thread has worked since the last call: for the client it has worked for, in ns."""
+        """Return the thread's CPU time since the last call, in ns: the work for one client."""
         before_ns, self._spent_ns = self._spent_ns, time.thread_time_ns()
         return self._spent_ns - before_ns
 

@@ -208,7 +208,7 @@ class Session:
 
     @_spends
     def hear(self, heard: ReceivedBytes) -> None:
-        """Take what one read has brought; stops first, and also of a client that has gone."""
+        """Take the bytes of one read; stops first, even of a client that has gone."""
         self.cpu_ns += heard.cpu_ns
         if heard.stop is not None:
             self._stop(heard.stop, heard)
@@ -443,7 +443,7 @@ class Session:
 
 
 def _is_greeting(line: bytes | framing.BadLine) -> bool:
-    """Return what needs no module: a client of ours says it before it asks for a stop."""
+    """Return whether a line needs no module: our client sends it before it asks for a stop."""
     try:
         return isinstance(line, bytes) and framing.decode_request(line).method in GREETINGS
     except framing.BadLine:

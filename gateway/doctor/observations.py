@@ -124,7 +124,7 @@ class Observations:
                 yield place
 
     def holds(self, place: Place, index: int, subindex: int = 0) -> Value:
-        """Return what its device holds there, of its own axis; `None` where it has none or did not tell."""
+        """Return the device's value of an object of its own axis; `None` if it has none or gave none."""
         shift = AXIS_OFFSET * place.axis if index >= FIRST_PROFILE_OBJECT else 0
         return self.objects.get(place.name, {}).get((index + shift, subindex))
 

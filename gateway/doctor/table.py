@@ -100,7 +100,7 @@ RULES: tuple[DoctorRule, ...] = (
 
 
 def judged(seen: Observations) -> Iterator[Verdict]:
-    """Yield what every rule says, in the table's order.
+    """Yield the verdicts of every rule, in the table's order.
 
     Values to be written are in their parameters' units.
     """

@@ -31,7 +31,7 @@ def _key(field: FieldInfo, unit: str) -> str:
 
 
 def _descriptions(type_: Any) -> Iterator[str]:
-    """Yield what the type's notes say, wherever in it they stand."""
+    """Yield the descriptions in a type's annotations, at any depth."""
     for argument in typing.get_args(type_):
         if isinstance(argument, Meta):
             if argument.description is not None:

@@ -204,7 +204,7 @@ def _has_mode(bench: Bench, test: Test) -> None:
 
 
 def _period(bench: Bench, axis: Axis) -> float:
-    """Return what the drive expects between two SYNCs (60C2h); within what this computer can keep."""
+    """Return the SYNC period that the drive expects (60C2h), as far as this computer can keep it."""
     value = number(bench, axis, *PERIOD)
     exponent = bench.read(axis.node, axis.index(EXPONENT[0]), EXPONENT[1])
     if not value or exponent is None:
@@ -234,7 +234,7 @@ def _agreed(test: Test, known: DriveFacts) -> Talk[bool]:
 
 
 def explained(test: Test, known: DriveFacts) -> Iterator[str]:
-    """Yield what will happen, line by line."""
+    """Yield the plan of the test for the person, line by line."""
     limits, wish = known.limits, test.wish
     low, high, _, time_s = planned(wish, known.period_s)
     yield f"What will happen, to the {words(test.joint)} ({test.axis}) alone: a {wish.kind} test"

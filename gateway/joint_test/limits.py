@@ -62,7 +62,7 @@ def limits(
     angle: float,
     period_s: float,
 ) -> JointTestLimits:
-    """Return what holds during this test of a joint that stands at `angle`.
+    """Return the limits of this test, for a joint that stands at `angle`.
 
     Raises:
         NotAllowed: something that must be known is not, or the test would go beyond it.

@@ -97,7 +97,7 @@ def _not_in_file(info: ParameterInfo, held: ParameterValue | None) -> Row:
 
 
 def left_out(wanted: Mapping[str, Number], infos: Iterable[ParameterInfo]) -> list[ParameterInfo]:
-    """Return what could be changed in the same components, and the file does not name."""
+    """Return writable parameters of the same components that the file does not name."""
     infos = tuple(infos)
     components = {info.component for info in infos if info.name in wanted}
     return [

@@ -100,7 +100,7 @@ class Journal:
         return found
 
     def with_head(self, work: Callable[[Head], Found]) -> "Future[Found]":
-        """Return what `work` makes of the newest entry, in the thread that reads.
+        """Return the result of `work` on the newest entry, in the reading thread.
 
         It delays no entry either.
         """
@@ -110,7 +110,7 @@ class Journal:
         return found
 
     def close(self) -> None:
-        """Write what was appended, and end. Idempotent."""
+        """Write the appended entries, and end. Idempotent."""
         if not self._ended:
             self._queue.put(None)
             self._thread.join()
@@ -411,7 +411,7 @@ def _append(file: BinaryIO, data: bytes) -> None:
 
 
 def _last_hash(piece: ClosedJournalFile) -> str | None:
-    """Return what the line after it refers to; `None` where the piece is damaged."""
+    """Return the hash of the last line, to which the next one refers; `None` if the piece is damaged."""
     try:
         with piece.path.open("rb") as file:
             last = next(journal_files.lines_backwards(file), None)
@@ -421,7 +421,7 @@ def _last_hash(piece: ClosedJournalFile) -> str | None:
 
 
 def _room(journal: Path, sizes: Sizes) -> Entry:
-    """Return what the first entry says of the room on the journal's file system.
+    """Return the first entry, with the room on the journal's file system.
 
     The log where it is little.
     """

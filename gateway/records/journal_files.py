@@ -43,7 +43,7 @@ def head_file(journal: Path) -> Path:
 
 
 def read_head(journal: Path) -> Head | None:
-    """Return what the journal is known to reach; `None` where nobody wrote it down.
+    """Return the recorded head of the journal; `None` if none was written.
 
     Raises:
         Broken: the head's file is damaged.
@@ -113,7 +113,7 @@ def decoded(line: bytes) -> Entry:
 
 
 def hash_of(line: bytes) -> Head:
-    """Return what follows this line refers to; raises `Broken`."""
+    """Return the hash of a line, to which the next one refers; raises `Broken`."""
     return check(0, None, line)[0]
 
 

@@ -102,7 +102,7 @@ def whole(source: Source) -> Selection:
 
 
 def narrow(selections: Iterable[Selection], globs: Sequence[str] | None) -> list[Selection]:
-    """Return what the globs leave of the selections; those left empty are gone."""
+    """Return the selections narrowed by the globs, without empty ones."""
     narrowed, wanted = [], Wanted(globs)
     for one in selections:
         indices = tuple(index for index in one.indices if one.source.channels[index].name in wanted)

@@ -110,12 +110,12 @@ def refuse(kind: ErrorKind, message: str, **data: Any) -> RpcError:
 
 
 def unknown_method(name: str) -> RpcError:
-    """Return what a method that does not exist is answered with (−32601)."""
+    """Return the error for an unknown method (−32601)."""
     return RpcError(f"there is no method {name!r}", ErrorData(ErrorKind.UNKNOWN_NAME), METHOD_NOT_FOUND)
 
 
 def internal_error(method: str, error: Exception) -> RpcError:
-    """Return what a failure of our own is answered with (−32603)."""
+    """Return the error for a failure of the gateway itself (−32603)."""
     message = f"{method} failed inside the gateway: {type(error).__name__}: {error}; its log says more"
     return RpcError(message, ErrorData(ErrorKind.UNAVAILABLE), INTERNAL_ERROR)
 
@@ -317,7 +317,7 @@ _strict = json.JSONDecoder(object_pairs_hook=_once, parse_int=_in_64_bits)
 
 
 def encode_refusal(line: bytes | BadLine, refusal: RpcError) -> bytes:
-    """Return what a line is answered with that is not served; nothing where it asks for no answer."""
+    """Return the answer to a line that is refused; nothing if it needs no answer."""
     try:
         if isinstance(line, BadLine):
             raise line

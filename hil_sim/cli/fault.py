@@ -81,7 +81,7 @@ def main(argv: list[str]) -> int:
 
 
 def _request(parser: argparse.ArgumentParser, arguments: argparse.Namespace) -> dict[str, Any]:
-    """Return what is meant, as the socket takes it; leaves with the usage where nothing is."""
+    """Return the request for the socket; exit with the usage if there is none."""
     if arguments.dir is None:
         parser.error("--dir DIR says which simulator")
     given: dict[str, Any] = {

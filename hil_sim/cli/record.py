@@ -142,7 +142,7 @@ class SessionRecorder:
         self._write(list(compress(row, self._kept)))
 
     def _danger(self) -> list[float]:
-        """Return what is written of dangers, in the order of `DANGER_COLUMNS`."""
+        """Return the values of dangers, in the order of `DANGER_COLUMNS`."""
         if self._course is None:
             return []
         units = zip(joints_reported(self._robot), JOINT_UNITS.values(), strict=True)

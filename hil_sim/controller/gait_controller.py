@@ -243,7 +243,7 @@ class GaitController(Node):
         self.generator.step(dt, Activity(self.dictionary[objects.ACTIVITY].number()), self._shape())
 
     def set_points(self) -> list[int]:
-        """Return what each joint is to follow now (counts)."""
+        """Return the set-points of the joints (counts)."""
         left = 1.0 - smooth(self._taken_over_s / _TAKE_OVER_S)
         parts = zip(self._joints, self._angles(), self._offsets, self.strays, strict=True)
         return [

@@ -116,5 +116,5 @@ def _say(case: ElementTree.Element, kind: str, message: str, text: str) -> None:
 
 
 def _plain(text: str) -> str:
-    """Return what may stand in XML; what may not is replaced, not left out."""
+    """Return text that XML allows; other characters are replaced, not left out."""
     return _NOT_IN_XML.sub("\ufffd", text)

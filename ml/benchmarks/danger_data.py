@@ -62,7 +62,7 @@ class Seen:
 
 
 def read(path: Path) -> list[Seen]:
-    """Return what the detectors see of a file of `gwrms sim-record --scenario dangers`.
+    """Read the detectors' input of a file of `gwrms sim-record --scenario dangers`.
 
     Raises:
         UnusableData: it is no such file, or damaged.

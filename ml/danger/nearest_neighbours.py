@@ -130,7 +130,7 @@ def _mean(values: Floats) -> Floats:
 
 
 def _alone(distance: Floats, there: Bools) -> Floats:
-    """Return how much closer neighbours each of six searches found than the others, 0 to 1.
+    """Return by how much each of six searches has closer neighbours than the others, 0 to 1.
 
     In a new activity no search finds close ones; if a single joint deviates, only the search without it does.
     Only joints that exist are compared; a single one has no others to compare: NaN.

@@ -44,7 +44,7 @@ class Pointer(Struct, frozen=True):
     signature: str = ""
 
     def message(self, task: str, robot: str) -> bytes:
-        """Return what is signed."""
+        """Return the bytes to be signed."""
         bare = msgspec.structs.replace(self, certificate="", signature="")
         return _KIND + msgspec.json.encode([task, robot, bare])
 
@@ -78,7 +78,7 @@ class Pointers:
         return [self._read(number) for number in range(1, self._last() + 1)]
 
     def newest(self) -> Pointer | None:
-        """Return what holds now; None where nobody has said anything yet."""
+        """Return the valid pointer; None if there is none yet."""
         last = self._last()
         return self._read(last) if last else None
 
@@ -108,7 +108,7 @@ class Pointers:
         raise UnusableModel(f"{self._whose}: {ATTEMPTS} times somebody else was faster")
 
     def target(self) -> RollbackTarget:
-        """Return what a rollback would go back to now.
+        """Return the target of a rollback.
 
         Raises:
             UnusableModel: nothing was before.

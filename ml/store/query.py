@@ -90,7 +90,7 @@ def _holding(labels: duckdb.DuckDBPyRelation) -> duckdb.DuckDBPyRelation:
 
 
 def _run(connection: duckdb.DuckDBPyConnection, work: Callable[[], Found]) -> Found:
-    """Return what may take long, in a thread, so that Ctrl-C ends it."""
+    """Run a long query in a thread, so that Ctrl-C ends it."""
     outcome: Future[Found] = Future()
     thread = threading.Thread(target=_settle, args=(outcome, work), name="query")
     try:

@@ -195,7 +195,7 @@ def channels(store: Store, session: Session) -> list[Channel]:
 
 
 def footer(store: Store, file: DataFile) -> pq.FileMetaData:
-    """Return what the file says of itself; raises `StoreError` where it is not there or damaged."""
+    """Return the footer of a file; raises `StoreError` if it is missing or damaged."""
     with (
         translated(f"{store.url}/{file.location}/{file.path} cannot be read"),
         store.files.open_input_file(f"{file.location}/{file.path}") as opened,
@@ -210,7 +210,7 @@ def rows_of(store: Store, session: Session, table: Table = EVENTS) -> list[dict[
 
 
 def labels(store: Store, session: Session) -> list[dict[str, Any]]:
-    """Return what somebody says that robot and wearer did, as far as it has not been taken back."""
+    """Return the valid labels of a session."""
     return holding(rows_of(store, session, LABELS))
 
 

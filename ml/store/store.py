@@ -227,7 +227,7 @@ class Store:
         return {name: known.unit for name, known in self.columns(location).items()}
 
     def columns(self, location: str) -> dict[str, ColumnFacts]:
-        """Return what is known of each column; nothing where there is no table yet."""
+        """Return the facts about each column; empty if there is no table yet."""
         try:
             delta = self._open.get(location) or self.table(location)
         except NoSuchTable:
@@ -235,7 +235,7 @@ class Store:
         return _known(delta.schema())
 
     def identity(self, location: str) -> str:
-        """Return what the table is called for ever, in copies of the store too."""
+        """Return the table's permanent identity, which copies of the store share."""
         return str((self._open.get(location) or self.table(location)).metadata().id)
 
     # --- inside
@@ -245,7 +245,7 @@ class Store:
         self._lasting[table] = newest
 
     def _about(self, wanted: About) -> About:
-        """Return what the store is; a new one is probed first."""
+        """Return the store's facts; a new store is probed first."""
         data = self.objects.read(ABOUT)
         if data is None:
             if self.folder is None and wanted.several_writers:

@@ -62,7 +62,7 @@ class Table:
 
 
 def shard_of(robot: str, shards: int) -> int:
-    """Return which of `shards` tables holds this robot; the same for ever."""
+    """Return the number of the table with this robot, of `shards`; it never changes."""
     return zlib.crc32(robot.encode()) % shards
 
 
@@ -80,7 +80,7 @@ class ColumnFacts(NamedTuple):
 
 
 def columns(schema: pa.Schema) -> dict[str, ColumnFacts]:
-    """Return what its fields tell."""
+    """Return the facts in the fields' metadata."""
     found: dict[str, ColumnFacts] = {}
     for each in schema:
         told = each.metadata or {}

@@ -76,7 +76,7 @@ class Material:
         ]
 
     def tables(self) -> tuple[TableVersion, ...]:
-        """Return what a model is made from, for ever."""
+        """Return the permanent versions of the tables behind a model."""
         shards = self.store.about.shards
         wanted = {LABELS.name, SESSIONS.name}
         wanted |= {TELEMETRY.location(each.robot, shards) for each in self.sessions}
@@ -88,7 +88,7 @@ class Material:
 
 
 def material(url: str, wish: Wish, cluster: str = "", told: Tell = untold) -> Material:
-    """Return what the store has for a wish, at the versions of now.
+    """Return the store's data for a wish, at its present versions.
 
     Raises:
         UnusableData: nothing.

@@ -128,7 +128,7 @@ def _part(task: Task, recipe: Recipe, session: SimulatedSession) -> SessionDecis
 
 
 def _thinned(part: SessionDecisions) -> SessionDecisions:
-    """Return what is learned from: of falling's many steady decisions a few."""
+    """Return the training data: of falling's many steady decisions a few."""
     steady = part.truth == "steady" if part.truth.ndim == 1 else np.zeros(len(part.truth), dtype=bool)
     return part.of(~steady | (np.arange(len(part.truth)) % STEADY_SHARE == 0))
 

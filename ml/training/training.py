@@ -202,7 +202,7 @@ def _enough(task: Task, lessons: Sequence[SessionDecisions]) -> tuple[list[Sessi
 
 
 def _unnamed(sessions: int) -> list[str]:
-    """Return what is to be known of sessions whose wearer may be any of those who judge."""
+    """Return a remark on unnamed sessions, whose wearer may be among those who judge."""
     if not sessions:
         return []
     remark = (

@@ -126,7 +126,7 @@ def _say(arguments: argparse.Namespace, known: ErasurePlan) -> None:
 
 
 def _not_reached(known: ErasurePlan) -> Iterator[str]:
-    """Yield what nobody here can look into."""
+    """Yield the places that cannot be searched from here."""
     if known.others:
         yield (
             f"not looked into: the spools of other computers that write to this store "
@@ -166,5 +166,5 @@ def _tell(arguments: argparse.Namespace, known: ErasurePlan, left: Sequence[str]
 
 
 def _moved(known: ErasurePlan) -> list[str]:
-    """Return what was exported and is there no more: removed, or somewhere else with all its rows."""
+    """Return exports that are gone: removed, or moved with all their rows."""
     return [each.place for each in known.exported if each.state is ExportState.GONE]

@@ -240,7 +240,7 @@ def _plan(command: str, arguments: argparse.Namespace, planned: Planner) -> tupl
 
 
 def _held(robot: Robot, name: str) -> float:
-    """Return what the device holds; one that has been asked nothing for a while may not have answered yet."""
+    """Return the device's value; a device that was idle for a while may take a moment to answer."""
     until_s = time.monotonic() + REACH_S
     while True:
         held = robot.read(name).values[name]
@@ -348,7 +348,7 @@ def _keep(told: EditEvidence, arguments: argparse.Namespace, command: str) -> No
 
 
 def _recording(spool: Path, calls_itself: str) -> tuple[str, str]:
-    """Return what the robot is called where it is recorded, and the recording.
+    """Return the name under which the robot is recorded, and the recording.
 
     As it calls itself, and none.
     """

@@ -83,7 +83,7 @@ class Controls:
         return self._station.writing.state is WriteState.WRITING
 
     def press(self, key: Key) -> None:
-        """Do what a key stands for; a STOP is shown until a key is pressed after it was answered, or not."""
+        """Carry out a key; a STOP is shown until a key is pressed after its answer, or failure."""
         self.stop_sent = key is Key.STOP or (self.stop_sent and self._stop_is_open)
         self._refusal, self._refused_until_s = self._refused(key), time.monotonic() + SAID_S
         if not self._refusal:

@@ -80,7 +80,7 @@ def run(options: Options) -> int:
 
 
 def _window(own: DemoRobot, options: Options, folder: Path, check: Callable[[], None]) -> int:
-    """Return what it records stays in the demo's folder: nothing simulated comes among real recordings."""
+    """Run the window; its recordings stay in the demo's folder, apart from real ones."""
     from server_gui.views.first_run.splash import Splash
     from server_gui.views.frame.application import application, kept_settings, kept_theme
 

@@ -73,7 +73,7 @@ class FollowedRobot:
         self._network.__exit__(*exc)
 
     def update(self) -> None:
-        """Take what has come since the last time."""
+        """Take the events since the last call."""
         for running in self._running:
             if running.done():
                 running.result()  # it ends only by a mistake of ours, which must not stay unseen

@@ -76,7 +76,7 @@ NARROW = PanelWidths(angle=22, past=0, foot=12, parameter=9, share=0, roomy=Fals
 
 
 def header(station: Station, where: str, look: PanelWidths) -> RenderableType:
-    """Return which robot, its worst state, how it is reached, how old what is shown is."""
+    """Return the header: the robot, its worst state, its link, the age of its data."""
     robot = station.robot
     row = Table.grid(expand=True, padding=(0, 2))
     row.add_column(ratio=1)
@@ -94,7 +94,7 @@ def header(station: Station, where: str, look: PanelWidths) -> RenderableType:
 
 
 def learned(text: str) -> Text:
-    """Return what was learned from the wearer, where that serves or may: in one line."""
+    """Return the line on a model adapted to the wearer, while it serves or may serve."""
     return Text(plain(text), style=WARN, no_wrap=True, overflow="ellipsis")
 
 
@@ -185,7 +185,7 @@ def _part_state(robot: Robot, name: str) -> Text:
 
 
 def feet_and_trunk(robot: Robot, gait: Gait, look: PanelWidths) -> RenderableType:
-    """Return what each foot carries, how the trunk leans, and how the wearer walks."""
+    """Return the loads of the feet, the lean of the trunk, and the gait."""
     stale = robot.is_stale()
     grid = Table.grid(expand=True, padding=(0, 1))
     grid.add_column(no_wrap=True)
@@ -321,7 +321,7 @@ def footer(station: Station, controls: Controls, where: str, *, in_full: bool = 
 
 
 def news_lines(station: Station, controls: Controls, where: str, columns: int) -> int:
-    """Return how many lines the last thing that was said takes in full."""
+    """Return the number of lines that the last message takes in full."""
     return len(_news(station, controls, where).wrap(Console(width=columns), columns))
 
 

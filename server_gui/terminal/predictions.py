@@ -150,7 +150,7 @@ def _quality(quality: Quality, *, flattered: bool) -> str:
 
 
 def _spells(found: Replayed) -> Iterator[str]:
-    """Yield what followed what."""
+    """Yield the sequence of predictions."""
     both = zip(found.predictions, found.utc_ns, strict=True)
     spells = [list(spell) for _, spell in itertools.groupby(both, key=lambda one: one[0].label)]
     rows = [(_time(spell[0][1]), _time(spell[-1][1]), spell[0][0].label, str(len(spell))) for spell in spells]

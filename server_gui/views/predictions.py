@@ -63,7 +63,7 @@ class PredictionRow:
 
 
 def said(shown: Told, *, stopped: str = "", unseen: str = "") -> PredictionRow:
-    """Return what a model says now: the label and how probable, or that it does not know.
+    """Return the row of a prediction: the label and its probability, or *unknown*.
 
     Of a robot that does not drive its wearer, by what `stopped` says, nothing is called unlike what is known,
     nor is it where the model does not see all, by what `unseen` says.
@@ -93,7 +93,7 @@ def said(shown: Told, *, stopped: str = "", unseen: str = "") -> PredictionRow:
 
 
 def unjudged(why: str) -> PredictionRow:
-    """Return that nothing is said of what the wearer does, and why."""
+    """Return the row of an activity that is not judged, and the reason."""
     return PredictionRow(Mark("ring", "dim", STOPPED), NOT_JUDGED, why, why)
 
 
@@ -114,7 +114,7 @@ def status(station: Station) -> PredictionRow | None:
 
 
 def activity(station: Station) -> PredictionRow:
-    """Return what the wearer does: by a model where one says so, else by the steps that were seen."""
+    """Return the row of the activity: by a model if it predicts one, else by the detected steps."""
     shown = station.predictions.told.get(ACTIVITY)
     if not station.is_live:
         return PredictionRow(Mark("ring", "old", "not known"), "Activity not known", "no live data")
@@ -138,7 +138,7 @@ def by_steps(station: Station) -> PredictionRow:
 
 
 def doing(station: Station) -> tuple[str, ...]:
-    """Return what a robot does, the fullest wording first: `Walk 74 steps/min · 6 of 6 enabled`."""
+    """Return the robot's activity, the fullest wording first: `Walk 74 steps/min · 6 of 6 enabled`."""
     count = enabled_text(station.robot, live=station.is_live)
     if not station.is_live:
         return ("what it does is not known", "not known")
@@ -196,7 +196,7 @@ def _learning(adapting: Adapting) -> PredictionRow:
 
 
 def _danger(predictions: StationPredictions) -> Iterator[PredictionRow]:
-    """Yield what is foreseen: its level and number, then why.
+    """Yield the rows of danger: its level and number, then the reasons.
 
     Nothing old, unknown or unsaid is called fine.
     """
@@ -279,7 +279,7 @@ def _as_predicted(line: PredictionRow) -> PredictionRow:
 
 
 def _runner_up(shown: Told) -> str:
-    """Return what it may be as well, where it may."""
+    """Return the second likeliest class, if it is likely."""
     prediction = shown.prediction
     others = sorted(prediction.probabilities.items(), key=lambda item: -item[1])
     if 1 < len(prediction.either) <= FEW:

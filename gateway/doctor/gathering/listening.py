@@ -46,7 +46,7 @@ class Listening:
         self._ending.close()
 
     def facts(self, asked_by_us: Mapping[str, Mapping[int, int]]) -> dict[str, BusFacts]:
-        """Return what was heard until now; before the end."""
+        """Return the facts heard so far; to be called before the end."""
         return {name: ear.facts(asked_by_us.get(name, {})) for name, ear in self._ears.items()}
 
     def asked(self, bus: str) -> frozenset[int]:

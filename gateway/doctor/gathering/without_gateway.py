@@ -92,7 +92,7 @@ def objects(
     asked_by_others: Mapping[str, frozenset[int]],
     wait: Wait,
 ) -> dict[str, dict[Object, Value]]:
-    """Return what each device holds that nobody else asks; one that does not answer is left out."""
+    """Return the values of each device that nobody else asks; devices without answer are left out."""
     found: dict[str, dict[Object, Value]] = {}
     with ExitStack() as ending:
         buses = {name: CanBus(name, settings) for name, settings in config.can.items()}

@@ -116,7 +116,7 @@ BUILDERS: Mapping[ComponentKind, Builder] = {
 
 
 def facts(config: RobotConfig, name: str, description: eds.Description) -> Mapping[str, str | int]:
-    """Return what `robot.describe` tells of a device: what its EDS says, and where it is."""
+    """Return the device facts of `robot.describe`: those of its EDS, and its place."""
     tables: dict[str, Any] = {name: one for kind in BUILDERS for name, one in getattr(config, kind).items()}
     bus, bitrate = tables[name].bus, config.can[tables[name].bus].bitrate
     found: dict[str, str | int] = {

@@ -86,7 +86,7 @@ class Objects:
         self._ask = ask
 
     def listed(self, params: ObjectListParams) -> ObjectList:
-        """Return what the EDS says of those that fit.
+        """Return the matching objects of the EDS.
 
         Raises:
             RpcError: there is no such component, or it has no object dictionary.
@@ -103,7 +103,7 @@ class Objects:
         return ObjectList(params.component, shown, len(found) - len(shown))
 
     def read(self, params: ObjectReadParams, client: Client) -> "Future[ObjectValues]":
-        """Return what the device holds of them now; raises `RpcError` for one that its EDS lacks."""
+        """Return the device's present values of objects; raises `RpcError` for one that its EDS lacks."""
         description = self._description(params.component)
         wanted = [self._wanted(params.component, text, description) for text in dict.fromkeys(params.objects)]
         ready = self._component.when_ready({params.component})
@@ -213,7 +213,7 @@ def address(index: int, subindex: int) -> str:
 
 
 def by_eds(variable: "ODVariable") -> ObjectInfo:
-    """Return what the EDS alone says of an object."""
+    """Return the description of an object from its EDS alone."""
     known, default = DATA_TYPES.get(variable.data_type or 0), variable.default
     return ObjectInfo(
         address(variable.index, variable.subindex),

@@ -72,7 +72,7 @@ class WriteLedger:
         return tuple(found)
 
     def goal(self, change: ObjectWrite, before: bytes) -> bytes | None:
-        """Return what the end of this trial would take a parameter back to."""
+        """Return the value to which the end of this trial would revert a parameter."""
         if self.trial_s is None:
             return None
         trials = self.replaced([change])

@@ -198,7 +198,7 @@ class Parameter:
         return value
 
     def told(self, data: bytes) -> Number | str:
-        """Return what the device's bytes mean: a value, or a text.
+        """Return the meaning of the device's bytes: a value, or a text.
 
         Raises `RpcError` (mismatch) as `decode`.
         """

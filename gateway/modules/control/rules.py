@@ -98,7 +98,7 @@ class Rules:
         return str(quality["problem"] or "it is silent")
 
     def reach(self, change: UndoChange) -> tuple[Parameter, Node]:
-        """Return what was written, as long as the robot's file still means the same by its name.
+        """Return a written parameter and its node, if its name in the robot's file still means the same.
 
         Raises:
             OutOfReach: it does not, or the device is not there now.

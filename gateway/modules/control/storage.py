@@ -236,7 +236,7 @@ class _Run:
             raise self._device_error(error) from error
 
     def _values(self) -> dict[str, tuple[Number, bytes]]:
-        """Return what can be changed in the device, as it is now."""
+        """Return the device's writable values, as of now."""
         found = {}
         for one in self._storage.parameters.values():
             usable = one.problem is None and one.lock is None and one.access in READABLE

@@ -35,7 +35,7 @@ class Leave:
         return self.overtaken() or self.permit.objection(address)
 
     def kind(self, said: str) -> ErrorKind:
-        """Return what an objection means."""
+        """Return the kind of error of an objection."""
         if said == ENDING:
             return ErrorKind.UNAVAILABLE
         allowed = said not in (self.overtaken(), self.permit.authority.frozen())
@@ -131,7 +131,7 @@ class Transaction:
             raise change.parameter.refusal(ErrorKind.NOT_ALLOWED, change.node.distrust)
 
     def _current(self) -> dict[str, bytes]:
-        """Return what the devices hold.
+        """Return the devices' present values.
 
         Read anew where a trial that this one takes over has ended meanwhile.
         """

@@ -37,7 +37,7 @@ class TrialJobs:
         self._let_pass = partial(writer.let_pass, Turn.TRIAL)
 
     def confirm(self, write: int) -> dict[str, float] | None:
-        """Keep what the devices still hold; `None` where nothing of it is left.
+        """Keep the values that the devices still hold; `None` if none is left.
 
         Raises:
             RpcError: it stays on trial.
@@ -86,7 +86,7 @@ class TrialJobs:
         return any(change.address in self._authority.locked for change in changes)
 
     def claim(self) -> list[int]:
-        """Return what stops a controller is never taken back: a stop has set it.
+        """End trials of values that stop a controller: a stop has set them, so they are never reverted.
 
         Returns the writes concerned.
         """

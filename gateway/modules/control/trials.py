@@ -125,7 +125,7 @@ class Trials:
         self._changed()
 
     def confirm(self, write: int) -> "Future[Confirmed]":
-        """Keep what is on trial, if the devices still hold it.
+        """Keep the values on trial, if the devices still hold them.
 
         Raises:
             RpcError: at once, or as the future's error. unknown_name: it has ended, and how; mismatch,

@@ -106,7 +106,7 @@ class Tuning:
         self._writer.close()
 
     def load(self) -> list[Undo]:
-        """Return what the last gateway left to be taken back. Before anything is written."""
+        """Return the writes that the last gateway left to be reverted; to be called before any write."""
         undos, problem = self._records.undo.load()
         if problem is not None:
             log.critical("%s", problem)
@@ -117,7 +117,7 @@ class Tuning:
         return undos
 
     def resume(self, undos: Iterable[Undo]) -> None:
-        """Take that back, the newest first, as soon as its devices are there; but what a stop has claimed."""
+        """Revert those writes, newest first, once their devices are there; not values claimed by a stop."""
         left = [undo for one in undos if (undo := self._records.undo.get(one.write)) is not None]
         ready = self._component.when_ready({one.component for undo in left for one in undo.changes})
         for undo in reversed(left):
@@ -125,7 +125,7 @@ class Tuning:
             self.trials.take_up(undo, f"the gateway ended {how}", ready)
 
     def claim(self) -> "Future[None]":
-        """Return what stops the controllers is as a stop has set it now, and never taken back.
+        """Keep the values that stop controllers as a stop has set them: they are never reverted.
 
         From any thread.
         """
@@ -146,13 +146,13 @@ class Tuning:
         return self._infos
 
     def listed(self, names: list[str] | None) -> ParameterValues:
-        """Return what is known without asking: the last value read, as long as its device is there."""
+        """Return the last known values, without asking; only of devices that are there."""
         chosen = self._parameters.chosen(names)
         lost = self._lost(chosen)
         return ParameterValues({one.name: self._last(one, lost) for one in chosen})
 
     def read(self, names: list[str] | None, client: Client) -> "Future[ParameterValues]":
-        """Return what the devices hold now; where one does not tell, `problem` says why."""
+        """Return the devices' present values; `problem` says why one is missing."""
         chosen = self._parameters.chosen(names)
         ready = self._component.when_ready({one.component for one in chosen})
         values = then(ready, lambda _none: self._reads.ask(client, chosen))
@@ -232,7 +232,7 @@ class Tuning:
     def _each(
         self, asked: Sequence[Parameter], node: Node, told: "Sequence[bytes | DriverError] | Exception"
     ) -> Iterator[bytes | Exception]:
-        """Return what is told of each; where a device did not answer, that is so for all that is left."""
+        """Return each parameter's answer; after a missing answer, the same error for all the rest."""
         found: list[bytes | Exception] = [told] if isinstance(told, Exception) else [*told]
         last = found[-1]
         if isinstance(last, DeviceTimeout):

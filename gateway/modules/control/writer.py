@@ -66,12 +66,12 @@ class Writer:
         return job.future
 
     def let_pass(self, turn: Turn) -> None:
-        """Do what waits and is more urgent; for a job of this turn, in its own thread."""
+        """Run waiting jobs that are more urgent; for a job of this turn, in its own thread."""
         while (job := self._take(turn)) is not None:
             job.do()
 
     def close(self) -> None:
-        """Do what was submitted, and end."""
+        """Run the submitted jobs, and end."""
         with self._changed:
             self._closed = True
             self._changed.notify()

@@ -148,7 +148,7 @@ class ResourceModule:
         return self._host.meter()
 
     def own_rss_bytes(self) -> int:
-        """Return what the gateway holds."""
+        """Return the gateway's resident memory."""
         return self._host.own_rss_bytes()
 
     def selections(self) -> list[Selection]:

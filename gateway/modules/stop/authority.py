@@ -66,7 +66,7 @@ class Authority:
         number: int = 0,
         findings: Mapping[str, ResetFinding] = MappingProxyType({}),
     ) -> Transition:
-        """Tell what has happened; `act` is given what follows, in the order of events: it must not block."""
+        """Feed an event; `act` receives the transition, in the order of events, and must not block."""
         with self._lock:
             standing = tuple(f"{name} ({why})" for name, why in self.standing().items())
             now_ns = time.monotonic_ns() if at_ns is None else at_ns

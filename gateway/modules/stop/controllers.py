@@ -108,7 +108,7 @@ def _write(
 
 
 def write_of(one: ControllerStop, description: Description) -> Write:
-    """Return what stops it, as its device is told; raises `CodingError` where its EDS has no such number."""
+    """Return the write that stops a controller; raises `CodingError` if its EDS has no such number."""
     variable = description.variable(*one.address)
     known = None if variable is None else DATA_TYPES.get(variable.data_type or 0)
     if variable is None or known is None or known.kind not in NUMBERS:

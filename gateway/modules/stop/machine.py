@@ -184,7 +184,7 @@ class Transition:
 
 
 def step(state: StopMachineState, event: Event) -> Transition:
-    """Return what follows from an event."""
+    """Return the transition for an event."""
     if event.input in _ENDS and event.number != state.number:
         return Transition(state)
     if event.input in (Input.SEEN, Input.LOST):

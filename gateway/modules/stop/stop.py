@@ -106,7 +106,7 @@ def _is_confirmed(stop: "Future[Report]") -> bool:
 
 
 def _so_far(stops: "Mapping[str, Future[Report]]", last: "Future[dict[str, Report]]") -> dict[str, Report]:
-    """Return what is known by now; a target that has not answered yet is not confirmed."""
+    """Return the reports so far; a target without an answer yet is unconfirmed."""
     reports = dict.fromkeys(stops, Report(StopOutcome.UNCONFIRMED))
     for name, stop in stops.items():
         if stop.done():

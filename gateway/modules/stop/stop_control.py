@@ -435,7 +435,7 @@ def _nothing(_step: Transition) -> None:
 
 
 def _reaction(drive: Drive, armed: bool) -> DriveReaction:
-    """Return what a drive does by itself, as it said when it came up."""
+    """Return a drive's own reaction to a lost master, as read when it came up."""
     options = {} if drive.reading is None else drive.reading.options
     quick_stop, abort_connection = options.get("quick_stop"), options.get("abort_connection")
     return DriveReaction(

@@ -40,7 +40,7 @@ class StopThread:
         self._thread.start()
 
     def close(self) -> None:
-        """Do what was given, and end."""
+        """Finish the given work, and end."""
         with self._closing:
             self._closed = True
             self._work.put(None)

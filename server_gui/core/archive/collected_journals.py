@@ -94,7 +94,7 @@ class KeptJournals:
 
 
 def look(settings: ServerSettings) -> JournalsFound:
-    """Return what store and spool have now; blocks."""
+    """Return the journals in store and spool; blocks."""
     entries: dict[str, list[Entry]] = {}
     try:
         waiting = spool_reader.rows(settings.recorder.spool, JOURNAL)

@@ -118,7 +118,7 @@ class Piece:
     said: Sequence[PastPrediction]
 
     def between(self, begin_ns: int, end_ns: int) -> "Piece":
-        """Return what is from `begin_ns` up to before `end_ns`."""
+        """Return the rows and predictions from `begin_ns` up to before `end_ns`."""
         first, last = (bisect_left(self.said, at, key=lambda one: one.utc_ns) for at in (begin_ns, end_ns))
         return Piece(self.rows.between(begin_ns, end_ns), self.said[first:last])
 
@@ -277,7 +277,7 @@ class Playback:
         self._robot.judge()
 
     def _flags(self, rows: Rows) -> Iterator[Flag]:
-        """Yield what happened meanwhile, on the clock of the rows."""
+        """Yield the flags within these rows, on their clock."""
         behind_ns = int(rows.stamps_ns[-1] - rows.utc_ns[-1])
         for flag in self.happened.flags.between(int(rows.utc_ns[0]), int(rows.utc_ns[-1]) + 1):
             if flag.kind not in (FlagKind.FAULT, FlagKind.STOP):  # these the rows tell themselves
@@ -329,7 +329,7 @@ def _words(tape: Tape, told: Mapping[str, dict[str, str]]) -> dict[str, dict[str
 
 
 def _description(tape: Tape, jumps: int, words: Mapping[str, dict[str, str]]) -> Description:
-    """Return what the robot said it was made of, as far as its channels tell."""
+    """Return the robot's description, as far as its channels show it."""
     channels = []
     for name, unit in tape.units.items():
         component, _, quantity = name.rpartition(".")

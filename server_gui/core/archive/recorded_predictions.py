@@ -29,7 +29,7 @@ class PastPrediction:
 
 
 def said(settings: ServerSettings, session: Session, begin_ns: int, end_ns: int) -> list[PastPrediction]:
-    """Return what was said from `begin_ns` up to before `end_ns`, in time's order; blocks.
+    """Return the predictions from `begin_ns` up to before `end_ns`, in time's order; blocks.
 
     Raises:
         StoreError: the store cannot be reached, or the table not be read.

@@ -109,7 +109,12 @@ class SideBySide:
 def _heel_strike_ns(station: Station | None) -> int | None:
     """Return the last one of the left leg, UTC."""
     robot = None if station is None else station.robot
-    if station is None or not isinstance(robot, PlayedRobot) or robot.row_ns is None or robot.stamp_ns is None:
+    if (
+        station is None
+        or not isinstance(robot, PlayedRobot)
+        or robot.row_ns is None
+        or robot.stamp_ns is None
+    ):
         return None
     found = [
         event.stamp_ns

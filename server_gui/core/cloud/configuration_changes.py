@@ -103,7 +103,7 @@ class SessionConfiguration(Struct, frozen=True):
 
 
 def changes(before: SessionConfiguration, after: SessionConfiguration) -> Changes:
-    """Return what differs between two sessions."""
+    """Return the differences between two sessions."""
     found = [one for pair in _facts(before, after) for one in _compared(*pair)]
     known = [one for one in found if NOT_RECORDED not in (one.before, one.after)]
     differ = [one for one in known if one.before != one.after]
@@ -158,7 +158,7 @@ def _part(setup: Facts, section: str) -> Facts:
 def _compared(
     kind: ChangeKind, title: str, before: Facts, after: Facts, are_told: bool
 ) -> Iterator[Difference]:
-    """Yield what a section has on both sides. `are_told`: both sessions tell what they are made of."""
+    """Yield the differences of a section. `are_told`: both sessions have a configuration."""
     whole = are_told and kind in (ChangeKind.COMPONENT, ChangeKind.GUARD, ChangeKind.LIMITS)
     if not before and not after and not whole:
         if kind is not ChangeKind.OPERATOR:

@@ -281,7 +281,7 @@ def _sums(batch: pa.RecordBatch, same: Mapping[str, str]) -> checksums.Sums:
 
 
 def _seen(claims: Mapping[Batch, Claim], batch: pa.RecordBatch, values: bool) -> Sequence[_Seen]:
-    """Return what these rows of another table are of each claim."""
+    """Return the contribution of these rows of another table to each claim."""
     each = checksums.of_rows(pa.Table.from_batches([batch])) if values else None
     rows = _Rows(each, None if values else named(batch, NUMBER), times_us(batch[TIME]))
     found: dict[Batch, list[int]] = defaultdict(list)

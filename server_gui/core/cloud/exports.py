@@ -83,7 +83,7 @@ def found(sessions: Collection[Name], but: str) -> list[Exported]:
 
 
 def _in(file: Path, wanted: Set[Name], but: str) -> Exported | None:
-    """Return what an entry of the list says, where it is of somebody's sessions."""
+    """Return an entry of the list, if it is of the wanted sessions."""
     try:
         note = _read(file)
     except (OSError, msgspec.MsgspecError) as error:
@@ -180,7 +180,7 @@ def _read(file: Path) -> _Note:
 
 
 def _known(place: str) -> _Note | None:
-    """Return what was noted of it before; one that cannot be read is written anew."""
+    """Return the earlier note of a place; an unreadable one is rewritten."""
     try:
         return _read(_note_of(place))
     except (FileNotFoundError, msgspec.MsgspecError):

@@ -121,7 +121,7 @@ def _told(store: Store, file: DataFile) -> str:
 
 
 def _held(store: Store, spool: Spool, numbers: Collection[int]) -> dict[Batch, tuple[ReceiptPart, ...]]:
-    """Return what second copies, and batches that wait, could bring; nothing of those that cannot be read."""
+    """Return the rows that second copies and pending batches could restore; unreadable ones are left out."""
     found = {}
     untouched = Untouched.existing(store.url) if numbers else store
     for number in numbers:

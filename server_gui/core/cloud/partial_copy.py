@@ -24,7 +24,7 @@ class CopyScope:
     session: str | None = None
 
     def values(self, table: Table) -> dict[str, str]:
-        """Return what its rows in this table have in common; a robot's journal belongs to no session."""
+        """Return the values that its rows in this table share; a robot's journal belongs to no session."""
         named = {"robot": self.robot, "session": self.session}
         return {name: value for name, value in named.items() if value and name in table.schema.names}
 

@@ -136,7 +136,7 @@ def _judge(store: Store, claim: Claim, proof: Proof, *, values: bool) -> bool:
 
 
 def tables(store: Store) -> set[str]:
-    """Return what the store's tables are called for ever."""
+    """Return the permanent identities of the store's tables."""
     found = set()
     for location in (each for table in TABLES.values() for each in table.locations(store.about.shards)):
         try:
@@ -197,7 +197,7 @@ def _columns_gone(
 
 
 def _found(claim: Claim, told: Mapping[str, Units], units: Mapping[str, Units]) -> ReceiptPart:
-    """Return what is there of a claim, as its receipt would say it."""
+    """Return the rows of a claim that were found, in the form of its receipt."""
     part, there = claim.part, units.get(claim.part.location, {})
     return msgspec.structs.replace(
         part,
@@ -221,7 +221,7 @@ def _claim(batch: Batch, part: ReceiptPart, retained: datetime | None) -> Claim:
 
 
 def _problem(claim: Claim, *, values: bool) -> str | None:
-    """Return what is wrong with the rows of a claim, in words."""
+    """Return the problem of a claim's rows, in words."""
     part, (writer, batch) = claim.part, claim.batch
     (sent, total), (rows, found) = claim.expected, claim.there
     if claim.is_open:

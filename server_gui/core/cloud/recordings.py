@@ -135,7 +135,7 @@ class Recordings:
         return recorded_order([*stored, *told])
 
     def labels(self, session: Session) -> list[Row]:
-        """Return what somebody says that robot and wearer did, as far as it has not been taken back."""
+        """Return the valid labels of a session."""
         return holding(self.rows_of(session, LABELS))
 
     def counted(self, session: Session) -> Session:

@@ -62,7 +62,7 @@ class SelectedRecording:
 
 
 def choose(recordings: Recordings, recorded: Recorded, choice: Choice) -> SelectedRecording:
-    """Return what is wanted of a session that was opened among these; telemetry is read while `tables` is.
+    """Return the chosen part of an open session; telemetry is read while `tables` is iterated.
 
     Raises:
         StoreError: there is nothing of it or of that time, or the store cannot be read.

@@ -165,7 +165,7 @@ OLD_VALUE: Final = frozenset({"taken back", "unchanged"})  # what a robot says o
 
 
 def _not_back(entry: Entry) -> Iterator[str]:
-    """Yield what a stop has set, somebody else has changed, or was given up."""
+    """Yield parameters that were not reverted: set by a stop, changed by others, or given up."""
     outcome = entry.get("outcome")
     if _OUTCOMES.get(str(entry.get("what"))) is EditState.REVERTED and isinstance(outcome, Mapping):
         yield from (f"{name}: {said}" for name, said in outcome.items() if said not in OLD_VALUE)
@@ -241,7 +241,7 @@ def spell(edit: Edit, edits: Sequence[Edit]) -> tuple[Spell, tuple[str, ...]]:
 
 
 def within(found: Spell, since_ns: int, until_ns: int) -> Spell:
-    """Return what of it lies in one recording: who wears the robot before or after that, nobody knows."""
+    """Return the parts within one recording: outside of it the wearer is unknown."""
     sides = (
         [(max(since, since_ns), min(until, until_ns)) for since, until in spans]
         for spans in (found.before, found.after)

@@ -78,7 +78,7 @@ class EvidenceFile:
             os.fsync(file.fileno())
 
     def read(self) -> dict[str, EditEvidence]:
-        """Return what is known of each edit, by its id, oldest first; raises `OSError`."""
+        """Return the evidence of each edit, by its id, oldest first; raises `OSError`."""
         found: dict[str, EditEvidence] = {}
         with contextlib.suppress(FileNotFoundError), self.path.open("rb") as lines:
             for number, line in enumerate(lines, 1):

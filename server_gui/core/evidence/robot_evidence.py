@@ -101,11 +101,11 @@ class RobotEvidence:
         return []
 
     def session_of(self, edit: Edit) -> str:
-        """Return what the recording was called in which the edit was made."""
+        """Return the name of the recording in which the edit was made."""
         return self._recordings[self._place(edit)][1]
 
     def label(self, stamp_ns: int, activity: str) -> None:
-        """Take what a model says that the wearer does at an instant."""
+        """Take a model's activity of the wearer at an instant."""
         self._cutter.label(stamp_ns, activity)
 
     def look(self) -> list[EditEvidence]:
@@ -113,7 +113,7 @@ class RobotEvidence:
         return [told for edit in self._open() if (told := self._look(edit)) is not None]
 
     def end(self) -> list[EditEvidence]:
-        """Return what is known of the edits that were still followed; nothing more will come."""
+        """Return the final evidence of the edits that were still followed."""
         told = [self._told(_left(edit), is_final=True) for edit in self._open()]
         self._over |= {one.edit.id for one in told}
         return told
@@ -129,7 +129,7 @@ class RobotEvidence:
     # --- inside
 
     def _told(self, edit: Edit, *, is_final: bool) -> EditEvidence:
-        """Return what an edit has done, as far as the cycles until now tell."""
+        """Return the effect of an edit, from the cycles until now."""
         windows, notes = self._spell(edit)
         edited = [joint for joint in self.joints if joint in edit.components]
         found = compare(self.cycles, windows, self.joints, edited)

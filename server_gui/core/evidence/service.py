@@ -59,7 +59,7 @@ class EvidenceService:
         self.worker.join()
 
     def take(self, robot: str, event: Event) -> None:
-        """Take what a robot's feed tells; from any thread, returns at once."""
+        """Take an event of a robot's feed; from any thread, returns at once."""
         session = self._session(robot)
         if self._recorded.get(robot) != session:
             self._recorded[robot] = session
@@ -67,7 +67,7 @@ class EvidenceService:
         self._inbox.put(robot, without_processes(event))
 
     def predicted(self, news: Iterable[PredictionNews]) -> None:
-        """Take what models say; from any thread, returns at once."""
+        """Take models' predictions; from any thread, returns at once."""
         for one in news:
             if isinstance(one, Predicted) and one.prediction.task == ACTIVITY:
                 self._said.append((one.robot, one.prediction))

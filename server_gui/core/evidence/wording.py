@@ -60,7 +60,7 @@ def interval(one: Measured) -> str:
 
 
 def word(told: EditEvidence) -> str:
-    """Return what an edit did, and in which tense: what has ended was so, however many strides still come."""
+    """Return the judgement of an edit, and its tense: past for an edit that has ended."""
     found = told.evidence.word
     if told.edit.state in (EditState.REVERTED, EditState.TAKEN_OVER) and told.experiment is None:
         return f"was {found}" if found in (Word.BETTER, Word.WORSE, Word.MIXED) else str(found)

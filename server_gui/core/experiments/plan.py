@@ -179,7 +179,7 @@ def orders(pairs: int) -> npt.NDArray[np.int8]:
 
 
 def signs(plan: ExperimentPlan) -> npt.NDArray[np.int8]:
-    """Return which of each pair comes first: 1 A, -1 B."""
+    """Return the order of each pair: 1 if A comes first, else -1."""
     first = plan.values[0]
     return np.array([1 if step.value == first else -1 for step in plan.steps[::2]], dtype=np.int8)
 

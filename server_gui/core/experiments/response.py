@@ -35,7 +35,7 @@ class Swept:
 def respond(
     periods: Sequence[HeldPeriod], joints: Sequence[str], edited: Sequence[str], original: float
 ) -> Swept:
-    """Return what the values did; judged by the tracking error of what was edited, else of all joints."""
+    """Return the responses to the values, judged by the tracking error of the edited joints, else of all."""
     series = [one for one in all_series(joints, periods) if not one.metric.is_slope]
     responses = [found for one in series if (found := _response(one, periods)) is not None]
     wanted = [one for one in series if one.metric.key == JUDGED and one.component in (edited or joints)]

@@ -21,7 +21,7 @@ LEFT_OUT: Final = "right after a change"
 
 
 def result(run: Run, who: str, unit: str, session: str = "") -> EditEvidence | None:
-    """Return what is to be kept of an experiment that is over; None where nothing was written."""
+    """Return the record of a finished experiment; None if nothing was written."""
     if run.state is Stands.NOTHING_DONE:
         return None
     plan, held = run.plan, [one for _, one in run.periods]
@@ -61,7 +61,7 @@ def result(run: Run, who: str, unit: str, session: str = "") -> EditEvidence | N
 
 
 def _edit(run: Run, who: str) -> Edit:
-    """Return what stands for all its trials in a list of edits."""
+    """Return the one edit that represents all trials of an experiment."""
     plan = run.plan
     first, last = plan.values[0], plan.values[-1]
     name = hashlib.sha256(f"{run.robot} {run.boot_id} {run.utc_ns} {plan.name}".encode()).hexdigest()[:ID]

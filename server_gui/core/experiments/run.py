@@ -129,7 +129,7 @@ class Run:
     # --- what comes
 
     def take(self, fact: Fact) -> None:
-        """Take what the robot's feed tells."""
+        """Take an event of the robot's feed."""
         self._walk.take(fact)
         self.watch.take(fact)
         match fact:

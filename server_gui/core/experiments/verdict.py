@@ -74,7 +74,7 @@ def judge(
     joints: Sequence[str],
     edited: Sequence[str],
 ) -> Evidence:
-    """Return what the second value did against the first, as evidence *before* and *after*.
+    """Return the effect of the second value against the first, as evidence *before* and *after*.
 
     `order` has of each planned pair which value came first (1: the first), `periods` what was held, in time.
     """
@@ -138,7 +138,7 @@ def _family(
     *,
     is_same: bool,
 ) -> list[tuple[Measured, Metric]]:
-    """Return what is known of each, p still without the other families."""
+    """Return each metric's result; p is not yet adjusted for the other families."""
     means = {one.key: period_means(one, [held for pair in pairs for held in pair]) for one in series}
     groups: dict[bytes, list[Series]] = {}
     found: dict[str, Measured] = {}
@@ -207,7 +207,7 @@ def _values(one: Series, side: Sequence[HeldPeriod]) -> list[float]:
 
 
 def _told(one: Series, sides: Sequence[Sequence[HeldPeriod]]) -> Measured:
-    """Return what both sides have, without a word."""
+    """Return both sides' values, without a judgement."""
     values = [_values(one, side) for side in sides]
     means = [float(np.mean(side)) if side and not one.metric.is_slope else None for side in values]
     word = Word.SAME if any(values) else Word.NO_DATA

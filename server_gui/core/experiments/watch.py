@@ -134,7 +134,7 @@ class ExperimentWatch:
                     yield f"{joint}: {_over(quantity, found, limit)}{self._allowed(quantity)}"
 
     def _allowed(self, quantity: str) -> str:
-        """Return what to do where the bound was nobody's choice."""
+        """Return the way to relax a default bound; empty for a bound that was chosen."""
         if quantity not in self._usual:
             return ""
         return (

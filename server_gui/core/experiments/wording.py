@@ -15,7 +15,7 @@ BAR: Final = 24  # letters
 
 
 def stated(plan: ExperimentPlan) -> Iterator[str]:
-    """Yield what will be done, before it begins."""
+    """Yield the plan in words, before it begins."""
     dwell = plan.dwell
     each = counted(dwell.cycles, "gait cycle") if dwell.seconds is None else f"{dwell.seconds:g} s"
     left_out = counted(dwell.transient, "gait cycle")
@@ -71,7 +71,7 @@ def ending(run: Run) -> str:
 
 
 def what(told: EditEvidence) -> str:
-    """Return what was changed: of an experiment all its values."""
+    """Return the changed parameters: of an experiment all its values."""
     one = told.experiment
     if one is None:
         return changes(told.edit)
@@ -98,7 +98,7 @@ def whole(found: Sequence[EditEvidence], writes: Collection[int] = ()) -> list[E
 
 
 def record(one: Experiment) -> Iterator[str]:
-    """Yield what was done, and how it ended."""
+    """Yield the course of an experiment and its end, in words."""
     cycles = counted(one.cycles, "gait cycle") if one.seconds is None else f"{one.seconds:g} s"
     drawn = f", order drawn with seed {one.seed}" if one.seed is not None else ""
     held = " ".join(number(period.value) for period in one.periods)

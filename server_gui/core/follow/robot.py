@@ -120,7 +120,7 @@ class Robot:
         return self._missing.take(buses, at_ns, cpu_percent)
 
     def hold(self, values: Mapping[str, float]) -> None:
-        """Take what devices were read to hold just now."""
+        """Take values just read from devices."""
         for name, value in values.items():
             if name in self.parameters:
                 self.parameters[name] = msgspec.structs.replace(self.parameters[name], value=value)
@@ -155,7 +155,7 @@ class Robot:
         return now_ns - self._flows_since_ns > RATE_WINDOW_NS and self.rate_hz(now_ns) < SLOW * self.asked_hz
 
     def rate_text(self, now_ns: int | None = None) -> str:
-        """Return how many rows come a second, of how many where these are fewer."""
+        """Return the row rate in words, with the requested rate if it is lower."""
         of = f" of {self.asked_hz:.0f}" if self.is_slow(now_ns) else ""
         return f"{self.rate_hz(now_ns):.0f}{of} Hz"
 

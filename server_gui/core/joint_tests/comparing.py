@@ -65,7 +65,7 @@ def last_before(test: Test) -> Path | None:
 
 
 def differences(one: Test, other: Test) -> Iterator[str]:
-    """Yield what else is not the same in both, in words: `other` is the older one."""
+    """Yield the other differences between two tests, in words: `other` is the older one."""
     if one.head.robot != other.head.robot or one.head.joint != other.head.joint:
         yield f"another joint: {other.head.robot} {other.head.joint}, now {one.head.robot} {one.head.joint}"
     for name in _CONDITIONS:

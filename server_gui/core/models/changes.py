@@ -42,7 +42,7 @@ class ModelChange:
 
     @property
     def outcome(self) -> str:
-        """Return what is so afterwards."""
+        """Return the state afterwards, in words."""
         then = "no model of its own" if self.then is None else self.names[self.then.id]
         return f"{task_name(self.task)}: {then} serves {self.robot or EVERY}"
 
@@ -54,7 +54,7 @@ class ModelChange:
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """Return what changes."""
+        """Return the effects of the change, in words."""
         return tuple(self._sentences())
 
     def _sentences(self) -> Iterator[str]:
@@ -76,7 +76,7 @@ class ModelChange:
 
 
 def promotion(url: str, model: str, robot: str) -> ModelChange:
-    """Return what it would change to let a model serve a robot, or all; blocks.
+    """Return the effect of promoting a model for a robot, or for all; blocks.
 
     Raises:
         UnusableModel: it is refused, as `gwrms models promote` refuses it.
@@ -91,7 +91,7 @@ def promotion(url: str, model: str, robot: str) -> ModelChange:
 
 
 def way_back(url: str, task: str, robot: str) -> ModelChange:
-    """Return what a rollback would change; blocks.
+    """Return the effect of a rollback; blocks.
 
     Raises:
         UnusableModel: it is refused, as `gwrms models rollback` refuses it.
@@ -106,7 +106,7 @@ def way_back(url: str, task: str, robot: str) -> ModelChange:
 
 
 def carry_out(url: str, change: ModelChange, who: str, why: str) -> Pointer:
-    """Do what was confirmed; blocks.
+    """Carry out a confirmed change; blocks.
 
     Raises:
         Overtaken: something else serves by now than what was confirmed; that stays.

@@ -60,11 +60,11 @@ class Compared:
         return BY_EDS if self.with_component is None else self.with_component.replace("_", " ")
 
     def value(self, info: ObjectInfo) -> Number | str | None:
-        """Return what the device held when it was read; None for what is not known."""
+        """Return the device's value as of the last read; None if unknown."""
         return _value(self.held.get((self.component, info.object)))
 
     def other(self, info: ObjectInfo) -> Number | str | None:
-        """Return what it is compared with."""
+        """Return the value to compare with."""
         if self.with_component is None:
             return info.default
         return _value(self.held.get((self.with_component, info.object)))

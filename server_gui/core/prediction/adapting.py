@@ -98,7 +98,7 @@ class _Attempts:
             self._enter(state, self.now.tried if found is None else found, why)
 
     def take(self, thing: Batch | list[Window], told: Callable[[], None]) -> None:
-        """Take what the robot has sent, or its model was asked."""
+        """Take the robot's rows, or inputs of its model."""
         if self._lesson is None:
             return
         if isinstance(thing, list):
@@ -302,7 +302,7 @@ class AdaptingService:
 
 
 def _after(before: Context, events: Iterable[Event]) -> Context:
-    """Return what the robot's link and boot are after these events."""
+    """Return the robot's link and boot after these events."""
     boot_id, links, is_linked = before.boot_id, before.links, before.is_linked
     for event in events:
         match event:

@@ -55,7 +55,7 @@ class Endangered:
 
 
 def turn(before: Level, verdict: DangerVerdict) -> str | None:
-    """Return what is to be noted where advice, or what is worse, begins or ends.
+    """Return a note for the recording, if advice or a worse level begins or ends.
 
     None where nothing has happened.
     """

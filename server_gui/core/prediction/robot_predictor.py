@@ -58,7 +58,7 @@ class Watched:
     def predicted(
         self, robot: str, clock: Clock, quality: Quality | None, predictions: Sequence[Prediction]
     ) -> Iterator[PredictionNews]:
-        """Return what these predictions say of what was due; `quality` is how right the model was of late."""
+        """Yield the news of these predictions; `quality` is the model's recent accuracy."""
         samples = [window.samples[0, :, -1] for window in self.due]
         self.due = []
         self._trusting.take(predictions, samples)
@@ -125,7 +125,7 @@ class RobotPredictor:
             self._danger.restart()
 
     def take(self, events: Iterable[Event]) -> None:
-        """Take what the robot's feed has told, in order."""
+        """Take the events of the robot's feed, in order."""
         for event in events:
             match event:
                 case Telemetry():

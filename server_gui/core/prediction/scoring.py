@@ -72,13 +72,13 @@ def _phases(true: Samples, sources: Names, said: Decisions) -> tuple[Names, Sequ
 
 
 def counted(was: Names, said: Sequence[str]) -> Counts:
-    """Return how often what was said of what, where somebody knows."""
+    """Count the pairs of truth and prediction, where the truth is known."""
     pairs = zip(was.tolist(), said, strict=True)
     return Counter((so, label) for so, label in pairs if so != NOBODY)
 
 
 def quality(counts: Mapping[tuple[str, str], int]) -> Quality:
-    """Return what of that was right."""
+    """Return the accuracy from such counts."""
     confusion: dict[str, dict[str, int]] = {}
     for (was, said), count in sorted(counts.items()):
         confusion.setdefault(was, {})[said] = count

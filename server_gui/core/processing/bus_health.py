@@ -104,7 +104,7 @@ def worst(robot: Robot) -> tuple[BusHealthLevel, tuple[str, ...]]:
 
 
 def trouble(bus: BusInfo) -> tuple[str, str] | None:
-    """Return what is wrong with a bus, and what to check where that is known; None: nothing."""
+    """Return a bus's problems, and what to check if that is known; None if there are none."""
     told = findings(bus)
     return (_joined(words for words, _ in told), _joined(check for _, check in told)) if told else None
 
@@ -150,7 +150,7 @@ def reason(bus: BusInfo) -> tuple[str, ...] | None:
 
 
 def talking(bus: BusInfo) -> list[Talking]:
-    """Return who talks on a bus, the most first; `node_id` None is what belongs to no node."""
+    """Return the senders on a bus, the busiest first; `node_id` None stands for frames of no node."""
     names = {node.node_id: tuple(node.components) for node in bus.nodes}
     total = sum(one.frames_per_s for one in bus.talks)
     by_node: dict[int | None, dict[str, float]] = {}
@@ -185,7 +185,7 @@ def _misses(node: NodeInfo) -> bool:
 
 
 def _gathered(nodes: Sequence[NodeInfo]) -> Iterator[tuple[str, str]]:
-    """Yield what nodes have, those with the same in one: `all 6 nodes: 3–4 % of their PDOs are missing`."""
+    """Yield the nodes' findings, equal ones in one: `all 6 nodes: 3–4 % of their PDOs are missing`."""
     same: dict[tuple[str, str], list[tuple[NodeInfo, str]]] = {}
     for node in nodes:
         said = [(one.words, one.check) for one in node.findings]

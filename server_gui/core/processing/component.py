@@ -83,7 +83,7 @@ class ComponentProcessing:
         return taken
 
     def shown(self, now_ns: int | None = None) -> Derived:
-        """Return what is derived at `now_ns` on the robot's clock; by default at the newest row."""
+        """Return the derived values at `now_ns` on the robot's clock; by default at the newest row."""
         now_ns = self._stamp_ns if now_ns is None else now_ns
         errors = ((name, error.at(now_ns)) for name, error in self._errors.items())
         return Derived(

@@ -158,7 +158,7 @@ class Spool:
     # --- any thread
 
     def earlier_writers(self) -> set[str]:
-        """Return what the openings before this one were called at the store, as far as anybody knows."""
+        """Return the names at the store of earlier openings, as far as they are known."""
         newest = self.receipts.newest()
         return (self._writers | ({newest.writer} if newest else set())) - {self.writer}
 
@@ -258,7 +258,7 @@ class Spool:
         return self._files.path(number, SegmentState.DAMAGED).exists()
 
     def loss_name(self, number: int) -> str:
-        """Return what the loss of this batch is called at the store: the same whoever tells it how often.
+        """Return the name of this batch's loss at the store: the same on every report.
 
         Where an older copy of the spool takes its place, and a batch is lost under the number again, it is
         another. Raises `SpoolUnusable`.
@@ -271,7 +271,7 @@ class Spool:
         self._settled.add(number)
 
     def robots_beside(self, number: int) -> set[str]:
-        """Return whose rows a lost batch may have had: the robots of the batches before and after it."""
+        """Return the robots whose rows a lost batch may have had: those of the batches beside it."""
         found: set[str] = set()
         for beside, kept in self._files.own():
             if (
@@ -289,7 +289,7 @@ class Spool:
         return found
 
     def backlog_bytes(self) -> int:
-        """Return what waits for upload, with what is being written."""
+        """Return the size of the pending data, including the segment being written."""
         return sum(
             Segment.size_bytes(self._files.path(number))
             for number in self._files.all_of(SegmentState.WAITING)
@@ -338,7 +338,7 @@ class Spool:
         return named
 
     def _called(self) -> Iterator[str]:
-        """Yield what receipts and segments call this spool, the newest first."""
+        """Yield the spool's names in receipts and segments, the newest first."""
         receipt = self.receipts.newest()
         if receipt:
             yield receipt.spool

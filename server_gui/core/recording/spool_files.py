@@ -93,7 +93,7 @@ class Files:
         self._write("id", name)
 
     def name_loss(self, number: int, name: str) -> str:
-        """Return what the loss of this batch is called at the store; `name` where it has no name yet."""
+        """Return the name of this batch's loss at the store; `name` if it has none yet."""
         file = self.folder / f"{number:08}.lost"
         known = file.read_bytes().decode(errors="replace").strip() if file.exists() else ""
         if not _LOSS.fullmatch(known):
@@ -154,7 +154,7 @@ class Files:
 
 
 def identity(folder: Path) -> str:
-    """Return what the spool in this folder is called; nothing where there is none, or its `id` is damaged.
+    """Return the name of the spool in this folder; empty if there is none, or its `id` is damaged.
 
     Raises:
         SpoolUnusable: it may not be read.

@@ -107,7 +107,7 @@ class Tally:
         known.times.add(times, each)
 
     def parts(self, location: str, table: str, units: Units) -> list[ReceiptPart]:
-        """Return what was counted, the first with the units of the columns."""
+        """Return the counts, the first with the units of the columns."""
         found = [
             ReceiptPart(
                 location,

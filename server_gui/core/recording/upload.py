@@ -137,7 +137,7 @@ def _bring(store: Store, rows: pa.Table, named: str) -> bool:
 
 
 def _told(store: Store, writer: str, number: int) -> ReceiptPart:
-    """Return what the store has of such events."""
+    """Return the store's count of such events."""
     column = pyarrow.dataset.field
     mine = (column("spool") == writer) & (column("batch") == number)
     with translated(f"{store.url}/{EVENTS.name} cannot be read"):
@@ -199,7 +199,7 @@ def ahead(spool: Spool, store: Store) -> list[str]:
 
 
 def _openings(spool: Spool, store: Store) -> set[str]:
-    """Return what other openings of this spool were called, also those after it was copied.
+    """Return the names of this spool's other openings, even after a copy.
 
     Each begins sessions.
     """

@@ -43,7 +43,7 @@ class Comparison:
 
 
 def open_file(path: Path, description: Description, component: str | None) -> Comparison:
-    """Read what a file says of this robot; `component` is the device that a DCF is for where it does not say.
+    """Read a file's values for this robot; `component` is a DCF's device, if the file does not name it.
 
     Raises:
         FileProblem: it cannot be read, or is another device's.
@@ -59,7 +59,7 @@ def open_file(path: Path, description: Description, component: str | None) -> Co
 
 
 def save_file(path: Path, description: Description, held: Held) -> int:
-    """Write what can be changed, as the robot holds it, as TOML; how many values.
+    """Write the robot's writable values as TOML; return their number.
 
     Raises:
         FileProblem: nothing is held, or the file cannot be written.
@@ -80,5 +80,5 @@ def save_file(path: Path, description: Description, held: Held) -> int:
 
 
 def staged_as(rows: Iterable[Row]) -> dict[str, float]:
-    """Return what is staged to bring these about: each value as the device would hold it."""
+    """Return the edits that apply these rows: each value as the device would hold it."""
     return {row.name: row.file for row in rows if row.file is not None}

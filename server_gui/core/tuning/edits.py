@@ -79,7 +79,7 @@ class Edits:
     def difference(
         self, held: Values, known: Mapping[str, ParameterInfo], units: Units
     ) -> tuple[ReviewedEdit, ...]:
-        """Return what would be written, and nothing else, in the robot's order of parameters."""
+        """Return the values that would be written, in the robot's order of parameters."""
         order = {name: place for place, name in enumerate(known)}
         names = sorted(self.staged, key=lambda name: order.get(name, len(order)))
         changes = (self._change(name, held.get(name), known.get(name), units) for name in names)

@@ -99,7 +99,7 @@ class ResultCard(Card):
 
 
 def checked(written: WrittenMessage) -> str:
-    """Return what `gwrms check` says of it, a line each."""
+    """Return the findings of `gwrms check`, a line each."""
     lines = [f"▲ {severity}: {words}" for severity, words in written.findings]
     if written.unfinished:
         lines.append(f"▲ not in it, because not finished: {', '.join(written.unfinished)}")

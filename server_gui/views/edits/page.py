@@ -176,7 +176,7 @@ class Edits(QWidget):
             self.form.show()
 
     def _chosen_edit(self, station: Station) -> Tried | None:
-        """Return what is looked at, unless something was staged or tried since."""
+        """Return the shown edit, unless something was staged or tried since."""
         told = self._chosen
         known = next((one for one in station.judged if told and one.edit.id == told.edit.id), None)
         if known is None or len(known.edit.changes) != 1 or station.writing.trial or station.edits.staged:
@@ -261,7 +261,7 @@ class Edits(QWidget):
             one.show_hover(at)
 
     def _what(self, told: EditEvidence) -> str:
-        """Return what was changed, in its unit."""
+        """Return the changed parameters, in their units."""
         if told.experiment is None:
             return changes(told.edit, self._units.get(told.edit.id, {}))
         return f"{what(told)} {told.experiment.unit}".rstrip()
@@ -347,7 +347,7 @@ def _by_our_clock(note: str) -> str:
 
 
 def _strong(told: EditEvidence) -> list[Measured]:
-    """Return what differs, the strongest first."""
+    """Return the differing metrics, the strongest first."""
     found = (one for one in told.evidence.metrics if one.word in (Word.BETTER, Word.WORSE, Word.CHANGED))
     return sorted(found, key=lambda one: -abs(one.size or 0.0))
 

@@ -23,7 +23,7 @@ def changes(station: Station, trial: Trial, units: Units) -> list[str]:
 
 
 def wordings(station: Station, trial: Trial, units: Units) -> tuple[str, ...]:
-    """Return what to say where there is less and less room: each value whole, and how many more there are."""
+    """Return the wordings for less and less room: each value whole, with the number of further ones."""
     first, *others = _changes(station, trial, units)
     said = changes(station, trial, units)
     full = ", ".join(said)
@@ -40,7 +40,7 @@ def why_no_ab(trial: Trial) -> str:
 
 
 def so_far(edit: EditEvidence | None) -> tuple[str, ...]:
-    """Return what it did until now in one clause: `so far worse: left knee tracking error RMS +45.0 %`.
+    """Return its effect so far in one clause: `so far worse: left knee tracking error RMS +45.0 %`.
 
     Then the same for where there is less and less room.
     """

@@ -78,7 +78,7 @@ class ChoiceBar(QWidget):
         _fill(self.other, [(BY_EDS, None), *others])
 
     def count(self, kinds: Mapping[RowKind, Sequence[object]], *, is_reading: bool) -> None:
-        """Say how many there are of each kind, and whether all are being read."""
+        """Show the number of objects of each kind, and whether all are being read."""
         for kind, button in self.kinds.items():
             _set_text(button, f"{kind.value} {len(kinds[kind])}")
         _set_text(self.all, READ_NO_MORE if is_reading else READ_ALL)

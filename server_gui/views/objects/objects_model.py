@@ -107,7 +107,7 @@ class ObjectsModel(QAbstractTableModel):
         return None
 
     def text(self, info: ObjectInfo, column: int) -> str:
-        """Return what a cell says."""
+        """Return the text of a cell."""
         text = plain(_TEXTS[column](self.shown, info))
         return text if len(text) <= LONGEST else f"{text[:LONGEST]}…"
 

@@ -253,7 +253,7 @@ class ObjectsPage(QWidget):
     def _wanted(
         self, station: Station, dictionary: Dictionary, compared: Compared
     ) -> tuple[list[Object], list[Object]]:
-        """Return what is chosen or in sight, here and on the device beside it.
+        """Return the chosen and visible objects, here and on the device beside it.
 
         And what of it never changes.
         """
@@ -272,7 +272,7 @@ class ObjectsPage(QWidget):
 
 
 def _trouble(station: Station, device: Device | None, dictionary: Dictionary) -> str:
-    """Return what is wrong as a whole; of single objects their rows tell."""
+    """Return the problem of the whole panel; problems of single objects are in their rows."""
     if not station.is_linked:
         return LOST
     if station.robot.description is None:

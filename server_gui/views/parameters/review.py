@@ -101,7 +101,7 @@ class Review(QWidget):
         everything.addLayout(row)
 
     def show_changes(self, changes: tuple[ReviewedEdit, ...]) -> None:
-        """Show what would be written from now on."""
+        """Show the changes to be written."""
         self.changes = changes
         self.table.setRowCount(len(changes))
         for row, change in enumerate(changes):

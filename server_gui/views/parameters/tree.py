@@ -156,7 +156,7 @@ class ParameterTree(QTreeView):
             self._show_columns()
 
     def show_only(self, words: str, names: Iterable[str] | None) -> None:
-        """Show what has all words and is one of `names`, its groups open; who chose one finds it chosen."""
+        """Show rows that match all words and are one of `names`, with open groups; the selection stays."""
         self._filtering = True
         if self.filter.show(words, names):
             self._open_groups(everything=bool(words) or names is not None)

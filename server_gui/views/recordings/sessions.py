@@ -291,7 +291,7 @@ def _when(time: datetime | None) -> str:
 
 
 def _told(session: Session | None, tape: Tape | None, problem: str, held: Sequence[str]) -> str:
-    """Return what is known of it, as text."""
+    """Return the facts of a session as text."""
     if session is None:
         return "Choose a recording to see what is in it; with Ctrl a second one, to compare the two."
     known = {

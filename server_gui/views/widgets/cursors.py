@@ -56,7 +56,7 @@ class CursorLayout:
 
 
 def told(flags: Iterable[tuple[float, FlagKind]], apart: float) -> list[tuple[float, FlagKind]]:
-    """Return which flags have room for their mark, `apart` from each other: a fault before the stop by it."""
+    """Return the flags with room for their mark, `apart` from each other: a fault before its stop."""
     found: list[tuple[float, FlagKind]] = []
     for share, kind in sorted(flags, key=lambda flag: FIRST.index(flag[1])):
         if all(abs(share - other) >= apart for other, _ in found):
