@@ -33,6 +33,8 @@ AGREES: Final = 8.0  # % of a stride, that steps and a model may be apart
 STOPPED: Final = "stopped"
 OLD: Final = "old"  # what a model said is no prediction any more
 NOT_JUDGED: Final = "Not judged while stopped"
+WALK: Final = "walk"  # a label of the models
+SEEN, SEEN_SHORT = "from the steps seen, without a model", "from the steps seen"
 UNSEEN: Final = "not judged"  # for the model does not see all
 
 
@@ -113,35 +115,37 @@ def status(station: Station) -> PredictionRow | None:
 
 def activity(station: Station) -> PredictionRow:
     """Return the row of the activity: by a model if it predicts one, else by the detected steps."""
-    gait, shown = station.processing.derived().gait, station.predictions.told.get(ACTIVITY)
+    shown = station.predictions.told.get(ACTIVITY)
     if not station.is_live:
         return PredictionRow(Mark("ring", "old", "not known"), "Activity not known", "no live data")
-    if shown is not None and not shown.is_stale():
-        return said(shown, stopped=not_judged(station), unseen=blind(station))
+    stopped = not_judged(station)
+    line = None if shown is None else said(shown, stopped=stopped, unseen=blind(station))
+    if line is not None and line.mark.word != OLD:
+        return line
+    return unjudged(stopped) if stopped else by_steps(station)
+
+
+def by_steps(station: Station) -> PredictionRow:
+    """Return what the steps that were seen tell, in the words of the models' labels."""
+    walks = station.processing.derived().gait.walking
     why = station.predictions.problem or "the model says nothing now"
-    if stopped := not_judged(station):
-        return unjudged(stopped)
-    if gait.walking is None:
-        return PredictionRow(
-            Mark("ring", "old", "not known"), "Activity not known", "too few steps seen yet", "", why
-        )
-    if not gait.walking:
-        return PredictionRow(
-            Mark("ring", "dim", "not walking"), "Not walking", "by the steps seen", "by steps", why
-        )
-    return PredictionRow(
-        Mark("diamond", "accent", "walking"), "Walking", "by the steps seen", "by steps", why
-    )
+    if walks is None:
+        mark, few = Mark("ring", "old", "not known"), "too few steps seen yet"
+        return PredictionRow(mark, "Activity not known", few, "", why)
+    if not walks:
+        return PredictionRow(Mark("ring", "dim", "no steps"), "No steps", SEEN, SEEN_SHORT, why)
+    return PredictionRow(Mark("diamond", "accent", WALK), label_text(WALK), SEEN, SEEN_SHORT, why)
 
 
 def doing(station: Station) -> tuple[str, ...]:
-    """Return the robot's activity, the fullest wording first: `Walking 74 steps/min · 6 of 6 enabled`."""
+    """Return the robot's activity, the fullest wording first: `Walk 74 steps/min · 6 of 6 enabled`."""
     count = enabled_text(station.robot, live=station.is_live)
     if not station.is_live:
         return ("what it does is not known", "not known")
     line, gait = activity(station), station.processing.derived().gait
     walks = gait.walking and gait.cadence_spm is not None and line.mark.word != STOPPED
-    cadence = f"{line.text} {gait.cadence_spm:.0f} steps/min" if walks else line.short_text
+    between = " " if line.mark.colour == "accent" else " · "  # the steps are not those of what is not known
+    cadence = f"{line.text}{between}{gait.cadence_spm:.0f} steps/min" if walks else line.short_text
     least = f"{PROBABLE.sub('', line.short_text)} · {count.replace(' of ', '/')}"
     return tuple(dict.fromkeys((f"{cadence} · {count}", f"{line.short_text} · {count}", least, count)))
 

@@ -15,7 +15,7 @@ from server_gui.core.evidence.cycles import DRAWN
 from server_gui.core.evidence.edits import EditState, ParameterChange
 from server_gui.core.evidence.file import EditEvidence
 from server_gui.core.tuning.writing import Trial
-from server_gui.views.edits.page import Edits
+from server_gui.views.edits.page import Edits, _by_our_clock
 from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.plot_frame import draw_frame
@@ -244,3 +244,9 @@ def test_strides_are_read_where_the_pointer_is(bench: Bench, parts: Parts) -> No
     assert {one.read for one in parts.edits.curves.values()} == {"50 %: 5.7 → 11.5 °"}
     QApplication.sendEvent(knee, QEvent(QEvent.Type.Leave))
     assert knee.read == ""
+
+
+def test_a_note_that_names_no_time_at_all_stays_as_it_was_written() -> None:
+    wrong = "compared with 2026-13-41T25:00:00Z (ab12), which overlaps"
+    assert _by_our_clock(wrong) == wrong
+    assert "Z (ab12)" not in _by_our_clock("compared with 2026-11-03T14:20:00Z (ab12), which overlaps")

@@ -122,6 +122,19 @@ def test_the_chosen_one_stays_chosen_when_it_is_found_again(page: ObjectsPage) -
     assert current.object == "0x6041:0"
 
 
+def test_the_facts_are_of_the_chosen_object_also_while_text_of_another_is_marked(page: ObjectsPage) -> None:
+    page.table.choose("0x6041:0")
+    page.facts.text.selectAll()
+    page.table.choose("0x6065:0")
+    assert "operation enabled" not in page.facts.text.toPlainText()
+    assert "to release in [joint.left_knee]" in page.facts.text.toPlainText()
+    said = page.facts.text.toPlainText()
+    page.facts.text.selectAll()
+    page.look()
+    assert page.facts.text.toPlainText() == said
+    assert page.facts.text.textCursor().hasSelection(), "what is marked to be copied stays marked"
+
+
 def test_its_facts_have_bits_by_name_and_why_it_is_locked(page: ObjectsPage) -> None:
     page.table.choose("0x6041:0")
     assert "2 operation enabled" in page.facts.text.toPlainText()

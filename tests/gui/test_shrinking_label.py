@@ -7,11 +7,13 @@ from PySide6.QtWidgets import QApplication
 from server_gui.views.overview.joint_table import (
     CURRENT,
     ERROR,
+    STATE,
     TEMPERATURE,
     TORQUE,
     VELOCITY,
     JointModel,
     JointTable,
+    in_few_words,
 )
 from server_gui.views.overview.joint_words import JointWords
 from server_gui.views.theme import Theme
@@ -76,7 +78,9 @@ def test_the_joint_table_cuts_no_number(theme: Theme, bench: Bench, width: int, 
             continue
         numbers = 2 <= column <= 6
         metrics = QFontMetrics(theme.number_font() if numbers else theme.text_font())
-        assert table.columnWidth(column) >= model.widest(column, metrics)
+        said = in_few_words if column == STATE and width < 640 else str
+        assert table.columnWidth(column) >= model.widest(column, metrics, said)
+    assert rules.halved_numbers(table, [table]) == []
     assert not table.isColumnHidden(TORQUE)
     assert not table.isColumnHidden(ERROR)
     destroy(table)
@@ -152,3 +156,24 @@ def test_of_many_errors_the_first_is_whole_and_the_others_are_counted(theme: The
     below.say([])
     assert below.text().startswith("Bars: ")
     destroy(below)
+
+
+@pytest.mark.parametrize("code", [0x0, 0x2310, 0x4210])
+@pytest.mark.parametrize("scale", [1.0, 1.5])
+@pytest.mark.parametrize("width", range(260, 700, 40))
+def test_what_is_shown_of_the_joint_table_is_whole_at_every_width(
+    theme: Theme, bench: Bench, width: int, scale: float, code: int
+) -> None:
+    theme.set(scale=scale)
+    bench.station.take([walking(10), looked()])
+    newest_ns = bench.station.rings.newest_ns or 0
+    bench.station.take([telemetry([newest_ns + 1], {"left_knee.error_code": [float(code)]})])
+    model = JointModel(bench.desk, theme)
+    model.refresh()
+    table = JointTable(model, theme)
+    table.resize(round(width * scale), 300)
+    table.show()
+    assert rules.halved_numbers(table, [table]) == []
+    assert not table.isColumnHidden(STATE)
+    assert not code or table.unsaid or not table.isColumnHidden(ERROR)
+    destroy(table)

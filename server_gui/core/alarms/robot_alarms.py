@@ -19,6 +19,8 @@ from server_gui.core.prediction.newest_predictions import ShownDanger
 from server_gui.core.processing import bus_health
 from server_gui.core.tuning.stop import StopProgress, StopState
 
+EVERY_OFF: Final = "every drive is off"
+OFF: Final = frozenset({"switch on disabled"})
 MOVES: Final = 0.1  # rad/s: what turns faster is not at rest
 SOON_NS: Final = 3_000_000_000  # for so long a link without a row is nothing strange
 _QUICK_STOP: Final = "quick stop active"
@@ -27,6 +29,7 @@ _CODE: Final = re.compile(r"0x([0-9A-Fa-f]{4})\b")
 _PREFIX: Final = re.compile(r"^(the drive is in fault: |it reports )")
 _LASTING: Final = re.compile(r" \(for \d+ s\)")  # an alarm says by itself since when
 _ADVICE: Final = re.compile(r": (?=(?:check|plug|see) )")  # with which what the robot says of a part may end
+_ANOTHER: Final = re.compile(r"(?:it reports|the drive is|its|no|nothing|node|\d+ %|0x[0-9A-Fa-f]{4}) ?\b")
 # What shows it best, by the code's beginning; else the position.
 _SHOWN_BY: Final = (
     ("2", ("current", "torque")),
@@ -96,9 +99,8 @@ def _of_stop(robot: Robot, stopping: StopProgress) -> Iterator[Alarm]:
             aside=by,
         )
     elif stopping.was_ended and not any_enabled(robot):
-        yield Alarm(
-            Kind.RESET, "", "every drive is off", check=check_of(Kind.RESET), since_s=stopping.since_s
-        )
+        what = EVERY_OFF if set(_words(robot).values()) <= OFF else _drives_did(robot) or EVERY_OFF
+        yield Alarm(Kind.RESET, "", what, check=check_of(Kind.RESET), since_s=stopping.since_s)
 
 
 def remedy(robot: Robot) -> str:
@@ -110,7 +112,10 @@ def remedy(robot: Robot) -> str:
 def _after_stop(robot: Robot, stopping: StopProgress) -> str:
     """Return what the drives' states have shown; where not all have shown it, how they are."""
     shown = set(stopping.proofs) >= set(robot.names("joint")) and not any_enabled(robot)
-    return stopping.proof if shown else "; ".join(filter(None, (stopping.proof, _drives_did(robot))))
+    every = "all " if len({proof.state for proof in stopping.proofs.values()}) == 1 else ""
+    return (
+        f"{every}{stopping.proof}" if shown else "; ".join(filter(None, (stopping.proof, _drives_did(robot))))
+    )
 
 
 def _after_unconfirmed(robot: Robot) -> str:
@@ -157,7 +162,7 @@ def _drives_did(robot: Robot) -> str:
 
 def _counted(words: Mapping[str, str | None], state: str, states: int) -> str:
     count = list(words.values()).count(state)
-    return f"all {state}" if states == 1 else f"{count} {state}"
+    return f"all {count} drives in {state}" if states == 1 else f"{count} {state}"
 
 
 def _did(robot: Robot, stopping: StopProgress) -> str:
@@ -265,11 +270,14 @@ def _of_part(robot: Robot, part: FollowedComponent, stopping: StopProgress) -> I
 
 
 def _advised(problem: str) -> tuple[str, str]:
-    """Split a problem into what is wrong and what to check: `this: check that; it goes on; more: …`."""
+    """Split a problem into what is wrong and what to check: `this: check that; it goes on; more: …`.
+
+    What goes on after an advice belongs to it, unless it begins as only what is wrong does.
+    """
     things, advice = list[str](), list[str]()
     for clause in problem.split("; "):
         thing, *check = _ADVICE.split(clause, maxsplit=1)
-        if not check and advice:
+        if not check and advice and not _ANOTHER.match(clause):
             advice[-1] += f"; {clause}"
         else:
             things.append(thing)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Final
 
+from gateway.units import with_minus
 from gateway.wire.dictionary import ObjectInfo
 from gateway.wire.method import Number
 from gateway.wire.object_search import fitting
@@ -117,7 +118,7 @@ def _by_kind(
 
 def limits(info: ObjectInfo) -> str:
     """Return the smallest and largest value by the EDS; empty where it names none."""
-    low, high = ("" if one is None else str(one) for one in (info.min, info.max))
+    low, high = ("" if one is None else with_minus(str(one)) for one in (info.min, info.max))
     return f"{low} … {high}" if low or high else ""
 
 

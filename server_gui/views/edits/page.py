@@ -337,7 +337,11 @@ def _by_our_clock(note: str) -> str:
     """Name an edit in a note by its time, by which the list has it, instead of by the command's id."""
 
     def time_of(found: re.Match[str]) -> str:
-        return _when(int(datetime.datetime.fromisoformat(f"{found[1]}+00:00").timestamp()) * 10**9)
+        try:
+            at = datetime.datetime.fromisoformat(f"{found[1]}+00:00")
+        except ValueError:  # as of a month 13: no time at all, which stays as it was written
+            return found[0]
+        return _when(int(at.timestamp()) * 10**9)
 
     return EDIT.sub(time_of, note)
 

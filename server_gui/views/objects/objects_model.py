@@ -10,6 +10,7 @@ from PySide6.QtCore import QAbstractTableModel, QModelIndex, QPersistentModelInd
 from gateway.plain_text import plain
 from gateway.wire.dictionary import ObjectInfo
 from server_gui.core.follow.frame_time import now_ns
+from server_gui.core.objects.forms import for_reading
 from server_gui.core.objects.reading import ReadValue
 from server_gui.core.objects.rows import Compared, limits, pin_of
 from server_gui.views.theme import Theme
@@ -138,7 +139,7 @@ def _name(shown: ShownObjects, info: ObjectInfo) -> str:
 def _holds(shown: ShownObjects, info: ObjectInfo) -> str:
     held = shown.held(info)
     if held is None or held.told.problem is None:
-        return "–" if held is None else held.told.words
+        return "–" if held is None else for_reading(info, held.told.words)
     return WHOSE.sub("", held.told.problem)
 
 
@@ -152,7 +153,7 @@ def _other(shown: ShownObjects, info: ObjectInfo) -> str:
     if other is None:
         return "–"
     mark = "≠ " if shown.compared.differs(info) else ""
-    return f"{mark}{_as_beside(_holds(shown, info), other)}"
+    return f"{mark}{for_reading(info, _as_beside(_holds(shown, info), other))}"
 
 
 def _as_beside(words: str, other: float | str) -> str:

@@ -162,6 +162,7 @@ class ObjectsPage(QWidget):
         station = self._desk.selected
         if station is not None:
             self._show_facts(station, self._compared(station, self._device(station)))
+            self._frame = 0  # and is asked for with the next frame
 
     def _pin(self) -> None:
         station, current = self._desk.selected, self.table.current

@@ -13,10 +13,10 @@ from server_gui.core.desk.desk import Desk
 from server_gui.core.follow.events import Described
 from server_gui.core.objects.devices import device_of, devices
 from server_gui.core.objects.facts import facts
-from server_gui.core.objects.forms import forms
+from server_gui.core.objects.forms import for_reading, forms
 from server_gui.core.objects.objects import Objects
 from server_gui.core.objects.reading import MOST, OLD_S, Reading, ReadValue
-from server_gui.core.objects.rows import Compared, Finder, RowKind, cells, channel_lines, pin_of
+from server_gui.core.objects.rows import Compared, Finder, RowKind, cells, channel_lines, limits, pin_of
 from tests.support.desk import Bench, FakeCommands, described
 from tests.support.dictionaries import HOLDS, OBJECTS, answer_lists, answer_reads, one
 
@@ -337,3 +337,14 @@ def test_what_has_no_eds_is_among_them_with_why() -> None:
     broken = ComponentInfo("ankle", "device", "absent", "ankle.eds is not there")
     description = replace(described().description, components=[broken])
     assert [one.problem for one in devices(description)] == ["ankle.eds is not there"]
+
+
+def test_numbers_are_read_with_the_sign_for_minus_and_texts_as_they_are() -> None:
+    number, text = one("0x6065:0", "Window", "INTEGER32"), one("0x1008:0", "Name", "VISIBLE_STRING")
+    assert for_reading(number, "-6700") == "−6700"
+    assert for_reading(text, "-A -6700") == "-A -6700"
+    assert limits(replace(number, min=-6700, max=6700)) == "−6700 … 6700"
+    held = {("left_knee", number.object): ReadValue(ObjectValue(-6700, "-6700", 1), time.monotonic_ns(), 0.0)}
+    said = dict(facts(number, Compared("left_knee", held), None, None, "", is_linked=True))
+    assert said["Holds"] == "−6700"
+    assert said["Decimal, Hex, Binary"].startswith("−6700 · 0xFFFFE5D4")
