@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from ml.features.blocks import bins, flat
+from ml.features.blocks import bins, by_channel, flat
 from ml.features.gait_status import CHANNELS, GAIT_STATUS, RATE_HZ, SOFTEN
 from ml.features.gaps import mended
 from ml.features.recipe import Features, Recipe
@@ -24,16 +24,16 @@ TURNED: Final = range(50, LOOK_BACK // COARSE + 1, 10)  # of these, over which a
 
 def _compute(windows: Samples) -> Features:
     filled = mended(windows)
-    coarse = np.ascontiguousarray(filled[..., ::COARSE])
+    coarse = by_channel(filled[..., ::COARSE])
     trunk, spin, left, left_spin, right, right_spin = np.split(coarse, 6, axis=1)
     yaw = along(spin, up(trunk))
     heading = _heading(yaw, along(left_spin, up(left)) + along(right_spin, up(right)))
-    feet = np.stack([length(left_spin), length(right_spin)])
-    signals = (length(spin), feet.sum(axis=0), feet.min(axis=0), np.abs(length(trunk) - GRAVITY))
+    feet = length(left_spin), length(right_spin)
+    signals = (length(spin), sum(feet), np.minimum(*feet), np.abs(length(trunk) - GRAVITY))
     columns: list[npt.NDArray[Any]] = [
-        GAIT_STATUS.compute(np.ascontiguousarray(filled[..., -GAIT_STATUS.look_back :])),
+        GAIT_STATUS.compute(filled[..., -GAIT_STATUS.look_back :]),
         bins(heading, STRETCH, coarse.shape[-1] // STRETCH),
-        bins(np.log(SOFTEN + np.stack(signals, axis=1)), STRETCH, coarse.shape[-1] // STRETCH),
+        bins(np.log(SOFTEN + np.stack(signals)).swapaxes(0, 1), STRETCH, coarse.shape[-1] // STRETCH),
         _turned(heading),
     ]
     return np.concatenate(columns, axis=1, dtype=np.float32)
@@ -42,7 +42,7 @@ def _compute(windows: Samples) -> Features:
 def _heading(trunk: Samples, feet: Samples) -> Samples:
     """Yaw rates of trunk and feet (n, 2, samples), positive the way that the trunk turned last second."""
     way = np.where(trunk[:, -SECOND:].sum(axis=1) < 0, -1.0, 1.0)
-    return np.stack([trunk, feet], axis=1) * way[:, None, None]
+    return (np.stack([trunk, feet]) * way[:, None]).swapaxes(0, 1)
 
 
 def _turned(heading: Samples) -> Samples:

@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from ml.features.blocks import bins, deviation, flat, moments, since
+from ml.features.blocks import bins, by_channel, flat, moments, since
 from ml.features.gaps import mended
 from ml.features.recipe import Features, Recipe
 from ml.features.signals import GRAVITY, across, along, length, up
@@ -28,19 +28,19 @@ SOFTEN: Final = 0.05  # added before a logarithm: the noise of a sensor at rest
 
 
 def _compute(windows: Samples) -> Features:
-    trunk, spin, left, left_spin, right, right_spin = np.split(mended(windows), 6, axis=1)
+    trunk, spin, left, left_spin, right, right_spin = np.split(by_channel(mended(windows)), 6, axis=1)
     vertical = up(trunk)
     lift, yaw = along(trunk, vertical), along(spin, vertical)
-    motion = _motion(trunk, spin, lift, yaw, (left, right), (left_spin, right_spin))
+    feet = length(left_spin), length(right_spin)
+    motion = _motion(trunk, spin, lift, yaw, (left, right), feet)
     heading = _heading(yaw, along(left_spin, up(left)) + along(right_spin, up(right)))
-    shape = np.log(SOFTEN + motion[:, [1, 2, 4, 5, 6, 7]])
     columns = [
         bins(heading, 10, 20),
         _turned(heading),
-        bins(shape, 10, 20),
-        *(moments(motion, samples) for samples in LENGTHS),
-        *(_turning(heading[..., -samples:]) for samples in LENGTHS),
-        _rest(length(left_spin), length(right_spin)),
+        bins(np.log(SOFTEN + motion[:, [1, 2, 4, 5, 6, 7]]), 10, 20),
+        moments(motion, *LENGTHS),
+        _turning(heading),
+        _rest(*feet),
     ]
     return np.concatenate(columns, axis=1, dtype=np.float32)
 
@@ -53,8 +53,8 @@ def _motion(
     feet: tuple[Samples, Samples],
     feet_spin: tuple[Samples, Samples],
 ) -> Samples:
-    """How much moves, whichever way: (n, 10, samples)."""
-    left, right = (length(one) for one in feet_spin)
+    """How much moves, whichever way: (n, 10, samples). Of the feet's spin it takes the lengths."""
+    left, right = feet_spin
     left_jolt, right_jolt = (np.abs(length(one) - GRAVITY) for one in feet)
     signals = (
         lift - GRAVITY,
@@ -68,13 +68,13 @@ def _motion(
         np.abs(left_jolt - right_jolt),
         length(trunk),
     )
-    return np.stack(signals, axis=1)
+    return np.stack(signals).swapaxes(0, 1)
 
 
 def _heading(trunk: Samples, feet: Samples) -> Samples:
     """Yaw rates of trunk and feet (n, 2, samples), positive the way that the trunk turned last second."""
     way = np.where(trunk[:, -100:].sum(axis=1) < 0, -1.0, 1.0)
-    return np.stack([trunk, feet], axis=1) * way[:, None, None]
+    return (np.stack([trunk, feet]) * way[:, None]).swapaxes(0, 1)
 
 
 def _turned(heading: Samples) -> Samples:
@@ -87,15 +87,17 @@ def _turned(heading: Samples) -> Samples:
 
 
 def _turning(heading: Samples) -> Samples:
-    spread = deviation(heading, heading.mean(axis=-1, keepdims=True))
-    return np.concatenate([spread, np.abs(heading).max(axis=-1)], axis=1)
+    """Standard deviation and largest rate, whichever way, over every length."""
+    found = moments(heading, *LENGTHS).reshape(len(heading), len(LENGTHS), 4, -1)
+    _, spread, most, least = np.moveaxis(found, 2, 0)
+    return flat(np.stack([spread, np.maximum(most, -least)], axis=2))
 
 
 def _rest(left: Samples, right: Samples) -> Samples:
     """How long the foot that moved last, and the other one, have rested."""
-    feet = [(since(left > still), since(right > still)) for still in STILL]
-    columns = [ordered(one, other) for ordered in (np.maximum, np.minimum) for one, other in feet]
-    return np.stack(columns, axis=1)
+    moves = np.stack([left, right]) > np.array(STILL)[:, None, None, None]
+    rested = since(moves.reshape(-1, left.shape[-1])).reshape(len(STILL), 2, -1)
+    return np.concatenate([rested.max(axis=1), rested.min(axis=1)]).T
 
 
 GAIT_STATUS: Final = Recipe("gait_status", RATE_HZ, LOOK_BACK, CHANNELS, _compute)
