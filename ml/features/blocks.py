@@ -11,14 +11,6 @@ def flat(values: Samples) -> Samples:
     return values.reshape(len(values), -1)
 
 
-def by_channel(windows: Samples) -> Samples:
-    """Return the same (n, channels, samples), with each channel of all windows in one piece of memory.
-
-    What is computed of a channel is then one long loop; a window's bits do not change.
-    """
-    return np.ascontiguousarray(windows.swapaxes(0, 1)).swapaxes(0, 1)
-
-
 def bins(signals: Samples, width: int, count: int) -> Samples:
     """(n, signals, samples) → means over the newest `count` stretches of `width` samples: their shape."""
     newest = signals[..., -width * count :]
