@@ -73,8 +73,8 @@ RULES: tuple[Rule, ...] = (
     Rule("imu", "the IMU's axes are wrong, or it is frozen", "standing: gravity; walking: sway", trunk.imu),
     Rule(
         "component",
-        "a driver says that something else is wrong, or a bus has no interface",
-        "channels: quality; computer: CAN interfaces",
+        "a driver says that something else is wrong, a controller is held, or a bus has no interface",
+        "channels: quality, state; computer: CAN interfaces",
         components.component,
     ),
     Rule("latency_timer", "a USB serial adapter gathers bytes", "computer: /sys", computer.latency_timer),
