@@ -22,7 +22,7 @@ from ml.registry.classifier_scores import calibrated, judged
 from ml.robot.learned import ABNORMAL_FROM, NONE, Learned, Verdicts
 from ml.robot.task import Task
 from ml.store.labels import LabelSource
-from ml.training.dataset import Part
+from ml.training.dataset import SessionDecisions
 
 FEW: Final = 20  # decisions; a class or person with fewer is no reason
 MOST_LOST: Final = 0.05  # of a class's or a person's F1, or of the calibration
@@ -70,7 +70,11 @@ class Decision:
 
 
 def judge(
-    name: str, new: Learned, parts: Sequence[Part], serving: Learned | None, its: Sequence[Part]
+    name: str,
+    new: Learned,
+    parts: Sequence[SessionDecisions],
+    serving: Learned | None,
+    its: Sequence[SessionDecisions],
 ) -> Judged:
     """Both models on the same decisions; `its` are the parts with the serving model's features, if it has."""
     parts = [_by_people(each) for each in parts]
@@ -170,12 +174,14 @@ def _figure(metrics: Metrics, name: str) -> float:
 # --- decisions
 
 
-def _by_people(part: Part) -> Part:
+def _by_people(part: SessionDecisions) -> SessionDecisions:
     """Return what people, the simulator or sensors say: nobody is judged by what a model said."""
     return part.of(part.source != LabelSource.PSEUDO.value)
 
 
-def _common(parts: Sequence[Part], its: Sequence[Part]) -> tuple[list[Part], list[Part]]:
+def _common(
+    parts: Sequence[SessionDecisions], its: Sequence[SessionDecisions]
+) -> tuple[list[SessionDecisions], list[SessionDecisions]]:
     """Return the decisions, session by session, that both have features for."""
     others = {(each.ask.robot, each.ask.session): _by_people(each) for each in its}
     mine, theirs = [], []
@@ -188,21 +194,21 @@ def _common(parts: Sequence[Part], its: Sequence[Part]) -> tuple[list[Part], lis
     return mine, theirs
 
 
-def _people(parts: Sequence[Part]) -> dict[str, int]:
+def _people(parts: Sequence[SessionDecisions]) -> dict[str, int]:
     counts: Counter[str] = Counter()
     for each in parts:
         counts[each.group] += len(each.truth)
     return counts
 
 
-def _classes(new: Learned, parts: Sequence[Part], serving: Learned | None) -> tuple[str, ...]:
+def _classes(new: Learned, parts: Sequence[SessionDecisions], serving: Learned | None) -> tuple[str, ...]:
     """Return the new model's, and then those that it does not know, but the other one or somebody does."""
     others = {str(name) for each in parts if new.task.fold for name in np.unique(each.truth)}
     others |= set(() if serving is None else serving.classes)
     return (*new.classes, *sorted(others - set(new.classes)))
 
 
-def _metrics(learned: Learned, parts: Sequence[Part], classes: Sequence[str]) -> Metrics:
+def _metrics(learned: Learned, parts: Sequence[SessionDecisions], classes: Sequence[str]) -> Metrics:
     """How right it is in terms of these classes."""
     parts = [each for each in parts if len(each.truth)]
     if not parts:

@@ -27,7 +27,7 @@ from ml.robot.task import Task
 from ml.store.labels import LabelSource
 from ml.training.adapting import adapted, divided
 from ml.training.choosing import held_out, judging, recipe_for, split
-from ml.training.dataset import LeftOut, Part
+from ml.training.dataset import LeftOut, SessionDecisions
 from ml.training.judging import Decision, Judged, decide, judge
 from ml.training.material import Material, Wish, material
 
@@ -179,8 +179,8 @@ def _teacher(wish: Wish, serving: _Model | None) -> tuple[str, float]:
 
 
 def _its_parts(
-    found: Material, serving: _Model | None, recipe: Recipe, judges: Sequence[Part]
-) -> Sequence[Part]:
+    found: Material, serving: _Model | None, recipe: Recipe, judges: Sequence[SessionDecisions]
+) -> Sequence[SessionDecisions]:
     """Return the same sessions with the features of the serving model."""
     if serving is None or serving.learned.recipe.name == recipe.name:
         return judges
@@ -190,7 +190,7 @@ def _its_parts(
 # --- examples
 
 
-def _enough(task: Task, lessons: Sequence[Part]) -> tuple[list[Part], list[str]]:
+def _enough(task: Task, lessons: Sequence[SessionDecisions]) -> tuple[list[SessionDecisions], list[str]]:
     """Lessons of classes with examples enough, and what is left out."""
     if not task.fold or not lessons:
         return list(lessons), []
@@ -202,7 +202,7 @@ def _enough(task: Task, lessons: Sequence[Part]) -> tuple[list[Part], list[str]]
 
 
 def _unnamed(sessions: int) -> list[str]:
-    """Return what is to be known of sessions whose wearer may be any of those who judge."""
+    """Return a remark on unnamed sessions, whose wearer may be among those who judge."""
     if not sessions:
         return []
     remark = (
@@ -213,7 +213,7 @@ def _unnamed(sessions: int) -> list[str]:
     return [remark]
 
 
-def _rows(lessons: Sequence[Part]) -> Mapping[str, int]:
+def _rows(lessons: Sequence[SessionDecisions]) -> Mapping[str, int]:
     """How many were labelled by whom."""
     return Counter(np.concatenate([each.source for each in lessons]).tolist())
 
@@ -222,7 +222,11 @@ def _rows(lessons: Sequence[Part]) -> Mapping[str, int]:
 
 
 def _card(
-    found: Material, learned: Learned, lessons: Sequence[Part], judges: Sequence[Part], metrics: Metrics
+    found: Material,
+    learned: Learned,
+    lessons: Sequence[SessionDecisions],
+    judges: Sequence[SessionDecisions],
+    metrics: Metrics,
 ) -> Card:
     recipe, rows = learned.recipe, _rows(lessons)
     lows, highs = (
@@ -253,7 +257,7 @@ def _card(
     )
 
 
-def _sessions(parts: Sequence[Part]) -> tuple[str, ...]:
+def _sessions(parts: Sequence[SessionDecisions]) -> tuple[str, ...]:
     return tuple(sorted({each.ask.session for each in parts}))
 
 

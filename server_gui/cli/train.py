@@ -74,7 +74,7 @@ def main(argv: list[str]) -> int:
 
 
 def _trained(registry: Registry, wish: Wish, arguments: argparse.Namespace) -> "Trained":
-    """Return what came of it; says what it does first, for even loading what learns takes its seconds."""
+    """Train, and return the result; print a line first, for even loading the libraries takes seconds."""
     tell = _teller(arguments)
     if not arguments.json:
         warn("train", f"{wish.task}, from the sessions and labels of {registry.url}")
@@ -84,7 +84,7 @@ def _trained(registry: Registry, wish: Wish, arguments: argparse.Namespace) -> "
 
 
 def _teller(arguments: argparse.Namespace) -> Tell:
-    """Return what tells how far it is: for machines in lines of JSON before the answer."""
+    """Return the function that reports progress: for machines in lines of JSON before the answer."""
     if arguments.json:
         if not arguments.progress:
             return untold

@@ -14,7 +14,7 @@ from ml.serving.trust import Trust
 from server_gui.core.desk.leg_phase import leg_phase
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.events import LinkChanged
-from server_gui.core.prediction.current import OFF, Recalled, Shown
+from server_gui.core.prediction.current import OFF, NewestPrediction, Recalled
 from server_gui.core.prediction.news import Ruled, Serves
 from server_gui.core.prediction.state import Quality
 from server_gui.core.processing.gait_events import Leg
@@ -201,7 +201,7 @@ def test_a_prediction_that_is_old_is_not_shown_as_one(window: Parts, station: St
     )
     shown(window, lambda: "from the steps seen · no prediction now, the last " in chip(window))
     assert chip(window).startswith("Walk\n"), "in the word that the model has for it"
-    assert isinstance(newest, Shown)
+    assert isinstance(newest, NewestPrediction)
     assert window.overview._ring._word == "Walk"
     assert doing(station)[0].startswith("Walk 120 steps/min · ")
 

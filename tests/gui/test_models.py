@@ -14,7 +14,7 @@ from ml.registry.registry import Registry
 from server_gui.core.archive.archive import Archive
 from server_gui.core.cloud.jobs import Job, JobState
 from server_gui.core.models.models import Tone
-from server_gui.core.prediction.adaptation import Adapting, State, Tried
+from server_gui.core.prediction.adaptation import AdaptationState, Adapting, Tried
 from server_gui.core.settings.server_file import ServerSettings
 from server_gui.views.models.models_table import SIGNED
 from server_gui.views.models.panel import ModelsPage
@@ -245,8 +245,12 @@ def test_a_copy_that_has_learned_from_the_wearer_is_told_with_since_when_and_how
 ) -> None:
     page = ModelsPage(archive.models, theme, bench.desk)
     page.show()
-    serving = Adapting("exo-01", 7, State.SERVING, "P01", tried=Tried(3.4, 2.1, 34), since_s=0.0)
-    for state, said in ((State.SERVING, "serves since"), (State.TRYING, "does not serve"), (State.OFF, "")):
+    serving = Adapting("exo-01", 7, AdaptationState.SERVING, "P01", tried=Tried(3.4, 2.1, 34), since_s=0.0)
+    for state, said in (
+        (AdaptationState.SERVING, "serves since"),
+        (AdaptationState.TRYING, "does not serve"),
+        (AdaptationState.OFF, ""),
+    ):
         bench.station.take_prediction(dataclasses.replace(serving, state=state))
         page._show_learned()
         assert said in page.learned.text()

@@ -14,7 +14,7 @@ from server_gui.core.alarms.alarm import Alarm
 from server_gui.core.alarms.causes import Stall, stood_still
 from server_gui.core.alarms.marks import ENABLED, age_text
 from server_gui.core.alarms.texts import Kind, check_of, error_check, error_text
-from server_gui.core.follow.robot import Part, Robot
+from server_gui.core.follow.robot import FollowedComponent, Robot
 from server_gui.core.prediction.current import ShownDanger
 from server_gui.core.processing import bus_health
 from server_gui.core.tuning.stop import StopProgress, StopState
@@ -218,7 +218,7 @@ def _of_drive(robot: Robot, name: str, stopping: StopProgress) -> Iterator[Alarm
     )
 
 
-def _cause(robot: Robot, part: Part) -> tuple[str, int | None]:
+def _cause(robot: Robot, part: FollowedComponent) -> tuple[str, int | None]:
     """Why a drive is in fault, and its code: as the robot says, else by the code that the drive tells."""
     said = _LASTING.sub("", _PREFIX.sub("", part.problem or ""))
     found = _CODE.search(said)
@@ -230,7 +230,7 @@ def _cause(robot: Robot, part: Part) -> tuple[str, int | None]:
     return said or "the drive does not say why", None
 
 
-def _of_part(robot: Robot, part: Part, stopping: StopProgress) -> Iterator[Alarm]:
+def _of_part(robot: Robot, part: FollowedComponent, stopping: StopProgress) -> Iterator[Alarm]:
     if robot.is_recording:
         return
     where, problem = _where(robot, part.name), _LASTING.sub("", part.problem or "")
@@ -347,7 +347,7 @@ def _of_buses(robot: Robot) -> Iterator[Alarm]:
         if said is None or (bus.state == CLOSED and bus.problem is None):
             continue
         what, check = said
-        kind = Kind.BUS_FAILS if bus_health.level(bus) is bus_health.Level.ALARM else Kind.BUS
+        kind = Kind.BUS_FAILS if bus_health.level(bus) is bus_health.BusHealthLevel.ALARM else Kind.BUS
         where, is_now = bus.name, now is not None
         yield Alarm(kind, f"bus.{bus.name}", what, where, check=check or check_of(kind), is_now=is_now)
 

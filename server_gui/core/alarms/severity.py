@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from server_gui.core.alarms.alarm import Alarm, Alarms
 from server_gui.core.alarms.marks import NEWS, Mark
 from server_gui.core.follow.news import Item
-from server_gui.core.processing.bus_health import Level
+from server_gui.core.processing.bus_health import BusHealthLevel
 
 SOON_S = 3.0  # an alarm is found so soon before or after its event
 
@@ -18,14 +18,14 @@ def event_mark(item: Item, alarms: Alarms | None) -> Mark:
     return own if worst is None else Mark(worst.mark.shape, worst.mark.colour, own.word)
 
 
-def bus_level(own: Level, bus: str, alarms: Alarms) -> Level:
+def bus_level(own: BusHealthLevel, bus: str, alarms: Alarms) -> BusHealthLevel:
     """Return how bad a bus is: no better than the alarms about it and about its nodes."""
     told = [
         alarm.mark.colour for alarm in alarms.each if bus in (alarm.node, alarm.subject.removeprefix("bus."))
     ]
     if "bad" in told:
-        return Level.ALARM
-    return Level.WARNING if "warn" in told and own is not Level.ALARM else own
+        return BusHealthLevel.ALARM
+    return BusHealthLevel.WARNING if "warn" in told and own is not BusHealthLevel.ALARM else own
 
 
 def _since(alarms: Alarms, item: Item) -> Iterator[Alarm]:

@@ -8,7 +8,7 @@ from server_gui.core.cloud.store_reach import StoreReach
 from server_gui.core.desk.pins import Pins
 from server_gui.core.desk.recording import By, Recording
 from server_gui.core.desk.station import Station
-from server_gui.core.evidence.file import Told
+from server_gui.core.evidence.file import EditEvidence
 from server_gui.core.follow.news import News
 from server_gui.core.prediction.adaptation import Happening
 
@@ -37,7 +37,7 @@ class Desk:
         self.reach = StoreReach()  # of the store that is recorded into, and read from
         self._recording = Recording(By.NOBODY, None, lambda call: call(), self.news)
         self.pins = Pins()
-        self.keep_evidence: Callable[[str, Told], None] = lambda _robot, _told: None  # on the disk
+        self.keep_evidence: Callable[[str, EditEvidence], None] = lambda _robot, _told: None  # on the disk
         self.adapt: Callable[[str, int, Happening], None] = lambda _robot, _number, _what: None
         self.on_select: list[Callable[[Station | None], None]] = []
 

@@ -34,7 +34,7 @@ SLOW = 0.8  # of the rate that was asked for: below that it is said
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class FollowedComponent:
     """One component as it was last seen."""
 
     name: str
@@ -75,7 +75,7 @@ class Robot:
     description: Description | None = None
     hello: Hello | None = None  # who we are there, and what we may not
     values: dict[str, float | None] = field(default_factory=dict)
-    parts: dict[str, Part] = field(default_factory=dict)
+    parts: dict[str, FollowedComponent] = field(default_factory=dict)
     parameters: dict[str, ParameterValue] = field(default_factory=dict)
     parameters_at_ns: int | None = None
     resources: ResourceSnapshot | None = None
@@ -120,7 +120,7 @@ class Robot:
         return self._missing.take(buses, at_ns, cpu_percent)
 
     def hold(self, values: Mapping[str, float]) -> None:
-        """Take what devices were read to hold just now."""
+        """Take values just read from devices."""
         for name, value in values.items():
             if name in self.parameters:
                 self.parameters[name] = msgspec.structs.replace(self.parameters[name], value=value)
@@ -155,7 +155,7 @@ class Robot:
         return now_ns - self._flows_since_ns > RATE_WINDOW_NS and self.rate_hz(now_ns) < SLOW * self.asked_hz
 
     def rate_text(self, now_ns: int | None = None) -> str:
-        """Return how many rows come a second, of how many where these are fewer."""
+        """Return the row rate in words, with the requested rate if it is lower."""
         of = f" of {self.asked_hz:.0f}" if self.is_slow(now_ns) else ""
         return f"{self.rate_hz(now_ns):.0f}{of} Hz"
 
@@ -167,7 +167,7 @@ class Robot:
         """Return the components of one kind, in the robot's order."""
         return [part.name for part in self.parts.values() if part.kind == kind]
 
-    def not_ok(self) -> list[Part]:
+    def not_ok(self) -> list[FollowedComponent]:
         """Return the components whose values cannot be trusted now."""
         return [part for part in self.parts.values() if part.state != "ok"]
 
@@ -201,7 +201,7 @@ class Robot:
         self.description, self.hello = event.description, event.hello
         self._words = {channel.name: channel.enum for channel in event.description.channels if channel.enum}
         self.parts = {
-            part.name: Part(part.name, part.kind, part.state, None, part.problem)
+            part.name: FollowedComponent(part.name, part.kind, part.state, None, part.problem)
             for part in event.description.components
         }
 
@@ -229,10 +229,10 @@ class Robot:
             self.parameters_at_ns = event.at_ns
 
 
-def _part(known: Part, found: QualityInfo) -> Part:
+def _part(known: FollowedComponent, found: QualityInfo) -> FollowedComponent:
     age_ms = found.get("age_ms")
     problem = found.get("problem")
-    return Part(
+    return FollowedComponent(
         known.name,
         known.kind,
         str(found.get("state", "unknown")),

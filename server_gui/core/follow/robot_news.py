@@ -39,7 +39,7 @@ class RobotNews:
         self._failure: object = None
 
     def look(self, robot: Robot) -> None:
-        """Tell what has changed."""
+        """Report changes since the last call."""
         self._look_at_link(robot)
         self._look_at_parts(robot)
         if not robot.is_stale():

@@ -81,7 +81,7 @@ def rows(one: Card, other: Card | None) -> list[Row]:
 
 
 def notes(one: Entry, other: Entry | None) -> Iterator[str]:
-    """Yield what is to be known of such a comparison."""
+    """Yield notes on such a comparison."""
     if other is not None and set(one.card.held_out) != set(other.card.held_out):
         yield "Each was judged on sessions of its own, so no verdict; training judges both on the same."
     if other is not None and (known := set(other.card.learned) & set(one.card.held_out)):
@@ -89,7 +89,7 @@ def notes(one: Entry, other: Entry | None) -> Iterator[str]:
 
 
 def last_week(entry: Entry) -> str:
-    """Return how often it was right of late, in words; never a number where nobody has labelled."""
+    """Return the share of its recent correct predictions, in words; without labels, no number."""
     if not entry.hits:
         return f"not known: nothing that it said within {WITHIN_DAYS} days was labelled"
     return "; ".join(f"{robot}: {quality.text}" for robot, quality in sorted(entry.hits.items()))
@@ -103,7 +103,7 @@ def week_short(entry: Entry) -> str:
 
 
 def usual_other(entry: Entry, found: Catalogue) -> Entry | None:
-    """Return what a model is compared with first: what serves in its place, else the newest beside it."""
+    """Return the default model for comparison: the one that serves in its place, else the newest other."""
     if entry.serving and entry.serving != entry.card.id:
         return found.find(entry.serving)
     beside = (each for each in found.entries if each.card.task == entry.card.task and each is not entry)

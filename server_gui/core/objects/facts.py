@@ -8,7 +8,7 @@ from gateway.units import Unit, with_minus
 from gateway.wire.dictionary import ObjectInfo
 from gateway.wire.parameter import ParameterInfo
 from server_gui.core.objects.forms import for_reading, forms
-from server_gui.core.objects.reading import Held
+from server_gui.core.objects.reading import ReadValue
 from server_gui.core.objects.rows import Compared, limits
 
 LONGEST: Final = 2000  # letters of a value that are shown
@@ -38,7 +38,7 @@ def facts(
     ]
 
 
-def _holds(info: ObjectInfo, held: Held | None, *, is_linked: bool) -> str:
+def _holds(info: ObjectInfo, held: ReadValue | None, *, is_linked: bool) -> str:
     if held is None:
         return "not read yet" if is_linked else "not read: the robot is not linked"
     now_ns = time.monotonic_ns()
@@ -47,7 +47,7 @@ def _holds(info: ObjectInfo, held: Held | None, *, is_linked: bool) -> str:
     return said if is_now else f"{said}   (OLD: read {held.age_s(now_ns):.0f} s ago)"
 
 
-def _notations(info: ObjectInfo, held: Held | None) -> Iterator[tuple[str, str]]:
+def _notations(info: ObjectInfo, held: ReadValue | None) -> Iterator[tuple[str, str]]:
     found = [] if held is None or held.told.problem is not None else forms(info, held.told)
     numbers = [text for title, text in found if title in IN_ONE_LINE]
     if numbers:
@@ -68,7 +68,7 @@ def _kind(info: ObjectInfo) -> Iterator[str]:
 
 
 def _as_parameter(
-    held: Held | None, parameter: ParameterInfo | None, unit: Unit | None
+    held: ReadValue | None, parameter: ParameterInfo | None, unit: Unit | None
 ) -> Iterator[tuple[str, str]]:
     value = None if held is None or held.told.problem is not None else held.told.value
     if parameter is not None and unit is not None and isinstance(value, int | float) and unit.symbol:

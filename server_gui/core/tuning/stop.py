@@ -159,7 +159,7 @@ class StopProgress:
     def show(
         self, stamps_ns: Sequence[int], columns: Mapping[str, Sequence[str | None]], offset_ns: int
     ) -> None:
-        """Take what drives' states were, in words; `offset_ns` is the robot's clock minus ours."""
+        """Take drives' states in words; `offset_ns` is the robot's clock minus ours."""
         if self.at_ns is None or self.state is StopState.IDLE:
             return
         for drive, words in columns.items():

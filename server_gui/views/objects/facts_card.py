@@ -72,7 +72,7 @@ class FactsCard(Card):
     def show_object(
         self, info: ObjectInfo | None, component: str, facts: Sequence[tuple[str, str]], refused: str
     ) -> None:
-        """Show what is known of it; `refused` says why it may not be changed here, empty where it may."""
+        """Show the facts of an object; `refused` is the reason why it may not be changed here, or empty."""
         is_another = (info, component) != (self._info, self._component)
         self._info, self._component = info, component
         title = NOTHING if info is None else f"{info.object}  {plain(info.name)}"

@@ -24,7 +24,7 @@ from server_gui.core.desk.station import Station
 from server_gui.core.processing.bus_health import (
     BUSY_PERCENT,
     FULL_PERCENT,
-    Level,
+    BusHealthLevel,
     Talking,
     findings,
     level,
@@ -45,10 +45,10 @@ from server_gui.views.widgets.wrapping_legend import WrappingLegend
 
 READ: Final = 6  # frames between two looks
 LEVELS: Final = {
-    Level.GOOD: Mark("disc", "good", "ok"),
-    Level.UNKNOWN: Mark("ring", "old", "not known"),
-    Level.WARNING: Mark("triangle", "warn", "warning"),
-    Level.ALARM: Mark("square", "bad", "ALARM"),
+    BusHealthLevel.GOOD: Mark("disc", "good", "ok"),
+    BusHealthLevel.UNKNOWN: Mark("ring", "old", "not known"),
+    BusHealthLevel.WARNING: Mark("triangle", "warn", "warning"),
+    BusHealthLevel.ALARM: Mark("square", "bad", "ALARM"),
 }
 TITLES: Final = (
     "Node",
@@ -151,7 +151,7 @@ class BusCard(Card):
         mark = LEVELS[bad]
         self._icon.show_mark(mark)
         rate = "" if bus.bitrate is None else f" of {bus.bitrate / 1e6:g} Mbit/s"
-        word = "FULL: " if bad is Level.ALARM and (bus.load_percent or 0.0) >= FULL_PERCENT else ""
+        word = "FULL: " if bad is BusHealthLevel.ALARM and (bus.load_percent or 0.0) >= FULL_PERCENT else ""
         self.load.say(f"{word}{load_text(bus)}{rate}", f"{word}{load_text(bus)}")
         self._bar.show_load(bus.load_percent, "accent" if mark.colour == "good" else mark.colour)
         self.set_title(f"Bus {bus.name}")
@@ -185,7 +185,7 @@ class BusCard(Card):
         for row, node_id in enumerate(rows):
             node, talk = nodes.get(-1 if node_id is None else node_id), talks.get(node_id)
             colours = [told.get(name) for name in (() if node is None else node.components)]
-            good = node is None or (node_level(node) is Level.GOOD and "warn" not in colours)
+            good = node is None or (node_level(node) is BusHealthLevel.GOOD and "warn" not in colours)
             colour = "bad" if "bad" in colours else "text" if good else "warn"
             for column, said in enumerate(_texts(node_id, node, talk)):
                 self._set(row, column, said, colour)
@@ -277,7 +277,7 @@ class BusHealthView(QWidget):
         checks = dict.fromkeys(check for *_, check in found if check)
         set_text(self.checks, "\n".join(f"→ {check}" for check in checks))
         self._check.setVisible(bool(checks))
-        tone = "bad" if any(bad is Level.ALARM for bad, *_ in found) else ""
+        tone = "bad" if any(bad is BusHealthLevel.ALARM for bad, *_ in found) else ""
         if self.said.property("tone") != tone:
             self.said.setProperty("tone", tone)
             self.said.style().polish(self.said)

@@ -10,7 +10,7 @@ from server_gui.core.alarms.texts import TEXTS, Kind
 from server_gui.core.desk.desk import Desk
 from server_gui.core.follow.events import Described, Event, Looked
 from server_gui.core.follow.news import NewsKind
-from server_gui.core.processing.bus_health import Level
+from server_gui.core.processing.bus_health import BusHealthLevel as Level
 from tests.support.desk import Bench, described, looked, walking
 
 MISSED = "the drive is in fault: 0x8130 life guard or heartbeat error"

@@ -4,7 +4,8 @@ from msgspec.structs import replace
 
 from gateway.wire.bus import BusInfo
 from server_gui.core.follow.missing_pdos import MissingPdos
-from server_gui.core.processing.bus_health import Level, findings, level
+from server_gui.core.processing.bus_health import BusHealthLevel as Level
+from server_gui.core.processing.bus_health import findings, level
 from tests.unit.processing.test_bus_health import BUS, NODE
 
 SECOND_NS = 1_000_000_000
@@ -35,7 +36,11 @@ def test_a_share_that_comes_and_goes_around_one_percent_is_one_warning_that_last
 
 def test_one_look_that_misses_two_percent_is_nothing_and_twenty_are_told_at_once() -> None:
     assert changes(looks(0.0, 2.0, *[0.0] * 20)) == [Level.GOOD]
-    assert changes(looks(0.0, 20.0, *[0.0] * 20)) == [Level.GOOD, Level.WARNING, Level.GOOD]
+    assert changes(looks(0.0, 20.0, *[0.0] * 20)) == [
+        Level.GOOD,
+        Level.WARNING,
+        Level.GOOD,
+    ]
 
 
 def test_a_busy_computer_is_named_where_every_node_of_a_bus_misses_some() -> None:
