@@ -149,7 +149,9 @@ def test_of_many_errors_the_first_is_whole_and_the_others_are_counted(theme: The
     below = JointWords(theme)
     below.resize(500, 20)
     below.show()
-    below.say([(f"joint {place}", f"0x{place:04X} something has happened to this drive") for place in range(6)])
+    below.say(
+        [(f"joint {place}", f"0x{place:04X} something has happened to this drive") for place in range(6)]
+    )
     assert below.text().startswith("joint 0: 0x0000 something has happened to this drive · ")
     assert below.text().endswith(" · 5 more")
     assert rules.cut_words(below, [below]) == []

@@ -1,4 +1,4 @@
-"""A second recording beside the one that is played: both at one instant, by their beginnings or a heel strike."""
+"""A second recording beside the one that is played, aligned by their beginnings or by a heel strike."""
 
 from collections.abc import Callable
 from concurrent.futures import Future
@@ -109,7 +109,12 @@ class SideBySide:
 def _heel_strike_ns(station: Station | None) -> int | None:
     """Return the last one of the left leg, UTC."""
     robot = None if station is None else station.robot
-    if station is None or not isinstance(robot, PlayedRobot) or robot.row_ns is None or robot.stamp_ns is None:
+    if (
+        station is None
+        or not isinstance(robot, PlayedRobot)
+        or robot.row_ns is None
+        or robot.stamp_ns is None
+    ):
         return None
     found = [
         event.stamp_ns

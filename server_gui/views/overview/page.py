@@ -141,7 +141,7 @@ class Overview(QWidget):
         return QSize(self._theme.px(A_COLUMN), super().minimumSizeHint().height())
 
     def _arrange(self, columns: int) -> None:
-        """Arrange as many cards as fit in a row, and the joints below, or above where there is little room."""
+        """Arrange as many cards as fit in a row, and the joints below; above where there is little room."""
         self._columns, grid = columns, self._grid
         grid.addWidget(self.now, 0, 0, 1, columns)
         cards = [] if self._is_plots else [self._status, self._posture, self._pressure]

@@ -254,7 +254,7 @@ class Player(QWidget):
         self.labels.refresh(tape)
 
     def _refresh_alarms(self) -> None:
-        """What was wrong then; where something was, there is room for it from then on: nothing moves again."""
+        """Show what was wrong then; once something was, its line stays, so that nothing moves again."""
         self.alarms.refresh()
         if self.alarms.told and self.alarms.isHidden():
             self.alarms.show()
