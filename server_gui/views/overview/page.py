@@ -128,8 +128,8 @@ class Overview(QWidget):
         return min(max(self.width() // self._theme.px(A_COLUMN), 1), len(SHARES))
 
     def show_plots_alone(self, alone: bool, *, with_now: bool = True) -> None:
-        """Show plots, below the first line or without it, and not the rest: for who labels what they show."""
-        self.now.setVisible(with_now or not alone)
+        """Show plots, and not the rest, for who labels what they show; the first line where it is wanted."""
+        self.now.setVisible(with_now)
         if alone is not self._is_plots:
             self._is_plots = alone
             for card in (self._status, self._posture, self._pressure, self._joints):
