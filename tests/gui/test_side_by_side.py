@@ -61,7 +61,8 @@ def test_both_are_in_the_same_plots_at_one_time_since_their_beginnings_until_one
     assert np.count_nonzero(~np.isnan(beside)) > len(times) / 2
     assert first.session.session != second.session.session
     assert player.beside_bar.isVisible()
-    assert "aligned by their beginnings" in player.beside_bar.said.text()
+    assert player.beside_bar.said.text().endswith("aligned by")
+    assert player.beside_bar.by.currentText() == "their beginnings"
     assert rules.out_of_reach(player) == []
     player.beside_bar.close_button.click()
     shown.draw()

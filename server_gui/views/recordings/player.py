@@ -143,6 +143,7 @@ class Player(QWidget):
         """Show another recording in the same plots: what is played goes on with it from its beginning."""
         self.beside.open(session)
         self.beside_bar.refresh()
+        self.labelling.setChecked(self._has_room_for_all)
         self._choice.button(SIGNALS).click()
 
     def show_around(self, channel: str, at_ns: int) -> None:

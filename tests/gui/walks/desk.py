@@ -154,7 +154,7 @@ def side_by_side(bench: Bench) -> None:
     x, y = hand.where(today, 1)
     hand.xdotool("mousemove", str(x), str(y), "keydown", "ctrl", "click", "1", "keyup", "ctrl")
     hand.insist("Side by side", lambda: hand.reads("┅ dashed"), exactly=True)
-    hand.sees("aligned by their beginnings", within_s=AGAIN_S)
+    hand.sees("┅ dashed", "aligned by", within_s=AGAIN_S)
     hand.misses("reading …", within_s=AGAIN_S)
     hand.keep("side-by-side")
     hand.click("Put the second recording away")
