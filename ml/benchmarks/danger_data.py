@@ -10,8 +10,8 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from ml.danger.now import CHANNELS
-from ml.danger.watch import PERIOD_S, Evidence
+from ml.danger.monitor import PERIOD_S, Evidence
+from ml.danger.observation import CHANNELS
 from ml.errors import UnusableData
 
 Floats = npt.NDArray[np.float64]
@@ -62,7 +62,7 @@ class Seen:
 
 
 def read(path: Path) -> list[Seen]:
-    """Return what the detectors see of a file of `gwrms sim-record --scenario dangers`.
+    """Read the detectors' input of a file of `gwrms sim-record --scenario dangers`.
 
     Raises:
         UnusableData: it is no such file, or damaged.

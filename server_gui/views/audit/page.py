@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from server_gui.core.archive.collected_journals import Found, KeptJournals
+from server_gui.core.archive.collected_journals import JournalsFound, KeptJournals
 from server_gui.core.archive.histories import History, histories
 from server_gui.core.desk.desk import Desk
 from server_gui.core.follow.news import NewsKind
@@ -131,7 +131,7 @@ class Audit(QWidget):
         """Show what has come."""
         if self._kept is not None:
             self._kept.look()
-        kept = Found() if self._kept is None else self._kept.found
+        kept = JournalsFound() if self._kept is None else self._kept.found
         known = self._called
         self._called = {
             name: known[name] if known.get(name) == history else history

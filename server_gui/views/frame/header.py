@@ -15,7 +15,7 @@ from server_gui.core.tuning.stop import StopState
 from server_gui.views.frame.chip import LEAST, Chip, Words
 from server_gui.views.frame.recording_chip import NAME, RecordingChip
 from server_gui.views.marks import Mark, age_text, drives_mark, enabled_text
-from server_gui.views.predictions import OLD, status
+from server_gui.views.predictions import OLD, by_steps, status
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.plain import PlainLabel, set_tip
 from server_gui.views.widgets.stop_button import StopButton
@@ -198,15 +198,17 @@ def _status(station: Station) -> Words:
     if line is not None and line.mark.word != OLD:
         parts = ("predicted", line.short) if line.detail.startswith("predicted") else (line.detail,)
         return Words(line.mark, line.text, tuple(filter(None, parts)), f"{line.text}\n{line.detail}")
-    gait, problem = station.processing.derived().gait, station.predictions.problem
+    gait, problem, seen = (
+        station.processing.derived().gait,
+        station.predictions.problem,
+        by_steps(station),
+    )
     why_not = f"not predicted: {problem}" if problem else "not predicted"
-    parts = ("by steps", why_not if line is None else f"no prediction now, {line.detail}")
-    if gait.walking is None:
-        return Words(Mark("ring", "old"), "Activity not known", parts)
+    parts = (seen.short or seen.detail, why_not if line is None else f"no prediction now, {line.detail}")
     if not gait.walking:
-        return Words(Mark("ring", "dim"), "Not walking", parts)
+        return Words(seen.mark, seen.text, parts)
     cadence = "–" if gait.cadence_spm is None else f"{gait.cadence_spm:.0f}"
-    return Words(Mark("diamond", "accent"), "Walking", (f"{cadence} steps/min", *parts))
+    return Words(seen.mark, seen.text, (f"{cadence} steps/min", *parts))
 
 
 def _link(station: Station) -> Words:

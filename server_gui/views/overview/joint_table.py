@@ -19,7 +19,7 @@ from server_gui.core.alarms.marks import GLYPHS
 from server_gui.core.alarms.texts import error_text
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
-from server_gui.core.follow.robot import Part
+from server_gui.core.follow.robot import FollowedComponent
 from server_gui.core.tuning.stop import StopState
 from server_gui.views.marks import STILL_ENABLED, state_mark
 from server_gui.views.theme import Theme
@@ -395,7 +395,7 @@ def _torque(station: Station, joint: str, desk: Desk, *, stale: bool) -> Cell:
     return Cell(text, plain.colour, Bar(share, colour), f"{100 * abs(share):.0f} % of its limit")
 
 
-def _error(station: Station, part: Part, *, stale: bool) -> Cell:
+def _error(station: Station, part: FollowedComponent, *, stale: bool) -> Cell:
     """Return the drive's error code in words, or what is wrong with the component.
 
     Nothing known is no dash.

@@ -21,7 +21,7 @@ from server_gui.core.processing.gait_events import Leg
 from server_gui.views.marks import age_text, old_text
 from server_gui.views.overview.joint_table import JointModel, JointTable
 from server_gui.views.overview.joint_words import JointWords
-from server_gui.views.overview.key_plot import SECONDS, KeyPlot, Kind
+from server_gui.views.overview.key_plot import SECONDS, KeyPlot, PlotKind
 from server_gui.views.overview.learned_offer import LearnedOffer
 from server_gui.views.overview.now_line import NowLine
 from server_gui.views.predictions import STOPPED, activity, lines, model_phases
@@ -44,15 +44,17 @@ WIDEST_N: Final = 888.0  # of what a foot carries
 SHARE: Final = 0.05  # of both feet: a figure that is further off than its picture is read at once
 SIDES: Final = ("left", "right")
 PLOTS: Final = (
-    Kind(
+    PlotKind(
         "Knee angle",
         "rad",
         0.2,
         tuple((f"{side}_knee.position", side, side) for side in SIDES),
         ends="0x607d",
     ),
-    Kind("Knee torque", "N·m", 5.0, tuple((f"{side}_knee.torque", side, side) for side in SIDES), "0x6072"),
-    Kind(
+    PlotKind(
+        "Knee torque", "N·m", 5.0, tuple((f"{side}_knee.torque", side, side) for side in SIDES), "0x6072"
+    ),
+    PlotKind(
         "Trunk tilt",
         "rad",
         0.08,
@@ -188,7 +190,7 @@ class Overview(QWidget):
 
     # --- one time for all plots
 
-    def _plot(self, kind: Kind) -> KeyPlot:
+    def _plot(self, kind: PlotKind) -> KeyPlot:
         made = KeyPlot(self._desk, self._theme, kind)
         made.plot.zoomed.connect(self._show_time)
         made.plot.fitted.connect(self._fit_time)

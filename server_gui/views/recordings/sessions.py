@@ -212,8 +212,8 @@ class SessionsPage(QWidget):
 
     def _state(self) -> str:
         library = self._archive.library
-        if library.found.problem is not None:
-            return f"The store is not reached, it is tried again: {library.found.problem}"
+        if library.reach.problem is not None:
+            return f"The store is not reached, it is tried again: {library.reach.problem}"
         return EMPTY if library.revision and not library.found.sessions else ""
 
     def _refresh_details(self) -> None:
@@ -291,7 +291,7 @@ def _when(time: datetime | None) -> str:
 
 
 def _told(session: Session | None, tape: Tape | None, problem: str, held: Sequence[str]) -> str:
-    """Return what is known of it, as text."""
+    """Return the facts of a session as text."""
     if session is None:
         return "Choose a recording to see what is in it; with Ctrl a second one, to compare the two."
     known = {
