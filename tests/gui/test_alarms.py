@@ -187,6 +187,21 @@ def test_rows_that_are_opened_under_the_pointer_are_whole_also_where_a_headline_
     assert "and this goes on for a line or two; and" in tip, "what has no room stands nowhere"
 
 
+def test_the_list_of_alarms_is_whole_when_it_is_first_seen_beside_the_panels(
+    theme: Theme, window: MainWindow, bench: Bench
+) -> None:
+    theme.set(scale=1.5)
+    window.resize(1024, 700)
+    fault(bench)
+    settle(window, bench)
+    window.panels_button.click()
+    settle(window, bench)
+    window.alarms.list.turn()
+    window.refresh()
+    assert window.alarms.list.room < 500
+    assert rules.cut_words(window, window.alarms.list.findChildren(QLabel)) == []
+
+
 @pytest.mark.parametrize(
     ("width", "height", "scale"),
     [(1024, 700, 1.0), (1024, 700, 1.5), (1366, 768, 1.0), (1366, 768, 1.5), (1920, 1080, 1.0)],
