@@ -4,6 +4,7 @@ Where the budget is smaller than what was recorded can show, the tail of the hea
 an exponential, the limit of most tails (Coles 2001, §4): an estimate, blind to what was never recorded.
 """
 
+import math
 from collections.abc import Mapping
 from typing import Final
 
@@ -42,7 +43,9 @@ def thresholds(maxima: Floats, hours: float) -> dict[Level, float]:
 
 
 def extrapolated(maxima: Floats, hours: float, odds: float) -> float:
-    """How often an hour such log odds would be reached, by the same tail."""
+    """How often an hour such log odds would be reached, by the same tail; NaN where nothing was seen."""
+    if not len(maxima):
+        return math.nan
     count, base, scale = _tail(np.sort(maxima)[::-1])
     return float(count / hours * np.exp(min((base - odds) / scale, 0.0)))
 
@@ -55,13 +58,20 @@ def _tail(ordered: Floats) -> tuple[int, float, float]:
 
 
 def rate_interval(events: int, hours: float) -> tuple[float, float]:
-    """95 % interval of a rate an hour (Garwood 1936); with none seen, at most 3.7 / hours."""
+    """95 % interval of a rate an hour (Garwood 1936); with none seen, at most 3.7 / hours.
+
+    NaN of no hours.
+    """
+    if not hours:
+        return math.nan, math.nan
     low = chi2.ppf(0.025, 2 * events) / 2.0 / hours if events else 0.0
     return float(low), float(chi2.ppf(0.975, 2 * (events + 1)) / 2.0 / hours)
 
 
 def rule_of_three(events: int, hours: float) -> float:
-    """95 % upper bound of a rate an hour, one-sided: 3 / hours where none was seen."""
+    """95 % upper bound of a rate an hour, one-sided: 3 / hours where none was seen; NaN of no hours."""
+    if not hours:
+        return math.nan
     return float(chi2.ppf(0.95, 2 * (events + 1)) / 2.0 / hours)
 
 
