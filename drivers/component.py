@@ -7,7 +7,7 @@ from drivers.latest import Latest
 from drivers.samples import Channel, Quality
 
 
-class Kind(StrEnum):
+class ComponentKind(StrEnum):
     """What a component is."""
 
     JOINT = "joint"
@@ -27,7 +27,7 @@ class Component(Protocol):
     def name(self) -> str: ...
 
     @property
-    def kind(self) -> Kind: ...
+    def kind(self) -> ComponentKind: ...
 
     @property
     def channels(self) -> tuple[Channel, ...]: ...

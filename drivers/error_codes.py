@@ -231,7 +231,7 @@ def error_text(code: int, vendor_id: int | None = None) -> str:
 
 
 def error_check(code: int) -> str:
-    """Return what to check where a device tells this code; a vendor's own lies in the class of its like."""
+    """Return the check to make for an error code; a vendor's own code falls into its standard class."""
     masks = (0xFFFF, 0xFFF0, 0xFF00, 0xF000)
     return next((said for mask in masks if (said := _CHECKS.get(code & mask)) is not None), _UNKNOWN)
 

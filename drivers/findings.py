@@ -23,5 +23,5 @@ class FindingState:
 
 
 def active_findings(noted: Iterable[FindingState]) -> tuple[Finding, ...]:
-    """Return what is wrong now."""
+    """Return the present findings."""
     return tuple(finding for one in noted if (finding := one.finding) is not None)

@@ -49,7 +49,7 @@ class Folder(Mapping[str, F]):
 
 
 def not_a_format(name: str, known: Iterable[str]) -> str:
-    """Return what is said of the key `format` where it names none of these."""
+    """Return the message for a key `format` that names none of these."""
     import difflib  # for who has mistyped only
 
     names = list(known)

@@ -1,10 +1,10 @@
 """How old a component's last sample is, and what that makes of its state."""
 
-from drivers.samples import State
+from drivers.samples import ComponentState
 
 
 def silence_text(age_ms: float | None) -> str:
-    """Return what there is to say of a silence whose cause nobody knows."""
+    """Return the description of a silence of unknown cause."""
     return "no sample has come yet" if age_ms is None else f"no new sample for {age_ms / 1000:.1f} s"
 
 
@@ -32,11 +32,11 @@ class Freshness:
         """Nothing can come until the next sample: lost at once, whatever the age."""
         self._connected = False
 
-    def state(self, now_ns: int) -> tuple[State, float | None]:
+    def state(self, now_ns: int) -> tuple[ComponentState, float | None]:
         """State by age alone, and the age in ms (`None` before the first sample)."""
         if self._last_ns is None:
-            return State.LOST, None
+            return ComponentState.LOST, None
         age_ns = max(0, now_ns - self._last_ns)
         if age_ns > self._lost_after_ns or not self._connected:
-            return State.LOST, age_ns / 1e6
-        return (State.STALE if age_ns > self._stale_after_ns else State.OK), age_ns / 1e6
+            return ComponentState.LOST, age_ns / 1e6
+        return (ComponentState.STALE if age_ns > self._stale_after_ns else ComponentState.OK), age_ns / 1e6

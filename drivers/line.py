@@ -76,7 +76,7 @@ class Line(Generic[F]):
             self._port.stop()
 
     def problem(self, now_ns: int) -> str | None:
-        """Return what is wrong with the line, in words with what to check; `None` while frames come."""
+        """Return the line's problem, in words with what to check; `None` while frames come."""
         if self._port.problem is not None:
             return self._port.problem
         opened_ns = self._port.opened_ns

@@ -54,7 +54,7 @@ SAVED = 1 << 18  # of those, the most that are kept for later
 
 
 def needs(count: int) -> int:
-    """Return what a format says of a length that so many bytes of the frame will tell more about."""
+    """Return the code for a length that needs `count` bytes of the frame to be known."""
     return -count
 
 

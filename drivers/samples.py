@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 
-class State(StrEnum):
+class ComponentState(StrEnum):
     """How far a component's values can be trusted."""
 
     OK = "ok"
@@ -57,7 +57,7 @@ class Finding:
 class Quality:
     """What is known about a component now."""
 
-    state: State
+    state: ComponentState
     age_ms: float | None  # since its last sample; None before the first
     problem: str | None = None  # in words, with what to check
     counters: Mapping[str, int] = field(default_factory=dict)

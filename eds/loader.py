@@ -202,7 +202,7 @@ def _set_limits(ini: IniText, sections: Sections, dictionary: canopen.ObjectDict
 
 
 def _described(dictionary: canopen.ObjectDictionary, section: str) -> ODVariable | None:
-    """Return what a section like [1018sub1] or [6064] describes."""
+    """Return the object of a section like [1018sub1] or [6064]."""
     index, _, subindex = section.partition("sub")
     return dictionary.get_variable(int(index, 16), int(subindex or "0", 16))
 

@@ -19,7 +19,7 @@ def identifier(text: str) -> str:
 
 
 def remark(text: str) -> str:
-    """Return what a name ends with in brackets, where files tell the unit: `Profile velocity (counts/s)`."""
+    """Return the text in brackets at the end of a name, often its unit: `Profile velocity (counts/s)`."""
     found = _LAST_BRACKETS.search(text)
     return found[1].strip() if found else ""
 

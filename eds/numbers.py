@@ -33,7 +33,7 @@ def parse_integer(text: str) -> int | None:
 
 
 def parse_relative(text: str) -> int | None:
-    """Return what stands beside the node id in `$NODEID+0x180`, `0x180 + $NODEID` or `NODEID`.
+    """Return the number added to the node id in `$NODEID+0x180`, `0x180 + $NODEID` or `NODEID`.
 
     `None` elsewhere.
     """

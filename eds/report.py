@@ -113,7 +113,7 @@ def grouped_findings(description: Description) -> list[tuple[str, str, str, int]
 
 
 def file_value(description: Description, index: int, subindex: int) -> int | None:
-    """Return what the file says that an object holds, a DCF's value before a default; `None` for nothing."""
+    """Return the file's value of an object, a DCF's before a default; `None` without one."""
     variable = description.variable(index, subindex)
     if variable is None:
         return None

@@ -41,7 +41,7 @@ def text(value: Number) -> str:
 
 
 def words(data: bytes, data_type: int) -> str:
-    """Return what is no number: a text as it stands, other bytes in hexadecimal.
+    """Return a value that is no number: a text as it is, other bytes in hexadecimal.
 
     A long one ends in its length.
     """

@@ -15,9 +15,9 @@ from gateway.config.robot import RobotConfig
 from gateway.connections.authentication import Authentication
 from gateway.connections.classic import ClassicPort
 from gateway.connections.connection_slots import ConnectionSlots
-from gateway.connections.doors import check_classic
 from gateway.connections.incoming_bytes import IncomingBytes
 from gateway.connections.intake import Intake
+from gateway.connections.listener_kind import check_classic
 from gateway.connections.session import Session
 from gateway.connections.sharing import Sharing
 from gateway.process.loop import Loop, Timer
@@ -27,7 +27,7 @@ from gateway.service import Service
 from gateway.wire import framing
 
 if TYPE_CHECKING:
-    from gateway.access.known import Known
+    from gateway.access.known import KnownClients
 
 log = logging.getLogger(__name__)
 
@@ -36,7 +36,7 @@ TIDY_S = 5.0  # after it has gone
 WATCH_S = 0.2  # between looks whether those who are connected are still known
 
 _REVOKED = framing.refuse(
-    framing.Kind.NOT_ALLOWED, "what you may do on this robot has changed, so this connection ends"
+    framing.ErrorKind.NOT_ALLOWED, "what you may do on this robot has changed, so this connection ends"
 )
 
 
@@ -60,7 +60,7 @@ class Daemon:
         it has `rested_without_keys`, it is served without them again.
 
         Raises:
-            DoorProblem: one of these sockets must not be served.
+            UnsafeListener: one of these sockets must not be served.
             KeyProblem: the robot's key cannot be used.
 
         """
@@ -78,16 +78,16 @@ class Daemon:
         self._idle: Timer | None = None
         self._sockets = [listener] if local is None else [listener, local]
         folder = AccessFolder(config.access)
-        self._entrance = Authentication(
+        self._authentication = Authentication(
             self._sockets,
             folder,
             self._complain,
             lambda: self._loop.post(self._left),
             rested_without_keys=rested_without_keys,
         )
-        self._known: Known | None = None  # of the last look, while somebody is there by a key or account
-        doors, registry = self._entrance.doors, self._service.registry
-        self._intake = Intake(self._loop, doors, self._open, lambda: registry.stop_now)
+        self._known: KnownClients | None = None  # at the last look, while a client is authenticated
+        listeners, registry = self._authentication.listeners, self._service.registry
+        self._intake = Intake(self._loop, listeners, self._open, lambda: registry.stop_now)
         self._classic: ClassicPort | None = None
         if classic is not None:
             check_classic(classic)
@@ -109,7 +109,7 @@ class Daemon:
     @property
     def has_keys(self) -> bool:
         """Whether it is served with them."""
-        return self._entrance.has_keys
+        return self._authentication.has_keys
 
     @property
     def told(self) -> bool:
@@ -121,7 +121,7 @@ class Daemon:
 
         Where it has ended because it was idle, the sockets stay open: somebody may just be coming.
         """
-        self._entrance.start(self._intake.admit)
+        self._authentication.start(self._intake.admit)
         self._intake.start()
         self._loop.post(self._service.resume)
         self._loop.post(ready)
@@ -130,7 +130,7 @@ class Daemon:
             self._loop.run()
         finally:
             self._intake.shut()  # nobody comes to the entrance any more …
-            self._entrance.end()  # … and nobody from there to the intake
+            self._authentication.end()  # … and nobody from there to the intake
             self._intake.end()
             self._service.close()
             if self._told:
@@ -195,7 +195,7 @@ class Daemon:
         """Whoever is there by a key or account goes as soon as that is taken away."""
         if session.identity is ANYBODY:
             return
-        known = self._entrance.known()
+        known = self._authentication.known()
         if not known.knows(session.identity):
             session.close(_REVOKED)
         elif self._known is None:
@@ -208,7 +208,7 @@ class Daemon:
         if not by_name:
             self._known = None
             return
-        before, known = self._known, self._entrance.known()
+        before, known = self._known, self._authentication.known()
         if known is not before:
             self._service.who_is_known(known)
         for session in by_name if known is not before else ():
@@ -245,7 +245,7 @@ class Daemon:
         """Nobody is there, nothing runs, and nothing is left that must."""
         if not self._ends_idle or self._ending or self._idle is not None or self._places.taken:
             return False
-        return not (self._entrance.busy or self._service.needed) and not (
+        return not (self._authentication.busy or self._service.needed) and not (
             self._classic is not None and self._classic.busy
         )
 

@@ -62,7 +62,7 @@ def extra_of(package: str, command: str = "") -> str:
 
 
 def explained(package: str, command: str = "") -> str:
-    """Return what to do where `command` misses this package."""
+    """Return the remedy, in words, for a package that `command` lacks."""
     if package in sys.stdlib_module_names:
         return f"this does not run on {sys.platform}, where Python has no {package!r}: use Linux"
     extra = extra_of(package, command)

@@ -10,7 +10,7 @@ from gateway.certificates import KeyProblem
 
 
 def run(arguments: Sequence[str], given: bytes, *descriptors: int) -> bytes:
-    """Return what it writes to its standard output.
+    """Run openssl; return its standard output.
 
     Raises:
         KeyProblem: it is not here, or did not do it; with its own last words.

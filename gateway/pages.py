@@ -30,6 +30,6 @@ def find(name: str) -> Path | None:
 
 
 def title(page: Path) -> str:
-    """Return what a page is about: its first heading."""
+    """Return the title of a page: its first heading."""
     with page.open(encoding="utf-8") as lines:
         return next((line.strip("# \n") for line in lines if line.startswith("# ")), "")

@@ -25,7 +25,7 @@ _FAR_OFF = 10.0
 
 
 def beside(config: RobotConfig) -> Iterator[Finding]:
-    """Yield what is wrong with files that it names, and with limits beside those of the EDS."""
+    """Yield mistakes in the files that it names, and limits that contradict the EDS."""
     robot = assemble(config)
     for name, (kind, why) in robot.absent.items():
         yield Finding(header(kind, name), "", why.removeprefix(f"{header(kind, name)}: "))
@@ -39,7 +39,7 @@ def beside(config: RobotConfig) -> Iterator[Finding]:
 
 
 def here(config: RobotConfig) -> Iterator[Finding]:
-    """Yield what this computer lacks, or has otherwise than the file says."""
+    """Yield what this computer lacks, and its deviations from the file."""
     for check in _HERE:
         yield from check(config)
 
@@ -70,7 +70,7 @@ def _about_channels(config: RobotConfig, robot: Robot) -> Iterator[Finding]:
 
 
 def _about_scaling(config: RobotConfig, robot: Robot) -> Iterator[Finding]:
-    """Yield what the drive itself says counts, and is read from it later; here only what is off by far."""
+    """Yield scaling factors far from the EDS's defaults; the drive's own values are read later."""
     for name, joint in config.joint.items():
         description = robot.descriptions.get(name)
         if description is None:

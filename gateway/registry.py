@@ -137,7 +137,7 @@ class Registry:
         """
         slot = self._slots[name]
         if self.ending:
-            return failed(framing.refuse(framing.Kind.UNAVAILABLE, "the gateway is ending"))
+            return failed(framing.refuse(framing.ErrorKind.UNAVAILABLE, "the gateway is ending"))
         if user is None:
             slot.linger_until_ns = self._linger_from_now_ns()
         else:
@@ -162,7 +162,7 @@ class Registry:
         """Stop everything now, whoever uses it; calls `closed` in the loop when all is off."""
         self._closing = closed
         for name in self._slots:
-            self._give_up(name, framing.refuse(framing.Kind.UNAVAILABLE, "the gateway is ending"))
+            self._give_up(name, framing.refuse(framing.ErrorKind.UNAVAILABLE, "the gateway is ending"))
         self._settle()
 
     def _stops_by(self, stop_now: StopNow | None) -> None:
@@ -279,7 +279,7 @@ class Registry:
 
     def _failed(self, name: str, slot: _Slot, reason: Exception) -> None:
         self._give_up(
-            name, framing.refuse(framing.Kind.UNAVAILABLE, f"the module {name} cannot start: {reason}")
+            name, framing.refuse(framing.ErrorKind.UNAVAILABLE, f"the module {name} cannot start: {reason}")
         )
         self._ended(slot)
 

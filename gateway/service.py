@@ -40,7 +40,7 @@ from gateway.wire.stop import ROBOT_STOP
 from gateway.wire.stream import STREAM_START, STREAM_STOP, StreamStarted, StreamStartParams, StreamStopParams
 
 if TYPE_CHECKING:
-    from gateway.access.known import Known
+    from gateway.access.known import KnownClients
     from gateway.cost import Costs
     from gateway.guard.module import GuardModule
     from gateway.modules.component.module import ComponentModule
@@ -116,7 +116,7 @@ class Service:
             return True
         return RecordsFolder(self._config.records).unfinished
 
-    def who_is_known(self, known: "Known") -> None:
+    def who_is_known(self, known: "KnownClients") -> None:
         """Who may come in, or what they may, is now this."""
         control = cast("ControlModule | None", self.registry.running("control"))
         if control is not None:  # else it looks itself when it starts
@@ -170,14 +170,14 @@ class Service:
     def _hello(self, session: Session, params: HelloParams) -> Hello:
         if params.protocol != framing.PROTOCOL:
             raise framing.refuse(
-                framing.Kind.BAD_PARAMS,
+                framing.ErrorKind.BAD_PARAMS,
                 f"this gateway speaks protocol {framing.PROTOCOL}, not {params.protocol}",
             )
         if not params.client.isprintable():
-            raise framing.refuse(framing.Kind.BAD_PARAMS, "a client's name is of printable characters")
+            raise framing.refuse(framing.ErrorKind.BAD_PARAMS, "a client's name is of printable characters")
         if session.named not in (None, params.client):
             raise framing.refuse(
-                framing.Kind.BAD_PARAMS,
+                framing.ErrorKind.BAD_PARAMS,
                 f"this connection has called itself {session.named!r} already; keep to it",
             )
         session.named = params.client
@@ -262,10 +262,10 @@ class Service:
             check_globs("channel", names, params.channels, absent)
             chosen = narrow(everything, params.channels)
             if session.closed:
-                raise framing.refuse(framing.Kind.UNAVAILABLE, "the connection has ended")
+                raise framing.refuse(framing.ErrorKind.UNAVAILABLE, "the connection has ended")
             if not chosen:
                 raise framing.refuse(
-                    framing.Kind.UNAVAILABLE, "there is no channel to stream; see robot.describe"
+                    framing.ErrorKind.UNAVAILABLE, "there is no channel to stream; see robot.describe"
                 )
             return StreamStarted(self.streams.start(session, chosen, params.rate_hz))
 
@@ -274,7 +274,7 @@ class Service:
     def _stream_stop(self, session: Session, params: StreamStopParams) -> Done:
         if not self.streams.stop(session, params.stream):
             raise framing.refuse(
-                framing.Kind.UNKNOWN_NAME,
+                framing.ErrorKind.UNKNOWN_NAME,
                 f"this connection has no stream {params.stream}; it may have ended before",
             )
         return Done()

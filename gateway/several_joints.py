@@ -94,7 +94,7 @@ class Spread:
 
 
 def other_side(component: str) -> str | None:
-    """Return what its counterpart on the other side of the body is called."""
+    """Return the name of the counterpart on the other side of the body."""
     side, _, rest = component.partition("_")
     return f"{SIDES[1 - SIDES.index(side)]}_{rest}" if side in SIDES and rest else None
 
@@ -297,7 +297,7 @@ def _is_unsigned(info: ParameterInfo) -> bool:
 
 
 def devices(description: Description) -> dict[str, tuple[object, object]]:
-    """Return which device each component is, by bus and node: axes of one node store together."""
+    """Return the device of each component, by bus and node: axes of one node store together."""
     found: dict[str, tuple[object, object]] = {}
     for part in description.components:
         about = part.device if isinstance(part.device, dict) else {}
@@ -306,7 +306,7 @@ def devices(description: Description) -> dict[str, tuple[object, object]]:
     return found
 
 
-class Outcome(StrEnum):
+class StoreOutcome(StrEnum):
     """What came of a device that was asked to store."""
 
     STORED = "stored"
@@ -315,9 +315,9 @@ class Outcome(StrEnum):
     UNASKED = "not asked"  # the link was lost before
 
 
-def refused_or_unknown(kind: str | None) -> Outcome:
-    """Return what a robot's refusal of this kind says of a device's flash."""
-    return Outcome.UNKNOWN if kind in UNSURE else Outcome.REFUSED
+def refused_or_unknown(kind: str | None) -> StoreOutcome:
+    """Return the state of a device's flash after a refusal of this kind."""
+    return StoreOutcome.UNKNOWN if kind in UNSURE else StoreOutcome.REFUSED
 
 
 def storing(description: Description) -> Iterator[tuple[str, ...]]:

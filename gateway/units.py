@@ -33,7 +33,7 @@ class Unit:
         return _EXACT.multiply(Decimal(value), self.factor)
 
     def si_value(self, typed: Decimal | str) -> float:
-        """Return what was typed in this unit, as the nearest SI float.
+        """Return a value typed in this unit, as the nearest SI float.
 
         Raises:
             ValueError: it is no number, or too large or too small for a float.

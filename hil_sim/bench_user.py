@@ -29,7 +29,7 @@ class BenchUser:
         joint.velocity = 0.0
 
     def upon(self, feet: tuple[Foot, Foot], trunk: Trunk, now_s: float) -> tuple[tuple[Foot, Foot], Trunk]:
-        """Return what soles and trunk feel, with what is done to them."""
+        """Return feet and trunk as changed by the user at the bench."""
         if self.lean is not None:
             forward, left = self.lean
             trunk = replace(trunk, pitch=forward, roll=-left)

@@ -111,7 +111,7 @@ def ask(folder: Path, request: dict[str, Any]) -> dict[str, Any]:
 
 
 def _why(folder: Path, error: OSError | ValueError) -> str:
-    """Return what keeps it from answering, and what to do."""
+    """Return the reason why it does not answer, and the remedy."""
     start = f"start one: gwrms sim --dir {folder}"
     match error:
         case NotADirectoryError():

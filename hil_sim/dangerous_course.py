@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Final
 
-from hil_sim.dangers import DANGERS, EVERYWHERE, LEVEL, LONGEST_S, Seen, healthy
+from hil_sim.dangers import DANGERS, EVERYWHERE, LEVEL, LONGEST_S, DangerContext, healthy
 from hil_sim.exoskeleton import Exoskeleton
 from hil_sim.faults.injector import Faults
 from hil_sim.gait.activity import Activity
@@ -79,7 +79,7 @@ class Course:
         danger, clock = DANGERS[name], self._robot.clock
         warmth = {drive.name: drive.temperature_c for drive in self._robot.simulated_drives}
         on, params = danger.drawn(self._source)
-        seen = Seen(self._robot, on, weak=self._robot.controller.generator.impairment[0])
+        seen = DangerContext(self._robot, on, weak=self._robot.controller.generator.impairment[0])
         self._faults.begin(danger.fault, on, None, params)
         self.now = 1.0 + list(DANGERS).index(name)
         end_s = clock.now_s + LONGEST_S

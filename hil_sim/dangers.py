@@ -28,12 +28,12 @@ DROPPED: Final = 0.85  # of what strength this wearer's leg had: its toes drag
 BEARS_N: Final = 200.0  # a foot that bears less says little
 HOT_C: Final = 100.0  # the drive switches itself off, and the leg gives way
 
-Harmed = Callable[["Seen"], bool]
+Harmed = Callable[["DangerContext"], bool]
 Params = Mapping[str, float]
 
 
 @dataclass(slots=True)
-class Seen:
+class DangerContext:
     """The robot, where the danger is, and what has to be remembered from cycle to cycle."""
 
     robot: Exoskeleton
@@ -70,35 +70,35 @@ class Danger:
         return source.choice(self.on), params
 
 
-def _astray(seen: Seen) -> bool:
+def _astray(seen: DangerContext) -> bool:
     return seen.astray > ASTRAY_RAD
 
 
-def _led_astray(seen: Seen) -> bool:
+def _led_astray(seen: DangerContext) -> bool:
     joint = seen.robot.drives[seen.on].joint
     return seen.astray > LED_ASTRAY_RAD or joint.at_low_switch or joint.at_high_switch
 
 
-def _on_ground(seen: Seen) -> bool:
+def _on_ground(seen: DangerContext) -> bool:
     return seen.robot.controller.generator.fall.state is FallState.LYING
 
 
-def _shaking(seen: Seen) -> bool:
+def _shaking(seen: DangerContext) -> bool:
     servo = seen.robot.drives[seen.on].servo
     square = (servo.joint.velocity - servo.reference.velocity) ** 2
     seen.shaking += 0.01 / SHAKEN_S * (square - seen.shaking)
     return math.sqrt(seen.shaking) > SHAKING_RAD_S
 
 
-def _hot(seen: Seen) -> bool:
+def _hot(seen: DangerContext) -> bool:
     return seen.robot.drives[seen.on].temperature_c > HOT_C
 
 
-def _resisted(seen: Seen) -> bool:
+def _resisted(seen: DangerContext) -> bool:
     return abs(seen.robot.wearer.resists.get(seen.joint, 0.0)) > RESISTED_NM or seen.astray > ASTRAY_RAD
 
 
-def _half_felt(seen: Seen) -> bool:
+def _half_felt(seen: DangerContext) -> bool:
     side = FEET.index(seen.on)
     foot: Foot = seen.robot.wearer.feet(seen.robot.clock.now_s)[side]
     pressures = seen.robot.sensors.pressures[side].pascal
@@ -106,11 +106,11 @@ def _half_felt(seen: Seen) -> bool:
     return foot.force > BEARS_N and felt < 0.5 * foot.force
 
 
-def _told_wrong(seen: Seen) -> bool:
+def _told_wrong(seen: DangerContext) -> bool:
     return abs(seen.robot.sensors.imu_faults.slipped) > TOLD_WRONG_RAD
 
 
-def _dropped(seen: Seen) -> bool:
+def _dropped(seen: DangerContext) -> bool:
     has = 1.0 - seen.weak
     return has - (1.0 - seen.robot.controller.generator.impairment[0]) > DROPPED * has
 

@@ -144,7 +144,7 @@ class Exoskeleton:
             self._next_entry = self.clock.after(round(entry.seconds * SECOND_NS), self._go_on)
 
     def own_pace(self, pace: Pace | None) -> Pace | None:
-        """Return what this wearer makes of a pace that ordinary ones are told to walk at."""
+        """Return this wearer's own pace, where an ordinary one is told to walk at `pace`."""
         return pace if pace is None or self.walk == ORDINARY else WALKS[self.walk].pace(*pace)
 
     def _take_own_pace(self) -> None:

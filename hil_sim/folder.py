@@ -71,7 +71,7 @@ class Folder:
         return True
 
     def memory(self, node: Node) -> FileMemory:
-        """Return what a device stores on command, and has again at the next start."""
+        """Return the memory of a device, which keeps stored values until the next start."""
         return FileMemory(self.path / "stored" / f"{node.name}.json", node.description.path.name)
 
     def link(self, sensor: str) -> Path:

@@ -22,7 +22,7 @@ class Mounting:
         return self.direction * angle
 
     def counts(self, angle: float, counts_per_radian: float) -> int:
-        """Return what the drive counts at an angle of the joint (rad)."""
+        """Return the drive's count at an angle of the joint (rad)."""
         return round(self.direction * angle * counts_per_radian) + self.zero
 
     def angle(self, counts: float, counts_per_radian: float) -> float:

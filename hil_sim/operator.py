@@ -92,7 +92,7 @@ class Operator:
 
 
 def verb_of(request: Request) -> str:
-    """Return which of the things that can be asked for it is; raises `RequestRefused`."""
+    """Return the request's verb; raises `RequestRefused`."""
     verbs = [verb for verb in _CHECKS if verb in request]
     if len(verbs) != 1:
         raise RequestRefused(f"say one of {', '.join(_CHECKS)}, not {', '.join(request) or 'nothing'}")
@@ -100,7 +100,7 @@ def verb_of(request: Request) -> str:
 
 
 def further(verb: str) -> tuple[str, ...]:
-    """Return what else a request of this kind may hold."""
+    """Return the further keys of a request of this kind."""
     return _CHECKS[verb][0]
 
 

@@ -62,7 +62,7 @@ class Pace:
 
 
 def _words(speed: float, went: float, busy: float, real_ns: int) -> str:
-    """Return what is slow, by how much, and what to do."""
+    """Return the slowness and its remedy, in words."""
     pace = "real time" if speed == 1.0 else f"{speed:g} times real time"
     if busy >= _BUSY:
         why = f"it takes {100 * busy:.0f} % of a core itself: take a lower --speed, or a faster computer"

@@ -38,6 +38,6 @@ def describe(path: Path, node_id: int) -> Description:
 
 
 def name(description: Description) -> str:
-    """Return what robot.toml calls the file: its name where it ships, else its whole path."""
+    """Return the file's name in robot.toml: its name if it ships, else its whole path."""
     path = description.path
     return path.name if path.parent == SHIPPED else str(path)

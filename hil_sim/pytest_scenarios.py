@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from hil_sim.scenario import report
-from hil_sim.scenario.expectation import Result
+from hil_sim.scenario.expectation import ScenarioResult
 from hil_sim.scenario.runner import GATEWAY_LOG, run
 from hil_sim.scenario.script import Script, load
 from hil_sim.scenario.table import ScenarioError
@@ -49,9 +49,9 @@ class ScenarioItem(pytest.Item):
             outcome = run(self._script, Path(folder))
             log = _last_words(Path(folder) / GATEWAY_LOG)
         self.add_report_section("call", GATEWAY_LOG, log)
-        if outcome.result is Result.INCONCLUSIVE and not self.config.getoption("gwrms_strict"):
+        if outcome.result is ScenarioResult.INCONCLUSIVE and not self.config.getoption("gwrms_strict"):
             pytest.skip(f"inconclusive: {outcome.doubt}")
-        if outcome.result is not Result.PASSED:
+        if outcome.result is not ScenarioResult.PASSED:
             raise NotAsExpected(report.text(self.path, self._script, outcome) + outcome.problem)
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:

@@ -53,7 +53,7 @@ class SimulationHost:
     # -- what a robot adds -----------------------------------------------------------------------------
 
     def _config_text(self, bus: str) -> str:
-        """Return what robot.toml says where there is none yet; `bus` is the table of its bus."""
+        """Return the text of a first robot.toml; `bus` is the table of its bus."""
         raise NotImplementedError
 
     def _companions(self) -> Mapping[str, str]:

@@ -105,7 +105,7 @@ class TruthFile:
         self._write([*head, self._events(feet), *rounded])
 
     def _events(self, feet: tuple[Foot, Foot]) -> list[str]:
-        """Return what has happened since the last line."""
+        """Return the events since the last line."""
         generator = self._robot.controller.generator
         before, self._label = self._label, generator.label
         events = [_BEGUN[self._label]] if self._label is not before and self._label in _BEGUN else []

@@ -25,7 +25,7 @@ from server_gui.core.desk.feeds import Feeds, Record
 from server_gui.core.desk.shutdown import Shutdown
 from server_gui.core.desk.station import Station
 from server_gui.core.desk.ticks import Ticks
-from server_gui.core.evidence.file import Told
+from server_gui.core.evidence.file import EditEvidence
 from server_gui.core.follow.events import Event
 from server_gui.core.follow.feed import FollowSettings
 from server_gui.core.follow.mailbox import Mailbox
@@ -122,7 +122,7 @@ class App:
         self._stations: dict[str, Station] = {}
         self._predicted: collections.deque[PredictionNews] = collections.deque(maxlen=MOST_PREDICTIONS)
         self._poster = Poster()
-        self._judged: collections.deque[tuple[str, Told]] = collections.deque(maxlen=MOST_PREDICTIONS)
+        self._judged: collections.deque[tuple[str, EditEvidence]] = collections.deque(maxlen=MOST_PREDICTIONS)
         self.feeds = Feeds(
             settings,
             following,
@@ -239,7 +239,7 @@ class App:
         if (station := self.desk.selected) is not None:
             self._stop(station.name, reason)
 
-    def _keep(self, robot: str, told: Told) -> None:
+    def _keep(self, robot: str, told: EditEvidence) -> None:
         report = self.desk.recording.link(self._stations[robot].address)
         self.feeds.keep(robot, told, "" if report is None else report.session)
 
@@ -267,6 +267,7 @@ class App:
         self._look_at_own()
         self.commissioning.look()
         self._look_at_gateway()
+        self._archive.look()
         self.window.refresh()
         self._garbage.look()
 

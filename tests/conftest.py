@@ -66,9 +66,10 @@ def table_of_marks() -> list[tuple[str, str]]:
     return re.findall(r"^\| `(tests/[^`]+)` \| (\w+) \|", README.read_text(encoding="utf-8"), re.MULTILINE)
 
 
-def _marks_of(item: pytest.Item, marks: list[tuple[str, str]]) -> Iterator[str]:
+def _marks_of(item: pytest.Item, marks: list[tuple[str, str]], names: tuple[str, ...]) -> Iterator[str]:
+    """`names` are those of `marks`: to look for all at once takes a tenth of the time."""
     node_id = item.nodeid
-    if node_id.startswith(tuple(name for name, _ in marks)):
+    if node_id.startswith(names):
         yield from (mark for name, mark in marks if node_id.startswith(name))
     callspec = getattr(item, "callspec", None)
     if callspec is not None and callspec.params.get("backend") == "s3" and not node_id.startswith(SMOKE):
@@ -111,8 +112,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> Generator[None, o
     if "PYTEST_XDIST_WORKER" in os.environ:
         items.sort(key=lambda item: item.nodeid.partition("::")[0])  # the same for all, who began elsewhere
     marks = table_of_marks()
+    names = tuple(name for name, _ in marks)
     for item in items:
-        for mark in _marks_of(item, marks):
+        for mark in _marks_of(item, marks, names):
             item.add_marker(mark)
     result = yield
     workers = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))

@@ -151,7 +151,7 @@ class ObjectChannels:
                 yield f"no {' and '.join(names)}: {bringer}"
 
     def _mapped(self, tpdo: Tpdo) -> Iterator[tuple[_Source, Field]]:
-        """Yield what this TPDO carries of them."""
+        """Yield the channels that this TPDO carries."""
         for place in tpdo.objects:
             for one in self._sources:
                 if one.settings.address == (place.index, place.subindex) and one.fits(place.bits):

@@ -16,7 +16,7 @@ class ConfirmedWrites:
         self._before: tuple[Object, bytes | None, bool] | None = None  # of the write under way
 
     def known(self, key: Object, otherwise: bytes | None = None) -> bytes | None:
-        """Return what was confirmed last, `otherwise` where nothing was written.
+        """Return the last confirmed value; `otherwise` if nothing was written.
 
         `None` where nobody knows.
         """

@@ -8,17 +8,17 @@ from drivers.bus.node import shared_node
 from drivers.bus.pdo import Tpdo, read_tpdos
 from drivers.bus.sdo.channel import SdoChannel
 from drivers.bus.settings import DeviceSettings
-from drivers.component import Kind
+from drivers.component import ComponentKind
 from drivers.errors import DeviceTimeout, DriverError, Unavailable
 from drivers.latest import Latest
-from drivers.samples import Channel, Quality, State
+from drivers.samples import Channel, ComponentState, Quality
 from eds import Description
 
 
 class CanDevice:
     """One device by its name in the robot's file; `chosen` are its objects that are channels."""
 
-    kind = Kind.DEVICE
+    kind = ComponentKind.DEVICE
 
     def __init__(
         self,
@@ -59,17 +59,19 @@ class CanDevice:
         age_ms = self.node.life.silent_ms(now_ns)
         problem = self.node.problem(now_ns)
         silence = self.node.silence(now_ns)
-        state = State.OK if self.node.ready else State.LOST
+        state = ComponentState.OK if self.node.ready else ComponentState.LOST
         if self.node.ready and self.node.life.lost(now_ns):
             lost = age_ms is not None and age_ms > self.settings.lost_after_s * 1000
-            state = State.LOST if lost else State.STALE
+            state = ComponentState.LOST if lost else ComponentState.STALE
         elif silence is not None:
-            state, problem = State.LOST, silence
+            state, problem = ComponentState.LOST, silence
         elif self.node.ready and self.node.life.active_emcy is not None:
-            state = State.FAULT
+            state = ComponentState.FAULT
             problem = f"it reports {self.node.life.active_emcy.text(self.node.description.vendor_id)}"
         trouble = self.node.trouble
-        channels = self._objects.problems(now_ns) if state in (State.OK, State.FAULT) else ()
+        channels = (
+            self._objects.problems(now_ns) if state in (ComponentState.OK, ComponentState.FAULT) else ()
+        )
         texts = (
             problem,
             self._unread,
@@ -82,7 +84,7 @@ class CanDevice:
         return Quality(state, age_ms, words or None, counters, trouble)
 
     def boot(self, sdo: SdoChannel) -> None:
-        """Read which of its channels come by PDO."""
+        """Read which channels come by PDO."""
         if not self._objects:
             return
         tpdos, unread = self._tpdos(sdo)
@@ -92,7 +94,7 @@ class CanDevice:
                 self._objects.install(tpdos)
 
     def _tpdos(self, sdo: SdoChannel) -> tuple[tuple[Tpdo, ...], str | None]:
-        """Return what it sends; nothing, and why, where its mapping cannot be understood."""
+        """Return the device's TPDOs; none, and the reason, if their mapping cannot be understood."""
         try:
             return read_tpdos(sdo, self._description), None
         except (DeviceTimeout, Unavailable):

@@ -41,7 +41,7 @@ class Field:
 
 
 def unpacker(fields: Sequence[Field]) -> Unpack:
-    """Return what makes a frame's bytes the numbers of these fields, in their order."""
+    """Return the function that turns a frame's bytes into the numbers of these fields, in their order."""
     return _by_struct(fields) or _by_bits(fields)
 
 

@@ -24,7 +24,7 @@ STATE_WORDS = {
 
 
 def bits_per_s(frames_per_s: float, bytes_per_s: float) -> float:
-    """Return what frames with so many bytes of data take of a bus's time, in bits."""
+    """Return the bus time of frames with so many bytes of data, in bits."""
     return FRAME_BITS * frames_per_s + BYTE_BITS * bytes_per_s
 
 

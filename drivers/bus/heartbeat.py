@@ -44,7 +44,7 @@ class Heartbeat(BusUser):
         self._bus.unsubscribe(HEARTBEAT + self.node_id, self._on_other)
 
     def feed(self) -> None:
-        """Say that whatever the devices rely on still runs."""
+        """Note that everything that the devices rely on still runs."""
         self._fed_ns = time.monotonic_ns()
 
     def beat(self) -> None:

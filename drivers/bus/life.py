@@ -120,7 +120,7 @@ class NodeLife:
         return self._standstill.silent_ns(self.heartbeat_ns, now_ns) / 1e9 > self.timeout_s
 
     def problem(self, now_ns: int) -> str | None:
-        """Return what is wrong with a node that came up, in words."""
+        """Return the problem of a node that came up, in words."""
         if self.lost(now_ns):
             words = self._standstill.words(now_ns, self.heartbeat_ns, self.timeout_s or 0.0)
             if words is not None:

@@ -228,13 +228,13 @@ class Node(BusUser):
         self.worker.wake()
 
     def problem(self, now_ns: int) -> str | None:
-        """Return what is wrong with the node now, in words with what to check; `None` when nothing is."""
+        """Return the node's present problem, in words with what to check; `None` if there is none."""
         if not self.ready:
             return self.bus.trouble or (_REMAPPED if now_ns < self._settled_ns else self._booting.step)
         return self.life.problem(now_ns) or self._asking.guard_problem or self.bus.trouble
 
     def counters(self) -> dict[str, int]:
-        """Return what happened since the node's object was made."""
+        """Return the counters since the node's object was made."""
         sdo = self.channel.counters
         return {
             "boots": self.life.boots,

@@ -48,7 +48,7 @@ def find_rpdo(sdo: SdoChannel, description: Description, index: int) -> tuple[Rp
 
 
 def read_values(sdo: SdoChannel, rpdo: Rpdo) -> dict[tuple[int, int], bytes]:
-    """Return what the device holds of the objects that it takes from an RPDO; raises `DriverError`."""
+    """Return the device's values of the objects in an RPDO; raises `DriverError`."""
     return {
         (one.index, one.subindex): sdo.upload(one.index, one.subindex)
         for one in rpdo.objects

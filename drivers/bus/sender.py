@@ -57,7 +57,7 @@ class _Frame:
         return self.can_id, self.data[:_SDO_HEAD]
 
     def settle(self, taken: bool | Unavailable) -> None:
-        """Say what has become of it; the first word counts."""
+        """Settle it with its outcome; only the first call counts."""
         if self.taken is None:
             self.taken = taken
             if self.settled is not None:

@@ -66,7 +66,7 @@ class Traffic:
 
 
 def talks(counts: Iterable[tuple[int, int]], seconds: float) -> list[Talk]:
-    """Return what frames with these ids were, the most first; error frames are none."""
+    """Return the shares of frames with these ids, the largest first; without error frames."""
     found: Counter[tuple[str, int | None]] = Counter()
     for can_id, count in counts:
         if not can_id & ERROR:

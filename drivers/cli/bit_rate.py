@@ -47,7 +47,7 @@ def check(name: str, settings: CanSettings, bitrate: int, others: Collection[int
 
 
 def next_steps(settings: CanSettings, bitrate: int) -> str:
-    """Return what is to be done after a bit rate was stored."""
+    """Return the steps after a stored bit rate, in words."""
     line = f"sudo ip link set {settings.channel} down, then up type can bitrate {bitrate} restart-ms 100"
     how = f" ({line})" if settings.interface == "socketcan" else ""
     return f"Switch it off, set the bus and all who are on it to that rate{how}, and switch it on"

@@ -33,7 +33,7 @@ from drivers.insole.frame import InsoleFrame
 from drivers.insole.layout import Layout
 from drivers.insole.settings import InsoleSettings
 from drivers.line import Line
-from drivers.samples import State
+from drivers.samples import ComponentState
 
 STANDARD_GRAVITY = 9.80665
 AVERAGE_S = 2.0
@@ -208,7 +208,7 @@ def _imu(options: argparse.Namespace) -> int:
     try:
         threading.Event().wait(AVERAGE_S)
         quality = imu.quality(time.monotonic_ns())
-        if quality.state is not State.OK:
+        if quality.state is not ComponentState.OK:
             raise Unavailable(quality.problem or f"nothing came from {options.port}")
         measured = imu.zero_now()
     finally:

@@ -16,7 +16,7 @@ SURE = 0.9  # a share of the bytes that needs no other baud rate tried
 
 
 @dataclass(frozen=True, slots=True)
-class Heard:
+class BaudRateSample:
     """What came at one baud rate."""
 
     baudrate: int
@@ -34,8 +34,8 @@ class Heard:
         return f"{match.format_name}{cells}: {explained}"
 
 
-def listen(port: str, baudrate: int | None = None) -> Iterator[Heard]:
-    """Yield what speaks at this baud rate, or at each, until one fits.
+def listen(port: str, baudrate: int | None = None) -> Iterator[BaudRateSample]:
+    """Yield the result of listening at this baud rate, or at each, until a format fits.
 
     Raises:
         Unavailable: the port cannot be opened, or goes away.
@@ -43,19 +43,19 @@ def listen(port: str, baudrate: int | None = None) -> Iterator[Heard]:
     """
     for each in (baudrate,) if baudrate else BAUDRATES:
         data = _read(port, each, LISTEN_S)
-        heard = Heard(each, len(data), recognise(data))
+        heard = BaudRateSample(each, len(data), recognise(data))
         yield heard
         if heard.match is not None and heard.match.share >= SURE:
             return
 
 
-def best(heard: Sequence[Heard]) -> Heard:
+def best(heard: Sequence[BaudRateSample]) -> BaudRateSample:
     """Return the candidate of which a format explains most."""
     return max(heard, key=lambda one: one.match.share if one.match else -1.0)
 
 
-def nothing(port: str, heard: Sequence[Heard]) -> str:
-    """Return what to do where no format fits."""
+def nothing(port: str, heard: Sequence[BaudRateSample]) -> str:
+    """Return a remedy if no format fits, in words."""
     if not any(one.bytes for one in heard):
         return f"{port} is silent: check the sensor's power and its TX wire, and whether it has to be started"
     rates = f"{heard[0].baudrate} baud" if len(heard) == 1 else "any usual baud rate"

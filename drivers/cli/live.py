@@ -18,7 +18,7 @@ from drivers.insole import layout as layouts
 from drivers.insole.build import insoles
 from drivers.insole.formats import FORMATS as INSOLE_FORMATS
 from drivers.insole.settings import InsoleSettings
-from drivers.samples import State
+from drivers.samples import ComponentState
 
 REFRESH_S = 0.25
 AXES = "# which of its axes point forward, left and up; here as its maker means it to sit"
@@ -66,7 +66,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def table(port: str, baudrate: int, match: Match) -> str:
-    """Return what of the robot's file wires the sensor: a table, or one for each foot."""
+    """Return the sensor's tables for the robot's file: one, or one for each foot."""
     keys = f'port = "{port}"\nbaudrate = {baudrate}\nformat = "{match.format_name}"\n'
     if match.format_name in IMU_FORMATS:
         axes = msgspec.json.encode(IMU_FORMATS[match.format_name].conventions.axes).decode()
@@ -81,7 +81,7 @@ def table(port: str, baudrate: int, match: Match) -> str:
 
 
 def _layout(match: Match) -> str | None:
-    """Return what the table has to name; `None` where the format knows where its cells are."""
+    """Return the layout that the table must name; `None` if the format knows its cells' positions."""
     if match.layout is not None or INSOLE_FORMATS[match.format_name].layout is not None:
         return match.layout
     return next(
@@ -110,7 +110,7 @@ def _show(components: list[Component], seconds: float | None) -> None:
         while time.monotonic() < until:
             pause.wait(REFRESH_S)
             now_ns = time.monotonic_ns()
-            there = [one for one in components if one.quality(now_ns).state is not State.LOST]
+            there = [one for one in components if one.quality(now_ns).state is not ComponentState.LOST]
             sys.stdout.write("\n".join(_line(one, now_ns) for one in there or components) + "\n")
             sys.stdout.flush()
     except KeyboardInterrupt:

@@ -232,7 +232,7 @@ def _set(task: _Task) -> int:
 
 
 def _plan(device: Device, node_id: int | None, bitrate: int | None, *, stored: bool) -> Iterator[str]:
-    """Yield what will happen, line by line."""
+    """Yield the plan for the person, line by line."""
     if node_id is not None:
         keeps = "stores that" if stored else "forgets that when it is switched off"
         yield f"  it becomes node {node_id}, and {keeps}"

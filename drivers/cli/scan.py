@@ -14,7 +14,7 @@ from drivers.bus.settings import CanSettings
 from drivers.cli.buses import named
 from drivers.cli.listen import best, listen
 from drivers.errors import Unavailable
-from drivers.scan.asking import Told
+from drivers.scan.asking import NodeAnswers
 from drivers.scan.products import Library, files
 from drivers.scan.report import as_json, as_text
 from drivers.scan.scan import scan
@@ -95,7 +95,9 @@ def _told(name: str, act: Any) -> bool:
 def _scan_bus(bus: str, settings: CanSettings, options: argparse.Namespace, library: Library) -> None:
     found = scan(settings, options.seconds, threading.Event().wait, active=options.active)
     proposals = {
-        node: library.proposals(node, told) for node, told in found.told.items() if isinstance(told, Told)
+        node: library.proposals(node, told)
+        for node, told in found.told.items()
+        if isinstance(told, NodeAnswers)
     }
     if options.json:
         line = msgspec.json.encode(as_json(settings, found, proposals, bus)).decode()

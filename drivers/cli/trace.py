@@ -14,9 +14,9 @@ import msgspec
 from drivers.bus.frames import EXTENDED
 from drivers.bus.settings import CanSettings
 from drivers.cli.buses import named
-from drivers.cli.trace_known import Known
+from drivers.cli.trace_known import TraceContext
 from drivers.cli.trace_load import Meters, show_load
-from drivers.trace.decoding import DecodedFrame, Decoder, Kind
+from drivers.trace.decoding import DecodedFrame, Decoder, FrameKind
 from drivers.trace.devices import Devices
 from drivers.trace.files import SUFFIXES, Captured, Put, is_file, writing
 from drivers.trace.merged import merged
@@ -71,7 +71,7 @@ def _parser() -> argparse.ArgumentParser:
         help="only this node, by id or name (repeatable)",
     )
     parser.add_argument(
-        "--kind", action="append", default=[], metavar="KIND", help=f"only these: {', '.join(Kind)}"
+        "--kind", action="append", default=[], metavar="KIND", help=f"only these: {', '.join(FrameKind)}"
     )
     parser.add_argument(
         "--object",
@@ -108,14 +108,14 @@ def main(arguments: Sequence[str]) -> int:
     files = [Path(name) for name in options.source if is_file(name)]
     buses = {} if files else _by_interface(named(options.source, options.bitrate))
     source = recorded(files) if files else _live(buses)
-    known = Known(options.robot or _robot(options.source), options.eds, buses)
+    known = TraceContext(options.robot or _robot(options.source), options.eds, buses)
     with contextlib.closing(source), _sink(options) as sink:
         if options.load:
             rates = {name: options.bitrate or settings.bitrate for name, settings in buses.items()}
             meters = Meters(rates, options.bitrate)
             show_load(until(source, options.seconds), meters, known.names, as_json=options.json)
         else:
-            shown = Shown(known, _wanted(options, known), options, with_interface=len(buses) != 1)
+            shown = TracePrinter(known, _wanted(options, known), options, with_interface=len(buses) != 1)
             _show_frames(source, sink, shown, options)
     return 0
 
@@ -175,11 +175,16 @@ def _sink(options: argparse.Namespace) -> Iterator[Put]:
         yield put
 
 
-class Shown:
+class TracePrinter:
     """Lines of all buses: each has a decoder of its own, for it has nodes and conversations of its own."""
 
     def __init__(
-        self, known: Known, wanted: Sequence[Wanted], options: argparse.Namespace, *, with_interface: bool
+        self,
+        known: TraceContext,
+        wanted: Sequence[Wanted],
+        options: argparse.Namespace,
+        *,
+        with_interface: bool,
     ) -> None:
         self._known = known
         self._wanted = wanted
@@ -188,7 +193,7 @@ class Shown:
         self._with_interface = with_interface
 
     def line(self, captured: Captured) -> str | None:
-        """Return what is shown of a frame; `None` where it is not wanted."""
+        """Return a frame's line; `None` if it is filtered out."""
         interface = captured.interface
         if interface not in self._decoders:
             self._decoders[interface] = Decoder(Devices(self._known.on(interface)))
@@ -207,7 +212,7 @@ class Shown:
         return f"{clock}{interface} {words}".rstrip()
 
 
-def _show_frames(source: Batches, sink: Put, shown: Shown, options: argparse.Namespace) -> None:
+def _show_frames(source: Batches, sink: Put, shown: TracePrinter, options: argparse.Namespace) -> None:
     left = options.count
     for batch in until(source, options.seconds):
         for captured in batch.frames:
@@ -223,7 +228,7 @@ def _show_frames(source: Batches, sink: Put, shown: Shown, options: argparse.Nam
             sys.stdout.flush()
 
 
-def _wanted(options: argparse.Namespace, known: Known) -> list[Wanted]:
+def _wanted(options: argparse.Namespace, known: TraceContext) -> list[Wanted]:
     found: list[Wanted] = []
     if options.node:
         found.append(by_node(options.node, known.all, known.on))

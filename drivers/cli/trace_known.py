@@ -12,7 +12,7 @@ from drivers.trace.robot_file import described, devices
 _NODE_IDS = range(1, 128)
 
 
-class Known:
+class TraceContext:
     """What `--robot` and `--eds` say; `buses` are the interfaces that are listened to, if any."""
 
     def __init__(self, robot: Path | None, words: Sequence[str], buses: Mapping[str, CanSettings]) -> None:

@@ -28,7 +28,7 @@ class Meters:
         meter.take(captured)
 
     def told(self, seconds: float) -> dict[str, Load]:
-        """Return what came since the last time, which was so long ago, by interface; begins anew."""
+        """Return the load since the last call, `seconds` ago, by interface, and begin anew."""
         return {name: meter.told(seconds) for name, meter in self._by_interface.items()}
 
 

@@ -11,7 +11,7 @@ from drivers.imu.trunk import TrunkImu
 from drivers.line import Line, Recognise, unrecognised
 from drivers.losses import Losses
 from drivers.reader_stalls import ReaderStalls
-from drivers.samples import Quality, State
+from drivers.samples import ComponentState, Quality
 
 
 class Imu(TrunkImu):
@@ -46,7 +46,9 @@ class Imu(TrunkImu):
     def quality(self, now_ns: int) -> Quality:
         counters = self.line.parser.counters.as_dict() | {"reconnects": self.line.reconnects}
         quality = self._quality(now_ns, self.line.problem(now_ns), counters)
-        return beside(quality, self._losses.findings, now_ns) if quality.state is State.OK else quality
+        return (
+            beside(quality, self._losses.findings, now_ns) if quality.state is ComponentState.OK else quality
+        )
 
     def received(self, frames: Sequence[ImuFrame], stamp_ns: int) -> None:
         """Frames of the line; called in the port's thread."""

@@ -48,7 +48,7 @@ def moments(frames: Sequence[ImuFrame]) -> list[ImuFrame]:
 
 
 def _together(group: list[ImuFrame]) -> ImuFrame:
-    """Return what frames of different kinds say that a trunk needs.
+    """Return one frame with the values of several kinds of frames.
 
     Where two say the same, the later one counts.
     """
@@ -83,7 +83,7 @@ _PARTS = {
 
 
 def flat(frame: ImuFrame) -> dict[str, object]:
-    """Return what `frame` carries, by the channels' names; angles in rad as `roll`, `pitch`, `yaw`."""
+    """Return the values of `frame` by the channels' names; angles in rad as `roll`, `pitch`, `yaw`."""
     line: dict[str, object] = {"frame": frame.kind}
     for number in ("sequence", "ticks"):
         if (value := getattr(frame, number)) is not None:

@@ -20,7 +20,7 @@ from drivers.imu.conventions import Conventions
 from drivers.imu.motion import TILT
 from drivers.imu.slopes import MappedSlope, SlopePlan
 from drivers.imu.trunk import TrunkImu
-from drivers.samples import Quality, State
+from drivers.samples import ComponentState, Quality
 from eds import Description
 
 
@@ -76,7 +76,7 @@ class Inclinometer(TrunkImu):
         known = beside(known, node.trouble, now_ns)
         notes = (*node.findings, *(self._plan.notes if self._plan is not None else ()))
         words = "; ".join(text for text in (known.problem, *notes) if text)
-        state = known.state if node.ready else State.LOST
+        state = known.state if node.ready else ComponentState.LOST
         return replace(known, state=state, problem=words or None)
 
     # What the node tells.

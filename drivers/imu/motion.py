@@ -110,7 +110,7 @@ class TrunkMotion:
         self._raw_from_ns: int | None = None  # when a device without attitude is known to have none to send
 
     def felt(self, frame: ImuFrame, stamp_ns: int) -> Felt:
-        """Return what `frame`, taken at `stamp_ns`, says of the trunk."""
+        """Return the trunk's motion from `frame`, taken at `stamp_ns`."""
         indices: tuple[int, ...] = ()
         values: tuple[float, ...] = ()
         acceleration = angular_velocity = up = None
@@ -150,7 +150,7 @@ class TrunkMotion:
         return self._filter.update(stamp_ns, frame.angular_velocity, frame.acceleration)
 
     def _device_attitude(self, frame: ImuFrame, stamp_ns: int) -> Quaternion | None:
-        """Return what the device says itself: its quaternion, else its angles."""
+        """Return the device's own attitude: from its quaternion, else from its angles."""
         device: Quaternion | None = None
         if frame.orientation is not None:
             device = rotation.normalised(frame.orientation)

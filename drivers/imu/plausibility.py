@@ -69,7 +69,7 @@ class ImuCheck(FindingState):
             self.clear()
 
     def _judge(self) -> tuple[str, str] | None:
-        """Return what is wrong with what it measures, and what to check."""
+        """Return the implausibility of its values, and what to check."""
         if len(self._fast_ns) == TOO_FAST and self._now_ns - self._fast_ns[0] < TOO_FAST_IN_S * 1e9:
             return (
                 f"{self._name} reports turns faster than {FASTEST:.0f} rad/s, which no trunk does",

@@ -88,7 +88,7 @@ def up(longitudinal: float, lateral: float, directions: tuple[int, int]) -> Vect
 
 
 def frame(longitudinal: float, lateral: float, directions: tuple[int, int]) -> ImuFrame:
-    """Return what the two slopes (rad) say."""
+    """Return the frame of two slopes (rad)."""
     return ImuFrame("slopes", up=up(longitudinal, lateral, directions))
 
 

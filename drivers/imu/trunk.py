@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from drivers.calibration_file import mark
-from drivers.component import Kind
+from drivers.component import ComponentKind
 from drivers.findings import active_findings
 from drivers.frame_shares import beside
 from drivers.freshness import Freshness, silence_text
@@ -16,7 +16,7 @@ from drivers.imu.plausibility import ImuCheck
 from drivers.imu.rotation import IDENTITY, Quaternion, Vector
 from drivers.imu.settings import Attitude, MountedSettings
 from drivers.latest import Latest
-from drivers.samples import Quality, State
+from drivers.samples import ComponentState, Quality
 
 
 class TrunkImu:
@@ -34,7 +34,7 @@ class TrunkImu:
 
     """
 
-    kind = Kind.IMU
+    kind = ComponentKind.IMU
     channel_count = len(UNITS)
 
     def __init__(
@@ -98,7 +98,9 @@ class TrunkImu:
         """`silence` is why nothing comes, in words; it matters only where nothing comes."""
         state, age_ms = self._freshness.state(now_ns)
         counters = {**counters, "stale": self._freshness.stale}
-        if state is not State.OK:
+        if state is not ComponentState.OK:
             return Quality(state, age_ms, silence or silence_text(age_ms), counters)
         findings = active_findings([self.check])
-        return beside(Quality(State.FAULT if findings else state, age_ms, None, counters), findings, now_ns)
+        return beside(
+            Quality(ComponentState.FAULT if findings else state, age_ms, None, counters), findings, now_ns
+        )

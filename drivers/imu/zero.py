@@ -71,7 +71,7 @@ def load(path: Path) -> Quaternion:
 
 
 def text(zero: Quaternion, taken_utc: str) -> str:
-    """Return what to write into the file."""
+    """Return the contents of the file."""
     numbers = ", ".join(f"{part:.9f}" for part in zero)
     return (
         "# The trunk's tilt reads zero in the posture in which this was taken.\n"

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import cast
 
 from drivers.build_context import BuildContext
-from drivers.component import Component, Kind
+from drivers.component import Component, ComponentKind
 from drivers.insole.device import Insole, layout_of, line_for
 from drivers.insole.settings import InsoleSettings
 
@@ -25,7 +25,7 @@ def build_insole(name: str, settings: InsoleSettings, site: BuildContext) -> Ins
 
 def join_insoles(components: Mapping[str, Component]) -> None:
     """Let the feet among `components` know each other, and each the hip of its leg."""
-    feet = [cast("Insole", one) for one in components.values() if one.kind is Kind.INSOLE]
+    feet = [cast("Insole", one) for one in components.values() if one.kind is ComponentKind.INSOLE]
     pair(feet)
     for foot in feet:
         if (hip := components.get(f"{foot.foot}_hip")) is not None:

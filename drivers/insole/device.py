@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from drivers.calibration_file import mark
-from drivers.component import Kind
+from drivers.component import ComponentKind
 from drivers.errors import SettingsError
 from drivers.findings import active_findings
 from drivers.frame_shares import beside, saturated_frames
@@ -23,7 +23,7 @@ from drivers.latest import Latest
 from drivers.line import Line, Recognise, unrecognised
 from drivers.losses import Losses
 from drivers.reader_stalls import ReaderStalls
-from drivers.samples import Channel, Finding, Quality, State
+from drivers.samples import Channel, ComponentState, Finding, Quality
 
 USUAL_LAYOUT = "insole-16"
 CONTACT = {0: "in the air", 1: "on the ground"}
@@ -44,7 +44,7 @@ class Insole:
 
     """
 
-    kind = Kind.INSOLE
+    kind = ComponentKind.INSOLE
 
     def __init__(
         self,
@@ -100,9 +100,9 @@ class Insole:
 
     def quality(self, now_ns: int) -> Quality:
         state, age_ms = self._freshness.state(now_ns)
-        if state is State.OK:
+        if state is ComponentState.OK:
             wrong = (*self._implausible(), *active_findings([self._saturated_share]))
-            state = State.FAULT if self._fault is not None or wrong else state
+            state = ComponentState.FAULT if self._fault is not None or wrong else state
             findings = (*wrong, *self._losses.findings)
             return beside(Quality(state, age_ms, self._fault, self._counters()), findings, now_ns)
         silence = self.line.problem(now_ns) or self._fault or self._wrong_foot()

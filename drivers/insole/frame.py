@@ -25,7 +25,7 @@ class InsoleFrame(msgspec.Struct, frozen=True):
 
 
 def flat(frame: InsoleFrame) -> dict[str, object]:
-    """Return what `frame` carries: `pressures` (Pa) where it is calibrated, else `counts`; `time` in s."""
+    """Return the values of `frame`: `pressures` (Pa) if it is calibrated, else `counts`; `time` in s."""
     line: dict[str, object] = {"frame": "insole"}
     numbers = {"foot": frame.foot, "sequence": frame.sequence, "bits": frame.bits}
     line |= {key: value for key, value in numbers.items() if value is not None}

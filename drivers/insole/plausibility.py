@@ -124,7 +124,7 @@ class FootCheck:
             self._stepped.note(stamp_ns, *wrong)
 
     def _judge(self) -> tuple[str, str] | None:
-        """Return what the steps of this window have shown, and what to check."""
+        """Return the implausibility of this window's steps, and what to check."""
         hardest = max(self._high)
         if self._force_high < LOW_PEAK or self._force_high > HIGH_PEAK:
             most = f"{self._name} measured at most {self._force_high:.0f} N over {STEPS} steps"

@@ -21,7 +21,7 @@ class Axis:
         self.sdo.download(CONTROLWORD + self.offset, 0, controlword.data, timeout_s)
 
     def state(self, timeout_s: float | None = None) -> DriveState | None:
-        """Return what its statusword says now; `None` for a pattern that the standard does not know."""
+        """Return the state by its statusword; `None` for a pattern unknown to the standard."""
         return drive_state(unsigned(self.read(STATUSWORD, 2, timeout_s=timeout_s)))
 
     def error_code(self) -> int:

@@ -20,13 +20,13 @@ from drivers.bus.lengths import Lengths
 from drivers.bus.node import shared_node
 from drivers.bus.sdo.channel import SdoChannel
 from drivers.bus.values import Number, decode
-from drivers.component import Kind
+from drivers.component import ComponentKind
 from drivers.error_codes import error_text
 from drivers.errors import DeviceAbort, Mismatch
 from drivers.freshness import Freshness
 from drivers.joint.cia402 import STATE_BITS, STATE_OF, DriveState
 from drivers.joint.decoder import Decoder
-from drivers.joint.plan import Plan, QuantitySource, make_plan
+from drivers.joint.plan import QuantitySource, ReadPlan, make_plan
 from drivers.joint.power import PowerDrive
 from drivers.joint.quantities import POSITION, STATE, STATUSWORD, Quantity, channels, quantities
 from drivers.joint.reading import DriveReading, read_drive
@@ -36,7 +36,7 @@ from drivers.joint.settings import JointSettings
 from drivers.joint.stop_rpdo import find_stop_rpdo
 from drivers.joint.watching import JointWatch
 from drivers.latest import Latest
-from drivers.samples import Channel, Finding, Quality, State
+from drivers.samples import Channel, ComponentState, Finding, Quality
 from eds import Description
 
 _IN_FAULT = (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE)
@@ -45,7 +45,7 @@ _IN_FAULT = (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE)
 class JointDrive(PowerDrive):
     """One joint by its name in the robot's file."""
 
-    kind = Kind.JOINT
+    kind = ComponentKind.JOINT
 
     def __init__(
         self,
@@ -76,7 +76,7 @@ class JointDrive(PowerDrive):
         self._freshness = Freshness(settings.stale_after_s, settings.lost_after_s)
         self._watch = JointWatch(self.latest, bus.standstill, description)
         self._arrivals = FrameLosses()
-        self._plan: Plan | None = None
+        self._plan: ReadPlan | None = None
         self._started = False
         self._lock = threading.RLock()  # the plan and its undoing; values come from two threads
         self._undo: list[Callable[[], None]] = []
@@ -119,17 +119,17 @@ class JointDrive(PowerDrive):
         problem = self.node.problem(now_ns)
         implausible: tuple[Finding, ...] = ()
         if not self.node.ready:
-            state = State.LOST
-        elif state is State.OK:
+            state = ComponentState.LOST
+        elif state is ComponentState.OK:
             implausible = self._watch.check.findings
             if self._drive_state(now_ns) in _IN_FAULT:
-                state, problem = State.FAULT, self._fault_text(now_ns)
+                state, problem = ComponentState.FAULT, self._fault_text(now_ns)
             elif implausible:
-                state = State.FAULT
+                state = ComponentState.FAULT
         else:
             problem = self._stood_still(now_ns, age_ms) or problem or self._silence_text(age_ms)
         findings = (*implausible, *self.node.trouble)
-        objects = self._objects.problems(now_ns) if state is not State.LOST else ()
+        objects = self._objects.problems(now_ns) if state is not ComponentState.LOST else ()
         notes = (*objects, *self._notes(now_ns, findings))
         texts = (problem, self._emcy_text(state, now_ns), *notes)
         words = "; ".join(text for text in texts if text)
@@ -173,7 +173,7 @@ class JointDrive(PowerDrive):
             self._watch.restart()
             self._freshness.disconnected()
 
-    def _remap(self, sdo: SdoChannel, reading: DriveReading, plan: Plan) -> str:
+    def _remap(self, sdo: SdoChannel, reading: DriveReading, plan: ReadPlan) -> str:
         """Bring what the channels need into free TPDOs; returns what came of it, in words."""
         if self.node.distrust is not None:
             return f"configure_pdos: {self.node.distrust}"
@@ -188,7 +188,7 @@ class JointDrive(PowerDrive):
 
     # How values come.
 
-    def _install(self, plan: Plan) -> None:
+    def _install(self, plan: ReadPlan) -> None:
         bus = self.node.bus
         for tpdo, decoder in plan.decoders:
             can_id = tpdo.cob_id | EXTENDED if tpdo.extended else tpdo.cob_id
@@ -205,7 +205,7 @@ class JointDrive(PowerDrive):
                 self._undo.append(self.node.worker.repeat(1 / hz, partial(self._poll, deque(polled))))
 
     def _handler(self, decoder: Decoder) -> FrameHandler:
-        """Return what is done with each frame of a TPDO: the hot path."""
+        """Return the handler of each frame of a TPDO: the hot path."""
         indices, values = decoder.channels, decoder.values
         update, lock = self.latest.update, self._lock
         position = self._index[POSITION] in indices
@@ -259,7 +259,7 @@ class JointDrive(PowerDrive):
     # What is wrong, in words.
 
     def _notes(self, now_ns: int, findings: tuple[Finding, ...]) -> Iterator[str | None]:
-        """Yield what explains something comes before what it explains."""
+        """Yield the notes on the joint; causes come before their consequences."""
         plan = self._plan
         yield self._watch.held_off.words
         yield from () if plan is None else plan.contradictions
@@ -285,10 +285,10 @@ class JointDrive(PowerDrive):
             return f"the drive is in fault: {error_text(int(code), vendor)}"
         return "the drive is in fault and does not say why (no EMCY was seen, 603Fh is empty)"
 
-    def _emcy_text(self, state: State, now_ns: int) -> str | None:
-        """Return what a drive reports that goes on all the same."""
+    def _emcy_text(self, state: ComponentState, now_ns: int) -> str | None:
+        """Return an emergency message of a drive that keeps working."""
         emcy = self.node.life.active_emcy
-        if emcy is None or state is State.LOST or self._drive_state(now_ns) in _IN_FAULT:
+        if emcy is None or state is ComponentState.LOST or self._drive_state(now_ns) in _IN_FAULT:
             return None
         age_s = max(0, now_ns - emcy.stamp_ns) / 1e9
         return f"it reports {emcy.text(self._description.vendor_id)} ({age_s:.0f} s ago)"

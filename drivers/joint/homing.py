@@ -56,7 +56,7 @@ METHODS: Mapping[int, Method] = dict(_methods())
 ORDER = sorted(METHODS, key=lambda number: METHODS[number].moves)  # what moves nothing comes first
 
 
-class Progress(Enum):
+class HomingProgress(Enum):
     """Statusword bits 13 (homing error), 12 (homing attained) and 10 (target reached), CiA 402-2 §11."""
 
     UNDER_WAY = 0b000
@@ -73,13 +73,17 @@ class Progress(Enum):
 
     @property
     def failed(self) -> bool:
-        return self in (Progress.FAILED, Progress.FAILED_MOVING, Progress.RESERVED)
+        return self in (HomingProgress.FAILED, HomingProgress.FAILED_MOVING, HomingProgress.RESERVED)
 
 
-def progress(statusword: int) -> Progress:
-    """Return what a statusword says of homing; true only while the axis is enabled in that mode."""
+def progress(statusword: int) -> HomingProgress:
+    """Return the progress of homing by a statusword; valid only while the axis is enabled in that mode."""
     error, attained, reached = (statusword >> bit & 1 for bit in (13, 12, 10))
-    return Progress.RESERVED if error and attained else Progress(error << 2 | attained << 1 | reached)
+    return (
+        HomingProgress.RESERVED
+        if error and attained
+        else HomingProgress(error << 2 | attained << 1 | reached)
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,11 +108,11 @@ class Setup:
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
+class AxisReading:
     """What an axis said in one look."""
 
     state: DriveState | None
-    progress: Progress
+    progress: HomingProgress
     position: int  # counts
     lag: int | None  # counts, 60F4h; None: the drive does not tell
 
@@ -178,13 +182,13 @@ def leave(axis: Axis, mode: bytes) -> None:
             raise Mismatch(f"{axis.sdo.label}: {MODE + axis.offset:04X}h is {held.hex()}, not {mode.hex()}")
 
 
-def look(axis: Axis) -> Seen:
+def look(axis: Axis) -> AxisReading:
     """Where it is, and how far. A position beside UNDER_WAY counts from the old zero: it was read before."""
     position, lag = axis.position(), None
     with suppress(DeviceAbort):
         lag = int.from_bytes(axis.read(FOLLOWING_ERROR, 4), "little", signed=True)
     word = unsigned(axis.read(STATUSWORD, 2))
-    return Seen(drive_state(word), progress(word), position, lag)
+    return AxisReading(drive_state(word), progress(word), position, lag)
 
 
 def begin(axis: Axis, errand: Errand) -> Led:
@@ -197,7 +201,7 @@ def begin(axis: Axis, errand: Errand) -> Led:
         return Led(state, "it is not enabled")
     if mode != HOMING:
         return Led(state, f"its mode of operation is {mode} (6061h), not homing", mode)
-    if progress(word) is Progress.UNDER_WAY:
+    if progress(word) is HomingProgress.UNDER_WAY:
         return Led(state, "it says that it is homing already", mode)
     axis.command(Controlword.START_HOMING)
     return Led(state, None, mode)

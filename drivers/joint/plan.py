@@ -24,7 +24,7 @@ class QuantitySource:
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
+class ReadPlan:
     """How a joint is read, and what an integrator should know about it."""
 
     decoders: tuple[tuple[Tpdo, Decoder], ...]
@@ -35,7 +35,7 @@ class Plan:
     position_from: Tpdo | None
 
 
-def make_plan(settings: JointSettings, found: tuple[Quantity, ...], reading: DriveReading) -> Plan:
+def make_plan(settings: JointSettings, found: tuple[Quantity, ...], reading: DriveReading) -> ReadPlan:
     """Decode every enabled TPDO; poll what none of them brings, or keeps fresh."""
     linears = scalings(settings, reading.scaling)
     wanted = {
@@ -50,7 +50,7 @@ def make_plan(settings: JointSettings, found: tuple[Quantity, ...], reading: Dri
     absent = [one for one in wanted.values() if one.channel not in brought]
     often = tuple(one for one in absent if one.quantity.fast)
     seldom = tuple(one for one in wanted.values() if one.channel not in fresh and one not in often)
-    return Plan(
+    return ReadPlan(
         decoders=tuple(
             (tpdo, make_decoder(tpdo, fields, statusword=names.index(STATUSWORD), state=len(names)))
             for tpdo, fields in mapped
@@ -68,7 +68,7 @@ def make_plan(settings: JointSettings, found: tuple[Quantity, ...], reading: Dri
 
 
 def _fields(tpdo: Tpdo, wanted: Mapping[tuple[int, int], QuantitySource]) -> list[Field]:
-    """Return what this TPDO carries of what is wanted, as wide as its type.
+    """Return the wanted objects that this TPDO carries in full width.
 
     A part of it would be another number.
     """

@@ -55,7 +55,7 @@ REQUIRED = ((0x6041, "statusword"), (0x6064, "position actual value"))
 
 
 def quantities(description: Description, axis: int) -> tuple[Quantity, ...]:
-    """Return what this drive has of what a joint can tell; raises `EdsError` where it cannot be a joint."""
+    """Return the quantities that this drive offers; raises `EdsError` if it cannot be a joint."""
     offset = axis * AXIS_OFFSET
     description.require(
         [(index + offset, name) for index, name in REQUIRED], "a joint" if axis == 0 else f"axis {axis}"
@@ -74,7 +74,7 @@ def channels(component: str, found: tuple[Quantity, ...]) -> tuple[Channel, ...]
 
 
 def _makers(description: Description) -> Iterator[Quantity]:
-    """Yield what CiA 402 has no object for, or what not every drive has there, by the product's profile."""
+    """Yield quantities without a standard object, from the product's profile."""
     profile = profile_of(description)
     if profile is None:
         return

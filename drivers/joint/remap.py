@@ -77,7 +77,7 @@ def free_tpdos(tpdos: Collection[Tpdo], node_id: int, taken: Collection[int]) ->
 
 
 def frames(first: Sequence[Entry], more: Sequence[Entry]) -> Iterator[tuple[Entry, ...]]:
-    """Yield what goes into which frame: `first` with what fits beside it, then the rest, in its order."""
+    """Yield the objects of each frame: `first` with all that fits beside it, then the rest, in its order."""
     left, frame = list(more), list(first)
     while frame:
         for one in list(left):

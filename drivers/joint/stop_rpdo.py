@@ -43,7 +43,7 @@ class StopRpdo:
         return self.node.bus.send_urgent(self.rpdo.can_id, self.rpdo.frame(values))
 
     def _held(self, object_: Object) -> bytes | None:
-        """Return what the device holds of an object now, as far as it has confirmed that.
+        """Return the last confirmed value of an object in the device.
 
         `None`: nobody knows.
         """

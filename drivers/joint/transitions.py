@@ -48,7 +48,7 @@ class Errand:
 
 
 def look(axis: Axis) -> Led:
-    """Return what its statusword says now; where it does not tell, why."""
+    """Return the state by its statusword; without an answer, the reason."""
     try:
         return _read(axis)
     except DriverError as error:

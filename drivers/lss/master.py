@@ -158,7 +158,7 @@ class LssMaster:
     # -- what the selected one says ------------------------------------------------------------------------
 
     def identity(self) -> Identity:
-        """Return what the selected device says that it is."""
+        """Return the identity of the selected device."""
         numbers = []
         for part, name in enumerate(PARTS):
             answer = self._ask(_INQUIRE + part, b"", f"the {name}")

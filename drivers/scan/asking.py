@@ -31,7 +31,7 @@ class Axis:
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class NodeAnswers:
     """What a node said when it was asked; `None`, or empty, is what it does not have."""
 
     device_type: int
@@ -81,8 +81,8 @@ def _noting(answered: set[int], node: int) -> Callable[[int, bytes], None]:
     return note
 
 
-def ask(bus: CanBus, node: int) -> Told:
-    """Read what a node is.
+def ask(bus: CanBus, node: int) -> NodeAnswers:
+    """Read the identity and abilities of a node.
 
     Raises:
         DriverError: it does not say of what type it is.
@@ -101,10 +101,10 @@ class _Reader:
         self._channel = channel
         self._problem: str | None = None
 
-    def told(self) -> Told:
+    def told(self) -> NodeAnswers:
         device_type = unsigned(self._channel.upload(0x1000, 0))
         axes = self._axes() if device_type & 0xFFFF == _DRIVE else ()
-        return Told(
+        return NodeAnswers(
             device_type=device_type,
             error_register=self._number(0x1001, 0),
             name=self._text(0x1008),

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import eds
-from drivers.scan.asking import Told
+from drivers.scan.asking import NodeAnswers
 from eds import Description, EdsError
 from eds.report import pdo_rows
 from eds.shipped import SHIPPED, shipped
@@ -45,7 +45,7 @@ class Library:
             if found.vendor_id is not None and found.product_code is not None:
                 self._by_product.setdefault((found.vendor_id, found.product_code), []).append(path)
 
-    def proposals(self, node: int, told: Told) -> tuple[Proposal, ...]:
+    def proposals(self, node: int, told: NodeAnswers) -> tuple[Proposal, ...]:
         """Return the files for this device, those that contradict it least first."""
         if told.vendor_id is None or told.product_code is None:
             return ()
@@ -55,7 +55,7 @@ class Library:
         return tuple(sorted(found, key=lambda proposal: len(proposal.differs)))
 
 
-def _differences(description: Description, told: Told) -> Iterator[str]:
+def _differences(description: Description, told: NodeAnswers) -> Iterator[str]:
     for index, subindex, name, value in (
         (0x1018, 3, "revision", told.revision),
         (0x1000, 0, "device type", told.device_type),

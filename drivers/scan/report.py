@@ -7,9 +7,9 @@ from typing import Any
 from drivers.bus.emcy import parse_emcy
 from drivers.bus.settings import CanSettings
 from drivers.joint.cia402 import MODES
-from drivers.scan.asking import Axis, Told
+from drivers.scan.asking import Axis, NodeAnswers
 from drivers.scan.products import Proposal
-from drivers.scan.scan import Found
+from drivers.scan.scan import ScanResult
 from eds.profile import profile_of
 from eds.table import BUS, joint_table
 
@@ -27,7 +27,7 @@ _ERRORS = ("generic", "current", "voltage", "temperature", "communication", "pro
 
 
 def as_json(
-    settings: CanSettings, found: Found, proposals: Mapping[int, Sequence[Proposal]], bus: str = BUS
+    settings: CanSettings, found: ScanResult, proposals: Mapping[int, Sequence[Proposal]], bus: str = BUS
 ) -> dict[str, Any]:
     """For machines: everything that was found. `bus` is what a robot's file calls this one."""
     traffic = found.traffic
@@ -44,7 +44,7 @@ def as_json(
     }
 
 
-def _node_json(node: int, found: Found, proposals: Sequence[Proposal], bus: str) -> dict[str, Any]:
+def _node_json(node: int, found: ScanResult, proposals: Sequence[Proposal], bus: str) -> dict[str, Any]:
     traffic, told = found.traffic, found.told.get(node)
     profile = profile_of(proposals[0].description) if proposals else None
     state = traffic.states.get(node)
@@ -60,11 +60,11 @@ def _node_json(node: int, found: Found, proposals: Sequence[Proposal], bus: str)
         "answer": None if told is None else told if isinstance(told, str) else asdict(told),
         "eds": [{"file": str(one.description.path), "differs": list(one.differs)} for one in proposals],
         "profile": None if profile is None else profile.name,
-        "table": _table(node, told, proposals, bus) if isinstance(told, Told) else None,
+        "table": _table(node, told, proposals, bus) if isinstance(told, NodeAnswers) else None,
     }
 
 
-def _table(node: int, told: Told, proposals: Sequence[Proposal], bus: str) -> str | None:
+def _table(node: int, told: NodeAnswers, proposals: Sequence[Proposal], bus: str) -> str | None:
     """Return the table for a robot's file, by the best EDS and the device's own answers."""
     if not proposals:
         return None
@@ -74,7 +74,7 @@ def _table(node: int, told: Told, proposals: Sequence[Proposal], bus: str) -> st
 
 def as_text(
     settings: CanSettings,
-    found: Found,
+    found: ScanResult,
     proposals: Mapping[int, Sequence[Proposal]],
     bus: str = BUS,
     *,
@@ -98,11 +98,11 @@ def as_text(
     for node in found.nodes:
         yield from _node_text(node, found, proposals.get(node, ()))
     for node, told in sorted(found.told.items()):
-        if isinstance(told, Told) and (table := _table(node, told, proposals.get(node, ()), bus)):
+        if isinstance(told, NodeAnswers) and (table := _table(node, told, proposals.get(node, ()), bus)):
             yield f"\nfor robot.toml\n\n{table.rstrip()}"
 
 
-def _node_text(node: int, found: Found, proposals: Sequence[Proposal]) -> Iterator[str]:
+def _node_text(node: int, found: ScanResult, proposals: Sequence[Proposal]) -> Iterator[str]:
     traffic, told = found.traffic, found.told.get(node)
     state = traffic.states.get(node)
     heartbeat = traffic.seen.get(0x700 + node)
@@ -124,7 +124,7 @@ def _node_text(node: int, found: Found, proposals: Sequence[Proposal]) -> Iterat
 
 
 def _names(proposals: Sequence[Proposal]) -> Callable[[int, int], str]:
-    """Return what objects are called by the file that fits best."""
+    """Return a function that names objects, by the best-fitting file."""
     description = proposals[0].description if proposals else None
 
     def name(index: int, subindex: int) -> str:
@@ -134,7 +134,7 @@ def _names(proposals: Sequence[Proposal]) -> Callable[[int, int], str]:
     return name
 
 
-def _told_text(told: Told, name: Callable[[int, int], str]) -> Iterator[str]:
+def _told_text(told: NodeAnswers, name: Callable[[int, int], str]) -> Iterator[str]:
     names = [part for part in (told.name, told.hardware, told.software) if part]
     yield f"  device      {_kind(told.device_type)}{': ' if names else ''}{', '.join(names)}"
     identity = (("vendor", told.vendor_id), ("product", told.product_code), ("revision", told.revision))
@@ -156,7 +156,7 @@ def _told_text(told: Told, name: Callable[[int, int], str]) -> Iterator[str]:
         yield f"  incomplete  {told.problem}"
 
 
-def _proposal_text(told: Told, proposals: Sequence[Proposal]) -> Iterator[str]:
+def _proposal_text(told: NodeAnswers, proposals: Sequence[Proposal]) -> Iterator[str]:
     if not proposals:
         known = told.vendor_id is not None and told.product_code is not None
         why = "take it from its maker, and give its folder with --eds" if known else "it says not who made it"
@@ -168,13 +168,13 @@ def _proposal_text(told: Told, proposals: Sequence[Proposal]) -> Iterator[str]:
         yield from (f"              {text}" for text in one.differs)
 
 
-def _emcy(node: int, found: Found) -> str | None:
+def _emcy(node: int, found: ScanResult) -> str | None:
     seen = found.traffic.seen.get(0x080 + node)
     emcy = None if seen is None else parse_emcy(seen.last_ns, seen.data)
     if emcy is None or seen is None:
         return None
     told = found.told.get(node)
-    return f"{emcy.text(told.vendor_id if isinstance(told, Told) else None)} ({seen.count} of them)"
+    return f"{emcy.text(told.vendor_id if isinstance(told, NodeAnswers) else None)} ({seen.count} of them)"
 
 
 def _every(period_s: float | None) -> str:

@@ -9,7 +9,7 @@ from drivers.bus.frames import STANDARD_IDS
 from drivers.bus.interfaces.controller_state import BusState
 from drivers.bus.settings import CanSettings
 from drivers.errors import DriverError, Unavailable
-from drivers.scan.asking import Told, ask, sweep
+from drivers.scan.asking import NodeAnswers, ask, sweep
 from drivers.scan.traffic import Traffic
 
 OPEN_S = 5.0
@@ -17,7 +17,7 @@ NODES = range(1, 128)
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class ScanResult:
     """What a bus has told. `told` are the nodes that answered, or why one that did could not be read."""
 
     seconds: float
@@ -27,7 +27,7 @@ class Found:
     error_frames: int
     state: BusState
     trouble: str | None
-    told: dict[int, Told | str]
+    told: dict[int, NodeAnswers | str]
     not_asked: frozenset[int]  # because somebody else asks them
 
     @property
@@ -36,7 +36,9 @@ class Found:
         return tuple(sorted(self.traffic.nodes() | self.told.keys()))
 
 
-def scan(settings: CanSettings, seconds: float, wait: Callable[[float], object], *, active: bool) -> Found:
+def scan(
+    settings: CanSettings, seconds: float, wait: Callable[[float], object], *, active: bool
+) -> ScanResult:
     """Listen for `seconds`, then ask where `active`: only nodes that nobody else is asking by SDO.
 
     Raises:
@@ -51,7 +53,7 @@ def scan(settings: CanSettings, seconds: float, wait: Callable[[float], object],
         await_open(bus, wait)
         began = time.monotonic()
         wait(seconds)
-        told: dict[int, Told | str] = {}
+        told: dict[int, NodeAnswers | str] = {}
         frames_per_s = bus.frames / max(time.monotonic() - began, 1e-3)
         load = bus.health.load_percent
         asked = traffic.asked() if active else frozenset()
@@ -60,7 +62,7 @@ def scan(settings: CanSettings, seconds: float, wait: Callable[[float], object],
                 if node not in traffic.asked():  # who has begun to ask it meanwhile goes first
                     told[node] = _ask(bus, node)
             asked = traffic.asked()
-        return Found(
+        return ScanResult(
             seconds, traffic, frames_per_s, load, bus.health.error_frames, bus.state, bus.trouble, told, asked
         )
     finally:
@@ -80,7 +82,7 @@ def await_open(bus: CanBus, wait: Callable[[float], object]) -> None:
         wait(0.01)
 
 
-def _ask(bus: CanBus, node: int) -> Told | str:
+def _ask(bus: CanBus, node: int) -> NodeAnswers | str:
     try:
         return ask(bus, node)
     except DriverError as error:

@@ -15,7 +15,7 @@ _NODES = range(1, 128)
 
 
 @dataclass(slots=True)
-class Seen:
+class IdentifierTraffic:
     """The frames of one identifier; stamps in ns of the monotonic clock."""
 
     count: int = 0
@@ -33,13 +33,13 @@ class Seen:
 class Traffic:
     """Every identifier that came. Written by one thread, read after it has ended."""
 
-    seen: dict[int, Seen] = field(default_factory=dict)
+    seen: dict[int, IdentifierTraffic] = field(default_factory=dict)
     boots: dict[int, int] = field(default_factory=dict)  # boot-ups by node
     states: dict[int, NmtState] = field(default_factory=dict)
 
     def take(self, stamp_ns: int, can_id: int, data: bytes) -> None:
         """One frame that came; error frames are not for this."""
-        one = self.seen.setdefault(can_id, Seen(first_ns=stamp_ns))
+        one = self.seen.setdefault(can_id, IdentifierTraffic(first_ns=stamp_ns))
         one.count += 1
         one.last_ns = stamp_ns
         one.data = data
@@ -61,7 +61,7 @@ class Traffic:
         """Nodes that somebody sends process data to."""
         return frozenset(node for node in _NODES if any(base + node in self.seen for base in RPDOS))
 
-    def sends(self, node: int) -> dict[int, Seen]:
+    def sends(self, node: int) -> dict[int, IdentifierTraffic]:
         """Its TPDOs of the predefined connection set, by identifier."""
         return {base + node: self.seen[base + node] for base in TPDOS if base + node in self.seen}
 

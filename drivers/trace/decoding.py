@@ -9,11 +9,11 @@ from drivers.bus.frames import ERROR, EXTENDED, REMOTE, STANDARD_IDS
 from drivers.trace import services
 from drivers.trace.devices import Devices, Mapped, Pdo
 from drivers.trace.files import Captured
-from drivers.trace.sdo import Conversation, Said
+from drivers.trace.sdo import Conversation, SdoText
 from drivers.trace.values import Value, label, value_of
 
 
-class Kind(StrEnum):
+class FrameKind(StrEnum):
     """Services of CiA 301 and CiA 305; OTHER is what belongs to none."""
 
     NMT = "nmt"
@@ -33,7 +33,7 @@ class DecodedFrame:
     """One frame, decoded. `node_id` is `None` where it belongs to no node."""
 
     captured: Captured
-    kind: Kind
+    kind: FrameKind
     title: str  # the service more exactly: TPDO1, SDO answer
     node_id: int | None
     name: str | None
@@ -42,12 +42,12 @@ class DecodedFrame:
     about: tuple[int, int] | None = None  # the object of an SDO, also before its value has come
 
 
-_FIXED: dict[int, Kind] = {
-    0x000: Kind.NMT,
-    0x080: Kind.SYNC,
-    0x100: Kind.TIME,
-    0x7E4: Kind.LSS,
-    0x7E5: Kind.LSS,
+_FIXED: dict[int, FrameKind] = {
+    0x000: FrameKind.NMT,
+    0x080: FrameKind.SYNC,
+    0x100: FrameKind.TIME,
+    0x7E4: FrameKind.LSS,
+    0x7E5: FrameKind.LSS,
 }
 _EMCY, _HEARTBEAT = 0x080, 0x700
 _SDO_ANSWER, _SDO_REQUEST = 0x580, 0x600
@@ -66,7 +66,7 @@ class Decoder:
         """Decode one frame."""
         can_id = captured.can_id & ~REMOTE
         if can_id & ERROR:
-            return _plain(captured, Kind.ERROR, services.error(can_id, captured.data))
+            return _plain(captured, FrameKind.ERROR, services.error(can_id, captured.data))
         if can_id & EXTENDED or can_id > STANDARD_IDS:
             return self._pdo_or_other(captured, can_id)
         fixed = _FIXED.get(can_id)
@@ -77,29 +77,31 @@ class Decoder:
             return decode(self, captured, node_id)
         return self._pdo_or_other(captured, can_id)
 
-    def _fixed(self, captured: Captured, can_id: int, kind: Kind) -> DecodedFrame:
+    def _fixed(self, captured: Captured, can_id: int, kind: FrameKind) -> DecodedFrame:
         data = captured.data
         words = {
-            Kind.NMT: lambda: services.nmt(data, self.devices.name),
-            Kind.SYNC: lambda: services.sync(data),
-            Kind.TIME: lambda: services.time_of_day(data),
-            Kind.LSS: lambda: services.lss(data, answer=can_id == 0x7E4),
+            FrameKind.NMT: lambda: services.nmt(data, self.devices.name),
+            FrameKind.SYNC: lambda: services.sync(data),
+            FrameKind.TIME: lambda: services.time_of_day(data),
+            FrameKind.LSS: lambda: services.lss(data, answer=can_id == 0x7E4),
         }[kind]()
         return _plain(captured, kind, words)
 
-    def _line(self, captured: Captured, kind: Kind, title: str, node_id: int, words: str) -> DecodedFrame:
+    def _line(
+        self, captured: Captured, kind: FrameKind, title: str, node_id: int, words: str
+    ) -> DecodedFrame:
         return DecodedFrame(captured, kind, title, node_id, self.devices.name(node_id), words)
 
     # -- of one node -----------------------------------------------------------------------------------------
 
     def _emcy(self, captured: Captured, node_id: int) -> DecodedFrame:
         words = services.emergency(captured.data, self.devices[node_id].vendor_id)
-        return self._line(captured, Kind.EMCY, "EMCY", node_id, words)
+        return self._line(captured, FrameKind.EMCY, "EMCY", node_id, words)
 
     def _heartbeat(self, captured: Captured, node_id: int) -> DecodedFrame:
         asked = captured.can_id & REMOTE
         words = "is asked for its state (node guarding)" if asked else services.heartbeat(captured.data)
-        return self._line(captured, Kind.HEARTBEAT, "heartbeat", node_id, words)
+        return self._line(captured, FrameKind.HEARTBEAT, "heartbeat", node_id, words)
 
     def _sdo_request(self, captured: Captured, node_id: int) -> DecodedFrame:
         return self._sdo(captured, node_id, "SDO", self._conversation(node_id).request(captured.data))
@@ -110,10 +112,10 @@ class Decoder:
     def _conversation(self, node_id: int) -> Conversation:
         return self._conversations.setdefault(node_id, Conversation())
 
-    def _sdo(self, captured: Captured, node_id: int, title: str, said: Said) -> DecodedFrame:
+    def _sdo(self, captured: Captured, node_id: int, title: str, said: SdoText) -> DecodedFrame:
         device = self.devices[node_id]
         if said.object is None:
-            return self._line(captured, Kind.SDO, title, node_id, said.words.replace("{}", "an object"))
+            return self._line(captured, FrameKind.SDO, title, node_id, said.words.replace("{}", "an object"))
         words = said.words.format(label(device.description, *said.object))
         values: tuple[Value, ...] = ()
         if said.value is not None:
@@ -121,7 +123,7 @@ class Decoder:
             words += f": {values[0].words}"
             if said.done:
                 self.devices.learn(node_id, *said.object, said.value)
-        return DecodedFrame(captured, Kind.SDO, title, node_id, device.name, words, values, said.object)
+        return DecodedFrame(captured, FrameKind.SDO, title, node_id, device.name, words, values, said.object)
 
     # -- PDOs ------------------------------------------------------------------------------------------------
 
@@ -132,20 +134,20 @@ class Decoder:
         if pdo is not None:
             return self._pdo(captured, pdo, receivers)
         title = (_RPDOS if commanded else _TPDOS)[can_id & 0x780]
-        return self._line(captured, Kind.PDO, title, node_id, _raw(captured))
+        return self._line(captured, FrameKind.PDO, title, node_id, _raw(captured))
 
     def _pdo_or_other(self, captured: Captured, can_id: int) -> DecodedFrame:
         pdo, receivers = self.devices.pdo(can_id, commanded=False)
         if pdo is not None:
             return self._pdo(captured, pdo, receivers)
-        return DecodedFrame(captured, Kind.OTHER, "other", None, None, _raw(captured))
+        return DecodedFrame(captured, FrameKind.OTHER, "other", None, None, _raw(captured))
 
     def _pdo(self, captured: Captured, pdo: Pdo, receivers: tuple[int, ...]) -> DecodedFrame:
         device = self.devices[pdo.node_id]
         others = [self.devices.name(node) for node in receivers if node != pdo.node_id]
         heard_by = f"   to {', '.join(others)}" if others else ""
         if captured.can_id & REMOTE:
-            return self._line(captured, Kind.PDO, pdo.name, pdo.node_id, "is asked for")
+            return self._line(captured, FrameKind.PDO, pdo.name, pdo.node_id, "is asked for")
         data = captured.data
         raw = int.from_bytes(data, "little")
         values = tuple(
@@ -155,7 +157,7 @@ class Decoder:
         )
         missing = "" if len(values) == len(pdo.objects) else f", {len(data)} bytes, shorter than its mapping"
         words = (", ".join(map(str, values)) or _raw(captured)) + missing + heard_by
-        return DecodedFrame(captured, Kind.PDO, pdo.name, pdo.node_id, device.name, words, values)
+        return DecodedFrame(captured, FrameKind.PDO, pdo.name, pdo.node_id, device.name, words, values)
 
     _OF_NODE: ClassVar[dict[int, Callable[[Any, Captured, int], DecodedFrame]]] = {
         _EMCY: _emcy,
@@ -166,8 +168,12 @@ class Decoder:
     }
 
 
-def _plain(captured: Captured, kind: Kind, words: str) -> DecodedFrame:
-    title = kind.value.upper() if kind in (Kind.NMT, Kind.SYNC, Kind.TIME, Kind.LSS) else kind.value
+def _plain(captured: Captured, kind: FrameKind, words: str) -> DecodedFrame:
+    title = (
+        kind.value.upper()
+        if kind in (FrameKind.NMT, FrameKind.SYNC, FrameKind.TIME, FrameKind.LSS)
+        else kind.value
+    )
     return DecodedFrame(captured, kind, title, None, None, words)
 
 

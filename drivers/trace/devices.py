@@ -82,7 +82,7 @@ class Device:
 
 
 def _configured(description: Description) -> Iterator[tuple[Object, int]]:
-    """Yield what the file says of PDOs: a DCF's value, else the default."""
+    """Yield the PDO settings of the file: a DCF's value, else the default."""
     for variable in description.variables():
         value = variable.default if variable.value is None else variable.value
         if variable.index in _CONFIGURATION and isinstance(value, int):

@@ -56,7 +56,7 @@ class Meter:
         self._bytes[can_id] += len(captured.data)
 
     def told(self, seconds: float) -> Load:
-        """Return what came since the last time, which was so long ago, and begin anew."""
+        """Return the load since the last call, `seconds` ago, and begin anew."""
         amounts = {
             (talk.kind, talk.node_id): talk.frames_per_s for talk in talks(self._bytes.items(), seconds)
         }

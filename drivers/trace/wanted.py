@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 
 from drivers.errors import SettingsError
-from drivers.trace.decoding import DecodedFrame, Kind
+from drivers.trace.decoding import DecodedFrame, FrameKind
 from drivers.trace.devices import Device
 
 Wanted = Callable[[DecodedFrame], bool]
@@ -24,7 +24,7 @@ def by_node(words: Sequence[str], all_: Sequence[Device], on: Callable[[str], Se
 
     def wanted(line: DecodedFrame) -> bool:
         nodes = nodes_of(line.captured.interface)
-        if line.kind is Kind.NMT and len(line.captured.data) == 2:
+        if line.kind is FrameKind.NMT and len(line.captured.data) == 2:
             return line.captured.data[1] in nodes | {0}
         return line.node_id in nodes
 
@@ -50,10 +50,10 @@ def _check(word: str, devices: Sequence[Device]) -> None:
 def by_kind(words: Sequence[str]) -> Wanted:
     """Lines of these services; raises `SettingsError`."""
     names = [name.strip().lower() for word in words for name in word.split(",")]
-    unknown = [name for name in names if name not in tuple(Kind)]
+    unknown = [name for name in names if name not in tuple(FrameKind)]
     if unknown:
-        raise SettingsError(f"--kind {', '.join(unknown)}: there are {', '.join(Kind)}")
-    kinds = frozenset(map(Kind, names))
+        raise SettingsError(f"--kind {', '.join(unknown)}: there are {', '.join(FrameKind)}")
+    kinds = frozenset(map(FrameKind, names))
     return lambda line: line.kind in kinds
 
 

@@ -16,7 +16,7 @@ log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
-class Known:
+class KnownClients:
     """All of them, at one moment; `problems` says in words what could not be read."""
 
     table: AccessTable
@@ -38,9 +38,9 @@ class Access:
         self.folder = folder
         self._lock = threading.Lock()
         self._stamp: Stamp | None = None
-        self._known: Known | None = None
+        self._known: KnownClients | None = None
 
-    def now(self) -> Known:
+    def now(self) -> KnownClients:
         """Return the same object as long as nothing has changed."""
         with self._lock:
             stamp = self.folder.stamp()
@@ -51,7 +51,7 @@ class Access:
             return self._known
 
 
-def known_in(folder: AccessFolder) -> Known:
+def known_in(folder: AccessFolder) -> KnownClients:
     """Who cannot be read is nobody. Without a role, a client's certificate is a viewer's."""
     table, problems = table_of(folder)
     by_key: dict[str, Identity] = {}
@@ -74,7 +74,7 @@ def known_in(folder: AccessFolder) -> Known:
         role = table.clients.get(file.stem, Role.VIEWER)
         by_key[of] = Identity(role, file.stem, of, granted=table.operators.may)
         found.append(der)
-    return Known(table, by_key, tuple(found), tuple(problems))
+    return KnownClients(table, by_key, tuple(found), tuple(problems))
 
 
 def _unreadable(folder: AccessFolder) -> list[str]:

@@ -5,7 +5,7 @@ from typing import Any, Final
 
 from gateway.access.identity import Identity
 from gateway.wire.control import CONTROL_ACQUIRE
-from gateway.wire.framing import Kind, RpcError, refuse
+from gateway.wire.framing import ErrorKind, RpcError, refuse
 from gateway.wire.method import AnyMethod
 from gateway.wire.methods import METHODS
 from gateway.wire.resource import RESOURCE_SNAPSHOT
@@ -50,7 +50,7 @@ def refused(who: Identity) -> dict[str, str]:
 def _refusal(who: Identity, needed: Role, what: str) -> RpcError:
     name = who.name or "this client"
     text = f"{name} is {_a(who.role)} on this robot, and {what} is for {_a(needed)}; ask one"
-    return refuse(Kind.NOT_ALLOWED, text)
+    return refuse(ErrorKind.NOT_ALLOWED, text)
 
 
 def _a(role: Role) -> str:

@@ -13,7 +13,7 @@ from gateway.cli.commission_faces import Terminal
 from gateway.cli.text import warn
 from gateway.commission.bench import CanBench
 from gateway.commission.dialogue import run
-from gateway.commission.draft import Found, alone
+from gateway.commission.draft import DraftValue, alone
 from gateway.commission.edit import NotEdited, comment_of, with_value
 from gateway.commission.robot_file import journal, write
 from gateway.commission.zero import PLAUSIBLE, NotRepeated, Zero, posture, repeated
@@ -124,7 +124,7 @@ def _write(
     config: RobotConfig, joint: str, text: str, zero: Zero, who: str, say: Callable[[str], None]
 ) -> int:
     table = f"joint.{joint}"
-    made = with_value(text, table, KEY, Found(zero.offset, zero.how))
+    made = with_value(text, table, KEY, DraftValue(zero.offset, zero.how))
     if _text(config.path) != text:
         raise NotEdited(f"{config.path} was changed meanwhile: begin again")
     found = write(config.path, made)

@@ -42,7 +42,7 @@ _MISSING: Final = "is missing"  # which is not known where a line could not be r
 
 
 @dataclass(frozen=True, slots=True)
-class Kind:
+class FileKind:
     """One kind of file: where it is checked and described, and the tables or keys that only it has."""
 
     what: str
@@ -52,8 +52,8 @@ class Kind:
 
 
 # What is not installed is needed by its own kind only.
-KINDS: Final[Mapping[str, Kind]] = {
-    "robot": Kind(
+KINDS: Final[Mapping[str, FileKind]] = {
+    "robot": FileKind(
         "a robot's file",
         "gateway.cli.check_robot:findings",
         "gateway.config.schema:schema",
@@ -73,13 +73,13 @@ KINDS: Final[Mapping[str, Kind]] = {
             ]
         ),
     ),
-    "server": Kind(
+    "server": FileKind(
         "a server's file",
         "server_gui.core.settings.server_file:findings",
         "server_gui.core.settings.schema:schema",
         frozenset(["robots", "store", "recorder", "prediction", "rules"]),
     ),
-    "scenario": Kind(
+    "scenario": FileKind(
         "a scenario",
         "gateway.cli.check_scenario:findings",
         "gateway.cli.check_scenario:schema",

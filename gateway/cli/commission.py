@@ -13,7 +13,7 @@ from drivers.errors import SettingsError
 from drivers.scan.products import Library, files
 from gateway.cli.commission_faces import Terminal
 from gateway.cli.commission_lines import JsonFace, Lines, stdin
-from gateway.cli.motion_ends import Ended, ending, stop_drives
+from gateway.cli.motion_ends import MotionEnded, ending, stop_drives
 from gateway.cli.text import warn
 from gateway.commission.bench import CanBench
 from gateway.commission.dialogue import At, Talk, agree, run
@@ -86,7 +86,7 @@ def _lead(
             face.steps(progress.steps())
     except EOFError:
         return _left(draft, "nobody answers any more", 1)
-    except Ended as end:
+    except MotionEnded as end:
         if lines is not None and lines.stop_asked:
             return stop_drives(draft, bench, as_json=True)
         return _left(draft, "interrupted", end.status)
@@ -99,7 +99,7 @@ def _lead(
 
 
 def _known_to(file: Path) -> Draft:
-    """Return what was found; where that cannot be read nothing is known, and a stop asks all."""
+    """Return the draft that was found; if it cannot be read, an empty one, so that a stop asks all drives."""
     try:
         return Draft(file)
     except SettingsError as error:

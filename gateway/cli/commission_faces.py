@@ -6,7 +6,7 @@ from collections.abc import Callable
 from gateway.cli.text import say
 from gateway.cli.typed import Typed
 from gateway.commission.dialogue import Ask
-from gateway.commission.progress import Step
+from gateway.commission.progress import CommissionStep
 from gateway.commission.writing import Written
 
 LOOK_S = 0.03  # for a STOP, each time
@@ -43,7 +43,7 @@ class Terminal:
     def written(self, written: Written) -> None:
         self.say(written.words)
 
-    def steps(self, steps: tuple[Step, ...]) -> None:
+    def steps(self, steps: tuple[CommissionStep, ...]) -> None:
         """Questions say it themselves."""
 
     def moving(self, text: str) -> str:

@@ -25,12 +25,12 @@ from drivers.errors import DriverError
 from drivers.inbox import Inbox
 from gateway.cli.text import say_json
 from gateway.commission.dialogue import Ask, Live
-from gateway.commission.progress import Step
+from gateway.commission.progress import CommissionStep
 from gateway.commission.writing import Written
 
 LOOK_S = 0.03  # for a STOP, each time
 SHOW_S = 0.5  # between two words of a joint that moves
-LIVE_S = 0.2  # between two looks while a question waits
+LIVE_S = 0.2  # between two looks while a question waits; a signal just before a wait is heard after it
 CHUNK = 4096
 LONGEST = 65_536  # of a line; whoever sends a longer one is not heard any more
 
@@ -64,7 +64,7 @@ class Lines:
         os.close(self._wake)
         os.close(self._woken)
 
-    def get(self, number: int, within_s: float | None) -> str | None:
+    def get(self, number: int, within_s: float) -> str | None:
         """Return the answer to question `number`; `None` where none has come.
 
         Raises `EOFError` after the last.
@@ -129,7 +129,7 @@ class JsonFace:
     def __init__(self, lines: Lines) -> None:
         self._lines = lines
         self._number = 0
-        self._steps: tuple[Step, ...] = ()
+        self._steps: tuple[CommissionStep, ...] = ()
         self._moving_s = 0.0  # when words of a motion were told; 0: nothing moves
 
     def moving(self, text: str) -> str:
@@ -157,7 +157,7 @@ class JsonFace:
         say_json({"written": written})
         say_json({"say": written.words})
 
-    def steps(self, steps: tuple[Step, ...]) -> None:
+    def steps(self, steps: tuple[CommissionStep, ...]) -> None:
         """How far it is, where that is another than before."""
         if steps != self._steps:
             self._steps = steps
@@ -170,7 +170,7 @@ class JsonFace:
         for key in ("choices", "default", "unit", "bounds", "press", "refused"):
             asked[key] = getattr(question, key)
         say_json(asked)
-        within_s = None if question.live is None else 0.0
+        within_s = LIVE_S if question.live is None else 0.0
         while (typed := self._lines.get(self._number, within_s)) is None:
             if question.live is not None:
                 self._show(question.live)

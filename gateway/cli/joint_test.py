@@ -12,18 +12,18 @@ from drivers.errors import DriverError, SettingsError
 from gateway.cli.calibrate import alone_on, named_joint
 from gateway.cli.commission_faces import Terminal
 from gateway.cli.commission_lines import JsonFace, Lines, stdin
-from gateway.cli.motion_ends import Ended, ending, stop_drives
+from gateway.cli.motion_ends import MotionEnded, ending, stop_drives
 from gateway.cli.text import say_json, warn
 from gateway.commission.bench import CanBench
 from gateway.commission.dialogue import run
 from gateway.commission.draft import Draft, alone
-from gateway.commission.powered_run import NotStopped, Outcome
+from gateway.commission.powered_run import NotStopped, PoweredRunResult
 from gateway.config.reading import load
 from gateway.config.robot import RobotConfig
 from gateway.joint_test import undo_file
 from gateway.joint_test.dialogue import Test, tested
-from gateway.joint_test.limits import LATE_S, Asked, NotAllowed
-from gateway.joint_test.motion import Kind, Wish
+from gateway.joint_test.limits import LATE_S, AskedLimits, NotAllowed
+from gateway.joint_test.motion import JointTestKind, Wish
 from gateway.records.folder import RecordsFolder
 from gateway.records.records import Records
 from gateway.user_name import user_name
@@ -85,7 +85,7 @@ def _parser(test: str) -> argparse.ArgumentParser:
     )
     if test == "stop":
         return parser
-    _motion(parser, Kind(test))
+    _motion(parser, JointTestKind(test))
     parser.add_argument(
         "--max-speed", type=_number(0.1, 360), metavar="°/S", help="cut the power beyond it (default: 180)"
     )
@@ -109,13 +109,13 @@ def _parser(test: str) -> argparse.ArgumentParser:
     return parser
 
 
-def _motion(parser: argparse.ArgumentParser, kind: Kind) -> None:
+def _motion(parser: argparse.ArgumentParser, kind: JointTestKind) -> None:
     """How it moves; the defaults are gentle ones."""
     usual = {
-        Kind.STEP: (1.0, 10.0),
-        Kind.CHIRP: (1.0, 15.0),
-        Kind.FRICTION: (10.0, 20.0),
-        Kind.RELAY: (5.0, 90.0),
+        JointTestKind.STEP: (1.0, 10.0),
+        JointTestKind.CHIRP: (1.0, 15.0),
+        JointTestKind.FRICTION: (10.0, 20.0),
+        JointTestKind.RELAY: (5.0, 90.0),
     }
     wide, fast = usual[kind]
     parser.add_argument(
@@ -124,10 +124,10 @@ def _motion(parser: argparse.ArgumentParser, kind: Kind) -> None:
         default=wide,
         metavar="°",
         help="how far it moves (default: %(default)g)"
-        if kind is not Kind.RELAY
+        if kind is not JointTestKind.RELAY
         else "how far it may swing (default: %(default)g)",
     )
-    if kind is not Kind.RELAY:
+    if kind is not JointTestKind.RELAY:
         parser.add_argument(
             "--speed",
             type=_number(0.1, 180),
@@ -135,14 +135,14 @@ def _motion(parser: argparse.ArgumentParser, kind: Kind) -> None:
             metavar="°/S",
             help="of its target, at most (default: %(default)g)",
         )
-    if kind in (Kind.STEP, Kind.RELAY):
+    if kind in (JointTestKind.STEP, JointTestKind.RELAY):
         parser.add_argument(
             "--repeat",
             type=_count,
-            default=3 if kind is Kind.STEP else 8,
+            default=3 if kind is JointTestKind.STEP else 8,
             help="times (default: %(default)d)",
         )
-    if kind is Kind.CHIRP:
+    if kind is JointTestKind.CHIRP:
         for name, low, high, default, what in (
             ("--from", 0.05, 50.0, 0.2, "Hz, where it begins"),
             ("--to", 0.1, 50.0, 15.0, "Hz, where it ends"),
@@ -155,7 +155,7 @@ def _motion(parser: argparse.ArgumentParser, kind: Kind) -> None:
                 metavar="N",
                 help=f"{what} (default: %(default)g)",
             )
-    if kind is Kind.RELAY:
+    if kind is JointTestKind.RELAY:
         parser.add_argument(
             "--torque", type=_number(0.01, 500), required=True, metavar="N·m", help="of the relay"
         )
@@ -183,9 +183,9 @@ def _count(typed: str) -> int:
     return found
 
 
-def _wish(kind: Kind, options: argparse.Namespace) -> Wish:
+def _wish(kind: JointTestKind, options: argparse.Namespace) -> Wish:
     told = vars(options)
-    if kind is Kind.CHIRP and told["from"] >= told["to"]:
+    if kind is JointTestKind.CHIRP and told["from"] >= told["to"]:
         raise SettingsError("--from must be less than --to")
     return Wish(
         kind,
@@ -249,8 +249,8 @@ def _lead(
     test = Test(
         config,
         joint,
-        _wish(Kind(kind), options),
-        Asked(
+        _wish(JointTestKind(kind), options),
+        AskedLimits(
             None if options.max_speed is None else math.radians(options.max_speed),
             options.max_torque,
             options.late / 1000,
@@ -276,7 +276,7 @@ def _lead(
         warn("joint-test", f"NOT STOPPED: {error}")
         result = f"NOT STOPPED: {error}"
         return stop_drives(Draft(config.path, go_on=False), bench, as_json=options.json) or 1
-    except Ended as end:
+    except MotionEnded as end:
         result = "interrupted"
         warn("joint-test", "interrupted; the drive is without power")
         return end.status
@@ -296,7 +296,7 @@ def _lead(
         )
 
 
-def _told(test: Test, outcome: Outcome, *, as_json: bool) -> int:
+def _told(test: Test, outcome: PoweredRunResult, *, as_json: bool) -> int:
     if as_json:
         say_json({"tested": {"file": str(test.file), "problem": outcome.problem, "off": outcome.off}})
     return 0 if outcome.problem is None else 1
@@ -312,7 +312,7 @@ def _stop(file: Path, joint: str, *, as_json: bool) -> int:
 
 
 def _cut_off(config: RobotConfig) -> str | None:
-    """Return what a test has left that nobody leads any more, in words."""
+    """Return the changes, in words, that a test whose program has ended left in a drive."""
     folder = RecordsFolder(config.records)
     try:
         folder.open()

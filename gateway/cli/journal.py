@@ -17,7 +17,7 @@ from gateway.cli.connect import choose, connect, parser
 from gateway.cli.text import say, say_json, table, warn
 from gateway.client.keys import checked_pin, pins, server_file
 from gateway.records.folder import RecordsFolder
-from gateway.records.witness import NOBODY, Judgement, Verdict, judge, objection
+from gateway.records.witness import NOBODY, Judgement, WitnessVerdict, judge, objection
 from gateway.wire.control import SignedHead
 
 VERIFY_EPILOG = """Run it on the robot's own computer, or on a copy of journal.jsonl with journal.jsonl.head
@@ -31,7 +31,7 @@ Whoever is root on the robot can write whatever they like into what no desk has 
 
 exit status: 0 intact; 1 broken; 2 not there, or usage; 3 unproven"""
 
-STATUS = {Verdict.INTACT: 0, Verdict.BROKEN: 1, Verdict.UNPROVEN: 3}
+STATUS = {WitnessVerdict.INTACT: 0, WitnessVerdict.BROKEN: 1, WitnessVerdict.UNPROVEN: 3}
 _SHOWN_APART = ("n", "utc_ns", "monotonic_ns", "boot_id", "who", "what", "previous", "hash")
 
 
@@ -104,7 +104,7 @@ def verify(argv: list[str]) -> int:
         say_json({"path": str(path), "problems": problems, **dataclasses.asdict(found)})
     else:
         _tell(path, found)
-        for problem in problems if found.verdict is not Verdict.UNPROVEN else ():
+        for problem in problems if found.verdict is not WitnessVerdict.UNPROVEN else ():
             warn("journal", problem)
     return STATUS[found.verdict]
 
@@ -112,13 +112,13 @@ def verify(argv: list[str]) -> int:
 def _tell(path: Path, found: Judgement) -> None:
     at = "" if found.at is None else f" at {found.at}"
     match found.verdict:
-        case Verdict.INTACT:
+        case WitnessVerdict.INTACT:
             say(f"{path} is intact: {found.entries} entries, {found.text}\n")
-        case Verdict.BROKEN:
+        case WitnessVerdict.BROKEN:
             warn("journal", f"{path} is BROKEN{at}: {found.text}")
-        case Verdict.UNPROVEN if not found.entries:
+        case WitnessVerdict.UNPROVEN if not found.entries:
             say(f"{path} is empty, and unproven: nothing in it tells whether there ever was an entry\n")
-        case Verdict.UNPROVEN:
+        case WitnessVerdict.UNPROVEN:
             say(
                 f"{path} is unproven{at}: its {found.entries} entries follow each other unaltered, but who "
                 f"may write that file can make such a chain; {found.text}\n"

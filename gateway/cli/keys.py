@@ -16,7 +16,7 @@ from gateway.cli import keys_push, qr_code
 from gateway.cli.connect import NobodyToAsk, choose
 from gateway.cli.text import say, say_json, table, warn
 from gateway.client.address import DEFAULT_PORT
-from gateway.connections.doors import is_loopback
+from gateway.connections.listener_kind import is_loopback
 from gateway.connections.listeners import listen
 from gateway.private import forbid_core_dumps
 from gateway.wire.pairing import PAIRING_PORT, TRIES, VALID_S, Reply, link, new_code
@@ -135,7 +135,7 @@ def _address() -> str:
 
 
 def _confirmed(candidate: Candidate, arguments: argparse.Namespace, folder: AccessFolder) -> tuple[str, Role]:
-    """Return what the person here says; raises `PairingEnded` where they refuse."""
+    """Return name and role as the person here confirms them; raises `PairingEnded` if they refuse."""
     if arguments.yes:
         return arguments.name, arguments.role
     wished = arguments.name or (candidate.name if NAME.fullmatch(candidate.name) else "")

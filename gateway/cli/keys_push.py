@@ -114,7 +114,7 @@ def _read(file: Path) -> bytes:
 
 
 def _added(host: str, name: str, pem: bytes, arguments: argparse.Namespace) -> dict[str, Any]:
-    """Return what the robot answers; raises `KeyProblem` with what it says where it refuses."""
+    """Return the robot's answer; raises `KeyProblem` with its words if it refuses."""
     ssh = shutil.which("ssh")
     if ssh is None:
         raise KeyProblem("the program ssh is not here: apt install openssh-client")

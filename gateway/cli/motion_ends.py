@@ -32,7 +32,7 @@ def stop_drives(draft: Draft, bench: CanBench, *, as_json: bool) -> int:
     return 0 if stopped.confirmed else 1
 
 
-class Ended(KeyboardInterrupt):
+class MotionEnded(KeyboardInterrupt):
     """Ctrl-C, SIGTERM or a terminal that is gone: the dialogue is closed, which ends what it has begun."""
 
     def __init__(self, number: int) -> None:
@@ -42,7 +42,7 @@ class Ended(KeyboardInterrupt):
 
 @contextmanager
 def ending() -> Iterator[None]:
-    """While inside, the first of `ENDS` raises `Ended` in whatever the dialogue does.
+    """While inside, the first of `ENDS` raises `MotionEnded` in whatever the dialogue does.
 
     The others change nothing: what ends and confirms a motion is not itself interrupted, and has its time.
     """
@@ -57,4 +57,4 @@ def ending() -> Iterator[None]:
 def _end(number: int, _frame: FrameType | None) -> None:
     for one in ENDS:
         signal.signal(one, signal.SIG_IGN)
-    raise Ended(number)
+    raise MotionEnded(number)

@@ -7,7 +7,7 @@ from typing import Final
 from gateway.cli.arguments import lines
 from gateway.cli.connect import UnknownName, connect, parser
 from gateway.cli.od_watch import watch
-from gateway.cli.set import Change, change_of, value_of
+from gateway.cli.set import TypedValue, change_of, value_of
 from gateway.cli.text import exact, say, say_json, table
 from gateway.cli.writing import add_trial, write
 from gateway.client import ClientError, Robot
@@ -162,11 +162,11 @@ def _set(robot: Robot, found: ObjectList, description: Description, arguments: a
             f"{found.component} {info.object} {info.name} is no parameter, {info.access} in the EDS; what "
             'may be written stands in robot.toml: [parameter."…"], or parameters = "eds" and release'
         )
-    change: Change = replace(arguments.set, name=info.parameter)
+    change: TypedValue = replace(arguments.set, name=info.parameter)
     return write(robot, {info.parameter: value_of(change, description)}, description, arguments)
 
 
-def _value(text: str) -> Change:
+def _value(text: str) -> TypedValue:
     """Return a value and its unit, for a parameter that is not known yet."""
     try:
         return change_of(f"object={text}")

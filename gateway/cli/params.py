@@ -11,7 +11,15 @@ from gateway.cli.text import exact, say, say_json, table, warn
 from gateway.cli.writing import add_trial, write
 from gateway.client import Robot
 from gateway.coding import Number
-from gateway.parameter_files.comparison import CANNOT_CHANGE, REFUSED, UNLIKE, Row, Verdict, compare, left_out
+from gateway.parameter_files.comparison import (
+    CANNOT_CHANGE,
+    REFUSED,
+    UNLIKE,
+    ComparisonVerdict,
+    Row,
+    compare,
+    left_out,
+)
 from gateway.parameter_files.contents import FileProblem, Scope
 from gateway.parameter_files.formats import format_of, read_file
 from gateway.records import durable
@@ -149,7 +157,7 @@ def _rows(robot: Robot, scope: Scope, file: Path) -> list[Row]:
 
 
 def _changes(rows: Iterable[Row], file: Path, *, skip: bool) -> dict[str, Number]:
-    """Return what is to be written; raises `FileProblem` where the file cannot be brought about."""
+    """Return the values to be written; raises `FileProblem` if the robot cannot be made equal to the file."""
     found = Counter(row.verdict for row in rows)
     refused = sum(found[verdict] for verdict in REFUSED)
     if refused:
@@ -160,7 +168,9 @@ def _changes(rows: Iterable[Row], file: Path, *, skip: bool) -> dict[str, Number
             f"{file}: nothing was sent, {counted(fixed, 'value')} cannot be changed; --skip leaves them out"
         )
     changes = {
-        row.name: row.file for row in rows if row.verdict is Verdict.DIFFERENT and row.file is not None
+        row.name: row.file
+        for row in rows
+        if row.verdict is ComparisonVerdict.DIFFERENT and row.file is not None
     }
     size = len(encode_request(0, PARAMETER_WRITE.name, ParameterWriteParams(changes))) if changes else 0
     if size > LINE_LIMIT:
@@ -203,4 +213,4 @@ def _table(rows: Iterable[Row]) -> str:
 
 def _summary(rows: Iterable[Row]) -> str:
     found = Counter(row.verdict for row in rows)
-    return ", ".join(f"{found[verdict]} {verdict}" for verdict in Verdict if found[verdict]) + "\n"
+    return ", ".join(f"{found[verdict]} {verdict}" for verdict in ComparisonVerdict if found[verdict]) + "\n"

@@ -16,7 +16,7 @@ from msgspec.structs import replace
 
 from gateway import config
 from gateway.certificates import KeyProblem
-from gateway.connections.doors import DoorProblem, is_loopback
+from gateway.connections.listener_kind import UnsafeListener, is_loopback
 from gateway.connections.listeners import Listeners, default_socket, inherited, listen, listen_locally, rest
 from gateway.daemon import Daemon
 from gateway.process import notify
@@ -103,7 +103,7 @@ def main(arguments: Sequence[str]) -> int:
             ends_idle=idle,
             rested_without_keys=sockets.without_keys,
         )
-    except (DoorProblem, KeyProblem) as error:
+    except (UnsafeListener, KeyProblem) as error:
         if handed is None:
             sockets.close()
             raise
@@ -133,7 +133,7 @@ def _robot(options: argparse.Namespace, *, tell: bool) -> config.RobotConfig:
 
 
 def _beside(robot: config.RobotConfig) -> list[Finding]:
-    """Return what `gwrms check` says of EDS files, layouts and calibrations: each costs a component only."""
+    """Return the findings about EDS files, layouts and calibrations: each costs only a component."""
     from gateway.prerequisites import beside  # all that drivers need: not for a gateway that wakes for a stop
 
     found = list(beside(robot))
@@ -179,7 +179,7 @@ def _refuse(handed: Listeners, error: Exception) -> int:
     Whoever comes from elsewhere is told nothing: nobody knows who that is.
     """
     log.error("%s", error)
-    line = framing.encode_error(None, framing.refuse(framing.Kind.UNAVAILABLE, str(error)))
+    line = framing.encode_error(None, framing.refuse(framing.ErrorKind.UNAVAILABLE, str(error)))
     for listener in handed.all:
         listener.setblocking(False)
         with contextlib.suppress(BlockingIOError):

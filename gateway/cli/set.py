@@ -50,7 +50,7 @@ _CHANGE: Final = re.compile(r"([^=]+)(?:=([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class TypedValue:
     """What was typed: a number as it stands, and its unit, where one was given; without it, what is held."""
 
     name: str
@@ -99,7 +99,7 @@ def main(argv: list[str]) -> int:
 
 
 def _spread(robot: Robot, arguments: argparse.Namespace, description: Description) -> dict[str, Number]:
-    """Return what each joint takes; raises `NotForAll` where one cannot and is not left out by word."""
+    """Return the new values of each joint; raises `NotForAll` if one cannot take it and is not left out."""
     held = robot.read().values
     changes: dict[str, Number] = {}
     check_names("joint", arguments.leave_out, all_joints(description))
@@ -132,7 +132,7 @@ def _spread(robot: Robot, arguments: argparse.Namespace, description: Descriptio
     return changes
 
 
-def _named(change: Change, description: Description) -> str:
+def _named(change: TypedValue, description: Description) -> str:
     """Return the parameter's name, also where its address was typed."""
     return next(
         info.name
@@ -141,17 +141,17 @@ def _named(change: Change, description: Description) -> str:
     )
 
 
-def change_of(text: str) -> Change:
+def change_of(text: str) -> TypedValue:
     """Take NAME=VALUE[UNIT] apart; an `argparse` type."""
     found = _CHANGE.fullmatch(text)
     if found is None:
         raise argparse.ArgumentTypeError(
             f"{text!r} is not NAME=VALUE with a number, as in gait.step_length=0.42 or gait.trunk_angle=3deg"
         )
-    return Change(found[1], found[2], found[3])
+    return TypedValue(found[1], found[2], found[3])
 
 
-def value_of(change: Change, description: Description) -> Number:
+def value_of(change: TypedValue, description: Description) -> Number:
     """Return the value in the parameter's own unit.
 
     A whole number as such, so that none of its digits is lost.

@@ -36,7 +36,7 @@ class Channels:
         }
 
     def info(self, name: str) -> ChannelInfo | None:
-        """Return what is known of the channel, with the unit in which it is shown."""
+        """Return the channel's description, with the unit in which it is shown."""
         return self._known.get(name)
 
     def value(self, name: str, value: float | None) -> float | None:

@@ -22,5 +22,5 @@ def add_component(made: argparse.ArgumentParser, nargs: str | None = None) -> No
 
 
 def say_stored(stored: Stored, *, json: bool) -> None:
-    """Print what the device has done."""
+    """Print the device's result."""
     say_json(stored) if json else say(f"{stored.component}: {stored.result}\n")

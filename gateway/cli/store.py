@@ -8,7 +8,7 @@ from gateway.cli.connect import connect, parser
 from gateway.cli.storage import add_component, say_stored
 from gateway.cli.text import say, say_json, table
 from gateway.client import CallTimeout, LinkLost, NotConnected, RemoteError, Robot
-from gateway.several_joints import Outcome, refused_or_unknown, storing
+from gateway.several_joints import StoreOutcome, refused_or_unknown, storing
 
 EPILOG = """Refused while one of its drives is enabled or in a state that is not known, while something
 is on trial, and where the device does not say that it can (1010h). All of its parameters are stored, whoever
@@ -23,11 +23,11 @@ examples:
   gwrms store --all"""
 
 
-class Result(Struct, frozen=True):
+class StoreResult(Struct, frozen=True):
     """What came of one device; `said` is its own words, or why not."""
 
     components: tuple[str, ...]
-    outcome: Outcome
+    outcome: StoreOutcome
     said: str
 
 
@@ -48,18 +48,18 @@ def main(argv: list[str]) -> int:
 
 
 def _all(robot: Robot, arguments: argparse.Namespace) -> int:
-    results: list[Result] = []
+    results: list[StoreResult] = []
     lost = ""
     for components in storing(robot.describe()):
         try:
-            outcome, said = (Outcome.UNASKED, lost) if lost else _one(robot, components)
+            outcome, said = (StoreOutcome.UNASKED, lost) if lost else _one(robot, components)
         except NotConnected as error:
-            outcome, said = Outcome.UNASKED, str(error)
+            outcome, said = StoreOutcome.UNASKED, str(error)
             lost = said
         except (LinkLost, CallTimeout) as error:
-            outcome, said = Outcome.UNKNOWN, str(error)
+            outcome, said = StoreOutcome.UNKNOWN, str(error)
             lost = said
-        results.append(Result(components, outcome, said))
+        results.append(StoreResult(components, outcome, said))
     if arguments.json:
         say_json(results)
     elif results:
@@ -67,11 +67,11 @@ def _all(robot: Robot, arguments: argparse.Namespace) -> int:
         say(table(("DEVICE", "", ""), rows))
     else:
         say("no device of this robot says that it can store (1010h)\n")
-    return 0 if results and all(one.outcome is Outcome.STORED for one in results) else 1
+    return 0 if results and all(one.outcome is StoreOutcome.STORED for one in results) else 1
 
 
-def _one(robot: Robot, components: tuple[str, ...]) -> tuple[Outcome, str]:
+def _one(robot: Robot, components: tuple[str, ...]) -> tuple[StoreOutcome, str]:
     try:
-        return Outcome.STORED, robot.store(components[0]).result
+        return StoreOutcome.STORED, robot.store(components[0]).result
     except RemoteError as error:
         return refused_or_unknown(error.kind), str(error)

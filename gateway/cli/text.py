@@ -68,7 +68,7 @@ def exact(value: float | None) -> str:
 
 
 def budget(info: BudgetInfo) -> str:
-    """Return what the gateway may use, and what its streams give up for it."""
+    """Return the gateway's CPU budget, and the thinning of its streams to keep it, in words."""
     shed = f": streams send one row of {info.shed}" if info.shed > 1 else ""
     return f"at most {percent(info.max_cpu_percent)} of a core{shed}"
 

@@ -6,7 +6,7 @@ import time
 
 from gateway.cli.text import exact, say, say_json
 from gateway.client import RemoteError, Robot
-from gateway.wire.framing import Kind
+from gateway.wire.framing import ErrorKind
 from gateway.wire.parameter import Written
 
 _CHOICE = "Enter keeps it, Ctrl-C takes it back; nobody else can write meanwhile"
@@ -41,7 +41,7 @@ def _take_back(robot: Robot, written: Written) -> str:
     try:
         outcome = robot.revert(written.write).outcome
     except RemoteError as error:
-        if error.kind != Kind.UNKNOWN_NAME:
+        if error.kind != ErrorKind.UNKNOWN_NAME:
             raise
         return _ended(error, written)
     before = written.before

@@ -5,6 +5,7 @@ import select
 
 STDIN = 0
 CHUNK = 4096
+TURN_S = 0.2  # of a wait: Python hears a signal that came just before one only after it
 
 
 class Typed:
@@ -18,7 +19,8 @@ class Typed:
     def line(self) -> str:
         """Return the next line, with its end; raises `EOFError` where none comes any more."""
         while b"\n" not in self._held and not self._over:
-            self._read()
+            if self._ready(TURN_S):
+                self._read()
         if not self._held:
             raise EOFError
         line, end, self._held = self._held.partition(b"\n")
@@ -39,7 +41,10 @@ class Typed:
         self._held = b""
 
     def _ready(self, seconds: float) -> bool:
-        return bool(select.select([self._descriptor], [], [], seconds)[0])
+        try:
+            return bool(select.select([self._descriptor], [], [], seconds)[0])
+        except OSError:  # closed: reading tells
+            return True
 
     def _read(self) -> None:
         try:

@@ -99,7 +99,7 @@ def _rows(
 
 
 def _clock(robot: Robot) -> Clock | None:
-    """Return what it says of its clocks now; None where it does not: no time is better than a wrong one."""
+    """Return the robot's clocks as of now; None if it does not answer: no time is better than a wrong one."""
     try:
         return robot.describe().clock
     except ClientError:

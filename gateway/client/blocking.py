@@ -82,7 +82,7 @@ class Robot:
         return self._client.link.hello
 
     def describe(self) -> Description:
-        """Return what the robot is made of."""
+        """Return the robot's description: its components, channels and modules."""
         return self._wait(self._client.describe())
 
     def resources(self, params: ResourceSnapshotParams | None = None) -> ResourceSnapshot:
@@ -98,7 +98,7 @@ class Robot:
         return self._wait(self._client.buses())
 
     def cost(self) -> GatewayCost:
-        """Return what monitoring costs the robot; rates are since the last call, None the first time."""
+        """Return the cost of monitoring on the robot; rates are since the last call, None the first time."""
         return self._wait(self._client.cost())
 
     def overruns(self) -> Overruns:
@@ -136,14 +136,14 @@ class Robot:
         return self._wait(self._client.read(*names))
 
     def objects(self, component: str, search: str = "") -> ObjectList:
-        """Return what an EDS says of a component's objects.
+        """Return the objects of a component by its EDS.
 
         `search`: an address, a range, or words of the name.
         """
         return self._wait(self._client.objects(component, search))
 
     def read_objects(self, component: str, *objects: str) -> ObjectValues:
-        """Return what a device holds of objects such as `0x6041:0` now; at most 64."""
+        """Return a device's present values of objects such as `0x6041:0`; at most 64."""
         return self._wait(self._client.read_objects(component, *objects))
 
     def write(self, changes: Mapping[str, float]) -> Written:
@@ -176,7 +176,7 @@ class Robot:
             self._wait(trying.__aexit__(None, None, None))
 
     def confirm(self, write: int) -> Confirmed:
-        """Keep what is on trial; raises `RemoteError` where it has ended, or is not what was written."""
+        """Keep the values on trial; raises `RemoteError` if it has ended, or they have changed."""
         return self._wait(self._client.confirm(write))
 
     def revert(self, write: int) -> Reverted:

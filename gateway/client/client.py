@@ -117,7 +117,7 @@ class Client:
         await self.link.close()
 
     async def describe(self) -> Description:
-        """Return what the robot is made of."""
+        """Return the robot's description: its components, channels and modules."""
         return await self.link.call(ROBOT_DESCRIBE, Params())
 
     async def resources(self, params: ResourceSnapshotParams | None = None) -> ResourceSnapshot:
@@ -133,7 +133,7 @@ class Client:
         return await self.link.call(BUS_SNAPSHOT, Params())
 
     async def cost(self) -> GatewayCost:
-        """Return what monitoring costs the robot; rates are since the last call, None the first time."""
+        """Return the cost of monitoring on the robot; rates are since the last call, None the first time."""
         return await self.link.call(GATEWAY_COST, Params())
 
     async def overruns(self) -> Overruns:
@@ -168,14 +168,14 @@ class Client:
         return await self.link.call(PARAMETER_READ, ParameterParams(list(names) or None), WRITE_TIMEOUT_S)
 
     async def objects(self, component: str, search: str = "") -> ObjectList:
-        """Return what an EDS says of a component's objects.
+        """Return the objects of a component by its EDS.
 
         `search`: an address, a range, or words of the name.
         """
         return await self.link.call(OBJECT_LIST, ObjectListParams(component, search))
 
     async def read_objects(self, component: str, *objects: str) -> ObjectValues:
-        """Return what a device holds of objects such as `0x6041:0` now; at most 64."""
+        """Return a device's present values of objects such as `0x6041:0`; at most 64."""
         params = ObjectReadParams(component, list(objects))
         return await self.link.call(OBJECT_READ, params, WRITE_TIMEOUT_S)
 
@@ -202,7 +202,7 @@ class Client:
         )
 
     async def confirm(self, write: int) -> Confirmed:
-        """Keep what is on trial; raises `RemoteError` where it has ended, or is not what was written."""
+        """Keep the values on trial; raises `RemoteError` if it has ended, or they have changed."""
         number = WriteNumberParams(write)
         ended = await self.link.call(PARAMETER_CONFIRM, number, WRITE_TIMEOUT_S)
         self._trying.discard(write)

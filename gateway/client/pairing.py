@@ -51,7 +51,7 @@ class Paired:
 
 
 def typed(where: str, code: str = "") -> tuple[Address, str]:
-    """Return what a person typed: HOST:PORT and the code, or the link that has both.
+    """Return address and code as typed: HOST:PORT and the code, or the link that has both.
 
     Raises:
         ValueError: it is neither; it says which of the two is wrong.
@@ -171,7 +171,7 @@ def own_certificate() -> bytes:
 
 
 def own_name() -> str:
-    """Return what a robot may call this desk: its user and computer."""
+    """Return the name that this desk proposes to a robot: its user and computer."""
     name = f"{user_name()}-{socket.gethostname()}"
     return re.sub(r"[^A-Za-z0-9_.-]", "-", name).lstrip("_.-")[:64] or "desk"
 

@@ -8,7 +8,7 @@ from drivers.bus.values import unsigned
 from drivers.errors import DriverError
 from drivers.joint.cia402 import ENERGISED, DriveState, drive_state
 from drivers.joint.quantities import AXIS_OFFSET
-from drivers.scan.asking import Told
+from drivers.scan.asking import NodeAnswers
 from gateway.commission.bench import Bench
 from gateway.commission.dialogue import Talk, press
 
@@ -33,7 +33,7 @@ class Axis:
         return index + self.number * AXIS_OFFSET
 
 
-def axes_of(told: Mapping[int, Told]) -> tuple[Axis, ...]:
+def axes_of(told: Mapping[int, NodeAnswers]) -> tuple[Axis, ...]:
     """Every axis of every node that says that it is a drive."""
     return tuple(Axis(node, axis.number) for node, one in sorted(told.items()) for axis in one.axes)
 

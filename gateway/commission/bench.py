@@ -20,7 +20,7 @@ from drivers.errors import DeviceAbort, Mismatch, Unavailable
 from drivers.joint.quantities import AXIS_OFFSET, quantities
 from drivers.joint.remap import free_tpdos, mappable, remap
 from drivers.joint.settings import JointSettings
-from drivers.scan.scan import Found, scan
+from drivers.scan.scan import ScanResult, scan
 from eds import Description
 from gateway.commission.power import Power, opened
 
@@ -34,7 +34,7 @@ STORE_S = 10.0  # for the answer: flash takes its time
 class Bench(Protocol):
     """The robot's bus while it is commissioned."""
 
-    def nodes(self) -> Found:
+    def nodes(self) -> ScanResult:
         """Listen, then ask all; raises `Unavailable`."""
         ...
 
@@ -78,7 +78,7 @@ class CanBench:
         self._open()
         self.close()
 
-    def nodes(self) -> Found:
+    def nodes(self) -> ScanResult:
         found = scan(self._settings, LISTEN_S, threading.Event().wait, active=True)
         self._nodes = frozenset(found.nodes)
         self._heard = frozenset(found.traffic.seen)

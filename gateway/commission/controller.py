@@ -5,7 +5,7 @@ from collections.abc import Mapping
 
 import eds
 from drivers.bus.settings import address_of
-from drivers.scan.asking import Told
+from drivers.scan.asking import NodeAnswers
 from drivers.scan.products import Library
 from eds.datatypes import DATA_TYPES
 from gateway.coding import NUMBERS
@@ -18,7 +18,7 @@ NONE = "none"
 _OBJECT = re.compile(r"0x[0-9A-Fa-f]{4}:(0x[0-9A-Fa-f]{1,2}|[0-9]{1,3})")
 
 
-def controller(draft: Draft, library: Library, told: Mapping[int, Told]) -> Talk[None]:
+def controller(draft: Draft, library: Library, told: Mapping[int, NodeAnswers]) -> Talk[None]:
     """Which node it is, by which object it is stopped; without one a stop tells the drives only."""
     if draft.value("gateway", "role") != OBSERVER or draft.has(CONTROLLER, "value"):
         return
@@ -31,7 +31,7 @@ def controller(draft: Draft, library: Library, told: Mapping[int, Told]) -> Talk
     yield from _how(draft, node)
 
 
-def _which(draft: Draft, others: Mapping[int, Told]) -> Talk[int | None]:
+def _which(draft: Draft, others: Mapping[int, NodeAnswers]) -> Talk[int | None]:
     names = ", ".join(f"{node} ({one.name or 'without a name'})" for node, one in sorted(others.items()))
     choice = yield from choose(
         "Which node commands the drives, so that a STOP can tell it too? "

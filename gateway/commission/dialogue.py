@@ -29,7 +29,7 @@ class Say:
 
 
 @dataclass(frozen=True, slots=True)
-class Reading:
+class DeviceReading:
     """What a device tells while somebody makes up an answer; `value` is `None` where it tells nothing."""
 
     name: str
@@ -37,7 +37,7 @@ class Reading:
     unit: str = ""
 
 
-Live = Callable[[], Sequence[Reading]]  # raises `DriverError` where a device does not answer
+Live = Callable[[], Sequence[DeviceReading]]  # raises `DriverError` where a device does not answer
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +70,7 @@ class Face(Protocol):
     def say(self, text: str) -> None: ...
 
     def ask(self, question: Ask) -> str:
-        """Return what was typed; raises `EOFError` where nothing more can be."""
+        """Return the typed answer; raises `EOFError` at the end of the input."""
         ...
 
     def moving(self, text: str) -> str:

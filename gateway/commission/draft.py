@@ -24,7 +24,7 @@ KINDS: Mapping[str, Any] = {  # what is reckoned with
 }
 
 
-class Found(msgspec.Struct, frozen=True):
+class DraftValue(msgspec.Struct, frozen=True):
     """One value of the robot's file, and how it was found, for its comment."""
 
     value: Any
@@ -71,10 +71,12 @@ class Draft:
         """
         self.file = file
         self.path = file.with_name(file.name + SUFFIX)
-        self.tables: dict[str, dict[str, Found]] = {}
+        self.tables: dict[str, dict[str, DraftValue]] = {}
         if go_on and self.path.exists():
             try:
-                self.tables = msgspec.json.decode(self.path.read_bytes(), type=dict[str, dict[str, Found]])
+                self.tables = msgspec.json.decode(
+                    self.path.read_bytes(), type=dict[str, dict[str, DraftValue]]
+                )
                 for key, found in (pair for keys in self.tables.values() for pair in keys.items()):
                     msgspec.convert(found.value, KINDS.get(key, Any))
             except (OSError, msgspec.DecodeError) as error:
@@ -91,7 +93,7 @@ class Draft:
 
     def put(self, table: str, key: str, value: Any, how: str = "") -> None:
         """Keep a finding; raises `OSError` where it cannot be kept."""
-        self.tables.setdefault(table, {})[key] = Found(value, how)
+        self.tables.setdefault(table, {})[key] = DraftValue(value, how)
         durable.write(self.path, msgspec.json.format(msgspec.json.encode(self.tables)))
 
     def forget(self, table: str, *keys: str) -> None:

@@ -4,7 +4,7 @@ import re
 import tomllib
 from typing import Any
 
-from gateway.commission.draft import Found
+from gateway.commission.draft import DraftValue
 from gateway.commission.writing import line
 
 OURS = "# rad; "  # a comment of `writing` that stands above its value
@@ -14,7 +14,7 @@ class NotEdited(ValueError):
     """The file is written in another way than such values are; the message says what to write by hand."""
 
 
-def with_value(text: str, table: str, key: str, found: Found) -> str:
+def with_value(text: str, table: str, key: str, found: DraftValue) -> str:
     """Return the text with this value, line ends kept; the rest is the same by TOML's reading.
 
     Raises:
@@ -39,7 +39,7 @@ def with_value(text: str, table: str, key: str, found: Found) -> str:
 
 
 def comment_of(text: str, table: str, key: str) -> str:
-    """Return what stands beside the value, or above it in the words of `writing`; "" where nothing does."""
+    """Return the comment beside the value, or above it as `writing` puts it; "" without one."""
     current, above = None, ""
     for one in text.splitlines():
         current = _head(one) or current

@@ -17,11 +17,11 @@ from gateway.commission import scale as scales
 from gateway.commission.axes import Axis, answered, nearest, number
 from gateway.commission.bench import Bench
 from gateway.commission.dialogue import Ask, Moving, Say, Talk, choose, press
-from gateway.commission.draft import Draft, Found
+from gateway.commission.draft import Draft, DraftValue
 from gateway.commission.homing_plan import (
     STILL,
     TOLD,
-    Known,
+    HomingBasis,
     armed,
     explained,
     known_now,
@@ -30,10 +30,10 @@ from gateway.commission.homing_plan import (
     refusal,
     told,
 )
-from gateway.commission.homing_run import HomingRun, Plan
+from gateway.commission.homing_run import HomingLimits, HomingRun
 from gateway.commission.joints import ENDS, held, table, words
 from gateway.commission.nodes import table as node_table
-from gateway.commission.powered_run import NotStopped, Outcome
+from gateway.commission.powered_run import NotStopped, PoweredRunResult
 from gateway.commission.scale import Scale
 
 NO = "no"
@@ -98,7 +98,7 @@ def _one(draft: Draft, bench: Bench, joint: str, axis: Axis, scale: Scale, metho
     return (yield from _new_zero(draft, bench, known, method, outcome))
 
 
-def _forget_zero(draft: Draft, joint: str) -> Found:
+def _forget_zero(draft: Draft, joint: str) -> DraftValue:
     """Also on disk: whatever becomes of this program, the zero from before a homing is not gone on with."""
     zero = draft.tables[table(joint)]["zero_offset"]
     draft.forget(table(joint), "zero_offset")
@@ -109,7 +109,7 @@ def _forget_zero(draft: Draft, joint: str) -> Found:
 # The word.
 
 
-def _agreed(bench: Bench, known: Known, method: int, plan: Plan) -> Talk[bool]:
+def _agreed(bench: Bench, known: HomingBasis, method: int, plan: HomingLimits) -> Talk[bool]:
     yield from press(
         f"The drive of the {words(known.joint)} is to get power. Nobody wears the robot, all hands are "
         "off it, the hardware emergency stop is within reach, and the drive's power and STO are released."
@@ -124,7 +124,7 @@ def _agreed(bench: Bench, known: Known, method: int, plan: Plan) -> Talk[bool]:
 # Under power.
 
 
-def _run(draft: Draft, bench: Bench, known: Known, plan: Plan) -> Talk[Outcome | None]:
+def _run(draft: Draft, bench: Bench, known: HomingBasis, plan: HomingLimits) -> Talk[PoweredRunResult | None]:
     try:
         with bench.power(_settings(draft, known), known.description) as power:
             why = yield Moving(f"The {words(known.joint)} gets power now. STOP: Enter.")
@@ -143,7 +143,7 @@ def _run(draft: Draft, bench: Bench, known: Known, plan: Plan) -> Talk[Outcome |
     return outcome
 
 
-def _followed(run: HomingRun, known: Known) -> Talk[Outcome]:
+def _followed(run: HomingRun, known: HomingBasis) -> Talk[PoweredRunResult]:
     """Every way out of here ends it, and waits for that."""
     try:
         run.start()
@@ -163,7 +163,7 @@ def _followed(run: HomingRun, known: Known) -> Talk[Outcome]:
     return outcome
 
 
-def _settings(draft: Draft, known: Known) -> JointSettings:
+def _settings(draft: Draft, known: HomingBasis) -> JointSettings:
     return JointSettings(
         bus="main",
         node_id=known.axis.node,
@@ -178,7 +178,9 @@ def _settings(draft: Draft, known: Known) -> JointSettings:
 # The zero that holds from now on.
 
 
-def _new_zero(draft: Draft, bench: Bench, known: Known, method: int, outcome: Outcome) -> Talk[Scale]:
+def _new_zero(
+    draft: Draft, bench: Bench, known: HomingBasis, method: int, outcome: PoweredRunResult
+) -> Talk[Scale]:
     """Of the joint where the drive counts 0: as it stood, or by a known angle where it may have moved."""
     joint, scale = known.joint, known.scale
     offset = yield from answered(lambda: option(bench, known.axis, HOME_OFFSET, 4))
@@ -198,7 +200,7 @@ def _new_zero(draft: Draft, bench: Bench, known: Known, method: int, outcome: Ou
     return new
 
 
-def _is_there(known: Known, method: int, outcome: Outcome, offset: int | None) -> bool:
+def _is_there(known: HomingBasis, method: int, outcome: PoweredRunResult, offset: int | None) -> bool:
     """Whether nothing has moved, and the drive counts as homing makes it count: its 607Ch is where it is."""
     if METHODS[method].moves or outcome.problem is not None or outcome.after is None:
         return False

@@ -16,7 +16,7 @@ from gateway.commission.bench import Bench
 from gateway.commission.dialogue import Say, Talk, agree
 from gateway.commission.dialogue import number as ask_number
 from gateway.commission.draft import Draft
-from gateway.commission.homing_run import Plan
+from gateway.commission.homing_run import HomingLimits
 from gateway.commission.joints import ENDS, table, words
 from gateway.commission.scale import Scale
 
@@ -32,7 +32,7 @@ STILL_S = 5.0
 
 
 @dataclass(frozen=True, slots=True)
-class Known:
+class HomingBasis:
     """What homing rests on. `ends` are how far it goes by hand (rad), None where nobody has shown it."""
 
     joint: str
@@ -103,11 +103,11 @@ def option(bench: Bench, axis: Axis, index: int, size: int = 2) -> int | None:
 
 def known_now(
     draft: Draft, bench: Bench, joint: str, axis: Axis, scale: Scale, description: Description
-) -> Talk[Known]:
+) -> Talk[HomingBasis]:
     position = yield from answered(lambda: _position(bench, axis))
     position = nearest(position, scales.counts_at_zero(scale))
     ends = draft.value(told(joint), ENDS)
-    return Known(
+    return HomingBasis(
         joint,
         axis,
         scale,
@@ -124,12 +124,12 @@ def _position(bench: Bench, axis: Axis) -> int:
     return position
 
 
-def planned(bench: Bench, known: Known, method: int) -> Talk[Plan | None]:
+def planned(bench: Bench, known: HomingBasis, method: int) -> Talk[HomingLimits | None]:
     """How far, how fast; `None` where its speed cannot be set."""
     lag = LAG * known.counts_per_turn / math.tau
     if not METHODS[method].moves:
         ends = [known.counts_at(known.angle + by) for by in (-STILL, STILL)]
-        return Plan(Setup(method), min(ends), max(ends), lag, lag, STILL_S)
+        return HomingLimits(Setup(method), min(ends), max(ends), lag, lag, STILL_S)
     low, high = known.ends or (known.angle, known.angle)
     if not low <= known.angle <= high:
         yield Say(
@@ -145,12 +145,12 @@ def planned(bench: Bench, known: Known, method: int) -> Talk[Plan | None]:
         return None
     ends = [known.counts_at(end) for end in (low, high)]
     time_s = EXTRA_S + 2 * math.degrees(high - low) / degrees
-    return Plan(
+    return HomingLimits(
         setup, min(ends), max(ends), math.radians(degrees) * known.counts_per_turn / math.tau, lag, time_s
     )
 
 
-def _setup(bench: Bench, known: Known, method: int, rad_s: float) -> Setup | None:
+def _setup(bench: Bench, known: HomingBasis, method: int, rad_s: float) -> Setup | None:
     """Return the drive's own units; raises `DriverError`."""
     description, axis, gear = known.description, known.axis, known.scale.gear_ratio
     unit = number(bench, axis, VELOCITY_UNIT)
@@ -162,8 +162,10 @@ def _setup(bench: Bench, known: Known, method: int, rad_s: float) -> Setup | Non
     return Setup(method, round(fast), slow, round(fast / RAMP_S) if in_counts else None)
 
 
-def explained(known: Known, method: int, plan: Plan, told: Mapping[int, int | None]) -> Iterator[str]:
-    """Yield what will happen, line by line; `told` are the drive's objects TOLD."""
+def explained(
+    known: HomingBasis, method: int, plan: HomingLimits, told: Mapping[int, int | None]
+) -> Iterator[str]:
+    """Yield the plan for the person, line by line; `told` are the drive's objects TOLD."""
     one, turn = METHODS[method], known.counts_per_turn
     yield f"What will happen, to the {words(known.joint)} ({known.axis}) alone:"
     yield f"  method {method}: the drive {one.words}; its position then counts as 607Ch says"

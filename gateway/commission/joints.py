@@ -14,7 +14,7 @@ from gateway.commission.dialogue import Say, Talk, choose, press, word
 from gateway.commission.dialogue import number as ask_number
 from gateway.commission.draft import Draft
 from gateway.commission.live import watched
-from gateway.commission.scale import Held, Nominal, Scale
+from gateway.commission.scale import HeldPose, Nominal, Scale
 
 USUAL = ("left_hip", "left_knee", "left_ankle", "right_hip", "right_knee", "right_ankle")
 CLEARLY = 10  # times as far as any other drive
@@ -170,7 +170,7 @@ def _ratio(bench: Bench, axis: Axis, index: int) -> float | None:
     return above / below if above and below and above != below else None
 
 
-def held(bench: Bench, joint: str, axis: Axis, where: str, near: int | None = None) -> Talk[Held]:
+def held(bench: Bench, joint: str, axis: Axis, where: str, near: int | None = None) -> Talk[HeldPose]:
     """Its counts unwrapped: each near the one before, the first near `near`."""
     while True:
         yield from unpowered(bench, [axis])
@@ -187,11 +187,11 @@ def held(bench: Bench, joint: str, axis: Axis, where: str, near: int | None = No
         found = [one for one in seen if one is not None]
         found = [nearest(one, found[0] if near is None else near) for one in found]
         if len(found) == len(seen) and max(found) - min(found) <= LEAST_MOVE:
-            return Held(math.radians(degrees), round(sum(found) / len(found)))
+            return HeldPose(math.radians(degrees), round(sum(found) / len(found)))
         yield Say("It moved while it was read, or has no position: once more.")
 
 
-def _settled(first: Held, second: Held, nominal: Nominal) -> Talk[Scale | None]:
+def _settled(first: HeldPose, second: HeldPose, nominal: Nominal) -> Talk[Scale | None]:
     """Return counts and gear that fit both the positions and the drive; `None` to measure again."""
     measured = scales.counts_per_turn(first, second)
     counts_per_revolution, ratio = nominal.counts_per_revolution, nominal.gear_ratio
@@ -221,7 +221,7 @@ def _settled(first: Held, second: Held, nominal: Nominal) -> Talk[Scale | None]:
     return scales.scale(first, second, counts_per_revolution, ratio)
 
 
-def _fits(found: Scale, second: Held) -> Talk[None]:
+def _fits(found: Scale, second: HeldPose) -> Talk[None]:
     """Warn of an encoder whose counter wraps near here: the gateway does not unwrap counts."""
     if not -HALF <= second.counts < HALF:
         yield Say(f"Its counter wraps around within the joint's way: {SET_ITS_ZERO}.")
@@ -230,7 +230,7 @@ def _fits(found: Scale, second: Held) -> Talk[None]:
         yield Say(f"It counts from a zero that is {turns:.0f} turns of the joint away: {SET_ITS_ZERO}.")
 
 
-def _keep(draft: Draft, joint: str, found: Scale, first: Held, second: Held) -> None:
+def _keep(draft: Draft, joint: str, found: Scale, first: HeldPose, second: HeldPose) -> None:
     one = table(joint)
     angles = f"{math.degrees(first.angle):g}° and {math.degrees(second.angle):g}°"
     share = abs(scales.counts_per_turn(first, second)) / (found.counts_per_revolution * found.gear_ratio)

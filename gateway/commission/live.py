@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from drivers.joint.cia402 import ENERGISED, DriveState
 from gateway.commission.axes import Axis, counts, nearest, state
 from gateway.commission.bench import Bench
-from gateway.commission.dialogue import Reading
+from gateway.commission.dialogue import DeviceReading
 
 POWERED, NOT_KNOWN = "UNDER POWER", "power not known"
 
@@ -16,7 +16,7 @@ def watched(
     axes: Sequence[Axis],
     before: Mapping[Axis, int | None] | None = None,
     angle: Callable[[int], float] | None = None,
-) -> tuple[Reading, ...]:
+) -> tuple[DeviceReading, ...]:
     """Each axis's power and counts, or how far it has counted since `before`. Raises `DriverError`."""
     return tuple(one for axis in axes for one in _axis(bench, axis, before, angle))
 
@@ -26,19 +26,19 @@ def _axis(
     axis: Axis,
     before: Mapping[Axis, int | None] | None,
     angle: Callable[[int], float] | None,
-) -> Sequence[Reading]:
+) -> Sequence[DeviceReading]:
     here = counts(bench, axis)
     name = str(axis)
     found = []
     if angle is not None:
-        found.append(Reading(name, None if here is None else round(math.degrees(angle(here)), 1), "°"))
+        found.append(DeviceReading(name, None if here is None else round(math.degrees(angle(here)), 1), "°"))
     if before is None:
-        found.append(Reading(name, here, "counts"))
+        found.append(DeviceReading(name, here, "counts"))
     else:
         was = before.get(axis)
         moved = None if here is None or was is None else nearest(here, was) - was
-        found.append(Reading(name, moved, "counts moved"))
-    return [*found, Reading(name, _power(bench, axis))]
+        found.append(DeviceReading(name, moved, "counts moved"))
+    return [*found, DeviceReading(name, _power(bench, axis))]
 
 
 def _power(bench: Bench, axis: Axis) -> str:

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import eds
 from drivers.errors import DriverError
-from drivers.scan.asking import Told
+from drivers.scan.asking import NodeAnswers
 from drivers.scan.products import Library
-from drivers.scan.scan import Found
+from drivers.scan.scan import ScanResult
 from eds import EdsError
 from eds.shipped import SHIPPED
 from gateway.commission.axes import POSITION, Axis, answered, axes_of, number
@@ -25,7 +25,7 @@ def table(node: int) -> str:
     return f"node.{node}"
 
 
-def scanned(bench: Bench) -> Talk[tuple[Found, dict[int, Told]]]:
+def scanned(bench: Bench) -> Talk[tuple[ScanResult, dict[int, NodeAnswers]]]:
     """All that answers; asked again until there is a drive."""
     while True:
         yield Say("Listening, then asking all 127 node ids what they are …")
@@ -41,7 +41,7 @@ def scanned(bench: Bench) -> Talk[tuple[Found, dict[int, Told]]]:
             yield Say(
                 f"Not asked, because somebody else asks them: {others}. End that program to commission them."
             )
-        answered = {node: told for node, told in found.told.items() if isinstance(told, Told)}
+        answered = {node: told for node, told in found.told.items() if isinstance(told, NodeAnswers)}
         if axes := axes_of(answered):
             drives = f"{len(axes)} drive" + "s" * (len(axes) > 1)
             if (yield from choose(f"{drives}. Are these all?", (ALL, AGAIN), ALL)) == ALL:
@@ -53,7 +53,7 @@ def scanned(bench: Bench) -> Talk[tuple[Found, dict[int, Told]]]:
         )
 
 
-def _line(node: int, told: Told | str) -> str:
+def _line(node: int, told: NodeAnswers | str) -> str:
     if isinstance(told, str):
         return f"  node {node}: {told}"
     serial = "" if told.serial_number is None else f", serial number {told.serial_number}"
@@ -61,7 +61,7 @@ def _line(node: int, told: Told | str) -> str:
     return f"  node {node}: {told.name or 'without a name'}{serial}{axes}"
 
 
-def role(draft: Draft, found: Found) -> Talk[None]:
+def role(draft: Draft, found: ScanResult) -> Talk[None]:
     """Who leads the bus; who was heard to lead it counts more than what was chosen before."""
     reasons = list(found.traffic.master())
     if reasons and draft.value("gateway", "role") != OBSERVER:
@@ -78,7 +78,7 @@ def role(draft: Draft, found: Found) -> Talk[None]:
     draft.put("gateway", "role", choice, "nobody was heard to lead the bus; chosen")
 
 
-def same_devices(draft: Draft, told: Mapping[int, Told]) -> Talk[None]:
+def same_devices(draft: Draft, told: Mapping[int, NodeAnswers]) -> Talk[None]:
     """Forget the findings of a node that is another device now (1018h), with its joints."""
     for node, one in sorted(told.items()):
         identity = [one.vendor_id, one.product_code, one.serial_number]
@@ -91,7 +91,7 @@ def same_devices(draft: Draft, told: Mapping[int, Told]) -> Talk[None]:
         draft.put(table(node), "identity", identity)
 
 
-def file_of(draft: Draft, library: Library, node: int, told: Told) -> Talk[None]:
+def file_of(draft: Draft, library: Library, node: int, told: NodeAnswers) -> Talk[None]:
     """Find the EDS for this device."""
     if draft.has(table(node), "eds"):
         return
@@ -111,7 +111,7 @@ def file_of(draft: Draft, library: Library, node: int, told: Told) -> Talk[None]
     draft.put(table(node), "eds", typed, "named by hand")
 
 
-def _called(node: int, told: Told) -> str:
+def _called(node: int, told: NodeAnswers) -> str:
     numbers = f"vendor {told.vendor_id or 0:#x}, product {told.product_code or 0:#x}"
     return f"Node {node} ({told.name or 'without a name'}, {numbers})"
 
@@ -157,7 +157,7 @@ def heartbeat(draft: Draft, bench: Bench, node: int) -> Talk[None]:
     draft.put(table(node), "heartbeat", HEARTBEAT_MS if yes else 0, how)
 
 
-def mapping(draft: Draft, bench: Bench, axis: Axis, told: Told, joint: str) -> Talk[None]:
+def mapping(draft: Draft, bench: Bench, axis: Axis, told: NodeAnswers, joint: str) -> Talk[None]:
     """Whether its position comes in a PDO; else whether the gateway may map it."""
     key = f"joint.{joint}"
     if draft.has(key, "configure_pdos"):

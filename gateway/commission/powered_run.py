@@ -32,7 +32,7 @@ OFF = LIMP_STATES  # what confirms that the axis has no power
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class PoweredRunResult:
     """What came of it. `off` is whether the drive has confirmed that it has no power."""
 
     problem: str | None
@@ -53,7 +53,7 @@ class NotStopped(Exception):
     """A drive has not confirmed that it is disabled."""
 
 
-class Ended(Exception):
+class RunEnded(Exception):
     """Why it must not go on."""
 
 
@@ -74,7 +74,7 @@ class PoweredRun:
         self._kept = time.monotonic()
         self._before: int | None = None
         self._after: int | None = None
-        self._outcome = Outcome("it was not begun", off=True, state="not asked for anything")
+        self._outcome = PoweredRunResult("it was not begun", off=True, state="not asked for anything")
         self._thread = threading.Thread(target=self._run, name=self.name, daemon=False)
 
     @property
@@ -96,7 +96,7 @@ class PoweredRun:
         """End it now; the first reason counts."""
         self._why = self._why or why
 
-    def end(self) -> Outcome:
+    def end(self) -> PoweredRunResult:
         """Stop it where it goes on, and wait until the drive is disabled, or did not confirm that in time."""
         while True:
             try:
@@ -111,7 +111,7 @@ class PoweredRun:
 
     def _run(self) -> None:
         problem: str | None = "internal error"
-        self._outcome = Outcome(problem, off=False, state="not read")
+        self._outcome = PoweredRunResult(problem, off=False, state="not read")
         mode: bytes | None = None
         try:
             mode = self._wait(self._power.drive.ask(homing.mode_of))
@@ -120,7 +120,7 @@ class PoweredRun:
             self._enable()
             self._act()
             problem = None
-        except (Ended, DriverError) as error:
+        except (RunEnded, DriverError) as error:
             problem = str(error)
         except Exception as error:  # noqa: BLE001 - whatever it is, the drive is stopped
             problem = f"internal error: {type(error).__name__}: {error}"
@@ -129,10 +129,10 @@ class PoweredRun:
             if off and mode is not None:
                 left = (self._leave(mode), self._restore())
                 problem = "; ".join(one for one in (problem, *left) if one) or None
-            self._outcome = Outcome(problem, off, state, self._before, self._after)
+            self._outcome = PoweredRunResult(problem, off, state, self._before, self._after)
 
     def _set_up(self) -> None:
-        """Write what it rests on, while the drive has no power."""
+        """Write the prerequisites, while the drive has no power."""
         raise NotImplementedError
 
     def _act(self) -> None:
@@ -144,19 +144,19 @@ class PoweredRun:
         return None
 
     def _ready(self) -> None:
-        """Whether the way up may be begun; raises `Ended`."""
+        """Whether the way up may be begun; raises `RunEnded`."""
         led = self._wait(self._power.drive.look())
         if led.problem is not None:
-            raise Ended(led.problem)
+            raise RunEnded(led.problem)
         if led.state not in WAY_UP:
-            raise Ended(f"the drive is in {'no known state' if led.state is None else led.state.words}")
+            raise RunEnded(f"the drive is in {'no known state' if led.state is None else led.state.words}")
 
     def _enable(self) -> None:
         """Enable the drive: one transition at a time, each confirmed, as long as nothing prevents it."""
         for origin in WAY_UP:
             led = self._wait(self._power.drive.step_up(origin, self._wanted, self.still_in))
             if led.problem is not None:
-                raise Ended(f"the drive could not be enabled: {led.problem} (is its STO released?)")
+                raise RunEnded(f"the drive could not be enabled: {led.problem} (is its STO released?)")
 
     def _error_code(self) -> str:
         try:
@@ -218,7 +218,7 @@ class PoweredRun:
 
     def _check(self) -> None:
         if (why := self._objection()) is not None:
-            raise Ended(why)
+            raise RunEnded(why)
         self._power.heartbeat.feed()
 
     def _wait(self, future: "Future[T]") -> T:

@@ -10,7 +10,7 @@ from gateway.commission.draft import Draft
 ROBOT, END = "robot", "sensors and file"  # parts that are no joint
 
 
-class State(StrEnum):
+class StepState(StrEnum):
     """Of a step."""
 
     DONE = "done"  # what it finds is in the draft
@@ -70,12 +70,12 @@ LAST: Mapping[str, tuple[str, Has | None]] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class CommissionStep:
     """One step as a face shows it."""
 
     part: str
     title: str
-    state: State
+    state: StepState
 
 
 class Progress:
@@ -93,9 +93,11 @@ class Progress:
         """Report that the file is written."""
         self._is_at_end = True
 
-    def steps(self) -> tuple[Step, ...]:
+    def steps(self) -> tuple[CommissionStep, ...]:
         """All that are known by now: joints are once they have names."""
-        return tuple(Step(where.part, title, self._state(where, has)) for where, title, has in self._all())
+        return tuple(
+            CommissionStep(where.part, title, self._state(where, has)) for where, title, has in self._all()
+        )
 
     def _all(self) -> Iterator[tuple[At, str, Has | None]]:
         joints: list[str] = self._draft.value("robot", "joints", [])
@@ -103,13 +105,13 @@ class Progress:
             for name, (title, has) in table.items():
                 yield At(part, name), title, has
 
-    def _state(self, where: At, has: Has | None) -> State:
+    def _state(self, where: At, has: Has | None) -> StepState:
         if self._seen and self._seen[-1] == where and not self._is_at_end:
-            return State.NOW
+            return StepState.NOW
         is_past = self._is_at_end or where in self._seen or self._is_behind(where)
         if is_past if has is None else has(self._draft, where.part):
-            return State.DONE
-        return State.PASSED if is_past else State.NEXT
+            return StepState.DONE
+        return StepState.PASSED if is_past else StepState.NEXT
 
     def _is_behind(self, where: At) -> bool:
         """Whether a later part was begun already."""

@@ -10,7 +10,7 @@ WHOLE = 0.02  # a ratio that is so near to a whole number is that number
 
 
 @dataclass(frozen=True, slots=True)
-class Held:
+class HeldPose:
     """A joint held still: the angle that was told (rad) and what its encoder counts."""
 
     angle: float
@@ -35,7 +35,7 @@ class Scale:
     zero_offset: float
 
 
-def problem(first: Held, second: Held) -> str | None:
+def problem(first: HeldPose, second: HeldPose) -> str | None:
     """Why these two say nothing."""
     if abs(second.angle - first.angle) < LEAST_RAD:
         return f"the two angles must differ by {math.degrees(LEAST_RAD):g}° or more"
@@ -47,7 +47,7 @@ def problem(first: Held, second: Held) -> str | None:
     return None
 
 
-def counts_per_turn(first: Held, second: Held) -> float:
+def counts_per_turn(first: HeldPose, second: HeldPose) -> float:
     """Of the joint, as measured; negative where counts fall while the angle rises."""
     return (second.counts - first.counts) / (second.angle - first.angle) * math.tau
 
@@ -60,7 +60,7 @@ def disagreement(measured: float, nominal: Nominal) -> float | None:
     return None if abs(ratio - 1) <= AGREES else ratio
 
 
-def scale(first: Held, second: Held, counts_per_revolution: float, gear_ratio: float) -> Scale:
+def scale(first: HeldPose, second: HeldPose, counts_per_revolution: float, gear_ratio: float) -> Scale:
     """Return the scale with these; its direction and zero are those of the two positions."""
     direction = 1 if counts_per_turn(first, second) > 0 else -1
     per_count = direction * math.tau / (counts_per_revolution * gear_ratio)
@@ -81,7 +81,7 @@ def near(scale: Scale) -> bool:
 
 
 def counts_at_zero(scale: Scale) -> int:
-    """Return what its encoder counts where the joint's angle is 0."""
+    """Return the encoder's count at the joint's angle 0."""
     per_count = scale.direction * math.tau / (scale.counts_per_revolution * scale.gear_ratio)
     return round(-scale.zero_offset / per_count)
 

@@ -16,7 +16,7 @@ from drivers.insole.device import layout_of, line_for
 from drivers.insole.formats import FORMATS as INSOLES
 from drivers.insole.frame import InsoleFrame
 from drivers.insole.settings import InsoleSettings
-from drivers.samples import State
+from drivers.samples import ComponentState
 from gateway.commission.sensors import Sensor
 
 LOOK_S = 3.0
@@ -55,7 +55,7 @@ class SerialPorts:
             ups = device.ups_as_mounted()
         finally:
             device.stop()
-        if quality.state is not State.OK or not ups:
+        if quality.state is not ComponentState.OK or not ups:
             raise Unavailable(quality.problem or f"{imu.port}: no attitude has come")
         x, y, z = (sum(part) / len(ups) for part in zip(*ups, strict=True))
         return x, y, z

@@ -5,7 +5,7 @@ What the draft has is not asked again: a dialogue that was interrupted goes on w
 
 from collections.abc import Sequence
 
-from drivers.scan.asking import Told
+from drivers.scan.asking import NodeAnswers
 from drivers.scan.products import Library
 from gateway.commission import joints, nodes
 from gateway.commission.axes import Axis, axes_of
@@ -58,7 +58,9 @@ def commission(
     yield At(END, "file")
 
 
-def _joint(draft: Draft, bench: Bench, library: Library, joint: str, axis: Axis, told: Told) -> Talk[None]:
+def _joint(
+    draft: Draft, bench: Bench, library: Library, joint: str, axis: Axis, told: NodeAnswers
+) -> Talk[None]:
     yield At(joint, "file")
     yield from nodes.file_of(draft, library, axis.node, told)
     yield At(joint, "heartbeat")

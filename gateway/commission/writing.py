@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from gateway.commission.controller import CONTROLLER
-from gateway.commission.draft import Draft, Found
+from gateway.commission.draft import Draft, DraftValue
 
 HEAD = """\
 # {robot}, commissioned {when} by {who}. Quantities are SI: rad, m, s, N·m.
@@ -61,7 +61,7 @@ def unfinished(draft: Draft) -> tuple[str, ...]:
 
 
 def _tables(draft: Draft) -> Iterator[str]:
-    yield from _table("robot", {"name": Found(draft.value("robot", "name"))})
+    yield from _table("robot", {"name": DraftValue(draft.value("robot", "name"))})
     yield from _table("gateway", draft.tables.get("gateway", {}))
     yield from _table("can.main", draft.tables["can.main"])
     for joint in draft.value("robot", "joints"):
@@ -81,22 +81,26 @@ def _controller(draft: Draft) -> Iterator[str]:
     """Who commands the drives, and what stops it."""
     if draft.value(CONTROLLER, "value") is not None:
         node = draft.value(CONTROLLER, "node_id")
-        device = {"bus": Found("main"), "node_id": Found(node), "eds": draft.tables[f"node.{node}"]["eds"]}
+        device = {
+            "bus": DraftValue("main"),
+            "node_id": DraftValue(node),
+            "eds": draft.tables[f"node.{node}"]["eds"],
+        }
         stop = {key: draft.tables[CONTROLLER][key] for key in ("object", "value")}
         yield from _table(CONTROLLER, device)
         yield "[[stop.controller]]"
-        yield from list(_table("", {"component": Found(CONTROLLER.partition(".")[2]), **stop}))[1:]
+        yield from list(_table("", {"component": DraftValue(CONTROLLER.partition(".")[2]), **stop}))[1:]
 
 
-def _joint(draft: Draft, joint: str, node: int) -> Mapping[str, Found]:
+def _joint(draft: Draft, joint: str, node: int) -> Mapping[str, DraftValue]:
     found = dict(draft.tables[f"joint.{joint}"])
-    heart = draft.tables.get(f"node.{node}", {}).get("heartbeat", Found(None))
+    heart = draft.tables.get(f"node.{node}", {}).get("heartbeat", DraftValue(None))
     return {
-        "bus": Found("main"),
+        "bus": DraftValue("main"),
         "node_id": found.pop("node_id"),
         "eds": draft.tables[f"node.{node}"]["eds"],
         **{key: one for key, one in found.items() if key != "axis" or one.value},
-    } | ({} if heart.how == "" else {"#": Found(None, f"heartbeat: {heart.value} {heart.how}")})
+    } | ({} if heart.how == "" else {"#": DraftValue(None, f"heartbeat: {heart.value} {heart.how}")})
 
 
 def _guard(draft: Draft) -> Iterator[str]:
@@ -104,18 +108,18 @@ def _guard(draft: Draft) -> Iterator[str]:
     for table in sorted(draft.tables):
         if table.startswith("guard.rule."):
             joint = table.removeprefix("guard.rule.").removesuffix("_range")
-            fixed = {"watch": Found("joint_limit"), "on": Found([joint])}
-            yield from _table(table, fixed | draft.tables[table] | {"actions": Found(["alarm"])})
+            fixed = {"watch": DraftValue("joint_limit"), "on": DraftValue([joint])}
+            yield from _table(table, fixed | draft.tables[table] | {"actions": DraftValue(["alarm"])})
 
 
-def _table(name: str, keys: Mapping[str, Found]) -> Iterator[str]:
+def _table(name: str, keys: Mapping[str, DraftValue]) -> Iterator[str]:
     yield f"[{name}]"
     for key, found in keys.items():
         yield f"# {_plain(found.how)}" if key == "#" else line(key, found)
     yield ""
 
 
-def line(key: str, found: Found) -> str:
+def line(key: str, found: DraftValue) -> str:
     """Return a value with its comment, beside it or above."""
     value = f"{key} = {_value(found.value)}"
     if not found.how:

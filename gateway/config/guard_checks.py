@@ -11,9 +11,9 @@ from gateway.config.guard import ALARMS, TABLES, WATCHES, GuardSettings
 from gateway.config.guard_rules import (
     SIDED,
     EmcyRule,
+    GuardRule,
     InputRule,
     RangeRule,
-    Rule,
     SymmetryRule,
     SyncRule,
     bit_words,
@@ -97,7 +97,7 @@ def _about_heartbeat(config: RobotConfig) -> Iterator[Finding]:
             yield Finding(f"[can.{name}]", "heartbeat_s", text)
 
 
-def _about_numbers(where: str, rule: Rule) -> Iterator[Finding]:
+def _about_numbers(where: str, rule: GuardRule) -> Iterator[Finding]:
     numbers = {key: getattr(rule, key) for key in rule.__struct_fields__}
     hysteresis, above = (numbers.get(key) for key in ("hysteresis", "above"))
     if hysteresis is not None and above is not None and hysteresis >= above:
@@ -105,8 +105,8 @@ def _about_numbers(where: str, rule: Rule) -> Iterator[Finding]:
 
 
 @singledispatch
-def _about(_rule: Rule, _where: str, _config: RobotConfig) -> Iterator[Finding]:
-    """Yield what is wrong with the keys of this kind of rule."""
+def _about(_rule: GuardRule, _where: str, _config: RobotConfig) -> Iterator[Finding]:
+    """Yield the mistakes in the keys of this kind of rule."""
     yield from ()
 
 
@@ -163,7 +163,7 @@ def _symmetry(rule: SymmetryRule, where: str, config: RobotConfig) -> Iterator[F
             yield Finding(where, key, text)
 
 
-def _about_components(config: RobotConfig, where: str, rule: Rule) -> Iterator[Finding]:
+def _about_components(config: RobotConfig, where: str, rule: GuardRule) -> Iterator[Finding]:
     kinds = WATCHES[rule.watch].kinds
     known = config.names(*(TABLES[kind] for kind in kinds))
     what = " or ".join(kinds)

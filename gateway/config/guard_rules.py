@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta, Struct
 
-from drivers.component import Kind
+from drivers.component import ComponentKind
 
 UNIT = "{unit}"  # in a key's words: the unit of what is watched
 _CODES = "how they begin, `0x2` current, `0x23`, `0x2310`; without, any"
@@ -32,13 +32,13 @@ BitName = Annotated[str, Meta(pattern=rf"^({'|'.join(INPUTS)}|0x[0-9A-Fa-f]{{1,8
 Bits = Annotated[tuple[BitNumber | BitName, ...], Meta(description=_BITS)]
 
 # What left and right can be compared by: where there is such a channel, and its unit.
-SIDED: Mapping[str, tuple[Kind, str]] = {
-    "position": (Kind.JOINT, "rad"),
-    "velocity": (Kind.JOINT, "rad/s"),
-    "torque": (Kind.JOINT, "N·m"),
-    "current": (Kind.JOINT, "A"),
-    "force": (Kind.INSOLE, "N"),
-    "load_share": (Kind.INSOLE, ""),
+SIDED: Mapping[str, tuple[ComponentKind, str]] = {
+    "position": (ComponentKind.JOINT, "rad"),
+    "velocity": (ComponentKind.JOINT, "rad/s"),
+    "torque": (ComponentKind.JOINT, "N·m"),
+    "current": (ComponentKind.JOINT, "A"),
+    "force": (ComponentKind.INSOLE, "N"),
+    "load_share": (ComponentKind.INSOLE, ""),
 }
 
 
@@ -58,7 +58,7 @@ class Blind(StrEnum):
     ACT = "act"  # as if it had tripped
 
 
-class Rule(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class GuardRule(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """What every rule has. `on` are globs of components; without them, all that have what is watched."""
 
     watch: str
@@ -68,11 +68,11 @@ class Rule(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     clear_s: Positive = 1.0  # how long all must be well again before it is over
 
     def words(self, unit: str, /) -> str:
-        """Return what makes it trip, where `unit` is that of what is watched."""
+        """Return the condition on which it trips; `unit` is that of the watched quantity."""
         raise NotImplementedError
 
 
-class LevelRule(Rule, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class LevelRule(GuardRule, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Trips where a magnitude, in either direction, is `above` this for `for_s`.
 
     It is over when the magnitude is `hysteresis` below that.
@@ -90,7 +90,7 @@ class LatencyRule(LevelRule, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     """The same for the time that a node takes to answer; no answer is above everything."""
 
 
-class RangeRule(Rule, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class RangeRule(GuardRule, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Trips where a value is below `min` or above `max` for `for_s`."""
 
     min: Bound = None
@@ -116,7 +116,7 @@ class StoppingRule(RangeRule, frozen=True, forbid_unknown_fields=True, kw_only=T
         return f"at rest only {super().words(unit)}, {braking}{after}"
 
 
-class HeatRule(Rule, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class HeatRule(GuardRule, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """I²t: trips where the mean of (current or torque / `rated`)² over the time constant is `above` this.
 
     The mean is a leaky integrator; 1 is what `rated`, held for ever, comes to.
@@ -133,7 +133,7 @@ class HeatRule(Rule, frozen=True, forbid_unknown_fields=True, kw_only=True):
         return f"mean of ({self.of} / {rated})² over {self.time_constant_s:g} s above {self.above:g}"
 
 
-class SilenceRule(Rule, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class SilenceRule(GuardRule, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Trips after a silence of `silent_s`; without it, of the time that the component's own table allows."""
 
     silent_s: Positive | None = None
@@ -142,7 +142,7 @@ class SilenceRule(Rule, frozen=True, forbid_unknown_fields=True, kw_only=True):
         return "silent" if self.silent_s is None else f"silent for {self.silent_s:g} s"
 
 
-class EmcyRule(Rule, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class EmcyRule(GuardRule, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Trips at an emergency message whose code begins so: `0x2` current, `0x23`, `0x2310`; without, any."""
 
     codes: Annotated[tuple[CodePrefix, ...], Meta(min_length=1, description=_CODES)] | None = None
@@ -151,7 +151,7 @@ class EmcyRule(Rule, frozen=True, forbid_unknown_fields=True, kw_only=True):
         return "any EMCY" if self.codes is None else f"EMCY {', '.join(self.codes)}"
 
 
-class InputRule(Rule, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class InputRule(GuardRule, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Trips where a bit is not as it must be, for `for_s`; `name` is what people call that."""
 
     name: Annotated[str, Meta(min_length=1, description="what people call it")] | None = None
@@ -165,7 +165,7 @@ class InputRule(Rule, frozen=True, forbid_unknown_fields=True, kw_only=True):
         return (mask(self.must_be_set) & ~now) | (mask(self.must_be_clear) & now)
 
     def says(self, wrong: float) -> str:
-        """Return what it means that these bits are wrong."""
+        """Return the meaning of these wrong bits."""
         bits = int(wrong)
         found = ((mask(self.must_be_set) & bits, "clear"), (mask(self.must_be_clear) & bits, "set"))
         told = "; ".join(f"{bit_words(some)} {state}" for some, state in found if some)
@@ -175,7 +175,7 @@ class InputRule(Rule, frozen=True, forbid_unknown_fields=True, kw_only=True):
         return f"{self.says(mask(self.must_be_set) | mask(self.must_be_clear))}{_for(self.for_s)}"
 
 
-class BusRule(Rule, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class BusRule(GuardRule, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Trips where a bus is gone or silent, or its controller all but takes part no more."""
 
     silent_s: Positive = 0.5
@@ -184,7 +184,7 @@ class BusRule(Rule, frozen=True, forbid_unknown_fields=True, kw_only=True):
         return f"error passive, bus off, gone, or silent for {self.silent_s:g} s"
 
 
-class SyncRule(Rule, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class SyncRule(GuardRule, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Trips where SYNC comes more than `tolerance_s` after its time."""
 
     period_s: Positive
@@ -199,7 +199,7 @@ class SyncRule(Rule, frozen=True, forbid_unknown_fields=True, kw_only=True):
         return f"no SYNC for {self.longest_s:g} s"
 
 
-class SymmetryRule(Rule, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class SymmetryRule(GuardRule, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Trips where `left` and `right` differ by more than `above` for `for_s`, over a window of strides."""
 
     left: str
@@ -220,7 +220,7 @@ class SymmetryRule(Rule, frozen=True, forbid_unknown_fields=True, kw_only=True):
         return f"{differ} {with_unit(self.above, self.unit)}{_for(self.for_s)}"
 
 
-class DriftRule(Rule, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class DriftRule(GuardRule, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Trips each time that a joint has moved by more than `above`, from `settle_s` after a stop on."""
 
     above: Above

@@ -110,7 +110,7 @@ class _Reading:
         self._lost: dict[str, frozenset[str]] = {}
 
     def config(self, path: Path, document: Table) -> RobotConfig | None:
-        """Return what can be made of it; `None` where that is no robot at all."""
+        """Return the valid parts of the file; `None` if it describes no robot at all."""
         self._decoding.tables(document, TABLES)
         if "robot" not in document:
             self._decoding.complain("[robot]", "", 'is missing: write [robot] and below it name = "…"')

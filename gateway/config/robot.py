@@ -15,7 +15,7 @@ from drivers.bus.settings import (
     Role,
     address_of,
 )
-from drivers.component import Kind
+from drivers.component import ComponentKind
 from drivers.imu.settings import CanImuSettings, ImuSettings, MountedSettings, NodeImuSettings
 from drivers.insole.settings import InsoleSettings
 from drivers.joint.settings import JointSettings
@@ -30,7 +30,7 @@ OnPort = InsoleSettings | ImuSettings
 OnBus = JointSettings | DeviceSettings | CanImuSettings | NodeImuSettings
 
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
-COMPONENT_TABLES = tuple(Kind)  # each kind by its name
+COMPONENT_TABLES = tuple(ComponentKind)  # each kind by its name
 
 
 class RobotSettings(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -161,7 +161,7 @@ class RobotConfig(Struct, frozen=True, kw_only=True):
         return tuple(name for name in self.sharing(component) if name in self.joint) or tuple(self.joint)
 
     def channels_of(self, component: str) -> dict[str, ChannelSettings]:
-        """Return what `[channel."COMPONENT.NAME"]` adds to a joint or device, by the names after the dot."""
+        """Return the tables `[channel."COMPONENT.NAME"]` of a joint or device, by the names after the dot."""
         whole = ((name.partition("."), one) for name, one in self.channel.items())
         return {quantity: one for (owner, _, quantity), one in whole if owner == component}
 
@@ -174,7 +174,7 @@ class RobotConfig(Struct, frozen=True, kw_only=True):
 
     def on_ports(self) -> Iterator[tuple[str, OnPort]]:
         """Every table of a sensor on a serial port, with its header."""
-        for table in (Kind.INSOLE, Kind.IMU):
+        for table in (ComponentKind.INSOLE, ComponentKind.IMU):
             for name, settings in getattr(self, table).items():
                 if isinstance(settings, OnPort):
                     yield header(table, name), settings

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 from gateway.access.folder import AccessFolder
 from gateway.access.identity import ANYBODY, Identity
-from gateway.connections.doors import Kind, Stream, has_keys_at_start, kind_of
 from gateway.connections.intake import Admit, Came
+from gateway.connections.listener_kind import ListenerKind, Stream, has_keys_at_start, kind_of
 from gateway.wire import framing
 
 if TYPE_CHECKING:
     from gateway.access.identity import Peer
-    from gateway.access.known import Access, Known
+    from gateway.access.known import Access, KnownClients
     from gateway.connections.accounts import Accounts
     from gateway.connections.handshakes import Handshakes
 
@@ -23,7 +23,7 @@ STRANGER = "is a user whom this robot does not know"
 
 
 class Authentication:
-    """The doors of one gateway. What keys need is imported only where a door needs it."""
+    """Authentication at the listeners of one gateway. Code for keys is imported only if needed."""
 
     def __init__(
         self,
@@ -37,7 +37,7 @@ class Authentication:
         """`complain` of an address, and `finished` after each handshake, are called in any thread.
 
         Raises:
-            DoorProblem: nobody may come in at one of these sockets.
+            UnsafeListener: one of these sockets must not be served.
             KeyProblem: the robot's key cannot be used.
 
         """
@@ -49,9 +49,13 @@ class Authentication:
         self._admit: Admit = _nobody
         self.has_keys = has_keys_at_start(now=folder.has_keys, rested_without=rested_without_keys)
         kinds = {one: kind_of(one, has_keys=self.has_keys) for one in listeners}
-        self._handshakes = self._made(finished) if Kind.TLS in kinds.values() else None
-        came = {Kind.PLAIN: self._came_plainly, Kind.TLS: self._came_for_tls, Kind.UNIX: self._came_locally}
-        self.doors: Mapping[socket.socket, Came] = {one: came[kind] for one, kind in kinds.items()}
+        self._handshakes = self._made(finished) if ListenerKind.TLS in kinds.values() else None
+        came = {
+            ListenerKind.PLAIN: self._came_plainly,
+            ListenerKind.TLS: self._came_for_tls,
+            ListenerKind.UNIX: self._came_locally,
+        }
+        self.listeners: Mapping[socket.socket, Came] = {one: came[kind] for one, kind in kinds.items()}
 
     def _made(self, finished: Callable[[], object]) -> "Handshakes":
         from gateway.connections.handshakes import Handshakes
@@ -59,13 +63,13 @@ class Authentication:
         return Handshakes(self._access, self._let_in, self._complain, finished)
 
     def start(self, admit: Admit) -> None:
-        """From now on, `admit` is called with whoever is let in."""
+        """Start; `admit` is called with every admitted client."""
         self._admit = admit
         if self._handshakes is not None:
             self._handshakes.start()
 
     def end(self) -> None:
-        """Join what was started."""
+        """Join the threads that were started."""
         if self._accounts is not None:
             self._accounts.end()
         if self._handshakes is not None:
@@ -73,17 +77,17 @@ class Authentication:
 
     @property
     def busy(self) -> bool:
-        """Whether somebody is at a door, and neither in nor gone yet."""
+        """Whether a client is being authenticated."""
         parts = (self._handshakes, self._accounts)
         return any(part is not None and part.busy for part in parts)
 
-    def known(self) -> "Known":
-        """Everybody who may come in, as the files say now."""
+    def known(self) -> "KnownClients":
+        """Return all clients that the files admit now."""
         return self._access.now()
 
     @property
     def _asked_for(self) -> "Accounts":
-        """For who comes locally; in the thread that accepts."""
+        """The accounts of local clients; for the thread that accepts."""
         if self._accounts is None:
             from gateway.connections.accounts import Accounts
 
@@ -131,7 +135,7 @@ class Authentication:
     def _refuse(self, connection: socket.socket, whom: str) -> None:
         """Refuse an unlisted user of the robot, with a message."""
         why = f"{whom} {STRANGER}: [users] or [groups] of {self._folder.table} may name it"
-        line = framing.encode_error(None, framing.refuse(framing.Kind.NOT_ALLOWED, why))
+        line = framing.encode_error(None, framing.refuse(framing.ErrorKind.NOT_ALLOWED, why))
         with connection:
             try:
                 connection.send(line)

@@ -90,4 +90,4 @@ def _one_silent_leaves(clients: Iterable[Session]) -> bool:
 
 def _refusal(what: str) -> framing.RpcError:
     most = f"{CLIENTS} clients are connected, or {CLIENTS_OF_ONE_ADDRESS} of your address, which is the most"
-    return framing.refuse(framing.Kind.UNAVAILABLE, f"{most}; {what}")
+    return framing.refuse(framing.ErrorKind.UNAVAILABLE, f"{most}; {what}")

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from concurrent.futures import Future
 
 from gateway.access.identity import Identity
-from gateway.connections.doors import Stream
+from gateway.connections.listener_kind import Stream
 from gateway.connections.pace import COSTLY_NS, FLOOD_S, Account, Pace
 from gateway.connections.stop_lines import StopSplitter
 from gateway.process.loop import HANGUP, READ, Loop, Timer
@@ -28,7 +28,7 @@ LAST_READS = 16  # of a connection that ends: a stop may still be in it …
 LAST_NS = 1_000_000  # … which is looked for so long
 
 _TOO_MANY = framing.refuse(
-    framing.Kind.UNAVAILABLE,
+    framing.ErrorKind.UNAVAILABLE,
     "too many requests wait; this one is not done: ask again when some have been answered",
 )
 
@@ -39,7 +39,7 @@ _BEGINNINGS = frozenset(b"{[ \t\"'")
 _NOTHING_YET = b"\r\n\0"  # of these UTF-16 and UTF-32 have the last before the first letter
 
 
-class Heard:
+class ReceivedBytes:
     """What one read has brought, on its way to the loop."""
 
     __slots__ = ("cpu_ns", "ended", "lines", "lost", "refusals", "stamp_ns", "stop", "stopped", "stops")
@@ -81,7 +81,7 @@ class IncomingBytes:
         self.identity = identity
         self.who = identity.called(peer)  # how the journal calls it
         self.received_bytes = self.unanswered = 0
-        self.receiver: Callable[[Heard], object] = bool  # in the loop; set before anything is heard
+        self.receiver: Callable[[ReceivedBytes], object] = bool  # in the loop; set before anything is heard
         self._front = front
         self._loop = loop
         self._stop_now = stop_now
@@ -117,7 +117,7 @@ class IncomingBytes:
     # In the intake's thread.
 
     def finish(self) -> None:
-        """Read what is there, for the stops in it, and close; idempotent."""
+        """Read the remaining bytes, for the stops in them, and close; idempotent."""
         if self._closed:
             return
         if not self._ended:
@@ -155,7 +155,7 @@ class IncomingBytes:
     def _on_ready(self, events: int) -> None:
         if self._ended:
             if events & HANGUP:
-                self._end("it has gone", Heard())
+                self._end("it has gone", ReceivedBytes())
         elif self._is_known and self._pace.has_time_for_known():
             self._receive(RECEIVE_BYTES)
         else:
@@ -211,7 +211,7 @@ class IncomingBytes:
         if not self._began:
             self._began = bool(begin := data.lstrip(_NOTHING_YET))
             if self._began and begin[0] not in _BEGINNINGS and begin[0] < 0x80:
-                self._end(FOREIGN, Heard())
+                self._end(FOREIGN, ReceivedBytes())
                 return True
         self.received_bytes += len(data)
         lines = self._splitter.feed(data)
@@ -246,7 +246,7 @@ class IncomingBytes:
         self._pace.resting -= self._rests
         self._rests = False
 
-    def _end(self, lost: str | None, heard: Heard) -> None:
+    def _end(self, lost: str | None, heard: ReceivedBytes) -> None:
         """End the client's input, or the client: `lost` says why."""
         self._ended = heard.ended = True
         self._wake()
@@ -261,7 +261,7 @@ class IncomingBytes:
             if self._pending is not None and self._pending():
                 self._front.post(self._look_again)
 
-    def _hand_over(self, heard: Heard) -> None:
+    def _hand_over(self, heard: ReceivedBytes) -> None:
         heard.cpu_ns = self._account.take_spent_ns()
         self._loop.post(lambda: self.receiver(heard))
 
@@ -277,8 +277,8 @@ class IncomingBytes:
         """Whether the loop keeps up, so that it can be given what is no request."""
         return self._handed - self._done < QUEUED_LINES + ON_THE_WAY
 
-    def _sorted(self, lines: list[framing.Line]) -> Heard:
-        heard = Heard()
+    def _sorted(self, lines: list[framing.Line]) -> ReceivedBytes:
+        heard = ReceivedBytes()
         newest = next((one for one in reversed(lines) if isinstance(one, framing.StopRequest)), None)
         if newest is not None:
             heard.stop, heard.stopped = newest, self._stop(newest)

@@ -1,6 +1,6 @@
-"""Where clients come in: a thread that accepts them, and reads all of them.
+"""The thread that accepts clients and reads from all of them.
 
-Whatever the main loop is doing, hung or busy, a stop goes from here to the drives.
+Even if the main loop hangs or is busy, a stop goes from here to the drives.
 """
 
 import socket
@@ -13,31 +13,31 @@ from typing import Any
 from drivers.realtime_priority import make_realtime
 from gateway.access.identity import Identity
 from gateway.connections.acceptor import Acceptor
-from gateway.connections.doors import Stream
 from gateway.connections.incoming_bytes import IncomingBytes, StopNow
+from gateway.connections.listener_kind import Stream
 from gateway.connections.pace import Pace
 from gateway.process.loop import Loop
 
-Admit = Callable[[Stream, str, Identity], object]  # lets somebody in, with whence they come
-Came = Callable[[socket.socket, Any], object]  # somebody at a door, with their address
+Admit = Callable[[Stream, str, Identity], object]  # admits a client, with its address
+Came = Callable[[socket.socket, Any], object]  # takes a new client, with its address
 
 # Whether the peer is still there: asked by the kernel after 10 s of silence, given up after 15 s more.
 _KEEPALIVE = {"TCP_KEEPIDLE": 10, "TCP_KEEPINTVL": 5, "TCP_KEEPCNT": 3, "TCP_USER_TIMEOUT": 25_000}
 
 
 class Intake:
-    """The thread, and the doors. `opened` is called in the loop with each client that is let in."""
+    """The accepting thread and its listeners. `opened` is called in the loop with each admitted client."""
 
     def __init__(
         self,
         loop: Loop,
-        doors: Mapping[socket.socket, Came],
+        listeners: Mapping[socket.socket, Came],
         opened: Callable[[IncomingBytes], None],
         stop_now: Callable[[], StopNow | None],
     ) -> None:
-        """`stop_now` gives what carries out a stop at once, from any thread, where there is something.
+        """`stop_now` returns the function that stops at once, from any thread, if there is one.
 
-        `doors` says of each listening socket what is called, in the thread, with who comes there.
+        `listeners` maps each listening socket to the function that takes its new clients, in the thread.
         """
         self._loop = loop
         self._front = Loop()
@@ -47,7 +47,7 @@ class Intake:
         self._spent_ns = 0
         self._pace = Pace(self._front)
         self._acceptors = [
-            Acceptor(self._front, one, partial(self._came, came)) for one, came in doors.items()
+            Acceptor(self._front, one, partial(self._came, came)) for one, came in listeners.items()
         ]
         self._thread = threading.Thread(target=self._run, name="intake")
 
@@ -58,11 +58,11 @@ class Intake:
         self._thread.start()
 
     def admit(self, connection: Stream, peer: str, identity: Identity) -> None:
-        """Let somebody in; from any thread."""
+        """Admit a client; from any thread."""
         self._front.post(lambda: self._admit(connection, peer, identity))
 
     def listen(self, *, on: bool, then: Callable[[], object] = lambda: None) -> None:
-        """Accept, or accept nobody more; `then` runs in the loop once everybody accepted so far is there."""
+        """Accept clients, or stop accepting; `then` runs in the loop after all accepted so far."""
 
         def change() -> None:
             for one in self._acceptors:
@@ -72,7 +72,7 @@ class Intake:
         self._front.post(change)
 
     def shut(self) -> None:
-        """Accept nobody more, from now on: returns when that is so."""
+        """Stop accepting, and return once that is done."""
         shut = threading.Event()
         self._front.post(lambda: self._shut(shut))
         shut.wait()
@@ -100,7 +100,7 @@ class Intake:
         self._front.stop()
 
     def _spent(self) -> int:
-        """Return what the thread has worked since the last call: for the client it has worked for, in ns."""
+        """Return the thread's CPU time since the last call, in ns: the work for one client."""
         before_ns, self._spent_ns = self._spent_ns, time.thread_time_ns()
         return self._spent_ns - before_ns
 

@@ -54,7 +54,7 @@ class Account:
         return spent_ns
 
     def settle(self) -> int:
-        """Return what is owed by now: while it costs nothing, that is forgotten."""
+        """Return the present debt; while it costs nothing, it is forgotten."""
         self._owe(0)
         return self.owed_ns
 

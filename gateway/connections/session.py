@@ -16,7 +16,7 @@ from typing import Concatenate, ParamSpec, Protocol
 import msgspec
 from msgspec import UNSET, UnsetType
 
-from gateway.connections.incoming_bytes import FOREIGN, Heard, IncomingBytes
+from gateway.connections.incoming_bytes import FOREIGN, IncomingBytes, ReceivedBytes
 from gateway.connections.sharing import Sharing
 from gateway.connections.stop_lines import STOP
 from gateway.process.futures import outcome
@@ -34,7 +34,7 @@ LAST_ANSWERS_S = 10.0  # how long a client that will say nothing more is waited 
 SILENCE_S = 5.0  # how long one that may only stop may say nothing
 
 _NO_REQUESTS = framing.refuse(
-    framing.Kind.BAD_PARAMS,
+    framing.ErrorKind.BAD_PARAMS,
     f"{BAD_LINES} lines were no requests, so this connection ends; send one JSON-RPC request a line",
 )
 
@@ -207,8 +207,8 @@ class Session:
     # What the client says
 
     @_spends
-    def hear(self, heard: Heard) -> None:
-        """Take what one read has brought; stops first, and also of a client that has gone."""
+    def hear(self, heard: ReceivedBytes) -> None:
+        """Take the bytes of one read; stops first, even of a client that has gone."""
         self.cpu_ns += heard.cpu_ns
         if heard.stop is not None:
             self._stop(heard.stop, heard)
@@ -269,13 +269,13 @@ class Session:
         if not self.spoke:
             self.close(
                 framing.refuse(
-                    framing.Kind.UNAVAILABLE, f"nothing was asked for in {SPEAK_S:g} s; connect again"
+                    framing.ErrorKind.UNAVAILABLE, f"nothing was asked for in {SPEAK_S:g} s; connect again"
                 )
             )
 
     # Answering
 
-    def _stop(self, stop: framing.StopRequest, heard: Heard) -> None:
+    def _stop(self, stop: framing.StopRequest, heard: ReceivedBytes) -> None:
         """Answer a stop that has acted; where nobody could act yet, let it be done now, ahead of all else."""
         self.requests += len(heard.stops)
         answer: Answer = heard.stopped
@@ -443,7 +443,7 @@ class Session:
 
 
 def _is_greeting(line: bytes | framing.BadLine) -> bool:
-    """Return what needs no module: a client of ours says it before it asks for a stop."""
+    """Return whether a line needs no module: our client sends it before it asks for a stop."""
     try:
         return isinstance(line, bytes) and framing.decode_request(line).method in GREETINGS
     except framing.BadLine:

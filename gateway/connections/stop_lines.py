@@ -88,7 +88,7 @@ def _printable(text: str) -> str:
 
 
 def _read(line: bytes) -> StopRequest:
-    """Return what can be read of a line that is no JSON."""
+    """Return the readable parts of a line that is no JSON."""
     id_, reason = _ID.search(line), _REASON.search(line)
     return StopRequest(
         reason="" if reason is None else _printable(reason[1].decode(errors="replace")),

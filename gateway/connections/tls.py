@@ -9,7 +9,7 @@ from typing import Final
 
 from drivers.realtime_priority import lent_realtime
 from gateway.access.folder import AccessFolder
-from gateway.access.known import Known
+from gateway.access.known import KnownClients
 from gateway.certificates import KeyProblem
 from gateway.private import forbid_core_dumps
 
@@ -127,7 +127,7 @@ class TlsStream:
                 self._lock.acquire()
 
 
-def context_of(folder: AccessFolder, known: Known) -> ssl.SSLContext:
+def context_of(folder: AccessFolder, known: KnownClients) -> ssl.SSLContext:
     """Return a robot's side: its own key, and nobody but those who are known.
 
     Raises:

@@ -76,7 +76,7 @@ class Mender:
     def _cause(
         self, finding: Finding, fix: Fix, about: set[str], others: Iterable[Finding]
     ) -> Finding | None:
-        """Return what is likelier to be wrong, of the same device or its bus."""
+        """Return a likelier cause: another finding about the same device or its bus."""
         causes = (*CAUSES, *UNSURE) if isinstance(fix, Write) else CAUSES
         for one in others:
             earlier = causes[: causes.index(finding.rule)] if finding.rule in causes else causes

@@ -17,7 +17,7 @@ FIRST_PROFILE_OBJECT = 0x6000
 
 
 @dataclass(frozen=True, slots=True)
-class Heard:
+class IdentifierFrames:
     """The frames of one identifier while the bus was listened to."""
 
     count: int
@@ -30,7 +30,7 @@ class BusFacts:
     """One bus over `seconds`; `heard` is `None` where it was not listened to, but by a gateway elsewhere."""
 
     seconds: float
-    heard: Mapping[int, Heard] | None
+    heard: Mapping[int, IdentifierFrames] | None
     frames_per_s: float | None
     load_percent: float | None
     error_frames_per_s: float | None
@@ -105,7 +105,7 @@ class Observations:
     units: Mapping[str, tuple[float, str]] = field(default_factory=dict)  # parameter's address → scale, unit
     other_file: str | None = None  # why the gateway judges by another file than this
 
-    def heard_on(self, bus: str) -> Mapping[int, Heard] | None:
+    def heard_on(self, bus: str) -> Mapping[int, IdentifierFrames] | None:
         """By identifier, what came on a bus; `None` where it was not listened to, or nobody was heard."""
         facts = self.buses.get(bus)
         return None if facts is None or facts.is_silent else facts.heard
@@ -124,7 +124,7 @@ class Observations:
                 yield place
 
     def holds(self, place: Place, index: int, subindex: int = 0) -> Value:
-        """Return what its device holds there, of its own axis; `None` where it has none or did not tell."""
+        """Return the device's value of an object of its own axis; `None` if it has none or gave none."""
         shift = AXIS_OFFSET * place.axis if index >= FIRST_PROFILE_OBJECT else 0
         return self.objects.get(place.name, {}).get((index + shift, subindex))
 

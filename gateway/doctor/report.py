@@ -27,7 +27,7 @@ def well(verdicts: Sequence[Verdict]) -> list[str]:
 
 
 def as_text(verdicts: Sequence[Verdict]) -> Iterator[str]:
-    """Yield what is wrong first, each with what mends it.
+    """Yield the report: the findings first, each with its remedies.
 
     Then what could not be judged, then what is well.
     """

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 from drivers.latest import Latest, Listener
 from drivers.samples import Channel
 from gateway.config.guard import ALARMS
-from gateway.guard.watcher import State
+from gateway.guard.watcher import RuleState
 from gateway.process.loop import Loop
 
 log = logging.getLogger(__name__)
@@ -16,7 +16,7 @@ log = logging.getLogger(__name__)
 WHO, ALARM = "guard", "alarm"
 SAY_AGAIN_S = 5.0  # how often one rule is written down; what comes between is counted, the newest is told
 STALE_S = 2.0  # a guard that says nothing for so long is not there
-STATE_WORDS = {int(state): state.words for state in State}
+STATE_WORDS = {int(state): state.words for state in RuleState}
 
 
 class Append(Protocol):
@@ -71,5 +71,5 @@ class GuardSource:
     def subscribe(self, listener: Listener) -> Callable[[], None]:
         return self.latest.subscribe(listener)
 
-    def publish(self, now_ns: int, alarms: int, states: Mapping[str, State]) -> None:
+    def publish(self, now_ns: int, alarms: int, states: Mapping[str, RuleState]) -> None:
         self.latest.update(now_ns, self._indices, (alarms, *states.values()))

@@ -7,11 +7,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from drivers.bus.emcy import Emcy
-from gateway.config.guard_rules import EmcyRule, Rule
+from gateway.config.guard_rules import EmcyRule, GuardRule
 from gateway.guard.judging import Joined, Judging
-from gateway.guard.watcher import GRACE_NS, Change, State, Watcher
+from gateway.guard.watcher import GRACE_NS, RuleState, RuleTransition, Watcher
 
-Changed = Callable[[Watcher, Change], None]
+Changed = Callable[[Watcher, RuleTransition], None]
 AGAIN_NS = 100_000_000  # how soon to look again for something that is not there
 
 
@@ -28,7 +28,7 @@ class LevelWatcher(Watcher):
 
     def __init__(
         self,
-        rule: Rule,
+        rule: GuardRule,
         component: str,
         what: str,
         now_ns: int,
@@ -56,7 +56,7 @@ class LevelWatcher(Watcher):
     def weigh(self, stamp_ns: int, number: float) -> None:
         """Take a derived value; infinite is beyond every limit."""
         self._seen_ns = stamp_ns
-        over = self._band.left(number, tripped=self.state is State.TRIPPED)
+        over = self._band.left(number, tripped=self.state is RuleState.TRIPPED)
         if not over and (self.is_settled or self._is_late(stamp_ns)):
             return  # nothing changes; what is not live ends nothing
         self.judge(stamp_ns, over, lambda: self._says(number), self._for_ns)
@@ -98,7 +98,7 @@ class Joining:
 class SilenceWatcher(Watcher):
     """A component that must be heard. One that was never heard is not lost: it cannot be seen."""
 
-    def __init__(self, rule: Rule, component: str, now_ns: int, changed: Changed, pulse: Pulse) -> None:
+    def __init__(self, rule: GuardRule, component: str, now_ns: int, changed: Changed, pulse: Pulse) -> None:
         super().__init__(rule, component, component, now_ns, changed)
         self._pulse = pulse
         self._heard_ns: int | None = None
@@ -113,7 +113,7 @@ class SilenceWatcher(Watcher):
         silent_s, timeout_s = (now_ns - self._heard_ns) / 1e9, self._pulse.timeout_s()
         over = silent_s > timeout_s
         self.judge(now_ns, over, lambda: f"silent for {silent_s:.2f} s")
-        well = self.state in (State.WATCHING, State.CLEARED)
+        well = self.state in (RuleState.WATCHING, RuleState.CLEARED)
         return self._heard_ns + round(timeout_s * 1e9) + 1 if well else now_ns + AGAIN_NS
 
     def on_emcy(self, _emcy: Emcy) -> None:
@@ -161,7 +161,7 @@ class EmcyWatcher(Watcher):
 class UnseenWatcher(Watcher):
     """Something that cannot be watched on this robot, and why."""
 
-    def __init__(self, rule: Rule, component: str, now_ns: int, changed: Changed, why: str) -> None:
+    def __init__(self, rule: GuardRule, component: str, now_ns: int, changed: Changed, why: str) -> None:
         super().__init__(rule, component, component, now_ns, changed)
         self.why = why
 

@@ -8,12 +8,12 @@ from functools import singledispatch
 from gateway.config.guard import WATCHES, limit
 from gateway.config.guard_rules import (
     DriftRule,
+    GuardRule,
     HeatRule,
     InputRule,
     LatencyRule,
     LevelRule,
     RangeRule,
-    Rule,
     StoppingRule,
     SymmetryRule,
     with_unit,
@@ -50,7 +50,7 @@ class Beside:
 
 
 @singledispatch
-def judging(rule: Rule, beside: Beside) -> Judging:  # noqa: ARG001 - those below have it
+def judging(rule: GuardRule, beside: Beside) -> Judging:  # noqa: ARG001 - those below have it
     """How this rule judges; raises `TypeError` where it judges no number."""
     raise TypeError(f"{rule.watch} judges no number")
 
@@ -116,7 +116,7 @@ def _band(rule: RangeRule) -> Band:
     return Band(low, high, rule.hysteresis)
 
 
-def _number(rule: Rule, unit: str) -> Callable[[float], str]:
+def _number(rule: GuardRule, unit: str) -> Callable[[float], str]:
     """Return a number, and the limit that it is beyond."""
     words = limit(rule)
     return lambda number: f"{with_unit(float(f'{number:.4g}'), unit)}, {words}"

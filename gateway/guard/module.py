@@ -13,7 +13,7 @@ from gateway.config.guard import GuardSettings, ends, limit, quantities
 from gateway.config.guard_rules import Action
 from gateway.guard.alarms import ALARM, WHO, Alarms, GuardSource
 from gateway.guard.armed_drives import ArmedDrives
-from gateway.guard.watcher import Change, State, Watcher
+from gateway.guard.watcher import RuleState, RuleTransition, Watcher
 from gateway.guard.wiring import Wiring
 from gateway.handlers import Handlers
 from gateway.wire.robot import GuardInfo, GuardRuleInfo
@@ -113,11 +113,11 @@ class GuardModule:
             for name, wiring in self._wirings.items()
             if action in wiring.rule.actions
         }
-        return {name: last.reason for name, last in worst.items() if last.state is State.TRIPPED}
+        return {name: last.reason for name, last in worst.items() if last.state is RuleState.TRIPPED}
 
     # In the thread that saw it.
 
-    def _changed(self, name: str, watcher: Watcher, change: Change) -> None:
+    def _changed(self, name: str, watcher: Watcher, change: RuleTransition) -> None:
         if change.acts and Action.QUICK_STOP in watcher.rule.actions:
             self._control.trip(WHO, _why(name, change))
         self._loop.post(lambda: self._follow(name, watcher, change))
@@ -128,16 +128,16 @@ class GuardModule:
 
     # In the loop.
 
-    def _follow(self, name: str, watcher: Watcher, change: Change) -> None:
+    def _follow(self, name: str, watcher: Watcher, change: RuleTransition) -> None:
         if change.acts:
             self._act(name, watcher, change)
-        elif change.state is State.BLIND:
+        elif change.state is RuleState.BLIND:
             self._tell(name, ALARM, change.reason)
         else:
             self._tell(name, "alarm over", f"{watcher.what} is {change.state.words}")
         self._publish()
 
-    def _act(self, name: str, watcher: Watcher, change: Change) -> None:
+    def _act(self, name: str, watcher: Watcher, change: RuleTransition) -> None:
         """Do a trip's actions other than the stop."""
         actions = watcher.rule.actions
         if Action.REVERT_TRIALS in actions:
@@ -170,7 +170,7 @@ class GuardModule:
         self._source.publish(time.monotonic_ns(), self._count, states)
 
 
-def _why(name: str, change: Change) -> str:
+def _why(name: str, change: RuleTransition) -> str:
     return f"guard rule {name}: {change.reason}"
 
 
@@ -197,7 +197,7 @@ def _info(name: str, wiring: Wiring) -> GuardRuleInfo:
         since_ns=worst.last.stamp_ns,
         reason=worst.last.reason or None,
         trips=sum(watcher.trips for watcher in wiring.watchers),
-        problems=[watcher.last.reason for watcher in wiring.watchers if watcher.state is State.BLIND],
+        problems=[watcher.last.reason for watcher in wiring.watchers if watcher.state is RuleState.BLIND],
         quantities=list(quantities(rule)) if has_ends else [],
         low=low,
         high=high,

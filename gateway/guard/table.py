@@ -8,9 +8,9 @@ from msgspec import NODEFAULT, Meta
 from msgspec.structs import FieldInfo, fields
 
 from gateway.config.guard import WATCHES
-from gateway.config.guard_rules import UNIT, Rule
+from gateway.config.guard_rules import UNIT, GuardRule
 
-_COMMON = frozenset(field.name for field in fields(Rule))
+_COMMON = frozenset(field.name for field in fields(GuardRule))
 
 
 def table() -> str:
@@ -31,7 +31,7 @@ def _key(field: FieldInfo, unit: str) -> str:
 
 
 def _descriptions(type_: Any) -> Iterator[str]:
-    """Yield what the type's notes say, wherever in it they stand."""
+    """Yield the descriptions in a type's annotations, at any depth."""
     for argument in typing.get_args(type_):
         if isinstance(argument, Meta):
             if argument.description is not None:

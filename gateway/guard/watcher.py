@@ -11,12 +11,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
 
-from gateway.config.guard_rules import Blind, Rule
+from gateway.config.guard_rules import Blind, GuardRule
 
 GRACE_NS = 3_000_000_000  # how long a device that nobody has heard yet may take to come up
 
 
-class State(IntEnum):
+class RuleState(IntEnum):
     """State of a rule or of one of its inputs; the worst counts."""
 
     WATCHING = 0
@@ -30,16 +30,16 @@ class State(IntEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class RuleTransition:
     """What has become of a watcher; `acts` where the rule's actions are due."""
 
-    state: State
+    state: RuleState
     stamp_ns: int
     reason: str
 
     @property
     def acts(self) -> bool:
-        return self.state is State.TRIPPED
+        return self.state is RuleState.TRIPPED
 
 
 class Watcher:
@@ -49,12 +49,17 @@ class Watcher:
     """
 
     def __init__(
-        self, rule: Rule, component: str, what: str, now_ns: int, changed: "Callable[[Watcher, Change], None]"
+        self,
+        rule: GuardRule,
+        component: str,
+        what: str,
+        now_ns: int,
+        changed: "Callable[[Watcher, RuleTransition], None]",
     ) -> None:
         self.rule = rule
         self.component = component
         self.what = what
-        self.last = Change(State.WATCHING, now_ns, "")
+        self.last = RuleTransition(RuleState.WATCHING, now_ns, "")
         self.trips = 0
         self._changed = changed
         self._clear_ns = round(rule.clear_s * 1e9)
@@ -63,13 +68,13 @@ class Watcher:
         self._well_since_ns: int | None = None
 
     @property
-    def state(self) -> State:
+    def state(self) -> RuleState:
         return self.last.state
 
     @property
     def is_settled(self) -> bool:
         """Whether another value that is well changes nothing, as it mostly is."""
-        return self._over_since_ns is None and self.last.state in (State.WATCHING, State.CLEARED)
+        return self._over_since_ns is None and self.last.state in (RuleState.WATCHING, RuleState.CLEARED)
 
     def look(self, now_ns: int) -> int:
         """See what has not come; returns when to look again at the latest (ns)."""
@@ -86,37 +91,37 @@ class Watcher:
         with self._lock:
             self._over_since_ns = self._well_since_ns = None
             change = None
-            if self.state not in (State.BLIND, State.TRIPPED):
-                state = State.TRIPPED if self.rule.blind is Blind.ACT else State.BLIND
+            if self.state not in (RuleState.BLIND, RuleState.TRIPPED):
+                state = RuleState.TRIPPED if self.rule.blind is Blind.ACT else RuleState.BLIND
                 change = self._go(state, now_ns, f"{self.what}: {words()}")
         self._tell(change)
 
-    def _on_over(self, stamp_ns: int, words: Callable[[], str], for_ns: int) -> Change | None:
+    def _on_over(self, stamp_ns: int, words: Callable[[], str], for_ns: int) -> RuleTransition | None:
         self._well_since_ns = None
         if self._over_since_ns is None:
             self._over_since_ns = stamp_ns
-        if self.state is State.TRIPPED or stamp_ns - self._over_since_ns < for_ns:
+        if self.state is RuleState.TRIPPED or stamp_ns - self._over_since_ns < for_ns:
             return None
-        return self._go(State.TRIPPED, stamp_ns, f"{self.what}: {words()}")
+        return self._go(RuleState.TRIPPED, stamp_ns, f"{self.what}: {words()}")
 
-    def _on_well(self, stamp_ns: int) -> Change | None:
+    def _on_well(self, stamp_ns: int) -> RuleTransition | None:
         self._over_since_ns = None
-        if self.state is State.BLIND:
-            return self._go(State.CLEARED if self.trips else State.WATCHING, stamp_ns, "")
-        if self.state is not State.TRIPPED:
+        if self.state is RuleState.BLIND:
+            return self._go(RuleState.CLEARED if self.trips else RuleState.WATCHING, stamp_ns, "")
+        if self.state is not RuleState.TRIPPED:
             return None
         if self._well_since_ns is None:
             self._well_since_ns = stamp_ns
         if stamp_ns - self._well_since_ns < self._clear_ns:
             return None
-        return self._go(State.CLEARED, stamp_ns, self.last.reason)
+        return self._go(RuleState.CLEARED, stamp_ns, self.last.reason)
 
-    def _go(self, state: State, stamp_ns: int, reason: str) -> Change:
+    def _go(self, state: RuleState, stamp_ns: int, reason: str) -> RuleTransition:
         self._over_since_ns = self._well_since_ns = None
-        self.trips += state is State.TRIPPED
-        self.last = Change(state, stamp_ns, reason)
+        self.trips += state is RuleState.TRIPPED
+        self.last = RuleTransition(state, stamp_ns, reason)
         return self.last
 
-    def _tell(self, change: Change | None) -> None:
+    def _tell(self, change: RuleTransition | None) -> None:
         if change is not None:
             self._changed(self, change)

@@ -7,15 +7,15 @@ from dataclasses import dataclass, field
 from functools import partial, singledispatch
 from typing import TYPE_CHECKING, cast
 
-from drivers.component import Component, Kind
+from drivers.component import Component, ComponentKind
 from drivers.errors import DeviceAbort, DeviceTimeout
 from drivers.samples import Sample
 from gateway.config.guard import quantities
 from gateway.config.guard_rules import (
     BusRule,
     EmcyRule,
+    GuardRule,
     LatencyRule,
-    Rule,
     SilenceRule,
     StoppingRule,
     SymmetryRule,
@@ -60,11 +60,11 @@ class Wire:
     held: Callable[[], bool]
     begins: list[Callable[[], Callable[[], None]]] = field(default_factory=list)
 
-    def unseen(self, rule: Rule, name: str, why: str) -> Watcher:
+    def unseen(self, rule: GuardRule, name: str, why: str) -> Watcher:
         """In the place of what cannot be watched."""
         return UnseenWatcher(rule, name, self.now_ns, self.changed, why)
 
-    def absent(self, rule: Rule, name: str) -> Watcher:
+    def absent(self, rule: GuardRule, name: str) -> Watcher:
         """In the place of a component that could not be built."""
         return self.unseen(rule, name, f"is not there: {self.robot.absent[name][1]}")
 
@@ -74,7 +74,7 @@ class Wire:
 
 
 @singledispatch
-def make(rule: Rule, wire: Wire, name: str) -> Iterator[Watcher]:
+def make(rule: GuardRule, wire: Wire, name: str) -> Iterator[Watcher]:
     """Yield the watchers of a component, or bus, that is there.
 
     One for each channel; what has none of them is passed over where nobody has named it.
@@ -101,7 +101,7 @@ def make(rule: Rule, wire: Wire, name: str) -> Iterator[Watcher]:
 def _silence(rule: SilenceRule, wire: Wire, name: str) -> Iterator[Watcher]:
     component = wire.robot.components[name]
     watcher = SilenceWatcher(rule, name, wire.now_ns, wire.changed, _pulse(component, rule.silent_s))
-    if component.kind is not Kind.INSOLE:
+    if component.kind is not ComponentKind.INSOLE:
         wire.begins.append(partial(_on_node(component).node.life.subscribe, watcher))
     yield watcher
 
@@ -174,7 +174,7 @@ def _sync(rule: SyncRule, wire: Wire, name: str) -> Iterator[Watcher]:
     yield watcher
 
 
-def _joined(rule: Rule, wire: Wire, parts: Sequence[Part], coming_ns: int = 0) -> Watcher:
+def _joined(rule: GuardRule, wire: Wire, parts: Sequence[Part], coming_ns: int = 0) -> Watcher:
     """One watcher of several channels, in this order."""
     names = dict.fromkeys(component.name for component, _ in parts)
     stale_ns = min(component.latest.stale_after_ns for component, _ in parts)
@@ -243,7 +243,7 @@ def _on_node(component: Component) -> "JointDrive | CanDevice":
 def _pulse(component: Component, silent_s: float | None) -> Pulse:
     """Return a node's heartbeat; where it has none, all that it sends; an insole's samples."""
     latest = component.latest
-    if component.kind is Kind.INSOLE:
+    if component.kind is ComponentKind.INSOLE:
         insole = cast("Insole", component)
         return Pulse(lambda: latest.updated_ns, lambda: silent_s or insole.settings.stale_after_s)
     life, settings = _on_node(component).node.life, _on_node(component).settings

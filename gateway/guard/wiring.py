@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
 from gateway.config.guard import BUS, WATCHES, quantities
-from gateway.config.guard_rules import Rule, SymmetryRule
+from gateway.config.guard_rules import GuardRule, SymmetryRule
 from gateway.guard.inputs import Changed
 from gateway.guard.watcher import Watcher
 from gateway.guard.watchers import Wire, make
@@ -24,7 +24,7 @@ class Wiring:
 
     def __init__(
         self,
-        rule: Rule,
+        rule: GuardRule,
         robot: "Robot",
         now_ns: int,
         changed: Changed,

@@ -33,14 +33,14 @@ from gateway.commission.dialogue import Ask, Moving, Say, Talk, press
 from gateway.commission.homing_plan import MAX_CURRENT, MAX_TORQUE, TOLD, armed, option
 from gateway.commission.joints import words
 from gateway.commission.power import Power
-from gateway.commission.powered_run import NotStopped, Outcome
+from gateway.commission.powered_run import NotStopped, PoweredRunResult
 from gateway.config.robot import JointTable, RobotConfig
 from gateway.joint_test import limits as limiting
 from gateway.joint_test import parameters, undo_file
-from gateway.joint_test.limits import Asked, Drive, Limits, NotAllowed
+from gateway.joint_test.limits import AskedLimits, Drive, JointTestLimits, NotAllowed
 from gateway.joint_test.motion import Wish, planned
-from gateway.joint_test.recording import Recording
-from gateway.joint_test.run import NEEDED, POSITION_MODE, READ_S, TORQUE_MODE, Plan, TestRun
+from gateway.joint_test.recording import JointTestRecording
+from gateway.joint_test.run import NEEDED, POSITION_MODE, READ_S, TORQUE_MODE, JointTestPlan, TestRun
 from gateway.joint_test.watching import Guarding
 from gateway.records.records import Records
 
@@ -62,7 +62,7 @@ class Test:
     config: RobotConfig
     joint: str
     wish: Wish
-    asked: Asked
+    asked: AskedLimits
     file: Path
     who: str
     records: Records
@@ -97,17 +97,17 @@ class Test:
 
 
 @dataclass(frozen=True, slots=True)
-class Known:
+class DriveFacts:
     """What is known of the drive before it has power."""
 
     angle: float
     period_s: float
-    limits: Limits
+    limits: JointTestLimits
     description: eds.Description
     options: Mapping[int, int | None]
 
 
-def tested(bench: Bench, others: Mapping[str, Bench], test: Test) -> Talk[Outcome | None]:
+def tested(bench: Bench, others: Mapping[str, Bench], test: Test) -> Talk[PoweredRunResult | None]:
     """Ask, move, record; `None` where nothing got power. `others` are the further buses of the robot.
 
     Raises:
@@ -161,7 +161,7 @@ def _is_off(bench: Bench, config: RobotConfig, name: str) -> None:
         )
 
 
-def _known(bench: Bench, test: Test) -> Known:
+def _known(bench: Bench, test: Test) -> DriveFacts:
     axis, settings = test.axis, test.settings
     description = eds.load(eds.locate(settings.eds, test.config.path), settings.node_id)
     readings = {name: number(bench, axis, *at) for name, at in SCALING_OBJECTS.items()}
@@ -187,7 +187,9 @@ def _known(bench: Bench, test: Test) -> Known:
     angle = position * linear.scale + linear.offset
     rules = {} if test.config.guard is None else test.config.guard.rule
     limits = limiting.limits(test.wish, test.asked, drive, rules, test.joint, angle, period_s)
-    return Known(angle, period_s, limits, description, {index: option(bench, axis, index) for index in TOLD})
+    return DriveFacts(
+        angle, period_s, limits, description, {index: option(bench, axis, index) for index in TOLD}
+    )
 
 
 def _signed(bench: Bench, axis: Axis, index: int, subindex: int) -> int | None:
@@ -202,7 +204,7 @@ def _has_mode(bench: Bench, test: Test) -> None:
 
 
 def _period(bench: Bench, axis: Axis) -> float:
-    """Return what the drive expects between two SYNCs (60C2h); within what this computer can keep."""
+    """Return the SYNC period that the drive expects (60C2h), as far as this computer can keep it."""
     value = number(bench, axis, *PERIOD)
     exponent = bench.read(axis.node, axis.index(EXPONENT[0]), EXPONENT[1])
     if not value or exponent is None:
@@ -219,7 +221,7 @@ def _period(bench: Bench, axis: Axis) -> float:
 # The word.
 
 
-def _agreed(test: Test, known: Known) -> Talk[bool]:
+def _agreed(test: Test, known: DriveFacts) -> Talk[bool]:
     yield from press(
         f"The drive of the {words(test.joint)} is to get power. The joint is free on a bench: nobody wears "
         "the robot, all hands are off it, the hardware emergency stop is within reach, STO is released."
@@ -231,8 +233,8 @@ def _agreed(test: Test, known: Known) -> Talk[bool]:
     return typed == test.phrase
 
 
-def explained(test: Test, known: Known) -> Iterator[str]:
-    """Yield what will happen, line by line."""
+def explained(test: Test, known: DriveFacts) -> Iterator[str]:
+    """Yield the plan of the test for the person, line by line."""
     limits, wish = known.limits, test.wish
     low, high, _, time_s = planned(wish, known.period_s)
     yield f"What will happen, to the {words(test.joint)} ({test.axis}) alone: a {wish.kind} test"
@@ -259,7 +261,7 @@ def explained(test: Test, known: Known) -> Iterator[str]:
 # Under power.
 
 
-def _moved(bench: Bench, test: Test, known: Known) -> Talk[Outcome | None]:
+def _moved(bench: Bench, test: Test, known: DriveFacts) -> Talk[PoweredRunResult | None]:
     yield Say("Listening whether somebody else is on the bus; then it begins …")
     beside = [one for one in test.config.joint.values() if one.bus == test.settings.bus]
     nodes = {one.node_id for one in beside}
@@ -291,7 +293,7 @@ def _taken(bench: Bench, test: Test, joint: JointTable) -> Iterator[int]:
 
 
 @contextmanager
-def _reader(test: Test, power: Power, known: Known) -> Iterator[JointDrive]:
+def _reader(test: Test, power: Power, known: DriveFacts) -> Iterator[JointDrive]:
     """Return the joint as a gateway follows it; its PDOs are as they are."""
     settings = msgspec.structs.replace(test.settings, configure_pdos=False)
     reader = JointDrive(test.joint, settings, power.bus, known.description)
@@ -316,8 +318,8 @@ def _operational(power: Power) -> bool:
 
 
 def _led(
-    test: Test, known: Known, power: Power, reader: JointDrive, guarding: Guarding
-) -> Talk[Outcome | None]:
+    test: Test, known: DriveFacts, power: Power, reader: JointDrive, guarding: Guarding
+) -> Talk[PoweredRunResult | None]:
     missing = [name for name in NEEDED if name not in reader.synchronous]
     missing += [] if {"torque", "current"} & reader.synchronous else ["torque or current"]
     if missing:
@@ -328,9 +330,9 @@ def _led(
     before = yield from _parameters(power, known)
     if before is None:
         return None
-    plan = Plan(test.wish, known.limits, known.angle, known.period_s, before)
+    plan = JointTestPlan(test.wish, known.limits, known.angle, known.period_s, before)
     head = _head(test, known, before, guarding)
-    with Recording(test.file, head, by_torque=test.wish.kind.by_torque) as recording:
+    with JointTestRecording(test.file, head, by_torque=test.wish.kind.by_torque) as recording:
         _keep(test, before)
         run = TestRun(power, reader, guarding, plan)
         try:
@@ -354,7 +356,7 @@ def _keep(test: Test, before: parameters.Parameters) -> None:
         undo_file.keep(test.left, undo_file.Unfinished(*place, _now(), test.who, changes))
 
 
-def _parameters(power: Power, known: Known) -> Talk[parameters.Parameters | None]:
+def _parameters(power: Power, known: DriveFacts) -> Talk[parameters.Parameters | None]:
     """Read while nothing has power; `None` where a stop came."""
     offset = power.drive.settings.axis * AXIS_OFFSET
     stopped = threading.Event()
@@ -374,7 +376,7 @@ def _parameters(power: Power, known: Known) -> Talk[parameters.Parameters | None
     return future.result()
 
 
-def _followed(run: TestRun, test: Test, recording: Recording) -> Talk[Outcome]:
+def _followed(run: TestRun, test: Test, recording: JointTestRecording) -> Talk[PoweredRunResult]:
     """Every way out of here ends it, and waits for that."""
     try:
         run.start()
@@ -398,7 +400,7 @@ def _followed(run: TestRun, test: Test, recording: Recording) -> Talk[Outcome]:
     return outcome
 
 
-def _close(recording: Recording, run: TestRun, outcome: Outcome) -> None:
+def _close(recording: JointTestRecording, run: TestRun, outcome: PoweredRunResult) -> None:
     with suppress(OSError):
         recording.add(run.take())
         recording.end(problem=outcome.problem, off=outcome.off, state=outcome.state, late_s=run.late_s)
@@ -408,7 +410,7 @@ def _now() -> str:
     return datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
 
 
-def _head(test: Test, known: Known, before: parameters.Parameters, guarding: Guarding) -> dict[str, Any]:
+def _head(test: Test, known: DriveFacts, before: parameters.Parameters, guarding: Guarding) -> dict[str, Any]:
     settings = test.settings
     return {
         "robot": test.config.robot.name,

@@ -5,8 +5,8 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from gateway.config.guard_rules import LevelRule, RangeRule, Rule
-from gateway.joint_test.motion import MOST_SHARE, Kind, Wish, planned
+from gateway.config.guard_rules import GuardRule, LevelRule, RangeRule
+from gateway.joint_test.motion import MOST_SHARE, JointTestKind, Wish, planned
 
 MOST_SPEED = math.radians(180.0)  # rad/s, whatever the drive allows
 LAG = math.radians(5.0)  # that a joint may follow behind
@@ -20,7 +20,7 @@ class NotAllowed(Exception):
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
+class JointTestLimits:
     """What ends a test; angles are the joint's own (rad)."""
 
     low: float
@@ -34,7 +34,7 @@ class Limits:
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class AskedLimits:
     """Limits that somebody has asked for; `None`: what is usual."""
 
     speed: float | None = None  # rad/s
@@ -55,14 +55,14 @@ class Drive:
 
 def limits(
     wish: Wish,
-    asked: Asked,
+    asked: AskedLimits,
     drive: Drive,
-    rules: Mapping[str, Rule],
+    rules: Mapping[str, GuardRule],
     joint: str,
     angle: float,
     period_s: float,
-) -> Limits:
-    """Return what holds during this test of a joint that stands at `angle`.
+) -> JointTestLimits:
+    """Return the limits of this test, for a joint that stands at `angle`.
 
     Raises:
         NotAllowed: something that must be known is not, or the test would go beyond it.
@@ -74,7 +74,7 @@ def limits(
         raise NotAllowed("its drive tells no limit of current or torque (6073h, 6072h)")
     low, high = _range(drive, rules, joint)
     first, last, fastest, time_s = planned(wish, period_s)
-    if wish.kind is Kind.CHIRP and wish.high_hz > MOST_SHARE / period_s:
+    if wish.kind is JointTestKind.CHIRP and wish.high_hz > MOST_SHARE / period_s:
         raise NotAllowed(
             f"{wish.high_hz:g} Hz is beyond a quarter of its {1 / period_s:g} cycles a second: ask for less"
         )
@@ -90,7 +90,7 @@ def limits(
         if asked.torque is None
         else _least("torque", "N·m", asked.torque, most, ())
     )
-    if wish.kind is Kind.RELAY and wish.torque > torque / 2:
+    if wish.kind is JointTestKind.RELAY and wish.torque > torque / 2:
         raise NotAllowed(
             f"a relay of {wish.torque:g} N·m needs room for the load's torque: its limit, {torque:.3g} N·m, "
             "must be twice that"
@@ -101,7 +101,7 @@ def limits(
         *([share * drive.rated_current] if drive.rated_current else []),
     ]
     lags = _levels(rules, joint, "following_error")
-    return Limits(
+    return JointTestLimits(
         low=low,
         high=high,
         speed=speed,
@@ -140,7 +140,7 @@ def _least(what: str, unit: str, asked: float | None, most: float, levels: tuple
     return allowed if asked is None else asked
 
 
-def _range(drive: Drive, rules: Mapping[str, Rule], joint: str) -> tuple[float, float]:
+def _range(drive: Drive, rules: Mapping[str, GuardRule], joint: str) -> tuple[float, float]:
     found = [rule for rule in of_joint(rules, joint, "joint_limit") if isinstance(rule, RangeRule)]
     lows = [one for one in (drive.low, *(rule.min for rule in found)) if one is not None]
     highs = [one for one in (drive.high, *(rule.max for rule in found)) if one is not None]
@@ -152,11 +152,11 @@ def _range(drive: Drive, rules: Mapping[str, Rule], joint: str) -> tuple[float, 
     return max(lows), min(highs)
 
 
-def _levels(rules: Mapping[str, Rule], joint: str, watch: str) -> tuple[float, ...]:
+def _levels(rules: Mapping[str, GuardRule], joint: str, watch: str) -> tuple[float, ...]:
     return tuple(rule.above for rule in of_joint(rules, joint, watch) if isinstance(rule, LevelRule))
 
 
-def of_joint(rules: Mapping[str, Rule], joint: str, watch: str) -> Iterator[Rule]:
+def of_joint(rules: Mapping[str, GuardRule], joint: str, watch: str) -> Iterator[GuardRule]:
     """Yield the guard's rules of this kind that watch the joint."""
     for rule in rules.values():
         globs = rule.on or ("*",)

@@ -21,7 +21,7 @@ BIAS_GAIN = 0.5  # of the relay's torque, by which a lopsided cycle shifts its m
 MOST_SHARE = 0.25  # of the sample rate that a chirp may reach
 
 
-class Kind(StrEnum):
+class JointTestKind(StrEnum):
     """Which test."""
 
     STEP = "step"
@@ -32,14 +32,14 @@ class Kind(StrEnum):
     @property
     def by_torque(self) -> bool:
         """Whether the drive is led by torque, not by position."""
-        return self is Kind.RELAY
+        return self is JointTestKind.RELAY
 
 
 @dataclass(frozen=True, slots=True)
 class Wish:
     """What is asked for. `amplitude` is in rad; of a relay it is how far the joint may swing."""
 
-    kind: Kind
+    kind: JointTestKind
     amplitude: float
     speed: float  # rad/s, of the target at most
     repeat: int = 3  # steps there and back; cycles of a relay
@@ -52,7 +52,7 @@ class Wish:
 
 def motion(wish: Wish, period_s: float) -> Motion:
     """Return the targets of this test, one each `period_s`."""
-    if wish.kind is Kind.RELAY:
+    if wish.kind is JointTestKind.RELAY:
         return _relay(wish, period_s)
     return _ignoring(_MADE[wish.kind](wish, period_s))
 
@@ -62,7 +62,7 @@ def planned(wish: Wish, period_s: float) -> tuple[float, float, float, float]:
 
     Of a relay they are what it may come to: it goes by what the joint does.
     """
-    if wish.kind is Kind.RELAY:
+    if wish.kind is JointTestKind.RELAY:
         return -wish.amplitude, wish.amplitude, wish.speed, RELAY_S * (wish.repeat + 2)
     targets = list(_MADE[wish.kind](wish, period_s))
     fastest = max(abs(after - before) for before, after in pairwise(targets)) / period_s
@@ -132,7 +132,7 @@ def _run(start: float, end: float, speed: float, period_s: float) -> Iterator[fl
     yield end
 
 
-_MADE = {Kind.STEP: _step, Kind.CHIRP: _chirp, Kind.FRICTION: _friction}
+_MADE = {JointTestKind.STEP: _step, JointTestKind.CHIRP: _chirp, JointTestKind.FRICTION: _friction}
 
 
 def _relay(wish: Wish, period_s: float) -> Motion:

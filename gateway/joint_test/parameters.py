@@ -36,7 +36,7 @@ def read(sdo: SdoChannel, description: Description, offset: int, wanted: Callabl
 
 
 def changed(before: Parameters, after: Parameters) -> dict[str, Change]:
-    """Return what is not as it was, by name."""
+    """Return the differences, by name."""
     return {name: (was, after.get(name)) for name, was in before.items() if was != after.get(name)}
 
 

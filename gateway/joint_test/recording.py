@@ -26,7 +26,7 @@ COLUMNS: Mapping[str, str] = {  # and their units; of a relay the target is N·m
 Row = tuple[float | None, ...]
 
 
-class Recording:
+class JointTestRecording:
     """One file; raises `OSError` where it cannot be written, and `FileExistsError` where it is there."""
 
     def __init__(self, path: Path, head: Mapping[str, Any], *, by_torque: bool) -> None:

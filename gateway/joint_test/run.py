@@ -26,9 +26,9 @@ from drivers.joint.scaling import scalings
 from drivers.realtime_priority import make_realtime
 from drivers.samples import Sample
 from gateway.commission.power import Power
-from gateway.commission.powered_run import Ended, PoweredRun
+from gateway.commission.powered_run import PoweredRun, RunEnded
 from gateway.joint_test import parameters
-from gateway.joint_test.limits import Limits
+from gateway.joint_test.limits import JointTestLimits
 from gateway.joint_test.motion import Wish, motion
 from gateway.joint_test.recording import Row
 from gateway.joint_test.watching import Guarding
@@ -43,18 +43,18 @@ READ_S = 30.0  # for its parameters to be read
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
+class JointTestPlan:
     """What is to be done, within which limits, SYNC by SYNC."""
 
     wish: Wish
-    limits: Limits
+    limits: JointTestLimits
     angle: float  # rad, where it stood when that was agreed to
     period_s: float
     parameters: parameters.Parameters  # as they were before
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
+class DriveSample:
     """What the drive told after one SYNC; `None` where its PDOs do not bring it."""
 
     sync_ns: int
@@ -66,7 +66,7 @@ class Seen:
     current: float | None
 
 
-class Watch:
+class JointMonitor:
     """The newest values of a joint, each as it came by PDO after a SYNC."""
 
     def __init__(self, reader: JointDrive) -> None:
@@ -82,7 +82,7 @@ class Watch:
     def close(self) -> None:
         self._end()
 
-    def after(self, sync_ns: int, within_s: float) -> Seen | None:
+    def after(self, sync_ns: int, within_s: float) -> DriveSample | None:
         """All that comes with each SYNC; `None` where it stays away."""
         wanted = [self.index[name] for name in self.brings]
         deadline = time.monotonic() + within_s
@@ -94,11 +94,11 @@ class Watch:
             self._came.clear()
         return self._seen(sync_ns)
 
-    def _seen(self, sync_ns: int) -> Seen | None:
+    def _seen(self, sync_ns: int) -> DriveSample | None:
         position, statusword = self._value("position"), self._value("statusword")
         if position is None or statusword is None:
             return None
-        return Seen(
+        return DriveSample(
             sync_ns,
             self._latest.stamp_ns(self.index["position"]) or 0,
             position,
@@ -120,7 +120,7 @@ class TestRun(PoweredRun):
     __test__ = False  # for pytest
     name = "joint test"
 
-    def __init__(self, power: Power, reader: JointDrive, guarding: Guarding, plan: Plan) -> None:
+    def __init__(self, power: Power, reader: JointDrive, guarding: Guarding, plan: JointTestPlan) -> None:
         super().__init__(power)
         self.moved = 0.0  # rad
         self.restored = False  # whether all parameters were read, and are as before
@@ -128,7 +128,7 @@ class TestRun(PoweredRun):
         self._guarding = guarding
         self._plan = plan
         self._by_torque = plan.wish.kind.by_torque
-        self._watch = Watch(reader)
+        self._watch = JointMonitor(reader)
         self._rows: deque[Row] = deque()
         self._way: deque[tuple[int, float]] = deque()
         self._start = 0.0
@@ -182,12 +182,12 @@ class TestRun(PoweredRun):
             seen = self._cycle(due)
             self._judge(seen, None)
             if abs(seen.position - first.position) > DRIFT:
-                raise Ended("the joint does not hold still where it was enabled")
+                raise RunEnded("the joint does not hold still where it was enabled")
             if seen.sync_ns - first.sync_ns > HOLD_S * 1e9:
                 return seen.position
         return first.position
 
-    def _cycle(self, due: float) -> Seen:
+    def _cycle(self, due: float) -> DriveSample:
         """At its time, one SYNC and what the drive answers."""
         while (left := due - time.monotonic()) > 0:
             self._rest(left)
@@ -195,7 +195,7 @@ class TestRun(PoweredRun):
         late_s = time.monotonic() - due
         self._late_s = max(self._late_s, late_s)
         if late_s > self._plan.limits.late_s:
-            raise Ended(
+            raise RunEnded(
                 f"a cycle came {late_s * 1000:.0f} ms after its time: this computer is too busy (--late)"
             )
         sync_ns = time.monotonic_ns()
@@ -203,7 +203,7 @@ class TestRun(PoweredRun):
         seen = self._watch.after(sync_ns, self._plan.limits.late_s)
         self._check()
         if seen is None:
-            raise Ended("the drive's PDOs stay away after a SYNC")
+            raise RunEnded("the drive's PDOs stay away after a SYNC")
         return seen
 
     def _aim(self, target: float) -> None:
@@ -222,10 +222,10 @@ class TestRun(PoweredRun):
         linears = scalings(self._reader.settings, {} if readings is None else readings.scaling)
         linear = linears[quantity]
         if linear is None:
-            raise Ended("the drive has come up anew, or nobody knows its units any more")
+            raise RunEnded("the drive has come up anew, or nobody knows its units any more")
         return linear
 
-    def _keep(self, seen: Seen, target: float) -> None:
+    def _keep(self, seen: DriveSample, target: float) -> None:
         self.moved = seen.position - self._start
         aimed = target if self._by_torque else self._start + target
         self._rows.append(
@@ -247,7 +247,7 @@ class TestRun(PoweredRun):
         """Whether it still stands where it was when somebody agreed to what will move."""
         plan = self._plan
         if abs(angle - plan.angle) > DRIFT:
-            raise Ended(
+            raise RunEnded(
                 f"the joint was moved: it stood at {math.degrees(plan.angle):.1f}° when its motion was "
                 f"agreed to, and is at {math.degrees(angle):.1f}°. Begin again"
             )
@@ -257,29 +257,29 @@ class TestRun(PoweredRun):
 
     def _check_time(self, began: float) -> None:
         if time.monotonic() - began > self._plan.limits.time_s:
-            raise Ended(f"it was not over within {self._plan.limits.time_s:.0f} s")
+            raise RunEnded(f"it was not over within {self._plan.limits.time_s:.0f} s")
 
-    def _judge(self, seen: Seen, target: float | None) -> None:
+    def _judge(self, seen: DriveSample, target: float | None) -> None:
         limits = self._plan.limits
         self._guarding.look()
         state = drive_state(seen.statusword)
         if state is not DriveState.OPERATION_ENABLED:
             words = "no state of CiA 402" if state is None else state.words
-            raise Ended(f"the drive has left operation by itself: {words}{self._error_code()}")
+            raise RunEnded(f"the drive has left operation by itself: {words}{self._error_code()}")
         emcy = self._power.node.life.active_emcy
         if emcy is not None:
-            raise Ended(f"the drive reports {emcy.text(self._power.node.description.vendor_id)}")
+            raise RunEnded(f"the drive reports {emcy.text(self._power.node.description.vendor_id)}")
         if not limits.low <= seen.position <= limits.high:
-            raise Ended(f"the joint has left its limits: it is at {math.degrees(seen.position):.1f}°")
+            raise RunEnded(f"the joint has left its limits: it is at {math.degrees(seen.position):.1f}°")
         away = abs(seen.position - self._start)
         if self._by_torque and target is not None and away > self._plan.wish.amplitude:
-            raise Ended(f"the joint swings by {math.degrees(away):.1f}°, further than was told")
+            raise RunEnded(f"the joint swings by {math.degrees(away):.1f}°, further than was told")
         if (
             not self._by_torque
             and target is not None
             and abs(self._start + target - seen.position) > limits.lag
         ):
-            raise Ended(
+            raise RunEnded(
                 f"the joint is more than {math.degrees(limits.lag):.1f}° behind its target{self._jerk()}"
             )
         self._judge_speed(seen)
@@ -288,7 +288,7 @@ class TestRun(PoweredRun):
             ("current", seen.current, limits.current, "A"),
         ):
             if value is not None and most is not None and abs(value) > most:
-                raise Ended(
+                raise RunEnded(
                     f"its {what} is {value:.3g} {unit}, beyond the limit of {most:.3g} {unit} "
                     f"(--max-torque){self._jerk()}"
                 )
@@ -299,7 +299,7 @@ class TestRun(PoweredRun):
             return ""
         return f"; a cycle came {self._late_s * 1000:.0f} ms late, which jerks a joint"
 
-    def _judge_speed(self, seen: Seen) -> None:
+    def _judge_speed(self, seen: DriveSample) -> None:
         """As the drive says it, and as its position goes: units that were misread show here."""
         self._way.append((seen.stamp_ns, seen.position))
         while self._way[-1][0] - self._way[0][0] > SPEED_S * 1e9 and len(self._way) > 2:
@@ -308,7 +308,7 @@ class TestRun(PoweredRun):
         speed = abs(now - was) * 1e9 / (last_ns - first_ns) if last_ns - first_ns > 0.5e9 * SPEED_S else 0.0
         speed = max(speed, abs(seen.velocity or 0.0))
         if speed > self._plan.limits.speed:
-            raise Ended(
+            raise RunEnded(
                 f"the joint moves at {math.degrees(speed):.3g}°/s, beyond its limit of "
                 f"{math.degrees(self._plan.limits.speed):.3g}°/s (--max-speed){self._jerk()}"
             )

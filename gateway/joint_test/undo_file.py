@@ -23,7 +23,7 @@ from gateway.records.chain import UNDECODABLE
 AS_BEFORE, PUT_BACK = "as before", "put back"
 
 
-class Change(msgspec.Struct, frozen=True):
+class OriginalValue(msgspec.Struct, frozen=True):
     """One number of a drive; `size` in bytes."""
 
     index: int
@@ -47,7 +47,7 @@ class Unfinished(msgspec.Struct, frozen=True):
     node_id: int
     began: str
     who: str
-    changes: tuple[Change, ...]
+    changes: tuple[OriginalValue, ...]
 
     @property
     def words(self) -> str:
@@ -59,12 +59,12 @@ class Unfinished(msgspec.Struct, frozen=True):
         )
 
 
-def changes(before: Parameters, mode: int, offset: int) -> tuple[Change, ...]:
-    """Return what a test in this mode of operation changes in an axis (`offset` above the first one's)."""
+def changes(before: Parameters, mode: int, offset: int) -> tuple[OriginalValue, ...]:
+    """Return the changes of a test in this mode of operation to an axis (`offset` above the first one's)."""
     wanted = ((MODE, 1, mode), *((index, size, 0) for index, size in OFFSETS[mode]))
     known = ((index + offset, size, before.get(name_of(index + offset, 0)), to) for index, size, to in wanted)
     return tuple(
-        msgspec.convert({"index": index, "size": size, "before": was, "written": to}, Change)
+        msgspec.convert({"index": index, "size": size, "before": was, "written": to}, OriginalValue)
         for index, size, was, to in known
         if isinstance(was, int) and was != to
     )
@@ -120,7 +120,7 @@ def put_right(
 
 
 def _put_back(bench: Bench, left: Unfinished) -> Iterator[tuple[str, str]]:
-    """Yield what became of each, in words; only what is still the test's is written over."""
+    """Yield the result of each restored value, in words; values that others changed since are left alone."""
     for one in left.changes:
         before, written = one.data(one.before), one.data(one.written)
         held = (bench.read(left.node_id, one.index) or b"")[: one.size]

@@ -11,11 +11,11 @@ from functools import partial
 from typing import Self
 
 from drivers.bus.bus import CanBus
-from drivers.component import Kind
+from drivers.component import ComponentKind
 from drivers.joint.drive import JointDrive
-from gateway.config.guard_rules import Rule, SyncRule
+from gateway.config.guard_rules import GuardRule, SyncRule
 from gateway.config.robot import RobotConfig
-from gateway.guard.watcher import Change, State, Watcher
+from gateway.guard.watcher import RuleState, RuleTransition, Watcher
 from gateway.guard.wiring import Wiring
 from gateway.modules.component.assembly import Robot
 
@@ -28,8 +28,8 @@ class Guarding:
     def __init__(self, config: RobotConfig, reader: JointDrive, bus: CanBus) -> None:
         self.tripped: str | None = None
         self._lock = threading.Lock()
-        others = {name: Kind.JOINT for name in config.joint if name != reader.name}
-        others |= dict.fromkeys(config.device, Kind.DEVICE)
+        others = {name: ComponentKind.JOINT for name in config.joint if name != reader.name}
+        others |= dict.fromkeys(config.device, ComponentKind.DEVICE)
         absent = {name: (kind, ALONE) for name, kind in others.items()}
         robot = Robot(buses={bus.name: bus}, components={reader.name: reader}, absent=absent)
         now_ns = time.monotonic_ns()
@@ -65,14 +65,14 @@ class Guarding:
     def _ours(self, watcher: Watcher) -> bool:
         return watcher.component in self._names
 
-    def _changed(self, name: str, watcher: Watcher, change: Change) -> None:
-        if change.state not in (State.TRIPPED, State.BLIND) or not self._ours(watcher):
+    def _changed(self, name: str, watcher: Watcher, change: RuleTransition) -> None:
+        if change.state not in (RuleState.TRIPPED, RuleState.BLIND) or not self._ours(watcher):
             return
         with self._lock:
             self.tripped = self.tripped or f"guard rule {name}: {change.reason}"
 
 
-def _rules(config: RobotConfig) -> Iterator[tuple[str, Rule]]:
+def _rules(config: RobotConfig) -> Iterator[tuple[str, GuardRule]]:
     """SYNC is our own here, which nobody hears from himself."""
     for name, rule in (config.guard.rule if config.guard is not None else {}).items():
         if not isinstance(rule, SyncRule):

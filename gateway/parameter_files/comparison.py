@@ -9,7 +9,7 @@ from gateway.coding import Coding, CodingError, Limit, Number, broken_limit, cod
 from gateway.wire.parameter import ParameterInfo, ParameterValue
 
 
-class Verdict(StrEnum):
+class ComparisonVerdict(StrEnum):
     """What becomes of one parameter when the file is applied."""
 
     SAME = "same"
@@ -23,15 +23,17 @@ class Verdict(StrEnum):
 
 
 # What a file is no longer the same for, what cannot be brought about, and what no leaving out can help.
-UNLIKE = frozenset(Verdict) - {Verdict.SAME, Verdict.NOT_IN_FILE}
-CANNOT_CHANGE = frozenset({Verdict.READ_ONLY, Verdict.NOT_ON_ROBOT})
-REFUSED = frozenset({Verdict.OUT_OF_LIMITS, Verdict.TOO_FAR, Verdict.UNREADABLE})
+UNLIKE = frozenset(ComparisonVerdict) - {ComparisonVerdict.SAME, ComparisonVerdict.NOT_IN_FILE}
+CANNOT_CHANGE = frozenset({ComparisonVerdict.READ_ONLY, ComparisonVerdict.NOT_ON_ROBOT})
+REFUSED = frozenset(
+    {ComparisonVerdict.OUT_OF_LIMITS, ComparisonVerdict.TOO_FAR, ComparisonVerdict.UNREADABLE}
+)
 
 
-_BROKEN: Mapping[Limit, tuple[Verdict, str]] = {
-    Limit.MIN: (Verdict.OUT_OF_LIMITS, "below"),
-    Limit.MAX: (Verdict.OUT_OF_LIMITS, "above"),
-    Limit.MAX_STEP: (Verdict.TOO_FAR, "at most"),
+_BROKEN: Mapping[Limit, tuple[ComparisonVerdict, str]] = {
+    Limit.MIN: (ComparisonVerdict.OUT_OF_LIMITS, "below"),
+    Limit.MAX: (ComparisonVerdict.OUT_OF_LIMITS, "above"),
+    Limit.MAX_STEP: (ComparisonVerdict.TOO_FAR, "at most"),
 }
 
 
@@ -42,7 +44,7 @@ class Row(Struct, frozen=True):
     unit: str
     file: Number | None
     robot: Number | None
-    verdict: Verdict
+    verdict: ComparisonVerdict
     why: str = ""
 
 
@@ -58,30 +60,30 @@ def compare(
 
 def _row(name: str, value: Number, info: ParameterInfo | None, held: ParameterValue | None) -> Row:
     if info is None:
-        return Row(name, "", value, None, Verdict.NOT_ON_ROBOT)
+        return Row(name, "", value, None, ComparisonVerdict.NOT_ON_ROBOT)
     if held is None or held.value is None:
         why = info.problem or (held.problem if held is not None else None) or "it was not read"
-        return Row(name, info.unit, value, None, Verdict.UNREADABLE, why)
+        return Row(name, info.unit, value, None, ComparisonVerdict.UNREADABLE, why)
     coding = coding_of(info.type, info.scale)
     if coding is None:
-        return Row(name, info.unit, value, held.value, Verdict.UNREADABLE, "its type is not known")
+        return Row(name, info.unit, value, held.value, ComparisonVerdict.UNREADABLE, "its type is not known")
     try:
         data = coding.encode(value)
     except CodingError as error:
-        return Row(name, info.unit, value, held.value, Verdict.OUT_OF_LIMITS, str(error))
+        return Row(name, info.unit, value, held.value, ComparisonVerdict.OUT_OF_LIMITS, str(error))
     stored = coding.decode(data)
     if data == coding.encode(held.value):
-        return Row(name, info.unit, stored, held.value, Verdict.SAME)
-    verdict, why = next(_objections(info, coding, stored, held.value), (Verdict.DIFFERENT, ""))
+        return Row(name, info.unit, stored, held.value, ComparisonVerdict.SAME)
+    verdict, why = next(_objections(info, coding, stored, held.value), (ComparisonVerdict.DIFFERENT, ""))
     return Row(name, info.unit, stored, held.value, verdict, why)
 
 
 def _objections(
     info: ParameterInfo, coding: Coding, stored: Number, held: Number
-) -> Iterator[tuple[Verdict, str]]:
+) -> Iterator[tuple[ComparisonVerdict, str]]:
     """Why the robot would refuse to change it, the most lasting reason first."""
     if info.read_only is not None:
-        yield Verdict.READ_ONLY, info.read_only
+        yield ComparisonVerdict.READ_ONLY, info.read_only
     broken = broken_limit(info, coding, stored, held)
     if broken is not None:
         verdict, word = _BROKEN[broken]
@@ -89,11 +91,13 @@ def _objections(
 
 
 def _not_in_file(info: ParameterInfo, held: ParameterValue | None) -> Row:
-    return Row(info.name, info.unit, None, None if held is None else held.value, Verdict.NOT_IN_FILE)
+    return Row(
+        info.name, info.unit, None, None if held is None else held.value, ComparisonVerdict.NOT_IN_FILE
+    )
 
 
 def left_out(wanted: Mapping[str, Number], infos: Iterable[ParameterInfo]) -> list[ParameterInfo]:
-    """Return what could be changed in the same components, and the file does not name."""
+    """Return writable parameters of the same components that the file does not name."""
     infos = tuple(infos)
     components = {info.component for info in infos if info.name in wanted}
     return [

@@ -62,5 +62,5 @@ def is_meant(info: ParameterInfo, globs: Sequence[str]) -> bool:
 
 
 def device(component: ComponentInfo) -> Mapping[str, str | int]:
-    """Return what its EDS says and where it is; empty for what is no CANopen device."""
+    """Return its EDS and its place; empty for a component that is no CANopen device."""
     return {} if component.device is UNSET else component.device

@@ -22,7 +22,7 @@ from gateway.wire.parameter import ParameterInfo
 
 
 def chosen(scope: Scope, globs: Sequence[str]) -> list[ParameterInfo]:
-    """Return what the globs mean in the device.
+    """Return the device's parameters that the globs select.
 
     Without any, all that can be configured there, by whomever.
     """
@@ -46,7 +46,7 @@ def write(path: Path, scope: Scope, values: Mapping[str, Number]) -> bytes:
 
 
 def read(path: Path, scope: Scope) -> Saved:
-    """Return what the file says of the device that it is for, or that `--component` names.
+    """Read the values for the device that the file is for, or that `--component` names.
 
     Raises:
         FileProblem, EdsError: it cannot be read, or is another device's.

@@ -22,7 +22,7 @@ def format_of(file: Path) -> Format:
 
 
 def read_file(file: Path, scope: Scope) -> Saved:
-    """Return what a file says; raises `FileProblem` where it cannot be read, or is another device's."""
+    """Read a file's values; raises `FileProblem` if it cannot be read, or is another device's."""
     try:
         return format_of(file).read(file, scope)
     except EdsError as error:

@@ -15,7 +15,7 @@ _TABLES = ("robot", "eds", "parameters")
 
 
 def chosen(scope: Scope, globs: Sequence[str]) -> list[ParameterInfo]:
-    """Return what the globs mean; without any, all that can be changed."""
+    """Return the parameters that the globs select; without any, all writable ones."""
     return [
         info
         for info in scope.robot.parameters
@@ -49,7 +49,7 @@ def write(path: Path, scope: Scope, values: Mapping[str, Number]) -> bytes:
 
 
 def read(path: Path, scope: Scope) -> Saved:
-    """Return what the file says; raises `FileProblem`."""
+    """Read the file's values; raises `FileProblem`."""
     document = _document(path)
     table = document["parameters"]
     values = {name: _value(path, name, value) for name, value in table.items()}

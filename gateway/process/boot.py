@@ -7,7 +7,7 @@ from pathlib import Path
 
 @functools.cache
 def boot_id() -> str:
-    """Return what changes whenever the monotonic clock begins anew: the kernel's boot, else this process."""
+    """Return an id that changes when the monotonic clock restarts: the kernel's boot, else this process."""
     try:
         return Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii").strip()
     except OSError:

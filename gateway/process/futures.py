@@ -26,7 +26,7 @@ def failed(error: BaseException) -> "Future[T]":
 
 
 def outcome(finished: "Future[T]") -> "T | Exception":
-    """Return what a finished future holds: its result, or its error (also that it was cancelled)."""
+    """Return the outcome of a finished future: its result, or its error (including cancellation)."""
     try:
         return finished.result()
     except Exception as error:  # noqa: BLE001 - it is handed on, not handled
@@ -42,7 +42,7 @@ def then(first: "Future[T]", continue_: Callable[[T], R]) -> "Future[R]": ...
 
 
 def then(first: "Future[T]", continue_: Callable[[T], Any]) -> "Future[Any]":
-    """Return what `continue_` makes of the result of `first`, in the thread that gives it.
+    """Return the future of `continue_`, applied to the result of `first` in the thread that sets it.
 
     Errors pass through.
     """

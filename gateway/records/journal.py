@@ -24,7 +24,7 @@ from drivers.inbox import Inbox
 from gateway.process.futures import failed
 from gateway.records import durable, journal_files
 from gateway.records.chain import Broken, Head, line
-from gateway.records.journal_files import Entry, Piece, Tail, head_file, read_head
+from gateway.records.journal_files import ClosedJournalFile, Entry, Tail, head_file, read_head
 from gateway.records.limits import OWN, Limits, Share, TooMany, within_limits
 from gateway.records.reading import SHORTENED, read_verified
 
@@ -100,7 +100,7 @@ class Journal:
         return found
 
     def with_head(self, work: Callable[[Head], Found]) -> "Future[Found]":
-        """Return what `work` makes of the newest entry, in the thread that reads.
+        """Return the result of `work` on the newest entry, in the reading thread.
 
         It delays no entry either.
         """
@@ -110,7 +110,7 @@ class Journal:
         return found
 
     def close(self) -> None:
-        """Write what was appended, and end. Idempotent."""
+        """Write the appended entries, and end. Idempotent."""
         if not self._ended:
             self._queue.put(None)
             self._thread.join()
@@ -367,7 +367,7 @@ class Journal:
         except OSError as error:
             log.warning("old pieces of the journal cannot be removed: %s", error.strerror or error)
 
-    def _surplus(self) -> list[Piece]:
+    def _surplus(self) -> list[ClosedJournalFile]:
         closed = journal_files.closed_pieces(self.path)
         left = self._sizes.kept
         for index in range(len(closed) - 1, -1, -1):
@@ -410,8 +410,8 @@ def _append(file: BinaryIO, data: bytes) -> None:
     os.fsync(file.fileno())
 
 
-def _last_hash(piece: Piece) -> str | None:
-    """Return what the line after it refers to; `None` where the piece is damaged."""
+def _last_hash(piece: ClosedJournalFile) -> str | None:
+    """Return the hash of the last line, to which the next one refers; `None` if the piece is damaged."""
     try:
         with piece.path.open("rb") as file:
             last = next(journal_files.lines_backwards(file), None)
@@ -421,7 +421,7 @@ def _last_hash(piece: Piece) -> str | None:
 
 
 def _room(journal: Path, sizes: Sizes) -> Entry:
-    """Return what the first entry says of the room on the journal's file system.
+    """Return the first entry, with the room on the journal's file system.
 
     The log where it is little.
     """

@@ -23,7 +23,7 @@ _STEP: Final = 64 * 1024
 _NUMBER: Final = re.compile(r"[0-9]{12,}")
 
 
-class Piece(NamedTuple):
+class ClosedJournalFile(NamedTuple):
     """A file to which nothing is added any more."""
 
     last: int  # the number of its last line
@@ -43,7 +43,7 @@ def head_file(journal: Path) -> Path:
 
 
 def read_head(journal: Path) -> Head | None:
-    """Return what the journal is known to reach; `None` where nobody wrote it down.
+    """Return the recorded head of the journal; `None` if none was written.
 
     Raises:
         Broken: the head's file is damaged.
@@ -57,19 +57,19 @@ def read_head(journal: Path) -> Head | None:
         raise Broken(f"{head_file(journal).name} is damaged: {error}") from error
 
 
-def closed_piece(journal: Path, last: int) -> Piece:
+def closed_piece(journal: Path, last: int) -> ClosedJournalFile:
     """How a piece is called that ends with this line."""
-    return Piece(last, journal.with_name(f"{journal.name}.{last:012}"))
+    return ClosedJournalFile(last, journal.with_name(f"{journal.name}.{last:012}"))
 
 
-def closed_pieces(journal: Path) -> list[Piece]:
+def closed_pieces(journal: Path) -> list[ClosedJournalFile]:
     """Those that are there, oldest first."""
     try:
         paths = list(journal.parent.iterdir())
     except FileNotFoundError:
         return []
     names = ((path, path.name.removeprefix(f"{journal.name}.")) for path in paths)
-    return sorted(Piece(int(name), path) for path, name in names if _NUMBER.fullmatch(name))
+    return sorted(ClosedJournalFile(int(name), path) for path, name in names if _NUMBER.fullmatch(name))
 
 
 def newest_line(journal: Path) -> bytes | None:
@@ -113,7 +113,7 @@ def decoded(line: bytes) -> Entry:
 
 
 def hash_of(line: bytes) -> Head:
-    """Return what follows this line refers to; raises `Broken`."""
+    """Return the hash of a line, to which the next one refers; raises `Broken`."""
     return check(0, None, line)[0]
 
 

@@ -118,7 +118,7 @@ class Limits:
         )
 
     def summaries(self, now_ns: int | None) -> list[Entry]:
-        """Return what is to be summed up now; everything, where `now_ns` is `None`."""
+        """Return the summaries due now; all of them if `now_ns` is `None`."""
         due = [one for one, left in self._left_out.items() if now_ns is None or left.due_ns <= now_ns]
         return [self._left_out.pop(whose).entry(whose) for whose in due]
 

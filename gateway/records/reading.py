@@ -66,7 +66,7 @@ def _open(path: Path, opened: contextlib.ExitStack) -> BinaryIO | None:
 
 
 def _before(file: BinaryIO) -> Head:
-    """Return what the first line says that it follows; whether it is that line is checked with all others."""
+    """Return the head to which the first line refers; it is verified together with all other lines."""
     first = next(iter(file), b"")
     file.seek(0)
     try:

@@ -37,6 +37,6 @@ class Records:
         return RecordsInfo(str(self.folder.path), self.journal.problem or self.undo.problem)
 
     def close(self) -> None:
-        """Write what was appended, and let others have the folder."""
+        """Write the appended entries, and release the folder."""
         self.journal.close()
         self.folder.close()

@@ -49,5 +49,5 @@ class HeadSigner:
 
 
 def message(head: SignedHead) -> bytes:
-    """Return what is signed of it."""
+    """Return the bytes that are signed for a head."""
     return _KIND + msgspec.json.encode([head.robot, head.n, head.hash, head.utc_ns])

@@ -72,7 +72,7 @@ class UndoFile:
         self._undos: dict[int, Undo] = {}
 
     def load(self) -> tuple[list[Undo], str | None]:
-        """Return what the last gateway left, oldest first.
+        """Return the undo entries of the last gateway, oldest first.
 
         And what is wrong with the file, then put aside.
         """

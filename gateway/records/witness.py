@@ -20,7 +20,7 @@ from gateway.records.signing import message
 from gateway.wire.control import SignedHead
 
 
-class Verdict(StrEnum):
+class WitnessVerdict(StrEnum):
     """What is known of a journal."""
 
     INTACT = "intact"  # every entry is the one that a witness has seen
@@ -32,7 +32,7 @@ class Verdict(StrEnum):
 class Judgement:
     """Of a journal; `at` is the first entry that is wrong, or of which that is not known."""
 
-    verdict: Verdict
+    verdict: WitnessVerdict
     text: str
     at: int | None = None
     entries: int = 0
@@ -84,9 +84,9 @@ def judge(journal: Path, witnesses: Iterable[SignedHead], problem: str = NOBODY)
             if last in wanted:
                 hashes[last] = entry["hash"]
     except Broken as error:
-        return Judgement(Verdict.BROKEN, str(error), error.at)
+        return Judgement(WitnessVerdict.BROKEN, str(error), error.at)
     found = Judgement(
-        Verdict.UNPROVEN, problem, first or 1, last - first + 1 if first else 0, max(0, first - 1)
+        WitnessVerdict.UNPROVEN, problem, first or 1, last - first + 1 if first else 0, max(0, first - 1)
     )
     return _told(found, seen, hashes, last)
 
@@ -97,21 +97,21 @@ def _told(found: Judgement, seen: list[SignedHead], hashes: Mapping[int, str], l
     for head in seen:
         if head.n > last:
             text = f"{_when(head)} it had {head.n} entries, and now it ends with {last}: the others are gone"
-            return Judgement(Verdict.BROKEN, text, last + 1, *counts, good.n if good else 0)
+            return Judgement(WitnessVerdict.BROKEN, text, last + 1, *counts, good.n if good else 0)
         if head.n in hashes and hashes[head.n] != head.hash:
             since = f"entries up to {good.n} are as they were" if good else "no earlier entry was witnessed"
             text = f"{_when(head)} entry {head.n} was another one: the journal was rewritten; {since}"
-            return Judgement(Verdict.BROKEN, text, head.n, *counts, good.n if good else 0)
+            return Judgement(WitnessVerdict.BROKEN, text, head.n, *counts, good.n if good else 0)
         good = head if head.n in hashes else good
     if good is None and seen:
         text = f"what others have seen of it ends with entry {seen[-1].n}, which is removed"
-        return Judgement(Verdict.UNPROVEN, text, found.at, *counts)
+        return Judgement(WitnessVerdict.UNPROVEN, text, found.at, *counts)
     if good is None:
         return found
     if good.n < last:
         text = f"entries up to {good.n} are as they were {_when(good)}; nobody has seen those after it"
-        return Judgement(Verdict.UNPROVEN, text, good.n + 1, *counts, good.n)
-    return Judgement(Verdict.INTACT, f"as it was {_when(good)}", None, *counts, good.n)
+        return Judgement(WitnessVerdict.UNPROVEN, text, good.n + 1, *counts, good.n)
+    return Judgement(WitnessVerdict.INTACT, f"as it was {_when(good)}", None, *counts, good.n)
 
 
 def _when(head: SignedHead) -> str:

@@ -107,7 +107,7 @@ class Feed:
 
 
 def values_a_second(rate_hz: float, channels: int) -> float:
-    """Return what such a stream costs: its values, and what its rows cost beside them."""
+    """Return the cost of a stream: its values a second, and the overhead of its rows."""
     return (rate_hz or OWN_RATE_HZ) * (ROW_VALUES + channels)
 
 

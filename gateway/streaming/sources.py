@@ -11,7 +11,7 @@ from msgspec import UNSET
 from drivers.latest import Latest, Listener
 from drivers.samples import Channel
 from gateway.wire.component import ChannelInfo
-from gateway.wire.framing import Kind, refuse
+from gateway.wire.framing import ErrorKind, refuse
 from gateway.wire.limits import GLOBS, NAME_OR_GLOB_LENGTH, NAMES, WILD_CARDS
 
 _WILD = frozenset("*?[")
@@ -57,21 +57,25 @@ class Wanted:
         named = globs or ()
         if len(named) > NAMES:
             raise refuse(
-                Kind.BAD_PARAMS,
+                ErrorKind.BAD_PARAMS,
                 f"{len(named)} names and globs, and {NAMES} are the most: use a glob such as left_*",
             )
         for one in named:
             if len(one) > NAME_OR_GLOB_LENGTH:
                 why = f"a name or glob has {len(one)} characters, and {NAME_OR_GLOB_LENGTH} are the most"
-                raise refuse(Kind.BAD_PARAMS, f"{why}: {one[:20]!r}…")
+                raise refuse(ErrorKind.BAD_PARAMS, f"{why}: {one[:20]!r}…")
         patterns = dict.fromkeys(one for one in named if not _WILD.isdisjoint(one))
         for one in patterns:
             if not one.isascii():
-                raise refuse(Kind.BAD_PARAMS, f"the glob {one!r} has characters beyond ASCII: use others")
+                raise refuse(
+                    ErrorKind.BAD_PARAMS, f"the glob {one!r} has characters beyond ASCII: use others"
+                )
             if sum(map(one.count, _WILD)) > WILD_CARDS:
-                raise refuse(Kind.BAD_PARAMS, f"the glob {one!r} has more than {WILD_CARDS} of * ? and [")
+                raise refuse(
+                    ErrorKind.BAD_PARAMS, f"the glob {one!r} has more than {WILD_CARDS} of * ? and ["
+                )
         if len(patterns) > GLOBS:
-            raise refuse(Kind.BAD_PARAMS, f"a request may have {GLOBS} globs, not {len(patterns)}")
+            raise refuse(ErrorKind.BAD_PARAMS, f"a request may have {GLOBS} globs, not {len(patterns)}")
         self._all = globs is None
         self._exact = dict.fromkeys(named)
         self._patterns = {one: re.compile(fnmatch.translate(one)) for one in patterns}
@@ -98,7 +102,7 @@ def whole(source: Source) -> Selection:
 
 
 def narrow(selections: Iterable[Selection], globs: Sequence[str] | None) -> list[Selection]:
-    """Return what the globs leave of the selections; those left empty are gone."""
+    """Return the selections narrowed by the globs, without empty ones."""
     narrowed, wanted = [], Wanted(globs)
     for one in selections:
         indices = tuple(index for index in one.indices if one.source.channels[index].name in wanted)
@@ -131,8 +135,10 @@ def check_globs(
     for glob in Wanted(globs).meaningless(dict.fromkeys(names)):
         component = glob.partition(".")[0]
         if absent and component in absent:
-            raise refuse(Kind.UNAVAILABLE, f"{glob}: {absent[component]}", component=component)
-        raise refuse(Kind.UNKNOWN_NAME, f"there is no {what} {glob!r}; robot.describe lists what there is")
+            raise refuse(ErrorKind.UNAVAILABLE, f"{glob}: {absent[component]}", component=component)
+        raise refuse(
+            ErrorKind.UNKNOWN_NAME, f"there is no {what} {glob!r}; robot.describe lists what there is"
+        )
 
 
 def channel_info(channel: Channel) -> ChannelInfo:

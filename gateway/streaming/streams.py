@@ -42,7 +42,7 @@ class Streams:
         """
         if len(session.outlets) >= STREAMS:
             most = f"a client may have {STREAMS} streams; end one, or ask for more channels in one"
-            raise framing.refuse(framing.Kind.UNAVAILABLE, most)
+            raise framing.refuse(framing.ErrorKind.UNAVAILABLE, most)
         chosen = list(selections)
         key = (rate_hz, tuple(name for selection in chosen for name in selection.names))
         feed = self._feeds.get(key)
@@ -72,7 +72,7 @@ class Streams:
             else ("the streams of all clients", together, ALL_VALUES_A_SECOND)
         )
         raise framing.refuse(
-            framing.Kind.UNAVAILABLE,
+            framing.ErrorKind.UNAVAILABLE,
             f"{whose} would cost {cost:,.0f} values a second, and {most:,} is the most (a row counts as its "
             f"channels and {ROW_VALUES} more): ask for a lower rate, or fewer channels",
             limit=float(most),

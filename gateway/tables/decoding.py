@@ -174,7 +174,7 @@ def _choices_words(kind: Any) -> str:
 
 
 def _choices(kind: Any) -> list[object]:
-    """Return what an enumeration allows; empty where it is none."""
+    """Return the members of an enumeration; empty for other types."""
     for one in _leaves(kind):
         if typing.get_origin(one) is Literal:
             return list(typing.get_args(one))

@@ -67,7 +67,7 @@ def _statements(lines: list[str]) -> Iterator[tuple[Path, int]]:
 
 
 def _statement(lines: list[str]) -> tuple[dict[str, Any], int]:
-    """Return what the first line says, with as many more as its value goes on for."""
+    """Parse the first statement, with as many further lines as its value has."""
     if not lines[0].strip() or lines[0].lstrip().startswith("#"):
         return {}, 1
     for count in range(1, len(lines) + 1):

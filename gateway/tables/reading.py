@@ -69,7 +69,7 @@ def parse(data: bytes) -> dict[str, Any]:
 
 
 def as_far_as_readable(file: Path, first: Finding) -> tuple[list[Finding], str | None]:
-    """Return what keeps a file from being TOML, each line that is none by itself; and the text without them.
+    """Return the lines that keep a file from being TOML, and the text without them.
 
     `first` is what reading it has found. Behind a header that cannot be read, or a value that does not end,
     nobody knows what is meant: no text then.

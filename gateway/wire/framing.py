@@ -27,7 +27,7 @@ INVALID_PARAMS: Final = -32602
 INTERNAL_ERROR: Final = -32603
 
 
-class Kind(StrEnum):
+class ErrorKind(StrEnum):
     """What an error means, for programs; the message is for people."""
 
     BAD_PARAMS = "bad_params"
@@ -48,30 +48,30 @@ class Kind(StrEnum):
     STOPPED = "stopped"
 
 
-CODES: Final[Mapping[Kind, int]] = {
-    Kind.BAD_PARAMS: INVALID_PARAMS,
-    Kind.UNKNOWN_NAME: -32001,
-    Kind.NO_LEASE: -32002,
-    Kind.LEASE_HELD: -32003,
-    Kind.NOT_ALLOWED: -32004,
-    Kind.OUT_OF_LIMIT: -32005,
-    Kind.WRONG_STATE: -32006,
-    Kind.READ_ONLY: -32007,
-    Kind.TRIAL_PENDING: -32008,
-    Kind.DEVICE_ABORT: -32010,
-    Kind.DEVICE_TIMEOUT: -32011,
-    Kind.MISMATCH: -32012,
-    Kind.ROLLED_BACK: -32013,
-    Kind.ROLLBACK_FAILED: -32014,
-    Kind.UNAVAILABLE: -32015,
-    Kind.STOPPED: -32016,
+CODES: Final[Mapping[ErrorKind, int]] = {
+    ErrorKind.BAD_PARAMS: INVALID_PARAMS,
+    ErrorKind.UNKNOWN_NAME: -32001,
+    ErrorKind.NO_LEASE: -32002,
+    ErrorKind.LEASE_HELD: -32003,
+    ErrorKind.NOT_ALLOWED: -32004,
+    ErrorKind.OUT_OF_LIMIT: -32005,
+    ErrorKind.WRONG_STATE: -32006,
+    ErrorKind.READ_ONLY: -32007,
+    ErrorKind.TRIAL_PENDING: -32008,
+    ErrorKind.DEVICE_ABORT: -32010,
+    ErrorKind.DEVICE_TIMEOUT: -32011,
+    ErrorKind.MISMATCH: -32012,
+    ErrorKind.ROLLED_BACK: -32013,
+    ErrorKind.ROLLBACK_FAILED: -32014,
+    ErrorKind.UNAVAILABLE: -32015,
+    ErrorKind.STOPPED: -32016,
 }
 
 
 class ErrorData(Struct, frozen=True, omit_defaults=True):
     """The `data` of an error. `object` is written `"0x6065:0"`; `outcome` says what became of each name."""
 
-    kind: Kind
+    kind: ErrorKind
     component: str | None = None
     object: str | None = None
     abort_code: int | None = None
@@ -96,7 +96,7 @@ class RpcError(Exception):
         self.code = CODES[data.kind] if code is None else code
 
     @property
-    def kind(self) -> Kind:
+    def kind(self) -> ErrorKind:
         return self.data.kind
 
     @property
@@ -104,27 +104,27 @@ class RpcError(Exception):
         return ErrorBody(self.code, str(self), self.data)
 
 
-def refuse(kind: Kind, message: str, **data: Any) -> RpcError:
+def refuse(kind: ErrorKind, message: str, **data: Any) -> RpcError:
     """Return an error of that kind; `data` are further fields of `ErrorData`."""
     return RpcError(message, ErrorData(kind, **data))
 
 
 def unknown_method(name: str) -> RpcError:
-    """Return what a method that does not exist is answered with (−32601)."""
-    return RpcError(f"there is no method {name!r}", ErrorData(Kind.UNKNOWN_NAME), METHOD_NOT_FOUND)
+    """Return the error for an unknown method (−32601)."""
+    return RpcError(f"there is no method {name!r}", ErrorData(ErrorKind.UNKNOWN_NAME), METHOD_NOT_FOUND)
 
 
 def internal_error(method: str, error: Exception) -> RpcError:
-    """Return what a failure of our own is answered with (−32603)."""
+    """Return the error for a failure of the gateway itself (−32603)."""
     message = f"{method} failed inside the gateway: {type(error).__name__}: {error}; its log says more"
-    return RpcError(message, ErrorData(Kind.UNAVAILABLE), INTERNAL_ERROR)
+    return RpcError(message, ErrorData(ErrorKind.UNAVAILABLE), INTERNAL_ERROR)
 
 
 class BadLine(RpcError):
     """A line that holds no request; `id` is what could still be read of it."""
 
     def __init__(self, message: str, code: int = INVALID_REQUEST, id: Id = None) -> None:  # noqa: A002
-        super().__init__(message, ErrorData(Kind.BAD_PARAMS), code)
+        super().__init__(message, ErrorData(ErrorKind.BAD_PARAMS), code)
         self.id = id
 
 
@@ -317,7 +317,7 @@ _strict = json.JSONDecoder(object_pairs_hook=_once, parse_int=_in_64_bits)
 
 
 def encode_refusal(line: bytes | BadLine, refusal: RpcError) -> bytes:
-    """Return what a line is answered with that is not served; nothing where it asks for no answer."""
+    """Return the answer to a line that is refused; nothing if it needs no answer."""
     try:
         if isinstance(line, BadLine):
             raise line
@@ -360,9 +360,9 @@ def decode_params(raw: Raw | UnsetType, type: type[_Params]) -> _Params:  # noqa
     if encoded == b"null":
         encoded = b"{}"
     if encoded.startswith(b"["):
-        raise refuse(Kind.BAD_PARAMS, "parameters go by name: send an object, not a list")
+        raise refuse(ErrorKind.BAD_PARAMS, "parameters go by name: send an object, not a list")
     try:
         return msgspec.json.decode(encoded, type=type)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         allowed = ", ".join(type.__struct_encode_fields__) or "none"
-        raise refuse(Kind.BAD_PARAMS, f"{plainly(error)} (parameters here: {allowed})") from error
+        raise refuse(ErrorKind.BAD_PARAMS, f"{plainly(error)} (parameters here: {allowed})") from error

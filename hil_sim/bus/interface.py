@@ -30,7 +30,7 @@ def to_bytes(frame: Frame) -> bytes:
 
 
 def to_frame(data: bytes) -> Frame:
-    """Return what the kernel gave, as a frame."""
+    """Return the kernel's bytes as a frame."""
     identifier, length, payload = _FRAME.unpack(data)
     remote = bool(identifier & _REMOTE)
     content = b"" if remote else payload[:length]

@@ -129,7 +129,7 @@ class SocketCanBridge:
             self._reopen()
 
     def _received(self, sock: socket.socket) -> list[Frame]:
-        """Return what has come; raises `OSError` where the interface has gone."""
+        """Return the received frames; raises `OSError` if the interface is gone."""
         frames: list[Frame] = []
         while len(frames) < _AT_ONCE:
             try:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from hil_sim.control_socket import ask
-from hil_sim.faults.fault import Target
+from hil_sim.faults.fault import FaultTarget
 from hil_sim.faults.registry import FAULTS
 from hil_sim.operator import VERBS
 
@@ -81,7 +81,7 @@ def main(argv: list[str]) -> int:
 
 
 def _request(parser: argparse.ArgumentParser, arguments: argparse.Namespace) -> dict[str, Any]:
-    """Return what is meant, as the socket takes it; leaves with the usage where nothing is."""
+    """Return the request for the socket; exit with the usage if there is none."""
     if arguments.dir is None:
         parser.error("--dir DIR says which simulator")
     given: dict[str, Any] = {
@@ -143,14 +143,14 @@ def _active(one: dict[str, Any]) -> str:
 
 def explained() -> str:
     """Return every fault by what it can be on: what it looks like, and its parameters with their defaults."""
-    return "\n".join(text for target in Target for text in (_heading(target), *_explained(target)))
+    return "\n".join(text for target in FaultTarget for text in (_heading(target), *_explained(target)))
 
 
-def _heading(target: Target) -> str:
+def _heading(target: FaultTarget) -> str:
     return f"-- on {' or '.join((', '.join(target.value[:-1]), target.value[-1])).removeprefix(' or ')}\n"
 
 
-def _explained(target: Target) -> Iterator[str]:
+def _explained(target: FaultTarget) -> Iterator[str]:
     for name, fault in FAULTS.items():
         if fault.on is target:
             lines = [name + " (at once, no duration)" * fault.momentary, f"    {fault.looks}"]

@@ -76,7 +76,7 @@ _DIGITS: Final = {
 _ROUNDED: Final = tuple(_DIGITS[unit] for unit in UNITS.values())
 
 
-class Recording:
+class SessionRecorder:
     """One wearer's session: writes a line to `file` after each cycle of the sensors, once the robot moves."""
 
     def __init__(
@@ -142,7 +142,7 @@ class Recording:
         self._write(list(compress(row, self._kept)))
 
     def _danger(self) -> list[float]:
-        """Return what is written of dangers, in the order of `DANGER_COLUMNS`."""
+        """Return the values of dangers, in the order of `DANGER_COLUMNS`."""
         if self._course is None:
             return []
         units = zip(joints_reported(self._robot), JOINT_UNITS.values(), strict=True)
@@ -228,7 +228,7 @@ def main(argv: list[str]) -> int:
         return 2 if leave.code else 0
     with _opened(arguments.out) as file:
         for person in arguments.subjects:
-            Recording(
+            SessionRecorder(
                 file, arguments.scenario, arguments.seed, person, arguments.walks, arguments.assists
             ).run(60.0 * arguments.minutes)
     return 0

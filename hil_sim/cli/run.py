@@ -13,7 +13,7 @@ from pathlib import Path
 from hil_sim.cli.arguments import speed
 from hil_sim.errors import SimulatorError
 from hil_sim.scenario import records, report
-from hil_sim.scenario.expectation import Result
+from hil_sim.scenario.expectation import ScenarioResult
 from hil_sim.scenario.records import Ran
 from hil_sim.scenario.runner import run
 from hil_sim.scenario.script import Script, load
@@ -150,7 +150,7 @@ def _write(file: Path, content: bytes) -> None:
         raise SimulatorError(f"{file} cannot be written: {error.strerror}") from error
 
 
-def _status(results: Collection[Result]) -> int:
-    if {Result.FAILED, Result.NOT_RUN} & set(results):
+def _status(results: Collection[ScenarioResult]) -> int:
+    if {ScenarioResult.FAILED, ScenarioResult.NOT_RUN} & set(results):
         return 1
-    return _INCONCLUSIVE if Result.INCONCLUSIVE in results else 0
+    return _INCONCLUSIVE if ScenarioResult.INCONCLUSIVE in results else 0

@@ -228,7 +228,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _parse(argv: list[str]) -> tuple[argparse.Namespace, Script]:
-    """Return what is asked for.
+    """Parse the command line.
 
     Where a script is named, its `[robot]` stands for the options that are not given.
     """

@@ -34,7 +34,7 @@ class Write:
 
 
 def needed(node_id: int, cycle_ms: int) -> Iterator[Write]:
-    """Yield what the controller needs of a drive whose joint is as ours: counts of 1/409 600 revolution."""
+    """Yield the controller's settings of a drive for one of our joints: counts of 1/409 600 revolution."""
     yield from _pdo(0x1800, 0x1A00, _NOT_ON_REQUEST | 0x180 + node_id, (0x6041_0010, 0x6064_0020))
     yield from _pdo(0x1400, 0x1600, 0x200 + node_id, (0x6040_0010, 0x6060_0008, 0x607A_0020))
     yield Write(0x60C2, 2, -3, 1)

@@ -48,7 +48,7 @@ def power_state_of(statusword: int) -> PowerState | None:
 
 
 @dataclass(slots=True)
-class Seen:
+class DriveStatus:
     """One drive: its node id, the state that its PDO showed last, and when."""
 
     node_id: int
@@ -75,6 +75,6 @@ class Seen:
         return QUICK_STOP if self.state is None else _WAY_UP.get(self.state, QUICK_STOP)
 
 
-def first(drives: list[Seen], wrong: Callable[[Seen], bool]) -> int | None:
+def first(drives: list[DriveStatus], wrong: Callable[[DriveStatus], bool]) -> int | None:
     """Return the node id of the first drive that is `wrong`."""
     return next((seen.node_id for seen in drives if wrong(seen)), None)

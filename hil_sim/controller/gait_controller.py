@@ -14,7 +14,7 @@ from hil_sim.bus.can_bus import CanBus
 from hil_sim.clock import MILLISECOND_NS, Clock
 from hil_sim.controller import objects
 from hil_sim.controller.commissioning import SDO_RESPONSE, Commissioning
-from hil_sim.controller.drives import ENABLE_OPERATION, QUICK_STOP, Seen, first
+from hil_sim.controller.drives import ENABLE_OPERATION, QUICK_STOP, DriveStatus, first
 from hil_sim.controller.objects import COMMANDING, ControllerState
 from hil_sim.gait.activity import Activity
 from hil_sim.gait.generator import Generator
@@ -59,7 +59,7 @@ class GaitController(Node):
         self._counts_per_radian = counts_per_radian
         self._joints = joints
         self._led = [place for place in range(len(joints)) if place not in absent]
-        self._drives = [Seen(joints[place].node_id, clock) for place in self._led]
+        self._drives = [DriveStatus(joints[place].node_id, clock) for place in self._led]
         objects.listen_to(
             self.dictionary,
             [None if place in absent else joint.node_id for place, joint in enumerate(joints)],
@@ -243,7 +243,7 @@ class GaitController(Node):
         self.generator.step(dt, Activity(self.dictionary[objects.ACTIVITY].number()), self._shape())
 
     def set_points(self) -> list[int]:
-        """Return what each joint is to follow now (counts)."""
+        """Return the set-points of the joints (counts)."""
         left = 1.0 - smooth(self._taken_over_s / _TAKE_OVER_S)
         parts = zip(self._joints, self._angles(), self._offsets, self.strays, strict=True)
         return [

@@ -15,7 +15,7 @@ class Encoder:
         self._last = 0.0
 
     def read(self, radians: float) -> float:
-        """Return what is read (rad at the joint) where the motor really stands at `radians`."""
+        """Return the reading (rad at the joint) while the motor really stands at `radians`."""
         if not self.stuck:
             self._last = radians + self.offset_counts / self._counts_per_radian
         return self._last

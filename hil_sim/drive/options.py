@@ -51,7 +51,7 @@ WAYS_OUT = {
 
 
 def ramp(objects: Objects, option: Key) -> Ramp:
-    """Return what `option` says; a vendor's own code counts as the quick stop ramp."""
+    """Return the ramp of `option`; a vendor's own code counts as the quick stop ramp."""
     return RAMPS.get(objects.number(option), Ramp.QUICK_STOP)
 
 

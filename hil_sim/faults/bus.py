@@ -6,7 +6,7 @@ from contextlib import contextmanager
 
 from hil_sim.bus.can_bus import BUS_OFF, RESTARTED, Disturbance, Frame
 from hil_sim.clock import MILLISECOND_NS, SECOND_NS
-from hil_sim.faults.fault import Fault, Form, Number, Site, Target
+from hil_sim.faults.fault import Fault, FaultTarget, Form, Number, Site
 from hil_sim.faults.frames import disturbed_by, disturbing
 from hil_sim.node import cob_id, sync
 from hil_sim.node.node import Node
@@ -101,19 +101,19 @@ def _load(site: Site) -> Iterator[None]:
 
 FAULTS = {
     "frame_loss": Fault(
-        Target.BUS,
+        FaultTarget.BUS,
         disturbed_by(_Loss),
         "Each receiver misses a share of the frames, each another: counters jump, SDO answers stay away.",
         {"percent": Number(5.0, 0.0, 100.0, "%", "share of the frames that a receiver misses")},
     ),
     "error_frames": Fault(
-        Target.BUS,
+        FaultTarget.BUS,
         disturbed_by(_Errors),
         "Error frames; each frame that one has destroyed is sent again and comes late, and none is missing.",
         {"percent": Number(10.0, 0.0, 90.0, "%", "share of the attempts to send that fail")},
     ),
     "bus_load": Fault(
-        Target.BUS,
+        FaultTarget.BUS,
         _load,
         "Frames of one identifier fill the bus; what has a higher identifier comes late, at 100 % never.",
         {
@@ -124,17 +124,17 @@ FAULTS = {
         },
     ),
     "bus_cut": Fault(
-        Target.BUS,
+        FaultTarget.BUS,
         disturbed_by(_Cut),
         "The gateway's cable is out: no frame comes, none is answered, and the robot walks on.",
     ),
     "gateway_bus_off": Fault(
-        Target.BUS,
+        FaultTarget.BUS,
         _gateway_bus_off,
         "The gateway's own CAN controller is bus off: it says so (error class 40h), and no frame passes it.",
     ),
     "sync_lost": Fault(
-        Target.BUS,
+        FaultTarget.BUS,
         disturbed_by(_NoSync),
         "No SYNC, so no synchronous PDO; heartbeats and SDO answers come, set-points take no effect.",
         {"percent": Number(100.0, 1.0, 100.0, "%", "share of the SYNCs that are not sent")},

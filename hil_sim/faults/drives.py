@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from hil_sim.clock import MILLISECOND_NS
 from hil_sim.drive.supervision import OVERCURRENT
 from hil_sim.exoskeleton import JOINTS
-from hil_sim.faults.fault import Fault, Form, Number, Site, Target
+from hil_sim.faults.fault import Fault, FaultTarget, Form, Number, Site
 
 _HEATING_TICK_NS = 100 * MILLISECOND_NS
 _STRAYING_TICK_NS = 10 * MILLISECOND_NS
@@ -115,13 +115,13 @@ _DEGREES = Number(5.0, -60.0, 60.0, "°", "how far, seen at the joint")
 
 FAULTS = {
     "overcurrent": Fault(
-        Target.DRIVE,
+        FaultTarget.DRIVE,
         _overcurrent,
         "EMCY 2310h with bit 1 of 1001h, 603Fh = 2310h; the state is fault reaction active, then fault.",
         momentary=True,
     ),
     "overtemperature": Fault(
-        Target.DRIVE,
+        FaultTarget.DRIVE,
         _overtemperature,
         "The motor's temperature rises; above 100 °C EMCY 4310h with bit 3 of 1001h, and the state fault.",
         {
@@ -130,54 +130,54 @@ FAULTS = {
         },
     ),
     "undervoltage": Fault(
-        Target.DRIVE,
+        FaultTarget.DRIVE,
         _undervoltage,
         "Below 36 V an enabled drive sends EMCY 3220h with bit 2 of 1001h and goes to fault.",
         {"volts": Number(30.0, 0.0, 60.0, "V", "of the DC link")},
     ),
     "encoder_jump": Fault(
-        Target.DRIVE,
+        FaultTarget.DRIVE,
         _encoder_jump,
         "6064h jumps from one PDO to the next, faster than a joint moves; the drive then moves it back.",
         {"degrees": _DEGREES},
     ),
     "encoder_stuck": Fault(
-        Target.DRIVE,
+        FaultTarget.DRIVE,
         _encoder_stuck,
         "6064h stays the same to the count while 6062h moves on; beyond 6065h and 6066h EMCY 8611h, fault.",
     ),
     "gear_slip": Fault(
-        Target.DRIVE,
+        FaultTarget.DRIVE,
         _gear_slip,
         "6064h shows nothing: the joint itself is off by the angle, until somebody homes it anew.",
         {"degrees": _DEGREES},
         momentary=True,
     ),
     "following_error": Fault(
-        Target.DRIVE,
+        FaultTarget.DRIVE,
         _friction,
         "The joint is all but jammed: 60F4h and torque grow, then bit 13, after 6066h EMCY 8611h and fault.",
         {"factor": Number(60.0, 1.0, 1000.0, "", "how many times its friction")},
     ),
     "sto": Fault(
-        Target.DRIVE,
+        FaultTarget.DRIVE,
         _sto,
         "Hardware takes the motor's power: switch on disabled, 60FDh bit 16; nothing enables it meanwhile.",
     ),
     "limit_switch": Fault(
-        Target.DRIVE,
+        FaultTarget.DRIVE,
         _limit_switch,
         "A bit of 60FDh is set, wherever the joint is; the drive itself does nothing about it.",
         {"bit": Number(1, 0, 31, "", "0 and 1 the limit switches, 2 home, 3 interlock", Form.WHOLE)},
     ),
     "drift": Fault(
-        Target.DRIVE,
+        FaultTarget.DRIVE,
         _drift,
         "6064h creeps while the motor has no power, as under a load that the gear does not hold.",
         {"deg_per_s": Number(2.0, -60.0, 60.0, "°/s", "how fast")},
     ),
     "runaway": Fault(
-        Target.DRIVE,
+        FaultTarget.DRIVE,
         _runaway,
         "The controller's set-points for the joint go away and on; the drive follows up to its own limits.",
         {"deg_per_s": Number(200.0, -300.0, 300.0, "°/s", "how fast")},

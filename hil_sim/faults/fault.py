@@ -22,7 +22,7 @@ class FaultRefused(SimulatorError):
     """A fault cannot be made as it was asked for; the message names what is wrong and what is allowed."""
 
 
-class Target(Enum):
+class FaultTarget(Enum):
     """What a fault acts on: the devices that it may be asked for."""
 
     DRIVE = tuple(JOINTS)
@@ -144,7 +144,7 @@ class Fault:
     fault is over as soon as it has begun and takes no duration.
     """
 
-    on: Target
+    on: FaultTarget
     act: Callable[[Site], AbstractContextManager[None]]
     looks: str
     parameters: Mapping[str, Parameter] = field(default_factory=dict)

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from hil_sim.clock import MILLISECOND_NS
 from hil_sim.drive import objects
 from hil_sim.exoskeleton import JOINTS
-from hil_sim.faults.fault import Fault, Number, Site, Target
+from hil_sim.faults.fault import Fault, FaultTarget, Number, Site
 
 _TICK_NS = 50 * MILLISECOND_NS
 _TICK_S = _TICK_NS / 1e9
@@ -120,13 +120,13 @@ def _mount_slips(site: Site) -> Iterator[None]:
 
 FAULTS = {
     "friction_grows": Fault(
-        Target.DRIVE,
+        FaultTarget.DRIVE,
         _friction_grows,
         "Torque grows with speed from stride to stride, then 60F4h; at last as following_error.",
         {"times_per_s": Number(0.4, 0.01, 100.0, "1/s", "of the usual friction, more each second")},
     ),
     "encoder_slips": Fault(
-        Target.DRIVE,
+        FaultTarget.DRIVE,
         _encoder_slips,
         "6064h jumps a little, again and again; each time the drive moves the joint by as much.",
         {
@@ -135,19 +135,19 @@ FAULTS = {
         },
     ),
     "torque_fades": Fault(
-        Target.DRIVE,
+        FaultTarget.DRIVE,
         _torque_fades,
         "6077h grows for the same motion: the current makes less torque; then 60F4h grows too.",
         {"percent_per_s": Number(10.0, 0.1, 1000.0, "%/s", "of its torque that is lost")},
     ),
     "oscillation": Fault(
-        Target.DRIVE,
+        FaultTarget.DRIVE,
         _oscillation,
         "606Ch and 6077h tremble faster than anybody moves, more and more: the loop is badly tuned.",
         {"percent_per_s": Number(12.0, 0.1, 1000.0, "%/s", "by which its gain grows and its damping falls")},
     ),
     "wearer_resists": Fault(
-        Target.DRIVE,
+        FaultTarget.DRIVE,
         _resists,
         "6077h beats some times a second, more and more: the wearer's muscles work against the joint.",
         {
@@ -156,7 +156,7 @@ FAULTS = {
         },
     ),
     "insole_cells_die": Fault(
-        Target.INSOLE,
+        FaultTarget.INSOLE,
         _cells_die,
         "One cell after the other says nothing: the force falls, the centre of pressure moves away.",
         {
@@ -165,7 +165,7 @@ FAULTS = {
         },
     ),
     "imu_slips": Fault(
-        Target.IMU,
+        FaultTarget.IMU,
         _mount_slips,
         "Tilt, acceleration and rate turn forward together, as the IMU turns on the trunk.",
         {"deg_per_s": Number(1.5, -50.0, 50.0, "°/s", "how fast")},

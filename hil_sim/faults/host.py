@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
-from hil_sim.faults.fault import Fault, FaultRefused, FolderName, Form, Number, Site, Target
+from hil_sim.faults.fault import Fault, FaultRefused, FaultTarget, FolderName, Form, Number, Site
 
 _MEGABYTE = 1 << 20
 _MEMORY_SHARE = 0.5  # of what is available: the bench itself must live
@@ -70,13 +70,13 @@ def _disk(site: Site) -> Iterator[None]:
 
 FAULTS = {
     "cpu_hog": Fault(
-        Target.HOST,
+        FaultTarget.HOST,
         _processor,
         "The processor is busy: the resource module shows it, a process `hil_sim.faults.hog` stands first.",
         {"cores": Number(0, 0, 256, "", "how many to keep busy; 0 is all of them", Form.WHOLE)},
     ),
     "memory_hog": Fault(
-        Target.HOST,
+        FaultTarget.HOST,
         _memory,
         "Available memory shrinks by so much: the resource module shows it and the process that holds it.",
         {
@@ -86,7 +86,7 @@ FAULTS = {
         },
     ),
     "slow_disk": Fault(
-        Target.HOST,
+        FaultTarget.HOST,
         _disk,
         "Programs that wait for the same disk (fsync) wait longer, for it is kept busy; not so in tmpfs.",
         {

@@ -116,7 +116,7 @@ def _meant(word: object, known: Iterable[str]) -> str:
 def check_fault(
     name: object, on: object, for_s: object, params: Mapping[str, object]
 ) -> tuple[Fault, str, dict[str, Value]]:
-    """Return what is meant: the kind of fault, the device, every parameter's value; raises `FaultRefused`."""
+    """Return the kind of fault, the device, and every parameter's value; raises `FaultRefused`."""
     fault = find(name)
     _check_duration(name, fault, for_s)
     return fault, _device(name, fault, on), _values(name, fault, params)

@@ -5,7 +5,7 @@ from contextlib import contextmanager
 
 from hil_sim.bus.can_bus import Disturbance, Frame
 from hil_sim.clock import SECOND_NS
-from hil_sim.faults.fault import Fault, FaultRefused, Form, Number, Site, Target
+from hil_sim.faults.fault import Fault, FaultRefused, FaultTarget, Form, Number, Site
 from hil_sim.faults.frames import disturbed_by, disturbing
 from hil_sim.node.nmt import HEARTBEAT_BASE, NMT_COB_ID, NmtService
 from hil_sim.node.node import BOOT_TIME_NS, Node
@@ -118,46 +118,46 @@ def _bus_off(site: Site) -> Iterator[None]:
 
 FAULTS = {
     "node_lost": Fault(
-        Target.NODE,
+        FaultTarget.NODE,
         _lost,
         "No frame of the node any more; at the end it boots, and shows its boot-up message 700h+id `00`.",
     ),
     "reboot": Fault(
-        Target.NODE,
+        FaultTarget.NODE,
         _reboot,
         "The node is silent until its boot-up message 50 ms later; what was not stored (1010h) is gone.",
         momentary=True,
     ),
     "late_boot": Fault(
-        Target.NODE,
+        FaultTarget.NODE,
         _late_boot,
         "The node is silent until its boot-up message comes, long after everybody else's.",
         {"boot_s": Number(3.0, 0.1, 600.0, "s", "how long it takes to boot")},
         momentary=True,
     ),
     "node_stopped": Fault(
-        Target.NODE,
+        FaultTarget.NODE,
         _stopped,
         "NMT stop comes by (000h `02 id`): the heartbeat says `04`, no SDO, no PDO; NMT start ends it.",
     ),
     "emcy": Fault(
-        Target.NODE,
+        FaultTarget.NODE,
         _emcy,
         "An EMCY message on 80h+id with the code and 1001h; at the end one with the code 0000h.",
         {"code": Number(0x1000, 0x0001, 0xFFFF, "", "error code of CiA 301 or the profile", Form.CODE)},
     ),
     "heartbeat_missing": Fault(
-        Target.NODE,
+        FaultTarget.NODE,
         disturbed_by(_heartbeat_missing),
         "No frame on 700h+id, while SDO and PDOs of the node work as before.",
     ),
     "tpdo_silent": Fault(
-        Target.NODE,
+        FaultTarget.NODE,
         disturbed_by(_tpdo_silent),
         "No PDO of the node, while its heartbeat says operational and SDO works.",
     ),
     "bus_off": Fault(
-        Target.NODE,
+        FaultTarget.NODE,
         _bus_off,
         "32 error frames, then nothing of it; at the end EMCY 8140h, no boot-up, heartbeat `7F` (1029h = 0).",
     ),

@@ -2,7 +2,7 @@
 
 from hil_sim.bus.can_bus import Disturbance, Frame
 from hil_sim.clock import MILLISECOND_NS
-from hil_sim.faults.fault import Fault, Form, Number, Site, Target
+from hil_sim.faults.fault import Fault, FaultTarget, Form, Number, Site
 from hil_sim.faults.frames import disturbed_by
 from hil_sim.node.nmt import COMMUNICATING
 
@@ -73,18 +73,20 @@ class _Abort(Disturbance):
 
 
 FAULTS = {
-    "sdo_duplicate": Fault(Target.NODE, disturbed_by(_Twice), "Each SDO answer of the node comes twice."),
+    "sdo_duplicate": Fault(
+        FaultTarget.NODE, disturbed_by(_Twice), "Each SDO answer of the node comes twice."
+    ),
     "sdo_late": Fault(
-        Target.NODE,
+        FaultTarget.NODE,
         disturbed_by(_Late),
         "Each SDO answer comes, but late: perhaps when the next request is already under way.",
         {"delay_ms": Number(800.0, 1.0, 60_000.0, "ms", "how much later")},
     ),
     "sdo_silent": Fault(
-        Target.NODE, disturbed_by(_Answers), "No SDO answer, while heartbeat and PDOs of the node come."
+        FaultTarget.NODE, disturbed_by(_Answers), "No SDO answer, while heartbeat and PDOs of the node come."
     ),
     "sdo_abort": Fault(
-        Target.NODE,
+        FaultTarget.NODE,
         disturbed_by(_Abort),
         "The n-th write is answered with an abort and not carried out; those before and after it work.",
         {

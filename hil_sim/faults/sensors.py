@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 
-from hil_sim.faults.fault import Fault, FaultRefused, Form, Number, Site, Target
+from hil_sim.faults.fault import Fault, FaultRefused, FaultTarget, Form, Number, Site
 from hil_sim.sensors.suite import FEET
 
 Act = Callable[[Site], AbstractContextManager[None]]
@@ -63,69 +63,69 @@ def _swapped_ports(site: Site) -> Iterator[None]:
 
 FAULTS = {
     "sensor_unplugged": Fault(
-        Target.SENSOR,
+        FaultTarget.SENSOR,
         _switched("unplugged"),
         "The port hangs up and its name is gone; plugged in again, the sensor starts and counts anew.",
     ),
     "sensor_garbage": Fault(
-        Target.SENSOR,
+        FaultTarget.SENSOR,
         _on_line(_switched("garbage_share", _share)),
         "Some of the bytes are others: checksums fail, frames are missing; at 100 % there is only noise.",
         {"percent": Number(100.0, 0.01, 100.0, "%", "share of the bytes that arrive as noise")},
     ),
     "sensor_wrong_baud": Fault(
-        Target.SENSOR,
+        FaultTarget.SENSOR,
         _on_line(_switched("wrong_baud", lambda site: site.whole("baudrate"))),
         "Other bytes come, and not as many: what a receiver makes of bits that are too long or too short.",
         {"baudrate": Number(57_600, 1200, 4_000_000, "baud", "at which the sensor sends", Form.WHOLE)},
     ),
     "sensor_frozen": Fault(
-        Target.SENSOR,
+        FaultTarget.SENSOR,
         _switched("frozen"),
         "Good frames that go on counting, with the same measured values again and again.",
     ),
     "sensor_dropout": Fault(
-        Target.SENSOR,
+        FaultTarget.SENSOR,
         _on_line(_switched("dropout_share", _share)),
         "Some frames never come; where the sensor counts them, its own numbers show the gaps.",
         {"percent": Number(20.0, 0.01, 100.0, "%", "share of the frames that are not sent")},
     ),
     "insole_stuck_cell": Fault(
-        Target.INSOLE,
+        FaultTarget.INSOLE,
         _switched("stuck_cell", lambda site: site.whole("cell")),
         "One cell says the same pressure always, foot on the ground or in the air.",
         {"cell": Number(5, 0, 63, "", "which cell, counted from 0", Form.WHOLE)},
     ),
     "insole_drift": Fault(
-        Target.INSOLE,
+        FaultTarget.INSOLE,
         _switched("drift", lambda site: site.number("kpa_per_s") * 1000.0),
         "Every cell reads more from second to second, also in the air.",
         {"kpa_per_s": Number(2.0, -50.0, 50.0, "kPa/s", "by which each cell drifts")},
     ),
     "insole_saturated": Fault(
-        Target.INSOLE,
+        FaultTarget.INSOLE,
         _switched("saturated"),
         "Pressures end at a ceiling far too low, and the frame's flag says so (bit 2 of the COBS format).",
     ),
     "imu_drift": Fault(
-        Target.IMU,
+        FaultTarget.IMU,
         _switched("drift", lambda site: math.radians(site.number("deg_per_s"))),
         "Pitch runs away while the acceleration still points to the true down.",
         {"deg_per_s": Number(1.0, -100.0, 100.0, "°/s", "what the gyro about the side axis reads too much")},
     ),
     "imu_saturated": Fault(
-        Target.IMU,
+        FaultTarget.IMU,
         _switched("clipped_at", lambda site: site.number("limit")),
         "No axis of the acceleration goes beyond the limit: at rest less than 9.8 m/s² in all.",
         {"limit": Number(6.0, 0.1, 1000.0, "m/s²", "where each axis ends")},
     ),
     "swapped_feet": Fault(
-        Target.FEET,
+        FaultTarget.FEET,
         _swapped_feet,
         "Each insole lies in the other shoe: the left one is loaded while the left hip swings.",
     ),
     "swapped_ports": Fault(
-        Target.FEET,
+        FaultTarget.FEET,
         _swapped_ports,
         "Each insole is plugged in where the other belongs: frames of the other foot come on each port.",
     ),

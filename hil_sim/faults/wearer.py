@@ -5,7 +5,7 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
 
 from hil_sim.clock import MILLISECOND_NS
-from hil_sim.faults.fault import Fault, Number, Site, Target
+from hil_sim.faults.fault import Fault, FaultTarget, Number, Site
 from hil_sim.gait.gaits import LEFT, RIGHT
 
 Act = Callable[[Site], AbstractContextManager[None]]
@@ -67,7 +67,7 @@ def _trip_and_fall(site: Site) -> Iterator[None]:
 
 FAULTS = {
     "fatigue": Fault(
-        Target.WEARER,
+        FaultTarget.WEARER,
         _fatigue,
         "Stride by stride the left leg bends less in swing, bears less and steps longer.",
         {
@@ -76,31 +76,31 @@ FAULTS = {
         },
     ),
     "fall_sideways": Fault(
-        Target.WEARER,
+        FaultTarget.WEARER,
         _falls(0.2, 1.2),
         "The trunk rolls over to one side, and lies 0.85 s later.",
         momentary=True,
     ),
     "fall_backward": Fault(
-        Target.WEARER,
+        FaultTarget.WEARER,
         _falls(-1.2, 0.1),
         "The trunk goes over backward, and lies 0.85 s later.",
         momentary=True,
     ),
     "foot_slips": Fault(
-        Target.WEARER,
+        FaultTarget.WEARER,
         _falls(-1.1, 0.25, slipping=True),
         "The feet bear less at once, the trunk goes over backward and aside, and lies 0.85 s later.",
         momentary=True,
     ),
     "trip_and_fall": Fault(
-        Target.WEARER,
+        FaultTarget.WEARER,
         _trip_and_fall,
         "A leg is held in its swing, the trunk pitches forward, and the wearer does not recover.",
         {"after_s": Number(0.35, 0.05, 2.0, "s", "from the trip to the fall")},
     ),
     "gait_asymmetry": Fault(
-        Target.WEARER,
+        FaultTarget.WEARER,
         _gait_asymmetry,
         "The left step is longer than the right one: the ranges of the hips differ, stride by stride.",
         {

@@ -98,7 +98,7 @@ class Generator:
             self.fall.start(side_of_fall(0.5 if self._source is None else self._source.random()))
 
     def _base(self, activity: Activity) -> Activity:
-        """Return what the body does apart from stumble and fall."""
+        """Return the body's activity apart from stumble and fall."""
         if self.fall.state is not FallState.UPRIGHT or activity is Activity.FALL:
             return Activity.STAND
         return Activity.WALK if activity is Activity.STUMBLE else activity

@@ -35,7 +35,7 @@ class Humps(NamedTuple):
         return first + down + up + last
 
     def parts(self) -> tuple[float, float, float, float]:
-        """Return what each way gives to the mean: all are symmetric."""
+        """Return the contribution of each part to the mean: all are symmetric."""
         return (
             self.first * (_FIRST_AT - (self.strike * _STRIKE_END + (1 - self.strike) * _FIRST_AT) / 2),
             (self.first + self.valley) / 2 * (_VALLEY_AT - _FIRST_AT),

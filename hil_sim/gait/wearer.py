@@ -108,7 +108,7 @@ class Wearer:
         return (1.0 - self._generator.walking) * (1.0 - self._generator.sitting)
 
     def support(self) -> float:
-        """Return what seat, crutches, or the ground under hands and body carry (N)."""
+        """Return the load on seat, crutches, or the ground under hands and body (N)."""
         leaning = zip(self._contacts(), self._crutches(), strict=True)
         crutches = sum(contact.load * share for contact, share in leaning)
         return self._carried() * (self._support() + (1.0 - self._support()) * crutches)

@@ -176,7 +176,7 @@ class Dictionary:
         return entry
 
     def read(self, index: int, subindex: int) -> bytes:
-        """Return what an SDO upload gives; raises `SdoAbort`."""
+        """Return the answer to an SDO upload; raises `SdoAbort`."""
         entry = self.find(index, subindex)
         if not entry.readable:
             raise SdoAbort(AbortCode.WRITE_ONLY)

@@ -29,7 +29,7 @@ _AT_LEAST = frozenset({2, 4})
 _AT_MOST = frozenset({3, 5})
 
 
-class State(Enum):
+class LssState(Enum):
     """Of the slave's state machine."""
 
     WAITING = auto()
@@ -65,7 +65,7 @@ class Lss:
         self._clock = clock
         self._dictionary = dictionary
         self._owner = owner
-        self.state = State.WAITING
+        self.state = LssState.WAITING
         self.node_id = self.pending_node_id = node_id
         self.bitrate = self.pending_bitrate = bitrate
         self.stores = self.scans = True
@@ -86,7 +86,7 @@ class Lss:
 
     def adopt(self) -> None:
         """Communication is reset: what was pending becomes active."""
-        self.state = State.WAITING
+        self.state = LssState.WAITING
         self._selected = self._in_range = self._scan_at = 0
         if self._activating is not None:
             self._activating.cancel()
@@ -109,7 +109,7 @@ class Lss:
                 self._answer(_UNCONFIGURED_IDENTIFIED)
         elif command == _FASTSCAN:
             self._fastscan(number, data[5], data[6], data[7])
-        elif self.state is State.CONFIGURATION:
+        elif self.state is LssState.CONFIGURATION:
             self._configure(command, data)
 
     def _answer(self, command: int, content: bytes = b"") -> None:
@@ -123,17 +123,17 @@ class Lss:
 
     def _switch_all(self, mode: int) -> None:
         if mode == _CONFIGURING:
-            self.state = State.CONFIGURATION
+            self.state = LssState.CONFIGURATION
         elif mode == 0:
-            left = self.state is State.CONFIGURATION
-            self.state = State.WAITING
+            left = self.state is LssState.CONFIGURATION
+            self.state = LssState.WAITING
             if left and not self.configured and self.pending_node_id != UNCONFIGURED:
                 self._owner.node_id_given()
 
     def _switch_one(self, part: int, number: int) -> None:
         self._selected = self._step(self._selected, part, number == self._own(part))
-        if self._selected == len(_SWITCH_ONE) and self.state is State.WAITING:
-            self.state = State.CONFIGURATION
+        if self._selected == len(_SWITCH_ONE) and self.state is LssState.WAITING:
+            self.state = LssState.CONFIGURATION
             self._answer(_SWITCHED)
 
     def _identify(self, place: int, number: int) -> None:
@@ -151,7 +151,7 @@ class Lss:
         return place + 1
 
     def _fastscan(self, number: int, bit: int, part: int, then: int) -> None:
-        if self.pending_node_id != UNCONFIGURED or self.configured or self.state is not State.WAITING:
+        if self.pending_node_id != UNCONFIGURED or self.configured or self.state is not LssState.WAITING:
             return
         if not self.scans:
             return
@@ -169,7 +169,7 @@ class Lss:
         self._scan_at = then
         self._answer(_IDENTIFIED)
         if bit == 0 and then < part:
-            self.state = State.CONFIGURATION
+            self.state = LssState.CONFIGURATION
 
     # -- what it is to become ------------------------------------------------------------------------------
 

@@ -25,7 +25,7 @@ name = "recording"
 
 
 def text(folder: Path, bus: str, nodes: Collection[int], ports: Collection[str]) -> str:
-    """Return what robot.toml can say of a recording in `folder` (absolute)."""
+    """Return a robot.toml for a recording in `folder` (absolute)."""
     names = "".join(f'\n#   port = "{folder / name}"' for name in ports)
     numbers = ", ".join(str(node) for node in sorted(nodes))
     return _TEXT.format(path=folder / "robot.toml", bus=bus, nodes=numbers or "none", ports=names or " none")

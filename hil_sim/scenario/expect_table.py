@@ -75,7 +75,7 @@ def _timing(table: Table) -> Timing:
 
 
 def _conditions(table: Table, keys: tuple[str, ...]) -> Iterator[tuple[str, Condition]]:
-    """Yield what a table asks for; `min` and `max` are one condition."""
+    """Yield the conditions of a table; `min` and `max` are one condition."""
     given = [key for key in keys if key in table and not (key == "max" and "min" in table)]
     for key in given:
         yield key, _CONDITIONS[key](table, key)

@@ -53,7 +53,7 @@ _NAMED = {
 }
 
 
-class Result(StrEnum):
+class ScenarioResult(StrEnum):
     """What came of an expectation, or of a scenario."""
 
     PASSED = "passed"
@@ -121,10 +121,10 @@ class Verdict:
     doubt: str = ""
 
     @property
-    def result(self) -> Result:
+    def result(self) -> ScenarioResult:
         if self.ok:
-            return Result.PASSED
-        return Result.INCONCLUSIVE if self.doubt else Result.FAILED
+            return ScenarioResult.PASSED
+        return ScenarioResult.INCONCLUSIVE if self.doubt else ScenarioResult.FAILED
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,7 +183,7 @@ def _unseen(series: Sequence[tuple[float, Seen]], end_s: float) -> tuple[float, 
 
 
 def _story(series: Sequence[tuple[float, Seen]]) -> str:
-    """Return what was seen, in words: the range of numbers, or each new word with its time."""
+    """Return the observations in words: the range of numbers, or each new word with its time."""
     numbers = [value for _, value in series if isinstance(value, float)]
     span = f"from {series[0][0]:.2f} to {series[-1][0]:.2f} s"
     if len(numbers) == len(series) > 1:

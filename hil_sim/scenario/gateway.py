@@ -94,7 +94,7 @@ class GatewayProcess:
 
 @contextmanager
 def _signals_later() -> Iterator[None]:
-    """Return what would end this process in the middle does so at the end, when what was begun is known."""
+    """Delay signals that would end this process until its work is done and known."""
     came: list[int] = []
     ends = (signal.SIGINT, signal.SIGTERM)
     before = {number: signal.signal(number, lambda came_in, _frame: came.append(came_in)) for number in ends}

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-from hil_sim.scenario.expectation import Result, Verdict
-from hil_sim.scenario.runner import Outcome
+from hil_sim.scenario.expectation import ScenarioResult, Verdict
+from hil_sim.scenario.runner import ScenarioOutcome
 from hil_sim.scenario.script import Script
 
 _NOT_IN_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")  # XML 1.0 §2.2
@@ -23,7 +23,7 @@ class Ran:
 
     file: Path
     script: Script
-    outcome: Outcome
+    outcome: ScenarioOutcome
     began_s: float
 
 
@@ -50,10 +50,12 @@ def as_json(ran: Ran) -> dict[str, Any]:
     }
 
 
-def total_as_json(results: Iterable[Result]) -> dict[str, int]:
+def total_as_json(results: Iterable[ScenarioResult]) -> dict[str, int]:
     """Return the object of all: how many there were, and how many of each result."""
     count = Counter(results)
-    return {"scenarios": count.total()} | {result.replace(" ", "_"): count[result] for result in Result}
+    return {"scenarios": count.total()} | {
+        result.replace(" ", "_"): count[result] for result in ScenarioResult
+    }
 
 
 def junit(runs: Sequence[Ran]) -> bytes:
@@ -78,9 +80,9 @@ def _suite(suites: ElementTree.Element, ran: Ran) -> None:
         "testsuite",
         name=_plain(str(ran.file)),
         tests=str(len(outcome.verdicts) or 1),
-        failures=str(count[Result.FAILED]),
+        failures=str(count[ScenarioResult.FAILED]),
         errors=str(int(bool(outcome.problem))),
-        skipped=str(count[Result.INCONCLUSIVE]),
+        skipped=str(count[ScenarioResult.INCONCLUSIVE]),
         time=f"{outcome.seconds:.3f}",
         timestamp=datetime.fromtimestamp(ran.began_s, UTC).strftime("%Y-%m-%dT%H:%M:%S"),
         hostname=socket.gethostname(),
@@ -96,9 +98,9 @@ def _suite(suites: ElementTree.Element, ran: Ran) -> None:
 
 def _case(suite: ElementTree.Element, ran: Ran, verdict: Verdict, share_s: float) -> None:
     case = _new_case(suite, ran, verdict.expected, share_s)
-    if verdict.result is Result.FAILED:
+    if verdict.result is ScenarioResult.FAILED:
         _say(case, "failure", verdict.seen, f"expected: {verdict.expected}\nseen: {verdict.seen}")
-    elif verdict.result is Result.INCONCLUSIVE:
+    elif verdict.result is ScenarioResult.INCONCLUSIVE:
         ElementTree.SubElement(case, "skipped", message=_plain(f"{verdict.doubt}; seen: {verdict.seen}"))
 
 
@@ -114,5 +116,5 @@ def _say(case: ElementTree.Element, kind: str, message: str, text: str) -> None:
 
 
 def _plain(text: str) -> str:
-    """Return what may stand in XML; what may not is replaced, not left out."""
+    """Return text that XML allows; other characters are replaced, not left out."""
     return _NOT_IN_XML.sub("\ufffd", text)

@@ -4,14 +4,18 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from hil_sim.scenario.expectation import Result, Verdict
-from hil_sim.scenario.runner import Outcome
+from hil_sim.scenario.expectation import ScenarioResult, Verdict
+from hil_sim.scenario.runner import ScenarioOutcome
 from hil_sim.scenario.script import Script
 
-_MARKS = {Result.PASSED: "ok    ", Result.FAILED: "FAILED", Result.INCONCLUSIVE: "?     "}
+_MARKS = {
+    ScenarioResult.PASSED: "ok    ",
+    ScenarioResult.FAILED: "FAILED",
+    ScenarioResult.INCONCLUSIVE: "?     ",
+}
 
 
-def text(file: Path, script: Script, outcome: Outcome) -> str:
+def text(file: Path, script: Script, outcome: ScenarioOutcome) -> str:
     """Return the whole: `head`, then `result`."""
     return head(file, script) + result(outcome)
 
@@ -21,7 +25,7 @@ def head(file: Path, script: Script) -> str:
     return f"{file}: {script.title}\n"
 
 
-def result(outcome: Outcome) -> str:
+def result(outcome: ScenarioOutcome) -> str:
     """Return a line for each expectation, and below it what was seen."""
     lines = []
     for verdict in outcome.verdicts:
@@ -37,22 +41,22 @@ def result(outcome: Outcome) -> str:
     return "\n".join(lines) + "\n"
 
 
-def total(results: Iterable[Result]) -> str:
+def total(results: Iterable[ScenarioResult]) -> str:
     """Return the last line: how many scenarios, and what came of them."""
     count = Counter(results)
-    said = [f"{count[result]} {result}" for result in Result if count[result]]
+    said = [f"{count[result]} {result}" for result in ScenarioResult if count[result]]
     return f"{_counted(count.total(), 'scenario')}: {', '.join(said)}\n"
 
 
-def _summary(outcome: Outcome) -> str:
+def _summary(outcome: ScenarioOutcome) -> str:
     verdicts = outcome.verdicts
     if outcome.problem:
-        return Result.NOT_RUN
+        return ScenarioResult.NOT_RUN
     wrong = [
         f"{count} {word}"
         for word, count in (
-            ("failed", _count(verdicts, Result.FAILED)),
-            ("inconclusive", _count(verdicts, Result.INCONCLUSIVE)),
+            ("failed", _count(verdicts, ScenarioResult.FAILED)),
+            ("inconclusive", _count(verdicts, ScenarioResult.INCONCLUSIVE)),
         )
         if count
     ]
@@ -61,7 +65,7 @@ def _summary(outcome: Outcome) -> str:
     return f"{_counted(len(verdicts), 'expectation')} met"
 
 
-def _count(verdicts: Sequence[Verdict], result: Result) -> int:
+def _count(verdicts: Sequence[Verdict], result: ScenarioResult) -> int:
     return sum(verdict.result is result for verdict in verdicts)
 
 

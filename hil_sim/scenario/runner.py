@@ -8,11 +8,11 @@ from pathlib import Path
 
 from hil_sim.clock import SECOND_NS
 from hil_sim.errors import SimulatorError
-from hil_sim.faults.fault import Target
+from hil_sim.faults.fault import FaultTarget
 from hil_sim.faults.registry import FAULTS
 from hil_sim.operator import Operator
 from hil_sim.robot import SimulatedRobot
-from hil_sim.scenario.expectation import Expectation, Observed, Result, Verdict
+from hil_sim.scenario.expectation import Expectation, Observed, ScenarioResult, Verdict
 from hil_sim.scenario.gateway import GatewayLink, GatewayProcess
 from hil_sim.scenario.lateness import Lateness
 from hil_sim.scenario.observer import Observer
@@ -25,7 +25,7 @@ _LOOK_NS = SECOND_NS // 2  # how often to look whether everything is decided
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class ScenarioOutcome:
     """What a scenario gave; `skipped_s` is simulated time that the computer was too slow for.
 
     `problem` says why it could not be run; then there are no verdicts.
@@ -37,11 +37,14 @@ class Outcome:
     problem: str = ""
 
     @property
-    def result(self) -> Result:
+    def result(self) -> ScenarioResult:
         if self.problem:
-            return Result.NOT_RUN
+            return ScenarioResult.NOT_RUN
         found = {verdict.result for verdict in self.verdicts}
-        return next((one for one in (Result.FAILED, Result.INCONCLUSIVE) if one in found), Result.PASSED)
+        return next(
+            (one for one in (ScenarioResult.FAILED, ScenarioResult.INCONCLUSIVE) if one in found),
+            ScenarioResult.PASSED,
+        )
 
     @property
     def doubt(self) -> str:
@@ -69,7 +72,7 @@ def _obey(operator: Operator, line: ScriptStep) -> None:
         raise ScenarioError(f"{line.where}, at {line.time_s:g} s: {error}") from error
 
 
-def run(script: Script, folder: Path, speed: float | None = 1.0) -> Outcome:
+def run(script: Script, folder: Path, speed: float | None = 1.0) -> ScenarioOutcome:
     """Run a scenario in `folder` and judge it; the gateway lives in real time whatever `speed` is.
 
     What it could not be run for is the outcome's problem.
@@ -78,11 +81,11 @@ def run(script: Script, folder: Path, speed: float | None = 1.0) -> Outcome:
     try:
         outcome = _run(script, folder, speed)
     except SimulatorError as error:
-        outcome = Outcome(problem=str(error))
+        outcome = ScenarioOutcome(problem=str(error))
     return replace(outcome, seconds=time.monotonic() - began)
 
 
-def _run(script: Script, folder: Path, speed: float | None) -> Outcome:
+def _run(script: Script, folder: Path, speed: float | None) -> ScenarioOutcome:
     robot = SimulatedRobot(
         folder,
         script.scenario,
@@ -113,7 +116,7 @@ def _run(script: Script, folder: Path, speed: float | None) -> Outcome:
         robot.run(script.seconds)
         skipped_s = robot.loop.skipped_ns / SECOND_NS
     judged = tuple(_judge(one, script.lines, observer.observed, lateness) for one in script.expectations)
-    return Outcome(judged, skipped_s)
+    return ScenarioOutcome(judged, skipped_s)
 
 
 def _watch(robot: SimulatedRobot, gateway: GatewayProcess) -> Lateness:
@@ -122,7 +125,7 @@ def _watch(robot: SimulatedRobot, gateway: GatewayProcess) -> Lateness:
 
     def waited_s() -> float:
         found_s = waiting.take_s()
-        on_purpose = any(FAULTS[active.name].on is Target.HOST for active in robot.faults.active)
+        on_purpose = any(FAULTS[active.name].on is FaultTarget.HOST for active in robot.faults.active)
         return 0.0 if on_purpose else found_s
 
     return Lateness(robot.exoskeleton.clock, lambda: robot.loop.take_late_ns() / SECOND_NS, waited_s)

@@ -79,7 +79,7 @@ def load(file: Path) -> Script:
 
 
 def examined(file: Path, values: Mapping[str, Any]) -> tuple[Script, list[Mistake]]:
-    """Return what stands in a file, and everything that is wrong with it, or likely is."""
+    """Return the contents of a file, and all its mistakes and unlikely values."""
     mistakes: list[Mistake] = []
     return _Reading(file, mistakes).script(values), mistakes
 
@@ -97,7 +97,7 @@ def findings(
     *,
     machine: bool,  # noqa: ARG001 - of robots
 ) -> Iterator[tuple[str, str, str, str]]:
-    """Return what `gwrms check` says of it: severity, where, key and text."""
+    """Return the findings of `gwrms check`: severity, where, key and text."""
     return ((one.severity, one.where, one.key, one.text) for one in examined(file, tables)[1])
 
 
@@ -109,7 +109,7 @@ class _Reading:
         self._mistakes = mistakes
 
     def script(self, values: Mapping[str, Any]) -> Script:
-        """Return what can be made of it."""
+        """Return the valid parts of the script."""
         top = Table("", values, self._mistakes)
         self._check_tables(values)
         robot = self._table("robot", values)
@@ -156,7 +156,7 @@ class _Reading:
                 self._mistakes.append(Mistake(f"[{key}]", "", said))
 
     def _each(self, values: Mapping[str, Any], key: str, read: Callable[[Table], T]) -> Iterator[T]:
-        """Yield what is made of each entry of a list; one that cannot be used does not hide the next."""
+        """Yield the result for each entry of a list; an unusable one does not hide the next."""
         found = values.get(key, [])
         if not isinstance(found, list):
             self._mistakes.append(Mistake(f"[{key}]", "", f"is a list of tables: write [[{key}]]"))

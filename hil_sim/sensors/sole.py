@@ -73,7 +73,7 @@ class Sole:
         return math.exp(-0.5 * (x * x + y * y))
 
     def _felt(self, truths: list[float]) -> list[float]:
-        """Return what the cells make of the true pressures (Pa)."""
+        """Return the cells' measurements of the true pressures (Pa)."""
         faults, drifted, gauss = self._faults, self._drifted, self._random.gauss
         noises = [gauss(0.0, 1.0) for _ in truths]
         felt = [
@@ -88,7 +88,7 @@ class Sole:
 
 
 def calibration_text(pascal_per_count: float) -> str:
-    """Return what `gwrms calibrate insole` would write for cells that are all alike."""
+    """Return the file that `gwrms calibrate insole` would write for identical cells."""
     return f"""\
 # The simulated insole's converter: the same for every cell. A real one is measured: gwrms calibrate insole.
 [default]

@@ -101,7 +101,7 @@ def quaternion(trunk: Trunk) -> Quaternion:
 
 
 def specific_force(trunk: Trunk) -> Vector:
-    """Return what the accelerometer feels (m/s²), in its own axes: acceleration and reaction to gravity."""
+    """Return the specific force on the accelerometer (m/s²) in its own axes: acceleration minus gravity."""
     w, x, y, z = quaternion(trunk)
     ax, ay, az = trunk.acceleration
     az += GRAVITY

@@ -76,7 +76,7 @@ def _minutes(trials: list[ipol.Trial]) -> dict[int, int]:
 
 
 def _minute(trials: list[ipol.Trial], person: int, minute: dict[int, int]) -> Decisions:
-    """Return what is learned from a person's first minute."""
+    """Return the training data of a person's first minute."""
     return own_lessons([one for one in trials if one.subject == person and one.number <= minute[person]])
 
 

@@ -49,7 +49,7 @@ def figures(by_subject: Groups) -> dict[str, float]:
 
 
 def of_rows(covered: Flags, said: Flags, right: Flags, rows: Flags) -> dict[str, float]:
-    """Return what these decisions show of sets."""
+    """Return figures of the prediction sets of these decisions."""
     spoken = rows & said
     return {
         "covered": _share(covered[rows]),

@@ -11,7 +11,9 @@ import numpy.typing as npt
 
 from ml.benchmarks.danger_data import SUDDEN, WALKS, Seen, judgeable, read
 from ml.benchmarks.outcome import Outcome
-from ml.danger.budget import (
+from ml.danger.calibration import Calibration, calibrated, evidence, fit, load, tails
+from ml.danger.detector import DETECTORS
+from ml.danger.false_alarm_budget import (
     BLOCK_S,
     BUDGETS,
     extrapolated,
@@ -20,10 +22,8 @@ from ml.danger.budget import (
     share_interval,
     thresholds,
 )
-from ml.danger.combine import Calibration, calibrated, evidence, fit, load, tails
-from ml.danger.detector import DETECTORS
-from ml.danger.levels import Level, Levels, held
-from ml.danger.now import CHANNELS
+from ml.danger.levels import Level, Levels, sustained
+from ml.danger.observation import CHANNELS
 from ml.errors import UnusableData
 from ml.features.recipe import Features, Recipe
 from ml.features.windows import Samples
@@ -158,7 +158,7 @@ def _maxima(one: Seen, odds: Floats) -> Floats:
     """Return the highest threshold that each block of healthy walking would have reached."""
     rows = walking(one)
     block = (one.at_s[rows] // BLOCK_S).astype(np.int_)
-    said = held(np.nan_to_num(odds))[rows]
+    said = sustained(np.nan_to_num(odds))[rows]
     return np.array([said[block == number].max() for number in np.unique(block)])
 
 

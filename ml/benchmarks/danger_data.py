@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ml.danger.detector import DETECTORS
-from ml.danger.now import CHANNELS
-from ml.danger.watch import PERIOD_S, Evidence
+from ml.danger.monitor import PERIOD_S, Evidence
+from ml.danger.observation import CHANNELS
 from ml.errors import UnusableData
 
 Floats = npt.NDArray[np.float64]
@@ -69,7 +69,7 @@ class Seen:
 
 
 def read(path: Path) -> list[Seen]:
-    """Return what the detectors see of a file of `gwrms sim-record --scenario dangers`.
+    """Read the detectors' input of a file of `gwrms sim-record --scenario dangers`.
 
     Raises:
         UnusableData: it is no such file, or damaged.

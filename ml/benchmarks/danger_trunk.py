@@ -1,4 +1,4 @@
-"""People who were recorded with an IMU on the trunk alone, as `ml.danger.watch` sees and judges them."""
+"""People who were recorded with an IMU on the trunk alone, as `ml.danger.monitor` sees and judges them."""
 
 import copy
 from collections.abc import Sequence
@@ -13,11 +13,11 @@ from drivers.imu.attitude import ComplementaryFilter
 from drivers.imu.motion import tilt
 from ml.benchmarks.danger import Judged, per_hour
 from ml.benchmarks.danger_data import HEALTHY, Seen
-from ml.danger.combine import Calibration
+from ml.danger.calibration import Calibration
 from ml.danger.detector import DETECTORS
 from ml.danger.levels import Level
-from ml.danger.now import CHANNELS, TRUNK
-from ml.danger.watch import Watch
+from ml.danger.monitor import DangerMonitor
+from ml.danger.observation import CHANNELS, TRUNK
 
 Floats = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
@@ -62,13 +62,13 @@ class Person:
     """A wearer and the watch that learns of him, one recording after the other."""
 
     subject: str
-    watch: Watch
+    watch: DangerMonitor
     at_s: float = 0.0
 
     @classmethod
     def of(cls, subject: str, calibration: Calibration) -> "Person":
         """Somebody whom nobody knows yet."""
-        return cls(subject, Watch(calibration))
+        return cls(subject, DangerMonitor(calibration))
 
     def take(self, rows: Floats, rate_hz: float, label: npt.NDArray[np.str_]) -> Judged:
         """Return what is said of the next recording, at 25 moments a second; a `label` a row."""

@@ -66,7 +66,7 @@ def read(path: Path) -> list[Walk]:
 
 
 def _names(file: Arrays, name: str, rows: int) -> npt.NDArray[np.str_]:
-    """Say what each row's number in the array `name` means."""
+    """Return the name of each row's number in the array `name`."""
     names, number = file.of(f"{name}_names", 1), file.of(name, 1, rows).astype(np.int_)
     if not np.isin(number, range(len(names))).all():
         raise file.problem(f"has numbers in {name!r} that {name + '_names'!r} does not name")

@@ -111,7 +111,7 @@ def _row(people: Sequence[Person]) -> dict[str, float]:
 
 
 def _adaptation(people: Sequence[Person], model: str) -> dict[str, float]:
-    """Return what a minute cuts of the later error: of all, and of the third that was worst in it."""
+    """Return the reduction of the later error by a minute: of all, and of the third that was worst in it."""
     judged = [one for one in people if not math.isnan(one.figures[f"{model}_later_rmse_percent"])]
     if not judged:
         return {}

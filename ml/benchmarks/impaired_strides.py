@@ -40,7 +40,7 @@ class Decisions:
 
 
 def lessons(walks: Sequence[impaired.Walk], later: Mapping[str, int], data: Decisions) -> Decisions:
-    """Return what these people teach: `data`, and their walks as slower and faster people would walk."""
+    """Return the training data of these people: `data`, and their walks at slower and faster paces."""
     people = {walk.subject for walk in walks}
     made = [data.of(np.isin(data.subject, list(people)))]
     for factor in PACES:

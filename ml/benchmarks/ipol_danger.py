@@ -12,9 +12,9 @@ from ml.benchmarks import danger_trunk, ipol
 from ml.benchmarks.danger import Judged
 from ml.benchmarks.danger_trunk import Person
 from ml.benchmarks.outcome import Outcome
-from ml.danger.combine import load
+from ml.danger.calibration import load
 from ml.danger.levels import Level
-from ml.danger.now import CHANNELS, SIDES
+from ml.danger.observation import CHANNELS, SIDES
 from ml.features.gait_status import RATE_HZ
 
 Floats = npt.NDArray[np.float64]

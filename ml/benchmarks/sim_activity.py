@@ -64,7 +64,7 @@ class Judged:
         return metrics.macro_f1(self.truth[rows], self.likeliest[rows], len(self.classes))
 
     def sets(self, rows: npt.NDArray[np.bool_]) -> dict[str, float]:
-        """Return what these rows show of conformal sets."""
+        """Return figures of these rows' conformal sets."""
         right = self.likeliest == self.truth
         return coverage.of_rows(self.covered, self.label != NONE, right, rows & self.known)
 

@@ -13,7 +13,7 @@ from ml.benchmarks.danger import Event, Judged, events, false_alarms, of_danger,
 from ml.benchmarks.danger_data import HEALTHY
 from ml.benchmarks.danger_trunk import Person
 from ml.benchmarks.outcome import Outcome
-from ml.danger.combine import Calibration, load
+from ml.danger.calibration import Calibration, load
 from ml.danger.levels import Level
 from ml.features.falling import RATE_HZ
 

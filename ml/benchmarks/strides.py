@@ -47,12 +47,12 @@ class Decisions:
 
 
 def lessons(trials: Sequence[ipol.Trial]) -> Decisions:
-    """Return what is learned from: every trial, and each as if somebody slower or faster had walked it."""
+    """Return the training data: every trial, and each at slower and faster paces."""
     return _joined(decisions(trials), decisions(_paced(trials, PACES), PACES_STEP))
 
 
 def own_lessons(trials: Sequence[ipol.Trial]) -> Decisions:
-    """Return what is learned from one wearer's trials."""
+    """Return the training data of one wearer's trials."""
     return _joined(_decisions(trials, OWN_STEP), _decisions(_paced(trials, OWN_PACES), 2 * OWN_STEP))
 
 

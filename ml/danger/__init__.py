@@ -1,10 +1,15 @@
-"""Danger, foreseen: one calibrated number a robot, out of detectors that each say why.
+"""Early detection of danger: one calibrated probability per robot, from detectors that each give a reason.
 
-now.py        a moment of a robot, and where its legs are in their strides
-detector.py   what a detector is; one each: tracking, torque, strides, support, balance, rhythm, agreement,
-              drift, creep; memory.py: five that ask one memory of this robot's own moments
-usual.py      how large each number usually is on this robot
-combine.py    one number out of all; calibration.json: what of it was learned from simulated wearers
-budget.py     thresholds from false alarms an hour; levels.py: the levels, and when one begins and ends
-watch.py      all of it for one robot, row by row
+observation.py         one sample of a robot, and the phase of its legs in their strides
+detector.py            the interface of a detector; a file each: tracking, torque, strides, support, balance,
+                       step_timing ("rhythm"), sensor_consistency ("agreement"), overheating ("drift"),
+                       encoder_slip ("creep")
+nearest_neighbours.py  four detectors that compare a sample with the most similar healthy ones of this robot
+baseline.py            the normal range of each measure on this robot
+calibration.py         one probability from all detectors; calibration.json: its fit to simulated wearers
+false_alarm_budget.py  thresholds from false alarms an hour
+levels.py              the levels, and when one begins and ends
+monitor.py             all of it for one robot, row by row
+
+The names in quotation marks are those of `calibration.json` and of the reports.
 """

@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from ml.danger.detector import Floats
-from ml.danger.now import Now
+from ml.danger.observation import Observation
 
 OMEGA: Final = math.sqrt(9.81 / 1.0)  # 1/s, of a body whose mass is a metre above the ground
 FOLLOWS: Final = 0.012  # of a sample at 25 Hz: what the trunk's lean has been for three seconds
@@ -28,7 +28,7 @@ class Balance:
         self._lean = np.full(2, np.nan)
         self._light = 0.0
 
-    def measure(self, now: Now, *, learn: bool) -> Floats:  # noqa: ARG002 - it has nothing to learn
+    def measure(self, now: Observation, *, learn: bool) -> Floats:  # noqa: ARG002 - it has nothing to learn
         acceleration, rate, told = now.trunk[:3], now.trunk[3:6], now.trunk[6:8]
         if not np.isfinite(now.trunk[:6]).all():
             return np.full(5, np.nan)

@@ -1,4 +1,4 @@
-"""What a detector of danger is: it measures what is unusual, and says it in words."""
+"""The interface of a detector of danger: it measures deviations from normal, and names them in words."""
 
 from collections.abc import Sequence
 from typing import Final, Protocol
@@ -6,7 +6,7 @@ from typing import Final, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from ml.danger.now import Now
+from ml.danger.observation import Observation
 
 Floats = npt.NDArray[np.float64]
 
@@ -28,11 +28,11 @@ DETECTORS: Final = (
 
 
 class Detector(Protocol):
-    """One way to see danger coming; it knows one robot alone.
+    """One method to detect danger early, on a single robot.
 
-    `measure` gives a number for each of `keys`, larger where it looks more dangerous, NaN where what it needs
-    is missing. `needs` says in words what that is. How large is usual is learned by `ml.danger.usual`, from
-    this robot's own healthy time; `least` is what a number has to differ from that at least, in its unit.
+    `measure` returns a number for each of `keys`: the larger, the more dangerous; NaN without its input.
+    `needs` names this input in words. `ml.danger.baseline` learns the normal range of each number from this
+    robot's own healthy time; `least` is the smallest deviation that counts, in the number's unit.
     """
 
     @property
@@ -47,8 +47,8 @@ class Detector(Protocol):
     @property
     def needs(self) -> str: ...
 
-    def measure(self, now: Now, *, learn: bool) -> Floats:
-        """Take the next sample; models of what is usual follow it where they may `learn`."""
+    def measure(self, now: Observation, *, learn: bool) -> Floats:
+        """Take the next sample; models of the normal state follow it if they may `learn`."""
 
     def words(self, key: str) -> str:
-        """Say what is wrong where this key is the worst."""
+        """Return the problem in words, if this key deviates most."""

@@ -1,4 +1,4 @@
-"""The four levels of danger, and when one begins and ends: thresholds from budgets, with hysteresis."""
+"""The four levels of danger, with thresholds from budgets of false alarms, and hysteresis."""
 
 from collections.abc import Mapping
 from enum import IntEnum
@@ -13,7 +13,7 @@ HOLD: Final = 2  # samples one after the other at which a level begins
 
 
 class Level(IntEnum):
-    """How urgent it is; UNKNOWN is not fine: nobody can say."""
+    """Urgency; UNKNOWN is not NONE: there is too little data to judge."""
 
     UNKNOWN = -1
     NONE = 0
@@ -24,7 +24,7 @@ class Level(IntEnum):
 
     @property
     def word(self) -> str:
-        """Return it as people call it."""
+        """The level's name in reports."""
         return _WORDS[self]
 
 
@@ -39,8 +39,8 @@ _WORDS: Final = {
 URGENT: Final = (Level.EARLY, Level.ADVICE, Level.ALARM, Level.STOP)
 
 
-def held(odds: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """Return the highest threshold at which a level would begin (n,): what `HOLD` moments all reached."""
+def sustained(odds: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Return the log odds that `HOLD` samples in a row reached (n,): thresholds up to it are met."""
     found = odds.copy()
     for before in range(1, HOLD):
         np.minimum(found[before:], odds[:-before], out=found[before:])

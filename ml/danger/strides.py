@@ -1,7 +1,7 @@
-"""(c) Each stride against those most alike of this wearer's own: asymmetry, loads, lean and torque.
+"""(c) Each stride against this wearer's most similar ones: asymmetry, loads, lean and torque.
 
-Stairs, ramps and turns have strides of their own; so a part of a stride is compared with that part of those
-healthy strides whose other parts were alike. Where none was, as in a first stride on stairs, little is said.
+Stairs, ramps and turns have strides of their own; so a part of a stride is compared with the same part of
+healthy strides whose other parts were similar. Without any, as on a first stride on stairs, it counts little.
 """
 
 import math
@@ -10,17 +10,17 @@ from typing import Final
 import numpy as np
 
 from ml.danger.detector import Floats
-from ml.danger.now import JOINTS, SIDES, Now, or_zero, spoken
+from ml.danger.observation import JOINTS, SIDES, Observation, or_zero, readable_name
 
-KEPT: Final = 160  # strides of each side; newer ones take the place of older ones
-FEWEST: Final = 14  # strides, before there is anything to compare with
+KEPT: Final = 160  # strides of each side; newer ones replace older ones
+FEWEST: Final = 14  # strides before the first comparison
 NEIGHBOURS: Final = 4
-FARTHEST: Final = 9.0  # squared spreads: more apart in one number says no more
-DOUBTED: Final = 1.5  # squared spreads a number, from the strides most alike: half is believed
+FARTHEST: Final = 9.0  # squared spreads: larger differences in one number are clipped
+DOUBTED: Final = 1.5  # squared spreads a number: at this distance of the neighbours a difference counts half
 STALE_S: Final = 3.0
 MEASURES: Final = 34
-KILO: Final = 1000.0  # loads in kilonewtons are of the size of angles
-# What each number has to differ by at least (rad, N·m, shares, m), and which numbers are which part.
+KILO: Final = 1000.0  # loads in kilonewtons are of the magnitude of angles
+# The smallest difference of each number that counts (rad, N·m, shares, m), and the numbers of each part.
 _LEAST: Final = np.array([0.02] * 18 + [0.5] * 6 + [0.03] * 4 + [0.003] * 2 + [0.01] * 2 + [0.03] * 2)
 PARTS: Final = (
     *((f"{joint}.angle", [at, at + 6, at + 12]) for at, joint in enumerate(JOINTS)),
@@ -38,7 +38,7 @@ _OTHERS: Final = MEASURES - _IN_PART.sum(axis=1)
 
 
 class _Side:
-    """Strides from one strike of a foot to its next."""
+    """Strides of one foot, from heel strike to heel strike."""
 
     def __init__(self) -> None:
         self.kept = np.zeros((KEPT, MEASURES))
@@ -53,7 +53,7 @@ class _Side:
         self._low, self._high = np.full(6, np.inf), np.full(6, -np.inf)
         self._sums = np.zeros(24)  # angles, squared torques; then load, samples and place by foot; lean
 
-    def take(self, now: Now) -> None:
+    def take(self, now: Observation) -> None:
         """Take a sample of the stride under way."""
         angle = now.joint[0]
         self.samples += 1
@@ -68,7 +68,7 @@ class _Side:
         self._sums[18:20] += now.trunk[6:8]
 
     def stride(self) -> Floats:
-        """Its numbers (MEASURES,)."""
+        """Return the measures of the stride (MEASURES,)."""
         sums, count = self._sums, max(self.samples, 1)
         stance = np.maximum(sums[14:16], 1.0)
         reach = self._high - self._low
@@ -93,7 +93,7 @@ class _Side:
         )
 
     def compare(self, stride: Floats) -> Floats:
-        """Spreads of each part from what it was in the strides most alike; NaN where it is not known."""
+        """Return the difference of each part from the most similar strides, in spreads; NaN where unknown."""
         if self.count < FEWEST:
             return np.full(len(PARTS), np.nan)
         kept = self.kept[: min(self.count, KEPT)]
@@ -110,7 +110,7 @@ class _Side:
         return believed
 
     def learn(self, stride: Floats) -> None:
-        """Keep it, and follow how much one differs from the next."""
+        """Keep the stride, and update the usual difference between strides."""
         if self._before is not None:
             step = np.abs(stride - self._before)
             first = np.isnan(self.spread)
@@ -123,7 +123,7 @@ class _Side:
 
 
 class Strides:
-    """Every stride of both sides; of the last two the smaller number, so that one odd stride is nothing."""
+    """Every stride of both sides; the smaller deviation of the last two: one odd stride is ignored."""
 
     name = "strides"
     keys = tuple(name for name, _ in PARTS)
@@ -136,7 +136,7 @@ class Strides:
         self._told = np.full(len(PARTS), np.nan)
         self._told_s = -math.inf
 
-    def measure(self, now: Now, *, learn: bool) -> Floats:
+    def measure(self, now: Observation, *, learn: bool) -> Floats:
         for side, leg in zip(self._sides, now.legs, strict=True):
             if leg.struck:
                 if 0.5 < side.samples * max(now.step_s, 0.01) < STALE_S:
@@ -157,7 +157,7 @@ class Strides:
         joint, _, what = key.partition(".")
         if what:
             does = "bends" if what == "angle" else "takes a torque"
-            return f"{spoken(joint)}: {does} as in none of its own strides alike"
+            return f"{readable_name(joint)}: {does} as in none of its own strides alike"
         if key == "asymmetry":
             return "left and right differ more than in any stride alike"
         return f"{key}: as in no stride alike"

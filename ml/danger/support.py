@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from ml.danger.detector import Floats
-from ml.danger.now import SIDES, STANDING, Now, or_zero
+from ml.danger.observation import SIDES, STANDING, Observation, or_zero
 
 FEWEST: Final = 12  # samples of a bin
 LOADED_N: Final = 100.0  # below that a centre of pressure says little
@@ -30,7 +30,7 @@ class Support:
         self._weight = math.nan
         self._borne = math.nan
 
-    def measure(self, now: Now, *, learn: bool) -> Floats:
+    def measure(self, now: Observation, *, learn: bool) -> Floats:
         bins, feet = np.array(now.bins()), np.arange(2)
         place = np.where(now.foot[0] > LOADED_N, now.foot[1:], np.nan)
         count, mean = self._count[:, feet, bins], self._mean[:, feet, bins]

@@ -1,18 +1,18 @@
-"""(b) Torque that the motion does not explain: the residual of a regression on this robot's own motion."""
+"""(b) Unexplained torque: the residual of a regression of torque on this robot's own motion."""
 
 from typing import Final
 
 import numpy as np
 
 from ml.danger.detector import Floats
-from ml.danger.now import JOINTS, Now, or_zero, spoken
+from ml.danger.observation import JOINTS, Observation, or_zero, readable_name
 
 TERMS: Final = 8
 SOLVE_EVERY: Final = 125  # samples
-FEWEST: Final = 500  # samples, before it explains anything
+FEWEST: Final = 500  # samples before the first prediction
 RIDGE: Final = 1.0
 FAST, SLOW = 0.45, 0.04  # of the newest sample: over 70 ms, and over a second
-SLOWEST: Final = 0.15  # rad/s: friction turns round there
+SLOWEST: Final = 0.15  # rad/s: scale of the change of friction's sign
 LEG: Final = np.array([0, 0, 0, 1, 1, 1])
 
 
@@ -38,7 +38,7 @@ class Torque:
         self._residual = np.zeros((2, 6))
         self._trembling = np.zeros(6)
 
-    def measure(self, now: Now, *, learn: bool) -> Floats:
+    def measure(self, now: Observation, *, learn: bool) -> Floats:
         position, velocity, torque = now.joint[:3]
         change = velocity - self._before[0]
         jerk = change - (self._before[0] - self._before[1])
@@ -63,7 +63,7 @@ class Torque:
         return found
 
     @staticmethod
-    def _terms(now: Now, position: Floats, velocity: Floats, acceleration: Floats) -> Floats:
+    def _terms(now: Observation, position: Floats, velocity: Floats, acceleration: Floats) -> Floats:
         load = or_zero(now.foot[0][LEG]) / 1000.0
         lever = or_zero(now.foot[1][LEG]) * 10.0
         sine = np.sin(position)
@@ -95,6 +95,6 @@ class Torque:
     def words(self, key: str) -> str:
         joint, _, what = key.partition(".")
         if what == "trembling":
-            return f"{spoken(joint)}: trembles faster than anybody moves"
+            return f"{readable_name(joint)}: trembles faster than anybody moves"
         lasting = "takes more torque, stride by stride," if what == "lasting" else "takes a torque"
-        return f"{spoken(joint)}: {lasting} that its motion does not explain"
+        return f"{readable_name(joint)}: {lasting} that its motion does not explain"

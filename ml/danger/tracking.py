@@ -1,17 +1,17 @@
-"""(a) Tracking: each joint's following error and angle against its own at this phase of the stride."""
+"""(a) Tracking: each joint's following error and angle against its own mean at this phase of the stride."""
 
 from typing import Final
 
 import numpy as np
 
 from ml.danger.detector import Floats
-from ml.danger.now import JOINTS, STANDING, Now, spoken
+from ml.danger.observation import JOINTS, STANDING, Observation, readable_name
 
-FEWEST: Final = 15  # samples of a bin before it says anything
+FEWEST: Final = 15  # samples of a bin before it is judged
 FOLLOWS: Final = np.array([[0.0], [0.3]])  # of a sample: an angle is compared with the last strides
 SMOOTH: Final = 0.6  # of the newest sample
-LEAST: Final = np.array([[0.004], [0.05]])  # rad: following errors and angles are not known better
-POSITION, ERROR = 0, 3  # rows of Now.joint
+LEAST: Final = np.array([[0.004], [0.05]])  # rad: the smallest spreads of following errors and angles
+POSITION, ERROR = 0, 3  # rows of Observation.joint
 LEG: Final = np.array([0, 0, 0, 1, 1, 1])
 JOINT: Final = np.arange(6)
 
@@ -30,7 +30,7 @@ class Tracking:
         self._square = np.zeros((2, 6, STANDING + 1))
         self._seen = np.zeros((2, 6))
 
-    def measure(self, now: Now, *, learn: bool) -> Floats:
+    def measure(self, now: Observation, *, learn: bool) -> Floats:
         bins = np.array(now.bins())[LEG]
         values = now.joint[[ERROR, POSITION]]
         count, mean = self._count[:, JOINT, bins], self._mean[:, JOINT, bins]
@@ -58,5 +58,5 @@ class Tracking:
     def words(self, key: str) -> str:
         joint, _, what = key.partition(".")
         if what == "error":
-            return f"{spoken(joint)}: does not follow its set-point as it does at this phase"
-        return f"{spoken(joint)}: is at an angle where it never is at this phase"
+            return f"{readable_name(joint)}: does not follow its set-point as it does at this phase"
+        return f"{readable_name(joint)}: is at an angle where it never is at this phase"

@@ -40,7 +40,7 @@ def _compute(windows: Samples) -> Features:
 
 
 def mirrored(windows: Samples) -> Samples:
-    """Return what the sensors would have measured, had left been right."""
+    """Return the windows with left and right exchanged."""
     swapped: Samples = windows[:, SWAPPED] * SIGNS
     return swapped
 

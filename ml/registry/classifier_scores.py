@@ -52,7 +52,7 @@ def confusion(classes: int, truth: Indices, label: Indices) -> Indices:
 
 
 def calibrated(probabilities: Floats, truth: Indices) -> tuple[Bin, ...]:
-    """Return what was said of the likeliest class, and how often it was right, in bins that are not empty."""
+    """Return the likeliest class's probability and accuracy, in bins that are not empty."""
     said, right = probabilities.max(axis=1), probabilities.argmax(axis=1) == truth
     place = np.minimum((said * BINS).astype(np.int_), BINS - 1)
     return tuple(

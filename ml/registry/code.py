@@ -61,7 +61,7 @@ def _tree(name: str) -> ast.Module:
 
 
 def _said(node: Any) -> Iterator[str]:
-    """Yield what the code says, the same in every version of Python.
+    """Yield the code's content, the same in every version of Python.
 
     Without places, docstrings and what is not.
     """

@@ -46,7 +46,7 @@ def exported(learned: Learned) -> bytes:
 
 
 def said(data: bytes, features: Features) -> dict[str, Any]:
-    """Return what the file says, by ONNX Runtime."""
+    """Return the file's outputs, by ONNX Runtime."""
     import onnxruntime
 
     session = onnxruntime.InferenceSession(data, providers=["CPUExecutionProvider"])

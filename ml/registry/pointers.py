@@ -44,12 +44,12 @@ class Pointer(Struct, frozen=True):
     signature: str = ""
 
     def message(self, task: str, robot: str) -> bytes:
-        """Return what is signed."""
+        """Return the bytes to be signed."""
         bare = msgspec.structs.replace(self, certificate="", signature="")
         return _KIND + msgspec.json.encode([task, robot, bare])
 
 
-class Target(NamedTuple):
+class RollbackTarget(NamedTuple):
     """Where a rollback goes: the number that it writes, a model or "", and what is before that."""
 
     number: int
@@ -78,7 +78,7 @@ class Pointers:
         return [self._read(number) for number in range(1, self._last() + 1)]
 
     def newest(self) -> Pointer | None:
-        """Return what holds now; None where nobody has said anything yet."""
+        """Return the valid pointer; None if there is none yet."""
         last = self._last()
         return self._read(last) if last else None
 
@@ -107,8 +107,8 @@ class Pointers:
                 return done
         raise UnusableModel(f"{self._whose}: {ATTEMPTS} times somebody else was faster")
 
-    def target(self) -> Target:
-        """Return what a rollback would go back to now.
+    def target(self) -> RollbackTarget:
+        """Return the target of a rollback.
 
         Raises:
             UnusableModel: nothing was before.
@@ -119,11 +119,11 @@ class Pointers:
         if now is None or not now.model:
             raise UnusableModel(f"{self._whose} has no model of its own, and so nothing to roll back from")
         if not now.before:
-            return Target(last + 1, "", 0)
+            return RollbackTarget(last + 1, "", 0)
         back = self._read(now.before)
-        return Target(last + 1, back.model, back.before)
+        return RollbackTarget(last + 1, back.model, back.before)
 
-    def roll_back(self, target: Target, who: str, why: str, content: str = "") -> Pointer:
+    def roll_back(self, target: RollbackTarget, who: str, why: str, content: str = "") -> Pointer:
         """Let that serve which did before.
 
         Raises:

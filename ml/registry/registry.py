@@ -15,7 +15,7 @@ import msgspec
 from ml.errors import Overtaken, UnusableModel
 from ml.registry.card import Card, checked_name, content_id, decoded, digest, encoded
 from ml.registry.code import features_hash
-from ml.registry.pointers import EVERY_ROBOT, Pointer, Pointers, Sign, Target
+from ml.registry.pointers import EVERY_ROBOT, Pointer, Pointers, RollbackTarget, Sign
 from ml.registry.pointers import FOLDER as SERVING
 from ml.robot.learned import Learned
 from ml.store import Store, upkeep
@@ -87,7 +87,7 @@ class Registry:
         }
 
     def card(self, model: str) -> Card:
-        """Return what is known of a model.
+        """Return the card of a model.
 
         Raises:
             UnusableModel: it is not there, or its card is damaged.
@@ -143,7 +143,7 @@ class Registry:
         return None if found is None else found.model
 
     def served_to(self, task: str, robot: str = "", channels: Set[str] | None = None) -> Serving | None:
-        """Return what serves a robot: promoted for it, else for all, else one that comes with GWRMS.
+        """Return the model that serves a robot: promoted for it, else for all, else a shipped one.
 
         With `channels` only a model that needs no other; without them, none that comes with GWRMS.
 
@@ -233,11 +233,11 @@ class Registry:
         return self._target(task, robot).model
 
     def history(self, task: str, robot: str = "") -> list[Pointer]:
-        """Return what has served, oldest first; raises `UnusableModel` where a part of that is damaged."""
+        """Return the models that served, oldest first; raises `UnusableModel` if a pointer is damaged."""
         return Pointers(self._objects, task, robot).history()
 
     def served(self) -> Iterator[tuple[str, str, Pointer]]:
-        """Yield what was promoted and serves now: tasks, robots ("" for all), pointers."""
+        """Yield the promoted models that serve now: tasks, robots ("" for all), pointers."""
         folders = {name.rpartition("/")[0] for name in self._objects.names(SERVING)}
         for folder in sorted(folders):
             task, robot = folder.split("/")[-2:]
@@ -251,7 +251,7 @@ class Registry:
     def _pointers(self, task: str, robot: str) -> Pointers:
         return Pointers(self._objects, task, robot, self._sign)
 
-    def _target(self, task: str, robot: str) -> Target:
+    def _target(self, task: str, robot: str) -> RollbackTarget:
         target = Pointers(self._objects, task, robot).target()
         if target.model:
             self.load(target.model)

@@ -58,7 +58,7 @@ def feet_phase(pair: Samples) -> Samples:
 
 
 def trunk_phase(trunk: Samples) -> Samples:
-    """Return what swings with the stride: acceleration, roll and yaw."""
+    """Return the channels that swing with the stride: acceleration, roll and yaw."""
     return bins(trunk[:, [0, 1, 2, 3, 5, 7]], 5, 20)
 
 

@@ -38,7 +38,7 @@ class Promise:
 
 
 def promised(above: Floats, sure: Floats, group: npt.NDArray[Any]) -> Promise:
-    """Return what can be promised of n decisions about left-out people.
+    """Return the promise that n decisions about left-out people allow.
 
     `above` (n,) is what was thought likelier than the truth, as `passed_over` gives it, `group` (n,) whose
     decision it is: k people. Nobody can promise anything to more than k in k + 1 new ones. `sure` (m,) is the

@@ -69,7 +69,7 @@ class Learned:
 
     @classmethod
     def restored(cls, state: Mapping[str, Any]) -> "Learned":
-        """Return what `state` says; raises `UnusableModel` where that is no model of ours."""
+        """Return the model of `state`; raises `UnusableModel` if that is no model of ours."""
         from ml.robot.checks import check  # brings scikit-learn, whose objects these are
 
         check(state)

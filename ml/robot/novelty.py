@@ -49,7 +49,7 @@ def distances(parts: Parts, inputs: Rows) -> tuple[Floats, Floats]:
 
 
 def limits(held_out: tuple[Floats, Floats]) -> dict[str, float]:
-    """Return what nearly all rows of people that were not learned from keep within.
+    """Return the limits that nearly all rows of unseen people keep.
 
     The numbers for `score`.
     """

@@ -80,7 +80,7 @@ class Grid:
 
 
 def on_grid(recipe: Recipe, stamps_ns: Stamps, values: Samples) -> list[Piece]:
-    """Return what `Grid` gives for a whole recording: pieces without a gap, in time's order.
+    """Resample a whole recording as `Grid` does: pieces without a gap, in time's order.
 
     `values` (rows, channels) are in the order of the recipe's channels; what is not finite is missing. Rows
     may come in any order.

@@ -23,7 +23,7 @@ OUTSIDE_SHARE: Final = 0.05  # of a channel's samples; 0.2 % of those that were 
 Ranges = Mapping[str, tuple[float, float]]  # of each channel, what nearly all samples learned from were in
 
 
-class Level(Enum):
+class TrustLevel(Enum):
     """In one word, for a person."""
 
     UNSEEN = "not yet known"  # too few decisions
@@ -54,13 +54,13 @@ class Trust:
         return tuple(sorted(found, key=lambda name: -found[name]))
 
     @property
-    def level(self) -> Level:
+    def level(self) -> TrustLevel:
         """How far to believe it."""
         if self.decisions < FEWEST:
-            return Level.UNSEEN
+            return TrustLevel.UNSEEN
         if self.abnormal > ABNORMAL_SHARE or self.drifted:
-            return Level.DRIFTED
-        return Level.UNSURE if self.unknown > UNSURE_SHARE else Level.GOOD
+            return TrustLevel.DRIFTED
+        return TrustLevel.UNSURE if self.unknown > UNSURE_SHARE else TrustLevel.GOOD
 
 
 class _Second:

@@ -88,7 +88,7 @@ def _busy(store: Store, location: str, path: str) -> StoreError:
 
 
 def _claim(store: Store, path: str) -> Claim | None:
-    """Return what an object claims; one that cannot be read counts as long as any, since it was written."""
+    """Return an object's claim; an unreadable one counts from its writing time, as long as any."""
     data = store.objects.read(path)
     if data is None:
         return None

@@ -24,7 +24,7 @@ _UNREADABLE: Final = (pa.ArrowException, OSError, ValueError)  # what pyarrow ra
 
 
 def damage(store: Store, file: DataFile, size_bytes: int | None, *, deep: bool) -> str | None:
-    """Return what is wrong with a file of which a listing says this size, in words; None where it is whole.
+    """Return the damage of a file with this listed size, in words; None if it is intact.
 
     Its footer is read, and with `deep` every value.
 
@@ -43,7 +43,7 @@ def damage(store: Store, file: DataFile, size_bytes: int | None, *, deep: bool) 
 
 
 def proven(store: Store, file: DataFile, why: str) -> str:
-    """Return what is wrong with a file that seems damaged, in words; `why` it seems so, in words too.
+    """Return the damage of a suspicious file, in words; `why` is the suspicion, in words too.
 
     Raises:
         StoreError: it is not proven.
@@ -77,7 +77,7 @@ def _decoded(store: Store, file: DataFile) -> int:
 
 
 def _problem(store: Store, file: DataFile, found: Object) -> str | None:
-    """Return what is wrong with its content, of which a copy is made first: no network makes that fail."""
+    """Return the problem of its content; a copy is made first, so that no network error interferes."""
     with tempfile.NamedTemporaryFile(prefix="gwrms-") as copy:
         for piece in store.objects.pieces(found):
             copy.write(piece)

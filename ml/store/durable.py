@@ -116,7 +116,7 @@ def log_entry(table: Path, version: int) -> Path:
 
 
 def read(entry: Path) -> Iterator[dict[str, Any]]:
-    """Yield what it says, line by line."""
+    """Yield the entry's actions, line by line."""
     yield from map(json.loads, entry.read_bytes().splitlines())
 
 

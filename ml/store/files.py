@@ -23,7 +23,7 @@ _ARGUMENTS: Final = {
 
 
 def filesystem(url: str) -> pyarrow.fs.FileSystem:
-    """Return what is under a store's URL, with paths from there."""
+    """Return the file system under a store's URL, with paths from there."""
     parts = urlsplit(url)
     path = unquote(parts.path)
     if parts.scheme == "file":

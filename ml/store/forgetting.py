@@ -38,7 +38,7 @@ class Worn:
 
 
 def worn(rows: Iterable[dict[str, object]], labels: Iterable[dict[str, object]], name: str) -> Worn:
-    """Return what rows of `sessions` and `labels`, of whatever place, say that somebody has worn."""
+    """Return the wearer's sessions by the given rows of `sessions` and `labels`."""
     people: dict[Name, set[str]] = {}
     for row in rows:
         if said := str(row.get("wearer") or ""):
@@ -69,7 +69,7 @@ def writers(store: Store) -> set[str]:
 
 
 def counted(store: Store, sessions: Sequence[Name]) -> dict[str, int]:
-    """Return how many rows of these sessions the newest version of each location has."""
+    """Return the number of these sessions' rows in the newest version of each location."""
     found: Counter[str] = Counter()
     for location, mine in _locations(store, sessions):
         with contextlib.suppress(NoSuchTable), translated(f"{store.url}/{location} cannot be read"):
@@ -78,7 +78,7 @@ def counted(store: Store, sessions: Sequence[Name]) -> dict[str, int]:
 
 
 def pinned(store: Store, sessions: Sequence[Name]) -> list[Pin]:
-    """Return which versions that models name have rows of these sessions, and keep them."""
+    """Return the pinned versions of models that hold rows of these sessions."""
     by_location = dict(_locations(store, sessions))
     return [
         named

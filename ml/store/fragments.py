@@ -105,7 +105,7 @@ def as_dataset(delta: DeltaTable, location: str, files: FileSystem) -> pyarrow.d
 
 
 def _log(delta: DeltaTable) -> dict[str, pa.ChunkedArray]:
-    """Return what it says of the files, by the names that we use."""
+    """Return the log's columns on files, under our names."""
     log = pa.table(delta.get_add_actions(flatten=True))
     found = {
         ours: log[theirs] if theirs in log.column_names else pa.chunked_array([pa.nulls(log.num_rows)])
@@ -125,7 +125,7 @@ def _between(name: str, first: pa.Scalar, last: pa.Scalar) -> pyarrow.dataset.Ex
 
 @functools.lru_cache(1_000)
 def _partition(robot: str | None, session: str | None) -> pyarrow.dataset.Expression:
-    """Return what is so of every row of a partition; these values are nowhere else."""
+    """Return the condition that all rows of a partition fulfil, and no others."""
     known = _ALL
     if robot is not None:
         known = known & (_column("robot") == robot)

@@ -111,7 +111,7 @@ def counts(label: str) -> bool:
 
 
 def person(name: str) -> str:
-    """Return what all spellings of somebody's name have in common: `P01`, `p01 `, `P-01` and `P1` are `p1`.
+    """Return the common form of all spellings of a person's name: `P01`, `p01 `, `P-01` and `P1` are `p1`.
 
     Capitals, spaces, signs and leading zeros are nothing; but numbers stay apart: `1-11` is not `11-1`.
     """

@@ -13,7 +13,7 @@ class NoLocks(OSError):
 
 
 def check() -> ModuleType:
-    """Return what locks; raises `NoLocks` where nothing does, as on Windows."""
+    """Return the module for locks; raises `NoLocks` on systems without, such as Windows."""
     try:
         import fcntl
     except ModuleNotFoundError:

@@ -82,7 +82,7 @@ def _note(store: Store, location: str, files: Iterable[DataFile]) -> None:
 
 
 def _move(store: Store, path: str) -> None:
-    """Keep what is there of a damaged file, for somebody to look at."""
+    """Keep the remains of a damaged file for inspection."""
     found = store.objects.find(path)
     if found is None:
         return

@@ -81,7 +81,7 @@ class Objects:
                 return None
 
     def find(self, path: str) -> Object | None:
-        """Return what is said of an object, without a listing, which may be late; None without one."""
+        """Return an object's facts, without a listing, which may be late; None if there is no such object."""
         with translated(f"{self.url}/{path} cannot be read"):
             try:
                 found = obstore.head(self._objects(), path)

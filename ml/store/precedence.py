@@ -36,7 +36,7 @@ def recorded_order(rows: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def spool(row: Row) -> str:
-    """Return whose row it is, however often that spool was begun anew."""
+    """Return the spool of a row, without the name of its opening."""
     return str(row.get("spool") or "").partition("/")[0]
 
 

@@ -47,7 +47,7 @@ class QueryError(StoreError):
 
 
 @dataclass(frozen=True, slots=True)
-class Result:
+class QueryResult:
     """What a query finds; the rows come while they are read."""
 
     schema: pa.Schema
@@ -55,7 +55,7 @@ class Result:
 
 
 @contextlib.contextmanager
-def query(store: Store, sql: str, robot: str | None = None) -> Iterator[Result]:
+def query(store: Store, sql: str, robot: str | None = None) -> Iterator[QueryResult]:
     """Run one SELECT over the tables `telemetry`, `sessions`, …, each as one view, whatever its shards.
 
     Of `labels` those that hold. Files, row groups and columns that the query does not need are not read. With
@@ -81,7 +81,7 @@ def query(store: Store, sql: str, robot: str | None = None) -> Iterator[Result]:
         with _said(store):
             reader = _run(connection, lambda: _found(connection, sql))
         with contextlib.closing(reader):
-            yield Result(reader.schema, _read(reader, connection, store))
+            yield QueryResult(reader.schema, _read(reader, connection, store))
 
 
 def _holding(labels: duckdb.DuckDBPyRelation) -> duckdb.DuckDBPyRelation:
@@ -90,7 +90,7 @@ def _holding(labels: duckdb.DuckDBPyRelation) -> duckdb.DuckDBPyRelation:
 
 
 def _run(connection: duckdb.DuckDBPyConnection, work: Callable[[], Found]) -> Found:
-    """Return what may take long, in a thread, so that Ctrl-C ends it."""
+    """Run a long query in a thread, so that Ctrl-C ends it."""
     outcome: Future[Found] = Future()
     thread = threading.Thread(target=_settle, args=(outcome, work), name="query")
     try:

@@ -31,7 +31,7 @@ _WHOLE: Final = (-(1 << 63), (1 << 63) - 2)  # stamps, where nobody knows which
 _AT_ONCE: Final = 8  # footers that are read at a time
 
 
-class Piece(NamedTuple):
+class SessionPiece(NamedTuple):
     """A part of a session's telemetry: from when to when, and which stamps, as far as that is known."""
 
     first: datetime | None
@@ -44,7 +44,7 @@ class Piece(NamedTuple):
 class TelemetrySource(NamedTuple):
     """A place with telemetry of a session: what is there, and what may have rows with such stamps."""
 
-    pieces: Sequence[Piece]
+    pieces: Sequence[SessionPiece]
     rows: Callable[[int, int], pyarrow.dataset.Dataset]
 
 
@@ -195,7 +195,7 @@ def channels(store: Store, session: Session) -> list[Channel]:
 
 
 def footer(store: Store, file: DataFile) -> pq.FileMetaData:
-    """Return what the file says of itself; raises `StoreError` where it is not there or damaged."""
+    """Return the footer of a file; raises `StoreError` if it is missing or damaged."""
     with (
         translated(f"{store.url}/{file.location}/{file.path} cannot be read"),
         store.files.open_input_file(f"{file.location}/{file.path}") as opened,
@@ -210,7 +210,7 @@ def rows_of(store: Store, session: Session, table: Table = EVENTS) -> list[dict[
 
 
 def labels(store: Store, session: Session) -> list[dict[str, Any]]:
-    """Return what somebody says that robot and wearer did, as far as it has not been taken back."""
+    """Return the valid labels of a session."""
     return holding(rows_of(store, session, LABELS))
 
 
@@ -234,7 +234,7 @@ def stored(store: Store, session: Session) -> TelemetrySource:
     """Return the session's telemetry in the store, for `merged`."""
     files = _files(store, session)
     rows = _of_session(store, session)
-    pieces = [Piece(each.first, each.last, each.first_ns, each.last_ns, each.rows) for each in files]
+    pieces = [SessionPiece(each.first, each.last, each.first_ns, each.last_ns, each.rows) for each in files]
     return TelemetrySource(pieces, lambda _begin, _end: rows)
 
 
@@ -259,13 +259,13 @@ def merged(
         yield rows.sort_by(ORDER).select([*KEYS, *names])
 
 
-def _within(piece: Piece, begin: datetime | None, end: datetime | None) -> bool:
+def _within(piece: SessionPiece, begin: datetime | None, end: datetime | None) -> bool:
     before = end is not None and piece.first is not None and piece.first >= end
     after = begin is not None and piece.last is not None and piece.last <= begin
     return not (before or after)
 
 
-def _steps(wanted: Sequence[Piece]) -> Iterator[tuple[int, int]]:
+def _steps(wanted: Sequence[SessionPiece]) -> Iterator[tuple[int, int]]:
     """Spans of stamps, each with about as many rows as are read at once."""
     first_ns = min(_WHOLE[0] if piece.first_ns is None else piece.first_ns for piece in wanted)
     end_ns = 1 + max(_WHOLE[1] if piece.last_ns is None else piece.last_ns for piece in wanted)

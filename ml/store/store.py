@@ -30,7 +30,7 @@ from ml.store.files import filesystem
 from ml.store.fragments import as_dataset
 from ml.store.objects import RETRIES, Objects, s3_options
 from ml.store.probe import probe
-from ml.store.tables import Known, Table
+from ml.store.tables import ColumnFacts, Table
 from ml.store.translation import translated
 from ml.store.url import checked_url, default_url
 
@@ -226,8 +226,8 @@ class Store:
         """Return each column's unit, None where none was given; nothing where there is no table yet."""
         return {name: known.unit for name, known in self.columns(location).items()}
 
-    def columns(self, location: str) -> dict[str, Known]:
-        """Return what is known of each column; nothing where there is no table yet."""
+    def columns(self, location: str) -> dict[str, ColumnFacts]:
+        """Return the facts about each column; empty if there is no table yet."""
         try:
             delta = self._open.get(location) or self.table(location)
         except NoSuchTable:
@@ -235,7 +235,7 @@ class Store:
         return _known(delta.schema())
 
     def identity(self, location: str) -> str:
-        """Return what the table is called for ever, in copies of the store too."""
+        """Return the table's permanent identity, which copies of the store share."""
         return str((self._open.get(location) or self.table(location)).metadata().id)
 
     # --- inside
@@ -245,7 +245,7 @@ class Store:
         self._lasting[table] = newest
 
     def _about(self, wanted: About) -> About:
-        """Return what the store is; a new one is probed first."""
+        """Return the store's facts; a new store is probed first."""
         data = self.objects.read(ABOUT)
         if data is None:
             if self.folder is None and wanted.several_writers:
@@ -325,7 +325,7 @@ class Store:
         """Values in different units, or of two channels, never share a column, even a new one."""
         there, where = _known(delta.schema()), f"{self.url}/{location}"
         for name, (unit, channel) in _known(DeltaSchema.from_arrow(schema)).items():
-            known = there.get(name, Known(unit))
+            known = there.get(name, ColumnFacts(unit))
             if name not in table.schema.names and known.unit != unit:
                 raise ColumnTaken(
                     f"{where} has {name} in {known.unit or 'no unit'}, and it was to be written in "
@@ -351,10 +351,11 @@ class Store:
         delta.update_incremental()
 
 
-def _known(schema: DeltaSchema) -> dict[str, Known]:
+def _known(schema: DeltaSchema) -> dict[str, ColumnFacts]:
     fields = msgspec.json.decode(schema.to_json())["fields"]  # asked one by one, each is decoded twice
     return {
-        each["name"]: Known(each["metadata"].get("unit"), each["metadata"].get("channel")) for each in fields
+        each["name"]: ColumnFacts(each["metadata"].get("unit"), each["metadata"].get("channel"))
+        for each in fields
     }
 
 

@@ -62,7 +62,7 @@ class Table:
 
 
 def shard_of(robot: str, shards: int) -> int:
-    """Return which of `shards` tables holds this robot; the same for ever."""
+    """Return the number of the table with this robot, of `shards`; it never changes."""
     return zlib.crc32(robot.encode()) % shards
 
 
@@ -72,19 +72,19 @@ def field(name: str, kind: Any, unit: str | None = None, channel: str | None = N
     return pa.field(name, kind, metadata=told or None)
 
 
-class Known(NamedTuple):
+class ColumnFacts(NamedTuple):
     """What is known of a column: its unit, empty where it has no dimension, and whose values are in it."""
 
     unit: str | None = None
     channel: str | None = None
 
 
-def columns(schema: pa.Schema) -> dict[str, Known]:
-    """Return what its fields tell."""
-    found: dict[str, Known] = {}
+def columns(schema: pa.Schema) -> dict[str, ColumnFacts]:
+    """Return the facts in the fields' metadata."""
+    found: dict[str, ColumnFacts] = {}
     for each in schema:
         told = each.metadata or {}
-        found[each.name] = Known(
+        found[each.name] = ColumnFacts(
             *(told[key].decode() if key in told else None for key in (b"unit", b"channel"))
         )
     return found

@@ -58,7 +58,7 @@ class Torn:
 
 
 def find(table: Path) -> Torn | None:
-    """Return what keeps the table from being read, or makes what is read wrong."""
+    """Return the torn part that makes the table unreadable, or wrong."""
     return next(
         itertools.chain(*(look(table) for look in (_end, _checkpoint, _hint, _earlier, _beginning))), None
     )

@@ -52,7 +52,7 @@ def write(
 
 
 def _portions(table: Table, batches: Iterator[pa.RecordBatch]) -> Iterator[tuple[Partition, pa.Table]]:
-    """Yield what follows each other in one partition, as much as a file holds."""
+    """Yield consecutive rows of one partition, as many as fit in a file."""
     filled = (batch for batch in batches if batch.num_rows)
     for partition, alike in itertools.groupby(filled, lambda batch: _partition(table, batch)):
         portion: list[pa.RecordBatch] = []

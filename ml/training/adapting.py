@@ -13,7 +13,7 @@ from ml.features.windows import Samples
 from ml.robot.learn import BATCH, pointers
 from ml.robot.learned import Learned, scaled
 from ml.robot.network import FAR
-from ml.training.dataset import EVERY_MS, Part
+from ml.training.dataset import EVERY_MS, SessionDecisions
 
 MINUTE_S: Final = 60.0  # of steps
 LEAST_LATER_S: Final = 20.0  # of steps, to judge by
@@ -24,11 +24,11 @@ EPOCHS: Final = 20
 class Divided:
     """One wearer's decisions in time's order: those that adapt, and those after them."""
 
-    early: list[Part]
-    later: list[Part]
+    early: list[SessionDecisions]
+    later: list[SessionDecisions]
 
 
-def divided(parts: Sequence[Part], minute_s: float = MINUTE_S) -> Divided:
+def divided(parts: Sequence[SessionDecisions], minute_s: float = MINUTE_S) -> Divided:
     """`parts` are in time's order.
 
     Raises:
@@ -39,8 +39,8 @@ def divided(parts: Sequence[Part], minute_s: float = MINUTE_S) -> Divided:
     if len(wearers) > 1:
         raise UnusableData(f"{', '.join(wearers)} walk there: name the sessions of one wearer (--session)")
     every_s = EVERY_MS["gait_phase"] / 1e3
-    early: list[Part] = []
-    later: list[Part] = []
+    early: list[SessionDecisions] = []
+    later: list[SessionDecisions] = []
     stepped_s = 0.0
     for each in parts:
         walked_s = stepped_s + every_s * np.cumsum(~np.isnan(each.truth).any(axis=1))
@@ -55,7 +55,7 @@ def divided(parts: Sequence[Part], minute_s: float = MINUTE_S) -> Divided:
     return Divided([each for each in early if len(each.truth)], [each for each in later if len(each.truth)])
 
 
-def adapted(base: Learned, parts: Sequence[Part], seed: int = 0) -> Learned:
+def adapted(base: Learned, parts: Sequence[SessionDecisions], seed: int = 0) -> Learned:
     """Return a copy that has also learned from these decisions; how far it trusts itself stays as it was."""
     features = np.concatenate([each.features for each in parts])
     return taught(base, features, np.concatenate([each.truth for each in parts]), seed)

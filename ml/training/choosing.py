@@ -8,7 +8,7 @@ from ml.errors import UnusableData
 from ml.features.recipe import Recipe
 from ml.robot.task import Task
 from ml.store.labels import person
-from ml.training.dataset import Part
+from ml.training.dataset import SessionDecisions
 
 HELD_OUT_SHARE: Final = 0.25  # of wearers, or sessions, where nobody says which
 
@@ -33,7 +33,7 @@ def recipe_for(task: Task, channels: Sequence[Set[str]]) -> Recipe:
     return max(enough, key=lambda recipe: (len(recipe.channels), recipe.name))
 
 
-def judging(parts: Sequence[Part]) -> list[Part]:
+def judging(parts: Sequence[SessionDecisions]) -> list[SessionDecisions]:
     """Those that may judge: one without a wearer's name may be of any wearer that has one."""
     return [each for each in parts if each.named] or list(parts)
 
@@ -88,7 +88,9 @@ def _place(name: str) -> float:
     return int.from_bytes(hashlib.sha256(name.encode()).digest()[:8]) / 2**64
 
 
-def split(parts: Iterable[Part], held: Set[str]) -> tuple[list[Part], list[Part], list[Part]]:
+def split(
+    parts: Iterable[SessionDecisions], held: Set[str]
+) -> tuple[list[SessionDecisions], list[SessionDecisions], list[SessionDecisions]]:
     """Parts to learn from, held out, and of the regression set."""
     every = list(parts)
     usual = [each for each in every if not each.regression]

@@ -27,7 +27,7 @@ from ml.store.sessions import newest
 from ml.store.tables import LABELS, SESSIONS, TELEMETRY, Table
 from ml.store.translation import translated
 from ml.training.recorded import Recorded, recorded
-from ml.training.truth import NOBODY, Instants, Names, Said, activities, phases
+from ml.training.truth import NOBODY, Instants, LabelSpan, Names, activities, phases
 
 EVERY_MS: Final[Mapping[str, int]] = {"activity": 100, "gait_phase": 60, "falling": 40}  # between decisions
 RANGE: Final = (0.001, 0.999)  # quantiles of what a channel showed
@@ -50,7 +50,7 @@ class Ask(Struct, frozen=True):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Part:
+class SessionDecisions:
     """A session's decisions of which something is known; a row each, in time's order.
 
     `truth` is (n,) names of classes or, for gait_phase, (n, 2) phases; `source` (n,) who says so, as in
@@ -67,9 +67,9 @@ class Part:
     ranges: Samples
     named: bool = True  # whether somebody has said who the wearer was
 
-    def of(self, rows: npt.NDArray[Any]) -> "Part":
+    def of(self, rows: npt.NDArray[Any]) -> "SessionDecisions":
         """Return some of its decisions."""
-        return Part(
+        return SessionDecisions(
             self.ask,
             self.group,
             self.regression,
@@ -90,7 +90,7 @@ class LeftOut:
     why: str
 
 
-def part(ask: Ask) -> Part | LeftOut:
+def part(ask: Ask) -> SessionDecisions | LeftOut:
     """Return the session's decisions.
 
     Raises:
@@ -104,7 +104,7 @@ def part(ask: Ask) -> Part | LeftOut:
         return LeftOut(ask, str(error))
 
 
-def _part(ask: Ask) -> Part:
+def _part(ask: Ask) -> SessionDecisions:
     store, recipe = Store.existing(ask.store), recipe_named(ask.recipe)
     _check_units(store, ask, recipe)
     rows = recorded(store, ask.robot, ask.session, recipe.channels, _version(store, ask))
@@ -118,7 +118,7 @@ def _part(ask: Ask) -> Part:
         raise UnusableData("nobody has said what robot or wearer did in it (gwrms label)")
     regression = any(each.label == REGRESSION for each in labels)
     who = _wearer(labels, _recorded_wearer(store, ask))
-    whole = Part(
+    whole = SessionDecisions(
         ask, who or ask.session, regression, found, truth, source, stamps_ns, ranges, named=bool(who)
     )
     return whole.of(known)
@@ -187,17 +187,17 @@ def _labels(store: Store, ask: Ask) -> list[Label]:
     return [Label.of(row) for row in holding(_rows(store, LABELS, ask))]
 
 
-def _said(labels: Sequence[Label], rows: Recorded) -> list[Said]:
+def _said(labels: Sequence[Label], rows: Recorded) -> list[LabelSpan]:
     """On the robot's clock."""
     times = np.array([(each.began_utc_ns, each.ended_utc_ns) for each in labels], np.int64).reshape(-1, 2)
     begins, ends = (rows.at_utc(column).tolist() for column in times.T)
     return [
-        Said(begin, end, each.label, each.source)
+        LabelSpan(begin, end, each.label, each.source)
         for begin, end, each in zip(begins, ends, labels, strict=True)
     ]
 
 
-def _truth(recipe: Recipe, said: Sequence[Said], stamps_ns: Instants) -> tuple[npt.NDArray[Any], Names]:
+def _truth(recipe: Recipe, said: Sequence[LabelSpan], stamps_ns: Instants) -> tuple[npt.NDArray[Any], Names]:
     task = TASKS[recipe.name.partition("/")[0]]
     about_ns = stamps_ns - task.delay_ms * 1_000_000
     if not task.fold:

@@ -9,12 +9,12 @@ from collections.abc import Sequence
 
 from ml.errors import UnusableData
 from ml.progress import Tell, untold
-from ml.training.dataset import Ask, LeftOut, Part, part
+from ml.training.dataset import Ask, LeftOut, SessionDecisions, part
 
 PATIENCE_S = 30  # for a cluster to answer
 
 
-def extract(asks: Sequence[Ask], cluster: str = "", told: Tell = untold) -> list[Part | LeftOut]:
+def extract(asks: Sequence[Ask], cluster: str = "", told: Tell = untold) -> list[SessionDecisions | LeftOut]:
     """Return a result for each that is asked for, in this order; `cluster` is a Dask scheduler's address.
 
     `told` hears of each session that is read here.
@@ -33,7 +33,7 @@ def extract(asks: Sequence[Ask], cluster: str = "", told: Tell = untold) -> list
     return found
 
 
-def _on(cluster: str, asks: Sequence[Ask]) -> list[Part | LeftOut]:
+def _on(cluster: str, asks: Sequence[Ask]) -> list[SessionDecisions | LeftOut]:
     try:
         from distributed import KilledWorker
     except ModuleNotFoundError as error:
@@ -46,12 +46,12 @@ def _on(cluster: str, asks: Sequence[Ask]) -> list[Part | LeftOut]:
         raise UnusableData(f"no Dask scheduler answers at {cluster}: {error}") from error
 
 
-async def _gathered(cluster: str, asks: Sequence[Ask]) -> list[Part | LeftOut]:
+async def _gathered(cluster: str, asks: Sequence[Ask]) -> list[SessionDecisions | LeftOut]:
     from distributed import Client
 
     # In a loop of our own: otherwise a client that finds nobody leaves its thread behind.
     made = Client(cluster, timeout=PATIENCE_S, set_as_default=False, asynchronous=True)  # type: ignore[no-untyped-call]
     async with made as client:
         # Not `pure`: the tables' rows are no part of what is asked.
-        found: list[Part | LeftOut] = await client.gather(client.map(part, asks, pure=False))
+        found: list[SessionDecisions | LeftOut] = await client.gather(client.map(part, asks, pure=False))
         return found

@@ -1,13 +1,16 @@
 """A new model against the one that serves: on people neither may know, and on a fixed regression set.
 
 It is better where its figure over the held-out decisions is; it is much worse somewhere where one class or
-one person loses more than is allowed, there or in the regression set. Both judge the same decisions.
+one person loses more than is allowed, there or in the regression set. Both judge the same decisions. Where no
+model serves that can judge them, it is not compared, and never called better; it may serve all the same
+where it knows more than saying always the same.
 """
 
 import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from enum import Enum
 from typing import Any, Final
 
 import numpy as np
@@ -19,12 +22,13 @@ from ml.registry.classifier_scores import calibrated, judged
 from ml.robot.learned import ABNORMAL_FROM, NONE, Learned, Verdicts
 from ml.robot.task import Task
 from ml.store.labels import LabelSource
-from ml.training.dataset import Part
+from ml.training.dataset import SessionDecisions
 
 FEW: Final = 20  # decisions; a class or person with fewer is no reason
 MOST_LOST: Final = 0.05  # of a class's or a person's F1, or of the calibration
 MOST_LOST_PERCENT: Final = 1.0  # of the cycle, of a person's error
 MOST_ABSTAINED: Final = 0.1  # more than the serving model
+NAMED: Final = 3  # channels that are told
 WITHIN: Final = 0.1  # of the cycle: a phase that is right
 
 
@@ -39,16 +43,38 @@ class Judged:
     people: Mapping[str, int] = field(default_factory=dict)  # decisions of each
 
 
+class Verdict(Enum):
+    """What came of a judgement; its words are those of commands and window."""
+
+    BETTER = "better"
+    NOT_BETTER = "not better"
+    NOT_COMPARED = "not compared"  # nothing serves that could be judged by the same decisions
+
+
 @dataclass(frozen=True, slots=True)
 class Decision:
-    """Whether the new model may serve, and why, in sentences."""
+    """What the new model is, and why, in sentences."""
 
-    better: bool
+    verdict: Verdict
     why: tuple[str, ...]
+
+    @property
+    def better(self) -> bool:
+        """Whether it is than what serves."""
+        return self.verdict is Verdict.BETTER
+
+    @property
+    def may_serve(self) -> bool:
+        """Whether it may be promoted without somebody who knows better."""
+        return self.verdict is not Verdict.NOT_BETTER
 
 
 def judge(
-    name: str, new: Learned, parts: Sequence[Part], serving: Learned | None, its: Sequence[Part]
+    name: str,
+    new: Learned,
+    parts: Sequence[SessionDecisions],
+    serving: Learned | None,
+    its: Sequence[SessionDecisions],
 ) -> Judged:
     """Both models on the same decisions; `its` are the parts with the serving model's features, if it has."""
     parts = [_by_people(each) for each in parts]
@@ -60,14 +86,19 @@ def judge(
     return Judged(name, sum(len(each.truth) for each in parts), metrics, other, _people(parts))
 
 
-def decide(task: Task, held_out: Judged, regression: Judged | None) -> Decision:
-    """Better on the held-out decisions, and nowhere much worse."""
+def decide(task: Task, held_out: Judged, regression: Judged | None, lacking: Sequence[str] = ()) -> Decision:
+    """Better on the held-out decisions, and nowhere much worse.
+
+    `lacking` are channels of a shipped model that the sessions do not have, so that it cannot judge them.
+    """
     if not held_out.decisions:
-        return Decision(False, ("no decision of the held-out people can be judged by both models",))
+        return Decision(
+            Verdict.NOT_BETTER, ("no decision of the held-out people can be judged by both models",)
+        )
     figure = "macro_f1" if task.fold else "rmse_percent"
     new = held_out.new.figures[figure]
     if held_out.serving is None:
-        return _without_serving(task, held_out, figure)
+        return _without_serving(task, held_out, figure, lacking)
     old = held_out.serving.figures[figure]
     gain = new - old if task.fold else old - new
     ours, its = _percents(task, new, old)
@@ -76,19 +107,30 @@ def decide(task: Task, held_out: Judged, regression: Judged | None) -> Decision:
         + ("" if gain > 0 else ": not better")
     ]
     losses = [loss for each in (held_out, regression) if each is not None for loss in _losses(task, each)]
-    return Decision(gain > 0 and not losses, (*reasons, *losses))
+    is_better = gain > 0 and not losses
+    return Decision(Verdict.BETTER if is_better else Verdict.NOT_BETTER, (*reasons, *losses))
 
 
-def _without_serving(task: Task, held_out: Judged, figure: str) -> Decision:
-    """Nothing serves: so it must be better than saying always the same."""
+def _without_serving(task: Task, held_out: Judged, figure: str, lacking: Sequence[str]) -> Decision:
+    """Nothing serves: so it must know more than saying always the same, which makes it no better model."""
     new, idle = held_out.new.figures[figure], held_out.new.figures["idle"]
-    better = new > idle if task.fold else new < idle
+    knows = new > idle if task.fold else new < idle
     ours, its = _percents(task, new, idle)
     told = (
         f"{figure} on {held_out.name}: {ours}; saying always the same has {its}; "
         "no model that was promoted serves yet"
     )
-    return Decision(better, (told,))
+    verdict = Verdict.NOT_COMPARED if knows else Verdict.NOT_BETTER
+    return Decision(verdict, (told, *([_unable(lacking)] if lacking else [])))
+
+
+def _unable(lacking: Sequence[str]) -> str:
+    """Return why what came with GWRMS is not compared, which a promotion for every robot would replace."""
+    named = f"{', '.join(lacking[:NAMED])}{', …' if len(lacking) > NAMED else ''}"
+    return (
+        f"channels that what came with GWRMS needs and these sessions lack: {len(lacking)} ({named}); so "
+        "it is not compared, and serves robots that have them until this model is promoted for every robot"
+    )
 
 
 def _losses(task: Task, found: Judged) -> Iterator[str]:
@@ -132,12 +174,14 @@ def _figure(metrics: Metrics, name: str) -> float:
 # --- decisions
 
 
-def _by_people(part: Part) -> Part:
+def _by_people(part: SessionDecisions) -> SessionDecisions:
     """Return what people, the simulator or sensors say: nobody is judged by what a model said."""
     return part.of(part.source != LabelSource.PSEUDO.value)
 
 
-def _common(parts: Sequence[Part], its: Sequence[Part]) -> tuple[list[Part], list[Part]]:
+def _common(
+    parts: Sequence[SessionDecisions], its: Sequence[SessionDecisions]
+) -> tuple[list[SessionDecisions], list[SessionDecisions]]:
     """Return the decisions, session by session, that both have features for."""
     others = {(each.ask.robot, each.ask.session): _by_people(each) for each in its}
     mine, theirs = [], []
@@ -150,21 +194,21 @@ def _common(parts: Sequence[Part], its: Sequence[Part]) -> tuple[list[Part], lis
     return mine, theirs
 
 
-def _people(parts: Sequence[Part]) -> dict[str, int]:
+def _people(parts: Sequence[SessionDecisions]) -> dict[str, int]:
     counts: Counter[str] = Counter()
     for each in parts:
         counts[each.group] += len(each.truth)
     return counts
 
 
-def _classes(new: Learned, parts: Sequence[Part], serving: Learned | None) -> tuple[str, ...]:
+def _classes(new: Learned, parts: Sequence[SessionDecisions], serving: Learned | None) -> tuple[str, ...]:
     """Return the new model's, and then those that it does not know, but the other one or somebody does."""
     others = {str(name) for each in parts if new.task.fold for name in np.unique(each.truth)}
     others |= set(() if serving is None else serving.classes)
     return (*new.classes, *sorted(others - set(new.classes)))
 
 
-def _metrics(learned: Learned, parts: Sequence[Part], classes: Sequence[str]) -> Metrics:
+def _metrics(learned: Learned, parts: Sequence[SessionDecisions], classes: Sequence[str]) -> Metrics:
     """How right it is in terms of these classes."""
     parts = [each for each in parts if len(each.truth)]
     if not parts:

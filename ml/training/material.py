@@ -16,7 +16,7 @@ from ml.store.labels import holding
 from ml.store.sessions import Session, among
 from ml.store.tables import LABELS, SESSIONS, TELEMETRY
 from ml.store.translation import translated
-from ml.training.dataset import Ask, LeftOut, Part, versions
+from ml.training.dataset import Ask, LeftOut, SessionDecisions, versions
 from ml.training.extract import extract
 
 
@@ -52,17 +52,17 @@ class Material:
 
     def parts(
         self, recipe: Recipe, teacher: str = "", least: float = 1.0
-    ) -> tuple[list[Part], list[LeftOut]]:
+    ) -> tuple[list[SessionDecisions], list[LeftOut]]:
         """Every session's decisions with a recipe's features, and the sessions without any."""
         asks = [
             Ask(self.store.url, self.versions, each.robot, each.session, recipe.name, teacher, least)
             for each in self.sessions
         ]
         found = extract(asks, self.cluster, self.told)
-        parts = [each for each in found if isinstance(each, Part)]
+        parts = [each for each in found if isinstance(each, SessionDecisions)]
         return parts, [each for each in found if isinstance(each, LeftOut)]
 
-    def of(self, parts: Sequence[Part]) -> "Material":
+    def of(self, parts: Sequence[SessionDecisions]) -> "Material":
         """Return the sessions of these parts alone."""
         wanted = {(each.ask.robot, each.ask.session) for each in parts}
         chosen = [each for each in self.sessions if (each.robot, each.session) in wanted]
@@ -76,7 +76,7 @@ class Material:
         ]
 
     def tables(self) -> tuple[TableVersion, ...]:
-        """Return what a model is made from, for ever."""
+        """Return the permanent versions of the tables behind a model."""
         shards = self.store.about.shards
         wanted = {LABELS.name, SESSIONS.name}
         wanted |= {TELEMETRY.location(each.robot, shards) for each in self.sessions}
@@ -88,7 +88,7 @@ class Material:
 
 
 def material(url: str, wish: Wish, cluster: str = "", told: Tell = untold) -> Material:
-    """Return what the store has for a wish, at the versions of now.
+    """Return the store's data for a wish, at its present versions.
 
     Raises:
         UnusableData: nothing.

@@ -23,7 +23,7 @@ from ml.robot.groups import unit
 from ml.robot.learn import learn
 from ml.robot.task import TASKS, Task
 from ml.store.labels import LabelSource
-from ml.training.dataset import RANGE, Ask, Part
+from ml.training.dataset import RANGE, Ask, SessionDecisions
 from ml.training.judging import judge
 from ml.training.simulated import SimulatedSession, examples, read, stepping
 
@@ -105,7 +105,7 @@ def _ship(registry: Registry, task: Task, sessions: Sequence[SimulatedSession]) 
     return Shipped(registry.publish(learned.state(), card), dict(metrics.figures))
 
 
-def _part(task: Task, recipe: Recipe, session: SimulatedSession) -> Part:
+def _part(task: Task, recipe: Recipe, session: SimulatedSession) -> SessionDecisions:
     """One simulated session as decisions, like those of a recorded one."""
     found = examples(task, recipe, [session], STEPS[task.name])
     truth: npt.NDArray[Any]
@@ -114,7 +114,7 @@ def _part(task: Task, recipe: Recipe, session: SimulatedSession) -> Part:
         known = truth != ""
     else:
         truth, known = stepping(found.label, found.phase)
-    part = Part(
+    part = SessionDecisions(
         Ask("", {}, "", session.name, recipe.name),
         session.subject,
         False,
@@ -127,13 +127,13 @@ def _part(task: Task, recipe: Recipe, session: SimulatedSession) -> Part:
     return part.of(known)
 
 
-def _thinned(part: Part) -> Part:
-    """Return what is learned from: of falling's many steady decisions a few."""
+def _thinned(part: SessionDecisions) -> SessionDecisions:
+    """Return the training data: of falling's many steady decisions a few."""
     steady = part.truth == "steady" if part.truth.ndim == 1 else np.zeros(len(part.truth), dtype=bool)
     return part.of(~steady | (np.arange(len(part.truth)) % STEADY_SHARE == 0))
 
 
-def _ranges(recipe: Recipe, lessons: Sequence[Part]) -> dict[str, tuple[float, float]]:
+def _ranges(recipe: Recipe, lessons: Sequence[SessionDecisions]) -> dict[str, tuple[float, float]]:
     low = np.min([part.ranges[:, 0] for part in lessons], axis=0)
     high = np.max([part.ranges[:, 1] for part in lessons], axis=0)
     return {name: (float(a), float(b)) for name, a, b in zip(recipe.channels, low, high, strict=True)}

@@ -27,7 +27,7 @@ from ml.robot.task import Task
 from ml.store.labels import LabelSource
 from ml.training.adapting import adapted, divided
 from ml.training.choosing import held_out, judging, recipe_for, split
-from ml.training.dataset import LeftOut, Part
+from ml.training.dataset import LeftOut, SessionDecisions
 from ml.training.judging import Decision, Judged, decide, judge
 from ml.training.material import Material, Wish, material
 
@@ -107,7 +107,8 @@ def _general(registry: Registry, found: Material, wish: Wish) -> Trained:
     if not regression:
         remarks.append("there is no regression set to judge by (gwrms label SESSION --regression)")
     card = _card(found, learned, lessons, [*judges, *regression], people.new)
-    return _trained(learned, card, serving, serving, people, fixed, left_out, remarks)
+    lacking = () if serving is not None else _lacking(registry, found.task, recipe)
+    return _trained(learned, card, serving, serving, people, fixed, left_out, remarks, lacking)
 
 
 def _personal(registry: Registry, found: Material, wish: Wish) -> Trained:
@@ -161,6 +162,14 @@ def _serving(registry: Registry, task: Task, robot: str, recipe: Recipe) -> _Mod
     return None if name is None else _loaded(registry, name)
 
 
+def _lacking(registry: Registry, task: Task, recipe: Recipe) -> Sequence[str]:
+    """Return which channels the fullest model that comes with GWRMS has, and these sessions do not."""
+    shipped = registry.shipped()
+    known = [card for card in registry.entries(task.name) if card.id in shipped]
+    fullest = max(known, key=lambda card: (len(card.channels), card.made), default=None)
+    return () if fullest is None else sorted(set(fullest.channels) - set(recipe.channels))
+
+
 def _teacher(wish: Wish, serving: _Model | None) -> tuple[str, float]:
     if wish.pseudo is None:
         return "", 1.0
@@ -170,8 +179,8 @@ def _teacher(wish: Wish, serving: _Model | None) -> tuple[str, float]:
 
 
 def _its_parts(
-    found: Material, serving: _Model | None, recipe: Recipe, judges: Sequence[Part]
-) -> Sequence[Part]:
+    found: Material, serving: _Model | None, recipe: Recipe, judges: Sequence[SessionDecisions]
+) -> Sequence[SessionDecisions]:
     """Return the same sessions with the features of the serving model."""
     if serving is None or serving.learned.recipe.name == recipe.name:
         return judges
@@ -181,7 +190,7 @@ def _its_parts(
 # --- examples
 
 
-def _enough(task: Task, lessons: Sequence[Part]) -> tuple[list[Part], list[str]]:
+def _enough(task: Task, lessons: Sequence[SessionDecisions]) -> tuple[list[SessionDecisions], list[str]]:
     """Lessons of classes with examples enough, and what is left out."""
     if not task.fold or not lessons:
         return list(lessons), []
@@ -193,7 +202,7 @@ def _enough(task: Task, lessons: Sequence[Part]) -> tuple[list[Part], list[str]]
 
 
 def _unnamed(sessions: int) -> list[str]:
-    """Return what is to be known of sessions whose wearer may be any of those who judge."""
+    """Return a remark on unnamed sessions, whose wearer may be among those who judge."""
     if not sessions:
         return []
     remark = (
@@ -204,7 +213,7 @@ def _unnamed(sessions: int) -> list[str]:
     return [remark]
 
 
-def _rows(lessons: Sequence[Part]) -> Mapping[str, int]:
+def _rows(lessons: Sequence[SessionDecisions]) -> Mapping[str, int]:
     """How many were labelled by whom."""
     return Counter(np.concatenate([each.source for each in lessons]).tolist())
 
@@ -213,7 +222,11 @@ def _rows(lessons: Sequence[Part]) -> Mapping[str, int]:
 
 
 def _card(
-    found: Material, learned: Learned, lessons: Sequence[Part], judges: Sequence[Part], metrics: Metrics
+    found: Material,
+    learned: Learned,
+    lessons: Sequence[SessionDecisions],
+    judges: Sequence[SessionDecisions],
+    metrics: Metrics,
 ) -> Card:
     recipe, rows = learned.recipe, _rows(lessons)
     lows, highs = (
@@ -244,7 +257,7 @@ def _card(
     )
 
 
-def _sessions(parts: Sequence[Part]) -> tuple[str, ...]:
+def _sessions(parts: Sequence[SessionDecisions]) -> tuple[str, ...]:
     return tuple(sorted({each.ask.session for each in parts}))
 
 
@@ -275,6 +288,7 @@ def _trained(
     fixed: Judged,
     left_out: Sequence[LeftOut],
     remarks: Sequence[str],
+    lacking: Sequence[str] = (),
 ) -> Trained:
     known = set(() if serving is None else serving.card.learned) & set(card.held_out)
     if known:
@@ -290,7 +304,7 @@ def _trained(
         "" if over is None else over.name,
         people,
         regression,
-        decide(learned.task, people, regression),
+        decide(learned.task, people, regression, lacking),
         tuple(left_out),
         tuple(remarks),
     )

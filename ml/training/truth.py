@@ -26,7 +26,7 @@ _NAME: Final = np.array(ACTIVITIES).dtype
 
 
 @dataclass(frozen=True, slots=True)
-class Said:
+class LabelSpan:
     """A label on the robot's clock; an instant begins and ends at one time."""
 
     begin_ns: int
@@ -35,7 +35,7 @@ class Said:
     source: LabelSource
 
 
-def activities(said: Sequence[Said], at_ns: Instants) -> tuple[Names, Names]:
+def activities(said: Sequence[LabelSpan], at_ns: Instants) -> tuple[Names, Names]:
     """Of instants (n,) in their order: the activity, and which source says so; NOBODY where none does."""
     names, sources = np.full(len(at_ns), NOBODY, _NAME), np.full(len(at_ns), NOBODY, "U16")
     for source in LabelSource:
@@ -46,7 +46,7 @@ def activities(said: Sequence[Said], at_ns: Instants) -> tuple[Names, Names]:
     return names, sources
 
 
-def _of_source(said: Iterable[Said], at_ns: Instants) -> tuple[Names, npt.NDArray[np.bool_]]:
+def _of_source(said: Iterable[LabelSpan], at_ns: Instants) -> tuple[Names, npt.NDArray[np.bool_]]:
     names, told = np.full(len(at_ns), NOBODY, _NAME), np.zeros(len(at_ns), np.bool_)
     disputed = told.copy()
     for each in said:
@@ -58,7 +58,7 @@ def _of_source(said: Iterable[Said], at_ns: Instants) -> tuple[Names, npt.NDArra
     return names, told
 
 
-def phases(said: Sequence[Said], at_ns: Instants) -> tuple[Samples, Names]:
+def phases(said: Sequence[LabelSpan], at_ns: Instants) -> tuple[Samples, Names]:
     """Of instants (n,): the phases (n, 2) of the left and the right leg, and which source says so.
 
     NaN, NaN where no leg steps; the source is NOBODY where that is not known, or of one leg alone.
@@ -72,7 +72,9 @@ def phases(said: Sequence[Said], at_ns: Instants) -> tuple[Samples, Names]:
     return found, np.where(steps, least_trusted, np.where(still, sources, NOBODY))
 
 
-def _leg(said: Sequence[Said], strike: str, at_ns: Instants) -> tuple[npt.NDArray[np.float64], LabelSource]:
+def _leg(
+    said: Sequence[LabelSpan], strike: str, at_ns: Instants
+) -> tuple[npt.NDArray[np.float64], LabelSource]:
     """By the most trusted source that has seen two strikes."""
     for source in LabelSource:
         strikes = np.unique([e.begin_ns for e in said if e.label == strike and e.source is source])

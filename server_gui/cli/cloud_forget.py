@@ -12,8 +12,8 @@ from ml.store import Store, StoreError, UnsafeStore
 from ml.store.forgetting import Name
 from server_gui.cli.cloud_options import add_url, parser, progress, reach, spool
 from server_gui.core.cloud import forget as forgetting
-from server_gui.core.cloud.exports import State
-from server_gui.core.cloud.forget import CannotForget, Plan
+from server_gui.core.cloud.exports import ExportState
+from server_gui.core.cloud.forget import CannotForget, ErasurePlan
 from server_gui.core.recording.errors import RecordingError
 from server_gui.core.recording.spool import Spool
 
@@ -86,7 +86,7 @@ def _forget(arguments: argparse.Namespace) -> int:
     return _tell(arguments, known, left)
 
 
-def _check_pins(arguments: argparse.Namespace, known: Plan) -> None:
+def _check_pins(arguments: argparse.Namespace, known: ErasurePlan) -> None:
     if known.pins and not arguments.unpin:
         names = "; ".join(f"version {pin.version} of {pin.location} for {pin.by}" for pin in known.pins)
         raise CannotForget(
@@ -101,12 +101,12 @@ def _learned(store: Store, sessions: Sequence[Name]) -> Sequence[str]:
     return [card.id for card in Registry(store.url).entries() if names & {*card.learned, *card.held_out}]
 
 
-def _question(store: Store, known: Plan) -> str:
+def _question(store: Store, known: ErasurePlan) -> str:
     sessions, rows = counted(len(known.sessions), "session"), counted(sum(known.rows.values()), "row")
     return f"remove {sessions} with {rows} of {store.url} for good?"
 
 
-def _say(arguments: argparse.Namespace, known: Plan) -> None:
+def _say(arguments: argparse.Namespace, known: ErasurePlan) -> None:
     """Print their data."""
     if arguments.json:
         return
@@ -125,18 +125,19 @@ def _say(arguments: argparse.Namespace, known: Plan) -> None:
         say(f"exported: {each.place} ({each.state.value})\n")
 
 
-def _not_reached(known: Plan) -> Iterator[str]:
-    """Yield what nobody here can look into."""
+def _not_reached(known: ErasurePlan) -> Iterator[str]:
+    """Yield the places that cannot be searched from here."""
     if known.others:
         yield (
             f"not looked into: the spools of other computers that write to this store "
             f"({', '.join(known.others)}): run the same command there, before they record or mend again"
         )
     for place in _moved(known):
-        yield f"not looked into: what was exported to {place}, which {State.GONE.value}: find it, remove it"
+        gone = ExportState.GONE.value
+        yield f"not looked into: what was exported to {place}, which {gone}: find it, remove it"
 
 
-def _tell(arguments: argparse.Namespace, known: Plan, left: Sequence[str]) -> int:
+def _tell(arguments: argparse.Namespace, known: ErasurePlan, left: Sequence[str]) -> int:
     if arguments.json:
         removed = not (arguments.dry_run or left)
         say_json(
@@ -164,6 +165,6 @@ def _tell(arguments: argparse.Namespace, known: Plan, left: Sequence[str]) -> in
     return OUT_OF_REACH if not arguments.dry_run and _moved(known) else 0
 
 
-def _moved(known: Plan) -> list[str]:
-    """Return what was exported and is there no more: removed, or somewhere else with all its rows."""
-    return [each.place for each in known.exported if each.state is State.GONE]
+def _moved(known: ErasurePlan) -> list[str]:
+    """Return exports that are gone: removed, or moved with all their rows."""
+    return [each.place for each in known.exported if each.state is ExportState.GONE]

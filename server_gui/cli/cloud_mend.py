@@ -81,7 +81,7 @@ def _mend(arguments: argparse.Namespace) -> int:
     return _tell(arguments, done)
 
 
-def _question(plan: mending.Plan) -> str:
+def _question(plan: mending.RepairPlan) -> str:
     going = "".join(f"{each}\n" for each in plan.lost)
     return (
         f"{going}count what then is there as what was sent, also where rows are missing, doubled or altered?"

@@ -59,7 +59,7 @@ def spool(arguments: argparse.Namespace) -> Path:
 
 
 def recordings(command: str, arguments: argparse.Namespace) -> Recordings:
-    """Return what is in the server's store and in its spool, or in another store by its URL.
+    """Return the recordings in the server's store and spool, or in another store by its URL.
 
     Says so where the store cannot be reached.
     """

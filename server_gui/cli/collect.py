@@ -156,7 +156,7 @@ def _status(spool: Path, *, as_json: bool) -> int:
 
 
 def status_text(report: CollectorReport) -> str:
-    """Return what a collector says of itself, for people."""
+    """Return a collector's report, for people."""
     recorder, uploader = report.recorder, report.uploader
     rows = f"{recorder.recorded} rows since then, {recorder.waiting} wait for the disk, {recorder.lost} lost"
     batches = (
@@ -188,7 +188,7 @@ def _batches(count: int) -> str:
 
 
 def _predicted(state: PredictingState | None) -> list[str]:
-    """Return what models say of the robots, and what is wrong with models."""
+    """Return the newest predictions of the robots, and problems of models."""
     if state is None:
         return ["prediction is off\n"]
     rows = [

@@ -13,9 +13,9 @@ from ml.store.private import private_files
 from server_gui.cli.cloud_options import parser, spool
 from server_gui.core.evidence.comparison import Measured, Word
 from server_gui.core.evidence.experiment import Experiment
-from server_gui.core.evidence.file import Told, folder_beside, read_all
+from server_gui.core.evidence.file import EditEvidence, folder_beside, read_all
 from server_gui.core.evidence.wording import interval, number, share, strides
-from server_gui.core.experiments.plan import Kind
+from server_gui.core.experiments.plan import ExperimentKind
 from server_gui.core.experiments.wording import chart, record, what, whole
 
 EPILOG: Final = """commands
@@ -92,7 +92,7 @@ def show(argv: list[str]) -> int:
     return 0
 
 
-def _read(arguments: argparse.Namespace) -> list[Told] | None:
+def _read(arguments: argparse.Namespace) -> list[EditEvidence] | None:
     folder = folder_beside(spool(arguments))
     try:
         return read_all(folder)
@@ -101,13 +101,13 @@ def _read(arguments: argparse.Namespace) -> list[Told] | None:
         return None
 
 
-def fields(told: Told) -> dict[str, Any]:
+def fields(told: EditEvidence) -> dict[str, Any]:
     """Return an edit for machines."""
     found: dict[str, Any] = msgspec.to_builtins(told)
     return found
 
 
-def _row(told: Told) -> tuple[str, ...]:
+def _row(told: EditEvidence) -> tuple[str, ...]:
     edit, evidence = told.edit, told.evidence
     strongest = next((one for one in evidence.metrics if one.series == evidence.strongest), None)
     return (
@@ -122,7 +122,7 @@ def _row(told: Told) -> tuple[str, ...]:
     )
 
 
-def shown(told: Told) -> Iterator[str]:
+def shown(told: EditEvidence) -> Iterator[str]:
     """Yield everything that is known of one, in lines."""
     edit, evidence, tried = told.edit, told.evidence, told.experiment
     yield f"{tried.kind if tried else 'edit'} {edit.id} of {edit.robot}, {edit.utc}, by {edit.who or NONE}"
@@ -139,7 +139,7 @@ def shown(told: Told) -> Iterator[str]:
         yield f"{evidence.word}: {strides(evidence)}"
     elif rows := list(chart(tried)):
         yield table(_columns(tried), rows, right=(0, 1, 4)).rstrip()
-    elif tried.kind == Kind.AB:
+    elif tried.kind == ExperimentKind.AB:
         yield f"{evidence.word}: {counted(before, 'gait cycle')} with A, {after} with B"
     yield from (f"  {note}" for note in evidence.notes)
     yield from (

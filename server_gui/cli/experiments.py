@@ -23,8 +23,8 @@ from gateway.wire.parameter import ParameterInfo
 from gateway.wire.robot import Description
 from ml.store.private import private_files
 from server_gui.cli.edits import fields, shown
-from server_gui.core.evidence.file import EvidenceFile, Told, folder_beside
-from server_gui.core.experiments.machine import State
+from server_gui.core.evidence.file import EditEvidence, EvidenceFile, folder_beside
+from server_gui.core.experiments.machine import ExperimentState
 from server_gui.core.experiments.plan import (
     FEWEST_PAIRS,
     MOST_PAIRS,
@@ -34,7 +34,7 @@ from server_gui.core.experiments.plan import (
     BadPlan,
     Bounds,
     Dwell,
-    Plan,
+    ExperimentPlan,
     ab,
     sweep,
 )
@@ -78,7 +78,7 @@ example:
   gwrms sweep left_knee.position_gain 2400 3600 200
 {EXIT}"""
 
-Planner = Callable[[ParameterInfo, float, Unit, Description], Plan]
+Planner = Callable[[ParameterInfo, float, Unit, Description], ExperimentPlan]
 
 
 def ab_main(argv: list[str]) -> int:
@@ -99,7 +99,7 @@ def ab_main(argv: list[str]) -> int:
     _add_shared(made)
     arguments = made.parse_args(_spaced(argv))
 
-    def plan(info: ParameterInfo, held: float, unit: Unit, description: Description) -> Plan:
+    def plan(info: ParameterInfo, held: float, unit: Unit, description: Description) -> ExperimentPlan:
         first, second = _values(arguments.name, arguments.values, description)
         dwell, bounds = _dwell(arguments), _bounds(arguments)
         values, seed = (first, second), arguments.seed
@@ -118,7 +118,7 @@ def sweep_main(argv: list[str]) -> int:
     _add_shared(made)
     arguments = made.parse_args(_spaced(argv))
 
-    def plan(info: ParameterInfo, held: float, unit: Unit, description: Description) -> Plan:
+    def plan(info: ParameterInfo, held: float, unit: Unit, description: Description) -> ExperimentPlan:
         texts = [arguments.first, arguments.last, arguments.step]
         first, last, step = _values(arguments.name, texts, description)
         return sweep(
@@ -216,12 +216,12 @@ def _run(command: str, arguments: argparse.Namespace, planned: Planner) -> int:
     if told is not None:
         _keep(told, arguments, command)
     _say_result(run, told, arguments, command)
-    if run.state is State.NOT_CONFIRMED:
+    if run.state is ExperimentState.NOT_CONFIRMED:
         return NOT_CONFIRMED
     return 0 if run.is_whole else 1
 
 
-def _plan(command: str, arguments: argparse.Namespace, planned: Planner) -> tuple[Plan, str]:
+def _plan(command: str, arguments: argparse.Namespace, planned: Planner) -> tuple[ExperimentPlan, str]:
     with connect(arguments, command) as robot:
         description = robot.describe()
         check_names("parameter", [arguments.name], parameter_names(description))
@@ -240,7 +240,7 @@ def _plan(command: str, arguments: argparse.Namespace, planned: Planner) -> tupl
 
 
 def _held(robot: Robot, name: str) -> float:
-    """Return what the device holds; one that has been asked nothing for a while may not have answered yet."""
+    """Return the device's value; a device that was idle for a while may take a moment to answer."""
     until_s = time.monotonic() + REACH_S
     while True:
         held = robot.read(name).values[name]
@@ -251,7 +251,7 @@ def _held(robot: Robot, name: str) -> float:
         time.sleep(BEAT_S)
 
 
-def _begin(plan: Plan, followed: FollowedRobot, ending_: ShutdownSignals) -> Run:
+def _begin(plan: ExperimentPlan, followed: FollowedRobot, ending_: ShutdownSignals) -> Run:
     until_s = time.monotonic() + REACH_S
     while True:
         followed.update()
@@ -313,7 +313,7 @@ def _say_progress(run: Run, said: str, arguments: argparse.Namespace) -> str:
         sys.stdout.flush()
         return text
     now = f"{run.state.name} {run.place}"
-    if now != said and run.state in (State.LOOKING, State.HOLDING):
+    if now != said and run.state in (ExperimentState.LOOKING, ExperimentState.HOLDING):
         say(f"{progress(run)}\n")
     return now
 
@@ -324,7 +324,7 @@ def say_of(arguments: argparse.Namespace, text: str) -> None:
         say(f"{text}\n")
 
 
-def _say_result(run: Run, told: Told | None, arguments: argparse.Namespace, command: str) -> None:
+def _say_result(run: Run, told: EditEvidence | None, arguments: argparse.Namespace, command: str) -> None:
     if arguments.json:
         found = {"ended": run.why, "state": run.state.name.lower(), "result": fields(told) if told else None}
         say_json(found)
@@ -332,11 +332,11 @@ def _say_result(run: Run, told: Told | None, arguments: argparse.Namespace, comm
     say(f"{ending(run)}\n")
     if told is not None:
         say("\n" + "\n".join(shown(told)) + "\n")
-    if run.state is State.NOT_CONFIRMED:
+    if run.state is ExperimentState.NOT_CONFIRMED:
         warn(command, f"{run.state.value}: {run.back}. Read it: gwrms get {run.plan.name}")
 
 
-def _keep(told: Told, arguments: argparse.Namespace, command: str) -> None:
+def _keep(told: EditEvidence, arguments: argparse.Namespace, command: str) -> None:
     """Beside the evidence for edits, with the recording that is made of the robot by a collector here."""
     try:
         spool = load(arguments.config).recorder.spool
@@ -348,7 +348,7 @@ def _keep(told: Told, arguments: argparse.Namespace, command: str) -> None:
 
 
 def _recording(spool: Path, calls_itself: str) -> tuple[str, str]:
-    """Return what the robot is called where it is recorded, and the recording.
+    """Return the name under which the robot is recorded, and the recording.
 
     As it calls itself, and none.
     """

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Final
 
 from gateway.cli.text import say, say_json, table, warn
-from server_gui.core.joint_tests.comparing import Shown, analysed, differences, last_before, told
+from server_gui.core.joint_tests.comparing import AnalysedTest, analysed, differences, last_before, told
 from server_gui.core.joint_tests.file import NotReadable
 from server_gui.core.joint_tests.measures import Measure
 
@@ -54,7 +54,7 @@ def main(argv: list[str]) -> int:
     return 0
 
 
-def _page(shown: Shown, last: Shown | None) -> Iterator[str]:
+def _page(shown: AnalysedTest, last: AnalysedTest | None) -> Iterator[str]:
     head = shown.test.head
     yield f"{head.robot} {head.joint}: {head.test} test of {head.began}, by {head.who}"
     if shown.test.problem is not None:

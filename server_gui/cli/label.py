@@ -64,7 +64,7 @@ def main(argv: list[str]) -> int:
 def _wanted(
     made: argparse.ArgumentParser, settings: ServerSettings, session: Session, arguments: argparse.Namespace
 ) -> Sequence[Label]:
-    """Return what is to be kept or taken back."""
+    """Return the labels to keep or to withdraw."""
     if arguments.file is not None:
         return from_table(
             session, arguments.file, arguments.author, lambda text: absolute(session, _time(text))

@@ -128,7 +128,7 @@ class Curves:
                 samples.popleft()
 
     def lines(self, columns: int) -> list[str]:
-        """Return what is shown, a title and the curve of each channel."""
+        """Return the lines to print: a title and the curve of each channel."""
         silent_s = time.monotonic() - self._taken_s
         silent_s = silent_s if silent_s > SILENT_S else 0.0
         found: list[str] = []

@@ -198,7 +198,7 @@ def _show_new(news: Sequence[PredictionNews], said: dict[tuple[str, str], str]) 
 
 
 def fields(one: PredictionNews) -> dict[str, Any]:
-    """Return what was predicted, for machines."""
+    """Return the prediction's fields, for machines."""
     match one:
         case Predicted():
             trust = {"trust": one.trust.level.value, "drifted": one.trust.drifted}

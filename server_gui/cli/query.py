@@ -14,7 +14,7 @@ from gateway.amounts import NONE
 from gateway.cli.text import say, table, warn
 from gateway.plain_text import json_plain
 from ml.store.private import private_files
-from ml.store.query import Result, query
+from ml.store.query import QueryResult, query
 from server_gui.cli.cloud_options import add_url, parser, reach
 from server_gui.core.cloud.tabular import iso_8601
 
@@ -61,7 +61,7 @@ def main(argv: list[str]) -> int:
     return 0
 
 
-def _json(result: Result) -> None:
+def _json(result: QueryResult) -> None:
     """One array, a row a line, written while it is read."""
     between = "["
     for batch in result.batches:
@@ -72,7 +72,7 @@ def _json(result: Result) -> None:
     sys.stdout.write("]\n" if between != "[" else "[]\n")
 
 
-def _csv(result: Result) -> None:
+def _csv(result: QueryResult) -> None:
     """Nothing for null, times as ISO 8601 has them, lists and structs as JSON."""
     schema = pa.schema(
         [(each.name, each.type if _is_plain(each.type) else pa.string()) for each in result.schema]
@@ -97,7 +97,7 @@ def _flat(column: pa.Array) -> pa.Array:
     return pa.array([None if value is None else _text(value) for value in column.to_pylist()], pa.string())
 
 
-def _table(result: Result) -> None:
+def _table(result: QueryResult) -> None:
     found = (
         (map(_text, row) for row in zip(*map(_list, batch.columns), strict=True)) for batch in result.batches
     )

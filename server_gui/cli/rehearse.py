@@ -22,7 +22,7 @@ for_ms = 60"""
 
 
 def rehearse(settings: ServerSettings, arguments: argparse.Namespace) -> int:
-    """Print what each rule would have done."""
+    """Print the outcome of each rule on recordings."""
     if not settings.rules:
         raise SettingsError(NO_RULES)
     if arguments.benchmark:

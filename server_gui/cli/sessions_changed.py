@@ -9,7 +9,13 @@ from gateway.cli.text import say, say_json, table
 from ml.store.sessions import Session
 from server_gui.cli.cloud_options import add_url, parser, progress, recordings
 from server_gui.cli.edits import COLUMNS, metric_row
-from server_gui.core.cloud.configuration_changes import Changes, Difference, Told, changes, not_known
+from server_gui.core.cloud.configuration_changes import (
+    Changes,
+    Difference,
+    SessionConfiguration,
+    changes,
+    not_known,
+)
 from server_gui.core.cloud.metric_changes import moved, walk
 from server_gui.core.evidence.comparison import Evidence, Word
 
@@ -40,7 +46,7 @@ def changed(argv: list[str]) -> int:
     arguments = made.parse_args(argv)
     known = recordings("sessions", arguments)
     sides = [known.find(name) for name in (arguments.before, arguments.after)]
-    found = changes(*(Told.of(known, session) for session in sides))
+    found = changes(*(SessionConfiguration.of(known, session) for session in sides))
     evidence = None
     if not arguments.facts:
         rows = sum(known.counted(session).rows for session in sides)

@@ -77,7 +77,7 @@ def _use(known: Recordings, name: str) -> SessionUse:
 
 
 def _version(session: Session) -> str:
-    """Return what a session's software is called: the gateway's version, else its own name."""
+    """Return the name of a session's software: the gateway's version, else the session's own name."""
     known = session.versions.get("gateway")
     return f"gateway {known}" if known else session.session
 

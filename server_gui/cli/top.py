@@ -70,7 +70,7 @@ def main(argv: list[str]) -> int:
 
 
 def _settings() -> "ServerSettings | None":
-    """Return what the server's file says; one that cannot be read hinders nobody."""
+    """Return the settings of the server's file; None, with a warning, if it cannot be read."""
     from server_gui.core.settings.server_file import SettingsError, load
 
     try:

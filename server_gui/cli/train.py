@@ -35,6 +35,8 @@ regression set are never learned from, and judge every model.
 
 The model is published (gwrms models ls), and with --promote it serves: where it is better on the held-out
 people than the model that serves now, and nowhere much worse; and where that one still serves at its end.
+Where no model serves robots with these sensors it is not compared, and serves if it knows more than saying
+always the same.
 gwrms models rollback takes that back.
 
 examples
@@ -72,7 +74,7 @@ def main(argv: list[str]) -> int:
 
 
 def _trained(registry: Registry, wish: Wish, arguments: argparse.Namespace) -> "Trained":
-    """Return what came of it; says what it does first, for even loading what learns takes its seconds."""
+    """Train, and return the result; print a line first, for even loading the libraries takes seconds."""
     tell = _teller(arguments)
     if not arguments.json:
         warn("train", f"{wish.task}, from the sessions and labels of {registry.url}")
@@ -82,7 +84,7 @@ def _trained(registry: Registry, wish: Wish, arguments: argparse.Namespace) -> "
 
 
 def _teller(arguments: argparse.Namespace) -> Tell:
-    """Return what tells how far it is: for machines in lines of JSON before the answer."""
+    """Return the function that reports progress: for machines in lines of JSON before the answer."""
     if arguments.json:
         if not arguments.progress:
             return untold
@@ -90,6 +92,13 @@ def _teller(arguments: argparse.Namespace) -> Tell:
     if arguments.progress:
         return lambda what, done, total: warn("train", f"{what}, {done} of {total}")
     return _Stages()
+
+
+HEADINGS: Final = {
+    "better": "better, and nowhere much worse:",
+    "not better": "not to be promoted:",
+    "not compared": "not compared, but able to serve:",
+}
 
 
 class _Stages:
@@ -108,7 +117,7 @@ def _promoted(
     registry: Registry, model: str, trained: "Trained", arguments: argparse.Namespace
 ) -> tuple[bool, str]:
     """Whether it serves now; why not, where it was better but something else serves since it was judged."""
-    if not (arguments.promote and trained.decision.better):
+    if not (arguments.promote and trained.decision.may_serve):
         return False, ""
     who, why = user_name(), "; ".join(trained.decision.why)
     try:
@@ -134,13 +143,13 @@ def _text(
             yield f"{each.name}, {each.decisions} decisions"
             yield table(("", "NEW", "SERVING"), _figures(each), right=(1, 2)).rstrip()
     yield ""
-    yield "better, and nowhere much worse:" if decision.better else "not to be promoted:"
+    yield HEADINGS[decision.verdict.value]
     yield from (f"  {why}" for why in decision.why)
     if promoted:
         yield f"it serves now, for {arguments.robot or 'every robot without a model of its own'}"
     elif overtaken:
         yield f"not promoted: {overtaken}"
-    elif decision.better:
+    elif decision.may_serve:
         whom = f" --robot {arguments.robot}" if arguments.robot else ""
         yield f"let it serve: gwrms models promote {model}{whom} --instead-of {trained.over or NOTHING}"
     yield ""
@@ -167,6 +176,7 @@ def _answer(model: str, trained: "Trained", overtaken: str, *, promoted: bool) -
         "compared_with": trained.serving,
         "over": trained.over,
         "better": trained.decision.better,
+        "verdict": trained.decision.verdict.value,
         "promoted": promoted,
         "overtaken": overtaken or None,
         "why": trained.decision.why,

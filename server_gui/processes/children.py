@@ -34,7 +34,7 @@ class Output:
         return self._pipe.fileno()
 
     def drain(self) -> None:
-        """Take what has come, so that the child never waits for us."""
+        """Read the child's output, so that the child never waits for us."""
         while chunk := self._pipe.read(HELD_BYTES):
             self._held = (self._held + chunk)[-HELD_BYTES:]
 

@@ -10,7 +10,7 @@ from typing import Final, Self
 
 from gateway.client import Address
 from server_gui.processes.children import ChildFailed
-from server_gui.processes.simulated import Part, simulated_robot
+from server_gui.processes.simulated import RobotPart, simulated_robot
 
 Running = tuple[Address, Callable[[], None]]  # where it listens, and how to check that all is well
 LOOK_S: Final = 0.5  # between looks whether both still run
@@ -31,7 +31,7 @@ class DemoRobot:
     def __init__(self, scenario: str = "walk", folder: Path | None = None) -> None:
         self.scenario = scenario
         self.folder = folder  # from the start on where its files are, the control socket among them
-        self.ready: tuple[Part, ...] = ()
+        self.ready: tuple[RobotPart, ...] = ()
         self.address: Address | None = None  # of its gateway, once that listens
         self.problem = ""  # why it does not run, or runs no more
         self._wanted = folder
@@ -89,7 +89,7 @@ class DemoRobot:
         with tempfile.TemporaryDirectory(prefix="gwrms-gui-", ignore_cleanup_errors=True) as made:
             yield Path(made)
 
-    def _ready(self, part: Part) -> None:
+    def _ready(self, part: RobotPart) -> None:
         self.ready = (*self.ready, part)
 
     def _give_up(self) -> None:

@@ -7,7 +7,7 @@ from typing import Final
 
 from server_gui.processes.children import Child
 from server_gui.processes.demo_robot import DemoRobot, Running
-from server_gui.processes.simulated import START_S, Part, address_in
+from server_gui.processes.simulated import START_S, RobotPart, address_in
 
 
 class FileGateway(DemoRobot):
@@ -22,5 +22,5 @@ class FileGateway(DemoRobot):
 
     @contextlib.contextmanager
     def _running(self, _folder: Path) -> Iterator[Running]:
-        with Child(Part.GATEWAY.value, ["gateway", str(self._file), "--port", "0"]) as gateway:
+        with Child(RobotPart.GATEWAY.value, ["gateway", str(self._file), "--port", "0"]) as gateway:
             yield gateway.wait_ready(address_in, START_S, self._give_up), gateway.check

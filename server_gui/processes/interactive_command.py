@@ -164,7 +164,7 @@ class Lines:
         self._held = b""
 
     def read(self, pipe: IO[bytes]) -> bool:
-        """Take what has come; whether there may be more."""
+        """Read the pipe; return whether there may be more."""
         chunk = pipe.read(CHUNK) or b""
         *lines, self._held = (self._held + chunk).split(b"\n")
         if not chunk and self._held:

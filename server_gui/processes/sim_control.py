@@ -52,7 +52,7 @@ class SimControl:
         self._folder = folder
 
     def listed(self) -> Listed:
-        """Return what can be broken, and what is."""
+        """Return the possible and the active faults."""
         try:
             return msgspec.convert(self._ask({"list": True}), Listed)
         except msgspec.ValidationError as error:

@@ -14,7 +14,7 @@ from server_gui.processes.children import Child
 START_S: Final = 60.0  # for a simulator or a gateway to become ready, on a slow machine
 
 
-class Part(Enum):
+class RobotPart(Enum):
     """What a simulated robot is made of, in the order in which it starts."""
 
     SIMULATOR = "simulator"
@@ -23,7 +23,10 @@ class Part(Enum):
 
 @contextlib.contextmanager
 def simulated_robot(
-    folder: Path, scenario: str, give_up: Callable[[], None], ready: Callable[[Part], None] = lambda _: None
+    folder: Path,
+    scenario: str,
+    give_up: Callable[[], None],
+    ready: Callable[[RobotPart], None] = lambda _: None,
 ) -> Iterator[tuple[Address, Callable[[], None]]]:
     """Where its gateway listens, and how to check that all is well; `give_up` may raise while it starts.
 
@@ -33,17 +36,17 @@ def simulated_robot(
         ChildFailed: simulator or gateway ended, or never became ready.
 
     """
-    with Child(Part.SIMULATOR.value, ["sim", "--dir", str(folder), "--scenario", scenario]) as simulator:
+    with Child(RobotPart.SIMULATOR.value, ["sim", "--dir", str(folder), "--scenario", scenario]) as simulator:
         config = simulator.wait_ready(_config_in, START_S, give_up)
-        ready(Part.SIMULATOR)
+        ready(RobotPart.SIMULATOR)
 
         def check_simulator() -> None:
             give_up()
             simulator.check()
 
-        with Child(Part.GATEWAY.value, ["gateway", config, "--port", "0"]) as gateway:
+        with Child(RobotPart.GATEWAY.value, ["gateway", config, "--port", "0"]) as gateway:
             address = gateway.wait_ready(address_in, START_S, check_simulator)
-            ready(Part.GATEWAY)
+            ready(RobotPart.GATEWAY)
 
             def check() -> None:
                 check_simulator()

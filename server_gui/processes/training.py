@@ -32,6 +32,6 @@ def training(url: str, wish: TrainingWish, done: Callable[[Trained], None]) -> W
             except ChildFailed as error:
                 raise TrainingFailed(str(error)) from error
         done(found)
-        return found.verdict
+        return found.said
 
     return work

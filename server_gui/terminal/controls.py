@@ -10,7 +10,7 @@ from gateway.wire.control import CONTROL_ACQUIRE
 from gateway.wire.parameter import PARAMETER_WRITE, ParameterInfo
 from gateway.wire.stop import ROBOT_RESET
 from server_gui.core.desk.station import Station
-from server_gui.core.tuning.edits import Change, refusal, unit_of
+from server_gui.core.tuning.edits import ReviewedEdit, refusal, unit_of
 from server_gui.core.tuning.stop import StopState
 from server_gui.core.tuning.writing import WriteState
 from server_gui.terminal.keys import Key
@@ -83,7 +83,7 @@ class Controls:
         return self._station.writing.state is WriteState.WRITING
 
     def press(self, key: Key) -> None:
-        """Do what a key stands for; a STOP is shown until a key is pressed after it was answered, or not."""
+        """Carry out a key; a STOP is shown until a key is pressed after its answer, or failure."""
         self.stop_sent = key is Key.STOP or (self.stop_sent and self._stop_is_open)
         self._refusal, self._refused_until_s = self._refused(key), time.monotonic() + SAID_S
         if not self._refusal:
@@ -118,7 +118,7 @@ class Controls:
             unit = unit_of(name, info.unit, Units())
             self.note = f"writing {name} = {unit.editable(target)} {unit.symbol}"
             problem = refusal(target, value, info, unit)
-            self._station.write((Change(name, unit, value, target, elsewhere=False, problem=problem),))
+            self._station.write((ReviewedEdit(name, unit, value, target, elsewhere=False, problem=problem),))
 
     def _stop(self) -> None:
         self._station.stop("STOP key of the dashboard")

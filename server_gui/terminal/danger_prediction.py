@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Sequence
 
-from ml.danger.combine import load
+from ml.danger.calibration import load
 from ml.errors import UnusableModel
 from server_gui.core.follow.events import Event
 from server_gui.core.prediction.news import PredictionNews

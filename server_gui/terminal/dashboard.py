@@ -50,7 +50,7 @@ def draw(station: Station, controls: Controls, where: str, size: tuple[int, int]
     return page
 
 
-def _fill(lower: Layout, station: Station, controls: Controls, look: panels.Look, room: int) -> None:
+def _fill(lower: Layout, station: Station, controls: Controls, look: panels.PanelWidths, room: int) -> None:
     """Draw what stands below the joints; what no line is left for is out of sight."""
     robot, gait = station.robot, station.processing.derived().gait
     lower.visible = room > 0

@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from gateway.client import Address
-from server_gui.core.desk.first_steps import FirstSteps, Step
+from server_gui.core.desk.first_steps import FirstStep, FirstSteps
 from server_gui.processes.demo_robot import DemoRobot
 from server_gui.processes.shutdown_signals import ShutdownRequested, ShutdownSignals
-from server_gui.processes.simulated import Part
+from server_gui.processes.simulated import RobotPart
 from server_gui.terminal.output import print_line
 
 if TYPE_CHECKING:  # what takes long to import is imported while simulator and gateway start
@@ -28,17 +28,17 @@ if TYPE_CHECKING:  # what takes long to import is imported while simulator and g
     from server_gui.terminal.followed_robot import FollowedRobot
 
 DONE = {
-    Step.SIMULATOR: "the simulator runs",
-    Step.GATEWAY: "the gateway listens",
-    Step.WINDOW: "the window is open",
-    Step.DATA: "data come from every component",
-    Step.WALK: "the robot walks",
+    FirstStep.SIMULATOR: "the simulator runs",
+    FirstStep.GATEWAY: "the gateway listens",
+    FirstStep.WINDOW: "the window is open",
+    FirstStep.DATA: "data come from every component",
+    FirstStep.WALK: "the robot walks",
 }
 WHOLE_S = 60.0  # for every component to be there
 TICK_S = 0.05
 LINE_S = 1.0
 WALKS = "walk"  # the scenario
-SHOWN_ONLY = (Step.SIMULATOR, Step.GATEWAY)  # of the steps, where the terminal shows the rest
+SHOWN_ONLY = (FirstStep.SIMULATOR, FirstStep.GATEWAY)  # of the steps, where the terminal shows the rest
 DEMO_BATCH_S = 10.0  # of recording that go to the store together: soon enough to be looked at
 
 
@@ -80,11 +80,13 @@ def run(options: Options) -> int:
 
 
 def _window(own: DemoRobot, options: Options, folder: Path, check: Callable[[], None]) -> int:
-    """Return what it records stays in the demo's folder: nothing simulated comes among real recordings."""
+    """Run the window; its recordings stay in the demo's folder, apart from real ones."""
     from server_gui.views.first_run.splash import Splash
     from server_gui.views.frame.application import application, kept_settings, kept_theme
 
-    steps = FirstSteps(_tell, [step for step in Step if step is not Step.WALK or options.scenario == WALKS])
+    steps = FirstSteps(
+        _tell, [step for step in FirstStep if step is not FirstStep.WALK or options.scenario == WALKS]
+    )
     qt = application()
     splash = Splash(steps, kept_theme(qt, kept_settings()))
     splash.show()
@@ -116,7 +118,7 @@ def import_slowly() -> Iterator[str]:
         yield name
 
 
-def _tell(step: Step, took_s: float) -> None:
+def _tell(step: FirstStep, took_s: float) -> None:
     print_line(f"{took_s:5.1f} s  {DONE[step]}")
 
 
@@ -140,7 +142,7 @@ def _started(own: DemoRobot, steps: FirstSteps, check: Callable[[], None]) -> Ad
         check()
         own.check()
         for part in own.ready:
-            steps.reach(Step.SIMULATOR if part is Part.SIMULATOR else Step.GATEWAY)
+            steps.reach(FirstStep.SIMULATOR if part is RobotPart.SIMULATOR else FirstStep.GATEWAY)
         if own.address is not None:
             return own.address
         time.sleep(TICK_S)

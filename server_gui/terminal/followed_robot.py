@@ -10,7 +10,7 @@ from msgspec.structs import replace
 
 from gateway.client import Address
 from gateway.wire.resource import ResourceSnapshotParams
-from ml.danger.now import CHANNELS
+from ml.danger.observation import CHANNELS
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.events import Event, Looked, Telemetry
 from server_gui.core.follow.feed import Feed, FollowSettings
@@ -73,7 +73,7 @@ class FollowedRobot:
         self._network.__exit__(*exc)
 
     def update(self) -> None:
-        """Take what has come since the last time."""
+        """Take the events since the last call."""
         for running in self._running:
             if running.done():
                 running.result()  # it ends only by a mistake of ours, which must not stay unseen

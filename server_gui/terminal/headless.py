@@ -12,7 +12,7 @@ NONE = "–"
 
 
 def line(robot: Robot, gait: Gait, elapsed_s: float) -> str:
-    """Return what is now, in one line."""
+    """Return the present state in one line."""
     joints = " ".join(_degrees(robot.values.get(f"{name}.position")) for name in robot.names("joint"))
     feet = "/".join(_newtons(robot.values.get(f"{name}.force")) for name in robot.names("insole"))
     tilts = " ".join(_degrees(robot.values.get(f"{name}.tilt_forward")) for name in robot.names("imu"))
@@ -33,7 +33,7 @@ def _link(robot: Robot) -> str:
 
 
 def table(summary: Summary, gait: Gait, robot: Robot) -> str:
-    """Return what the run showed."""
+    """Return the summary of the run."""
     link = robot.link
     links = "once" if link.links == 1 else f"{link.links} times"
     lines = [

@@ -65,7 +65,7 @@ class Learned:
 
 
 def _of(report: _Report, station: Station) -> str:
-    """Return what is said of this robot, by whichever name."""
+    """Return the report on this robot, by either name."""
     description = station.robot.description
     calls_itself = None if description is None else description.robot
     for name, link in report.robots.items():

@@ -60,7 +60,7 @@ NOT_WRITTEN = (WriteState.FAILED, WriteState.NOT_STORED, WriteState.UNKNOWN)
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class PanelWidths:
     """How much room there is: columns of the drawings, 0 where one is left out."""
 
     angle: int
@@ -71,12 +71,12 @@ class Look:
     roomy: bool  # frames, limits and process numbers
 
 
-WIDE = Look(angle=28, past=34, foot=20, parameter=10, share=12, roomy=True)
-NARROW = Look(angle=22, past=0, foot=12, parameter=9, share=0, roomy=False)
+WIDE = PanelWidths(angle=28, past=34, foot=20, parameter=10, share=12, roomy=True)
+NARROW = PanelWidths(angle=22, past=0, foot=12, parameter=9, share=0, roomy=False)
 
 
-def header(station: Station, where: str, look: Look) -> RenderableType:
-    """Return which robot, its worst state, how it is reached, how old what is shown is."""
+def header(station: Station, where: str, look: PanelWidths) -> RenderableType:
+    """Return the header: the robot, its worst state, its link, the age of its data."""
     robot = station.robot
     row = Table.grid(expand=True, padding=(0, 2))
     row.add_column(ratio=1)
@@ -94,7 +94,7 @@ def header(station: Station, where: str, look: Look) -> RenderableType:
 
 
 def learned(text: str) -> Text:
-    """Return what was learned from the wearer, where that serves or may: in one line."""
+    """Return the line on a model adapted to the wearer, while it serves or may serve."""
     return Text(plain(text), style=WARN, no_wrap=True, overflow="ellipsis")
 
 
@@ -113,7 +113,7 @@ def _danger(station: Station) -> Text:
     return words(f"  danger: {level.word}", style=style)
 
 
-def _link(robot: Robot, look: Look) -> Text:
+def _link(robot: Robot, look: PanelWidths) -> Text:
     link = robot.link
     age_s = robot.age_s()
     if link.state is not ConnectionState.CONNECTED:
@@ -132,7 +132,7 @@ def _link(robot: Robot, look: Look) -> Text:
     return text
 
 
-def joints(station: Station, look: Look) -> RenderableType:
+def joints(station: Station, look: PanelWidths) -> RenderableType:
     """Return every joint with its drive's state and its angle over the last seconds."""
     robot = station.robot
     stale = robot.is_stale()
@@ -184,8 +184,8 @@ def _part_state(robot: Robot, name: str) -> Text:
     return text
 
 
-def feet_and_trunk(robot: Robot, gait: Gait, look: Look) -> RenderableType:
-    """Return what each foot carries, how the trunk leans, and how the wearer walks."""
+def feet_and_trunk(robot: Robot, gait: Gait, look: PanelWidths) -> RenderableType:
+    """Return the loads of the feet, the lean of the trunk, and the gait."""
     stale = robot.is_stale()
     grid = Table.grid(expand=True, padding=(0, 1))
     grid.add_column(no_wrap=True)
@@ -211,7 +211,7 @@ def feet_and_trunk(robot: Robot, gait: Gait, look: Look) -> RenderableType:
     return _panel(grid, "Feet and trunk", robot, _walk(gait, look))
 
 
-def _walk(gait: Gait, look: Look) -> str:
+def _walk(gait: Gait, look: PanelWidths) -> str:
     """Return steps a minute and, where there is room, each foot's share of its stride on the ground."""
     if gait.cadence_spm is None:
         return ""
@@ -223,7 +223,7 @@ def _walk(gait: Gait, look: Look) -> str:
     return f"{cadence}, stance {shares} %"
 
 
-def parameters(robot: Robot, controls: Controls, look: Look, rows: int) -> RenderableType:
+def parameters(robot: Robot, controls: Controls, look: PanelWidths, rows: int) -> RenderableType:
     """Return the parameters as the devices have them, as many as fit; the chosen one can be moved."""
     grid = Table.grid(expand=True, padding=(0, 1))
     for width in (1, None, 7, 4, None):
@@ -259,7 +259,7 @@ def _around(names: Sequence[str], chosen: str | None, rows: int) -> Sequence[str
     return names[first : first + max(1, rows)]
 
 
-def _range(held: ParameterValue, info: ParameterInfo | None, unit: Unit, look: Look) -> Text:
+def _range(held: ParameterValue, info: ParameterInfo | None, unit: Unit, look: PanelWidths) -> Text:
     if held.problem is not None or info is None or info.min is None or info.max is None:
         return words(held.problem or "no limits known", style=WARN)
     where = needle(held.value, info.min, info.max, look.parameter)
@@ -268,7 +268,7 @@ def _range(held: ParameterValue, info: ParameterInfo | None, unit: Unit, look: L
     return Text.assemble(f"{unit.brief(info.min):>6} ", (where, DIM), f" {unit.brief(info.max)}")
 
 
-def resources(station: Station, look: Look) -> RenderableType:
+def resources(station: Station, look: PanelWidths) -> RenderableType:
     """Return the robot's computer: CPU, memory, and who uses them most."""
     robot, table = station.robot, station.processes
     seen = robot.resources
@@ -321,7 +321,7 @@ def footer(station: Station, controls: Controls, where: str, *, in_full: bool = 
 
 
 def news_lines(station: Station, controls: Controls, where: str, columns: int) -> int:
-    """Return how many lines the last thing that was said takes in full."""
+    """Return the number of lines that the last message takes in full."""
     return len(_news(station, controls, where).wrap(Console(width=columns), columns))
 
 

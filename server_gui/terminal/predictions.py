@@ -12,7 +12,7 @@ from ml.registry.card import Card, age_days
 from ml.robot.task import ABNORMAL, TASKS, UNKNOWN
 from ml.serving.predictor import Prediction
 from ml.serving.trust import Trust
-from server_gui.core.prediction.current import Shown
+from server_gui.core.prediction.current import NewestPrediction
 from server_gui.core.prediction.live import Watched
 from server_gui.core.prediction.replay import Replayed
 from server_gui.core.prediction.state import WITHIN_DAYS, Quality
@@ -60,7 +60,7 @@ def link(watched: Watched) -> str:
     return f"{link.state.value}: {link.problem}" if link.problem else link.state.value
 
 
-def _row(shown: Shown) -> tuple[str, ...]:
+def _row(shown: NewestPrediction) -> tuple[str, ...]:
     prediction = shown.predicted.prediction
     return (
         prediction.task,
@@ -72,12 +72,12 @@ def _row(shown: Shown) -> tuple[str, ...]:
     )
 
 
-def _model(shown: Shown) -> tuple[str, ...]:
+def _model(shown: NewestPrediction) -> tuple[str, ...]:
     card = shown.predicted.card
     return card.id, made(card), card.source.value
 
 
-def _right(found: Iterable[Shown]) -> Iterator[str]:
+def _right(found: Iterable[NewestPrediction]) -> Iterator[str]:
     """How right models were of late, where labels say what was so."""
     for shown in found:
         if (quality := shown.predicted.quality) is not None:
@@ -150,7 +150,7 @@ def _quality(quality: Quality, *, flattered: bool) -> str:
 
 
 def _spells(found: Replayed) -> Iterator[str]:
-    """Yield what followed what."""
+    """Yield the sequence of predictions."""
     both = zip(found.predictions, found.utc_ns, strict=True)
     spells = [list(spell) for _, spell in itertools.groupby(both, key=lambda one: one[0].label)]
     rows = [(_time(spell[0][1]), _time(spell[-1][1]), spell[0][0].label, str(len(spell))) for spell in spells]

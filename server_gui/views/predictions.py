@@ -8,12 +8,12 @@ from typing import Final
 from ml.danger.detector import DETECTORS
 from ml.danger.levels import Level as DangerLevel
 from ml.robot.task import ABNORMAL, UNKNOWN
-from ml.serving.trust import Level
+from ml.serving.trust import TrustLevel
 from server_gui.core.desk.confidence import belief, blind, not_judged
 from server_gui.core.desk.leg_phase import LegPhase, apart, leg_phase, phase_at
 from server_gui.core.desk.station import Station
 from server_gui.core.models.names import model_name, told_name
-from server_gui.core.prediction.adaptation import LEARNED_S, TRIED_S, Adapting, State
+from server_gui.core.prediction.adaptation import LEARNED_S, TRIED_S, AdaptationState, Adapting
 from server_gui.core.prediction.current import STALE_S, Recalled, StationPredictions, Told
 from server_gui.core.processing.gait_events import Leg
 from server_gui.views.marks import Mark, enabled_text
@@ -24,15 +24,17 @@ FEW: Final = 3  # classes of which one is true: more are no news
 LEAST: Final = 0.01  # what is less probable is not worth a word
 PROBABLE: Final = re.compile(r" \d+ %$")
 TITLES: Final = {FALLING: "Balance", GAIT_PHASE: "Stride"}
-LEARNED: Final = {state: ("ring", "dim", state.value) for state in State} | {
-    State.OFFERED: ("diamond", "accent", "offered"),
-    State.SERVING: ("disc", "accent", "serves"),
-    State.FAILED: ("triangle", "warn", "failed"),
+LEARNED: Final = {state: ("ring", "dim", state.value) for state in AdaptationState} | {
+    AdaptationState.OFFERED: ("diamond", "accent", "offered"),
+    AdaptationState.SERVING: ("disc", "accent", "serves"),
+    AdaptationState.FAILED: ("triangle", "warn", "failed"),
 }  # shape, colour and word of what is learned from the wearer
 AGREES: Final = 8.0  # % of a stride, that steps and a model may be apart
 STOPPED: Final = "stopped"
 OLD: Final = "old"  # what a model said is no prediction any more
 NOT_JUDGED: Final = "Not judged while stopped"
+WALK: Final = "walk"  # a label of the models
+SEEN, SEEN_SHORT = "from the steps seen, without a model", "from the steps seen"
 UNSEEN: Final = "not judged"  # for the model does not see all
 
 
@@ -61,7 +63,7 @@ class PredictionRow:
 
 
 def said(shown: Told, *, stopped: str = "", unseen: str = "") -> PredictionRow:
-    """Return what a model says now: the label and how probable, or that it does not know.
+    """Return the row of a prediction: the label and its probability, or *unknown*.
 
     Of a robot that does not drive its wearer, by what `stopped` says, nothing is called unlike what is known,
     nor is it where the model does not see all, by what `unseen` says.
@@ -91,7 +93,7 @@ def said(shown: Told, *, stopped: str = "", unseen: str = "") -> PredictionRow:
 
 
 def unjudged(why: str) -> PredictionRow:
-    """Return that nothing is said of what the wearer does, and why."""
+    """Return the row of an activity that is not judged, and the reason."""
     return PredictionRow(Mark("ring", "dim", STOPPED), NOT_JUDGED, why, why)
 
 
@@ -112,36 +114,38 @@ def status(station: Station) -> PredictionRow | None:
 
 
 def activity(station: Station) -> PredictionRow:
-    """Return what the wearer does: by a model where one says so, else by the steps that were seen."""
-    gait, shown = station.processing.derived().gait, station.predictions.told.get(ACTIVITY)
+    """Return the row of the activity: by a model if it predicts one, else by the detected steps."""
+    shown = station.predictions.told.get(ACTIVITY)
     if not station.is_live:
         return PredictionRow(Mark("ring", "old", "not known"), "Activity not known", "no live data")
-    if shown is not None and not shown.is_stale():
-        return said(shown, stopped=not_judged(station), unseen=blind(station))
+    stopped = not_judged(station)
+    line = None if shown is None else said(shown, stopped=stopped, unseen=blind(station))
+    if line is not None and line.mark.word != OLD:
+        return line
+    return unjudged(stopped) if stopped else by_steps(station)
+
+
+def by_steps(station: Station) -> PredictionRow:
+    """Return what the steps that were seen tell, in the words of the models' labels."""
+    walks = station.processing.derived().gait.walking
     why = station.predictions.problem or "the model says nothing now"
-    if stopped := not_judged(station):
-        return unjudged(stopped)
-    if gait.walking is None:
-        return PredictionRow(
-            Mark("ring", "old", "not known"), "Activity not known", "too few steps seen yet", "", why
-        )
-    if not gait.walking:
-        return PredictionRow(
-            Mark("ring", "dim", "not walking"), "Not walking", "by the steps seen", "by steps", why
-        )
-    return PredictionRow(
-        Mark("diamond", "accent", "walking"), "Walking", "by the steps seen", "by steps", why
-    )
+    if walks is None:
+        mark, few = Mark("ring", "old", "not known"), "too few steps seen yet"
+        return PredictionRow(mark, "Activity not known", few, "", why)
+    if not walks:
+        return PredictionRow(Mark("ring", "dim", "no steps"), "No steps", SEEN, SEEN_SHORT, why)
+    return PredictionRow(Mark("diamond", "accent", WALK), label_text(WALK), SEEN, SEEN_SHORT, why)
 
 
 def doing(station: Station) -> tuple[str, ...]:
-    """Return what a robot does, the fullest wording first: `Walking 74 steps/min · 6 of 6 enabled`."""
+    """Return the robot's activity, the fullest wording first: `Walk 74 steps/min · 6 of 6 enabled`."""
     count = enabled_text(station.robot, live=station.is_live)
     if not station.is_live:
         return ("what it does is not known", "not known")
     line, gait = activity(station), station.processing.derived().gait
     walks = gait.walking and gait.cadence_spm is not None and line.mark.word != STOPPED
-    cadence = f"{line.text} {gait.cadence_spm:.0f} steps/min" if walks else line.short_text
+    between = " " if line.mark.colour == "accent" else " · "  # the steps are not those of what is not known
+    cadence = f"{line.text}{between}{gait.cadence_spm:.0f} steps/min" if walks else line.short_text
     least = f"{PROBABLE.sub('', line.short_text)} · {count.replace(' of ', '/')}"
     return tuple(dict.fromkeys((f"{cadence} · {count}", f"{line.short_text} · {count}", least, count)))
 
@@ -180,16 +184,19 @@ def _learning(adapting: Adapting) -> PredictionRow:
     """How it goes with what is learned from the wearer, while there is nothing to decide."""
     whom = f"from the steps of {adapting.wearer}"
     text, detail = {
-        State.UNNAMED: ("Wearer not named", adapting.text),
-        State.COLLECTING: (f"Learning {adapting.stepped_s:.0f} of {LEARNED_S:.0f} s", whom),
-        State.LEARNING: ("Learning", whom),
-        State.TRYING: (f"Trying {adapting.stepped_s:.0f} of {TRIED_S:.0f} s", f"what was learned {whom}"),
+        AdaptationState.UNNAMED: ("Wearer not named", adapting.text),
+        AdaptationState.COLLECTING: (f"Learning {adapting.stepped_s:.0f} of {LEARNED_S:.0f} s", whom),
+        AdaptationState.LEARNING: ("Learning", whom),
+        AdaptationState.TRYING: (
+            f"Trying {adapting.stepped_s:.0f} of {TRIED_S:.0f} s",
+            f"what was learned {whom}",
+        ),
     }.get(adapting.state, ("Nothing is learned", adapting.text))
     return PredictionRow(Mark(*LEARNED[adapting.state]), text, detail, "", adapting.text)
 
 
 def _danger(predictions: StationPredictions) -> Iterator[PredictionRow]:
-    """Yield what is foreseen: its level and number, then why.
+    """Yield the rows of danger: its level and number, then the reasons.
 
     Nothing old, unknown or unsaid is called fine.
     """
@@ -260,7 +267,7 @@ def _stride(station: Station, line: PredictionRow) -> PredictionRow:
 
 def _knows(shown: Told) -> bool:
     prediction = shown.prediction
-    drifted = not isinstance(shown, Recalled) and shown.predicted.trust.level is Level.DRIFTED
+    drifted = not isinstance(shown, Recalled) and shown.predicted.trust.level is TrustLevel.DRIFTED
     return prediction.label not in (UNKNOWN, ABNORMAL) and not drifted
 
 
@@ -272,7 +279,7 @@ def _as_predicted(line: PredictionRow) -> PredictionRow:
 
 
 def _runner_up(shown: Told) -> str:
-    """Return what it may be as well, where it may."""
+    """Return the second likeliest class, if it is likely."""
     prediction = shown.prediction
     others = sorted(prediction.probabilities.items(), key=lambda item: -item[1])
     if 1 < len(prediction.either) <= FEW:

@@ -128,6 +128,7 @@ QFrame#card[selected="false"] {{ padding-left: 2px; }}
 QLabel, QCheckBox {{ background: transparent; }}
 QLabel#dim, QLabel#note {{ color: {dim}; }}
 QLabel#title[tone="old"] {{ color: {old}; }}
+QLabel#dim[tone="bad"] {{ color: {bad}; }}
 QLabel#title {{ font-weight: bold; }}
 QLabel#brand {{ color: {accent}; padding-right: 8px; }}
 QLabel#banner {{ background: {staged}; border: 1px solid {warn}; border-radius: 4px; padding: 5px 8px; }}

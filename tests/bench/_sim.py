@@ -16,7 +16,7 @@ from hil_sim import personality
 from hil_sim.bus.can_bus import CanBus, Frame
 from hil_sim.bus.hub import Hub
 from hil_sim.clock import SECOND_NS, Clock
-from hil_sim.controller.drives import Seen
+from hil_sim.controller.drives import DriveStatus
 from hil_sim.drive.drive import JointDrive
 from hil_sim.drive.mechanics import Joint, JointConstants
 from hil_sim.node.node import Node
@@ -35,7 +35,7 @@ class Leader:
     def __init__(self, clock: Clock, bus: CanBus, nodes: tuple[int, ...], period_ns: int | None) -> None:
         self._clock = clock
         self._bus = bus
-        self._drives = {0x180 + node: Seen(node, clock) for node in nodes}
+        self._drives = {0x180 + node: DriveStatus(node, clock) for node in nodes}
         bus.attach(self, self._receive)
         clock.after(SECOND_NS // 5, self._start)
         if period_ns is not None:

@@ -34,11 +34,11 @@ from hil_sim.exoskeleton import Exoskeleton
 from server_gui.core.evidence.comparison import Evidence, Spell, Word, compare
 from server_gui.core.evidence.cycles import Cycle
 from server_gui.core.evidence.metrics import OF_JOINTS, OF_ROBOTS
-from server_gui.core.experiments.machine import State
+from server_gui.core.experiments.machine import ExperimentState
 from server_gui.core.experiments.plan import USUAL_CYCLES, USUAL_PAIRS, USUAL_TRANSIENT, ab, orders
 from server_gui.core.experiments.result import result
 from server_gui.core.experiments.run import Run
-from server_gui.core.experiments.verdict import Held, judge
+from server_gui.core.experiments.verdict import HeldPeriod, judge
 from server_gui.core.follow.events import Telemetry
 from server_gui.core.processing.gait_events import Leg
 from server_gui.core.tuning.commands import ReadBack
@@ -129,7 +129,7 @@ def tried(case: str, number: int, pairs: int = USUAL_PAIRS) -> Evidence:
     for event in walk(LONGEST_S, seed=5000 + number, person=number, each_s=every):
         if isinstance(event, Telemetry):
             now_ns = event.batch.stamps_ns[-1]
-            if run.state is State.LOOKING:
+            if run.state is ExperimentState.LOOKING:
                 run.take(looked({name: first}, at_ns=now_ns))
         run.take(event)
         run.tick(())
@@ -195,7 +195,7 @@ def made_up(task: tuple[str, int]) -> tuple[str, bool, bool]:
             found[side].append(Cycle(leg, began_ns, began_ns + 1_200_000_000, "", values))
     held = USUAL_CYCLES + USUAL_TRANSIENT
     periods = [
-        Held(float(is_b[first]), found[0][first + USUAL_TRANSIENT : first + held])
+        HeldPeriod(float(is_b[first]), found[0][first + USUAL_TRANSIENT : first + held])
         for first in range(0, count, held)
     ]
     tried = judge((0.0, 1.0), order, periods, JOINTS, JOINTS[:1])

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from server_gui.core.evidence.comparison import Evidence, Word
-from server_gui.core.evidence.file import Told
+from server_gui.core.evidence.file import EditEvidence
 from server_gui.core.evidence.robot_evidence import RobotEvidence
 from tests.support.desk import JOINTS
 from tests.unit.evidence.walks import CYCLE_TIME, GAIN, SPEED, Edit, walk, warming
@@ -64,7 +64,7 @@ def walked(number: int) -> Walked:
     newest: dict[str, Evidence] = {}
     for turn, event in enumerate(events):
         began_s = time.process_time()
-        told: Iterable[Told] = robot.take(event)
+        told: Iterable[EditEvidence] = robot.take(event)
         told = [*told, *(robot.look() if turn % 10 == 0 else ())]
         took_s += time.process_time() - began_s
         newest |= {one.edit.names: one.evidence for one in told}

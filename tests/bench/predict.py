@@ -30,9 +30,9 @@ from ml.benchmarks.models.gait_status import StatusSettings, status_model
 from ml.benchmarks.models.quick import QuickTerrain, outputs, scaled_rows
 from ml.benchmarks.models.terrain import TerrainSettings, terrain_model
 from ml.benchmarks.models.trees import QuickTrees
-from ml.danger.combine import load
-from ml.danger.now import CHANNELS
-from ml.danger.watch import Watch
+from ml.danger.calibration import load
+from ml.danger.monitor import DangerMonitor
+from ml.danger.observation import CHANNELS
 from ml.features import FeatureStream, Recipe, features
 from ml.features.falling import FALLING
 from ml.features.gait_context import GAIT_CONTEXT
@@ -211,7 +211,7 @@ def _served(learned: Learned, robots: int) -> list[float]:
 
 def _watched(robots: int) -> list[float]:
     """Milliseconds from a row of each robot, of somebody who walks, to what is said of danger."""
-    first = Watch(load())
+    first = DangerMonitor(load())
     for at in range(FULL):
         first.take(*_walking(at))
     watches = [copy.deepcopy(first) for _ in range(robots)]

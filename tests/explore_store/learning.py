@@ -25,7 +25,7 @@ from ml.store.labels import holding, utc_ns, wearer
 from ml.store.objects import Objects
 from ml.store.tables import LABELS, TELEMETRY
 from ml.training import choosing, dataset, training
-from ml.training.dataset import Part
+from ml.training.dataset import SessionDecisions
 from ml.training.material import Wish
 from tests.explore_store.disk import Ended
 from tests.explore_store.judging import rows_of_version
@@ -40,7 +40,7 @@ NOTHING: Final = Path("/nonexistent")  # no models come with it
 OLDEST_NS: Final = 100_000_000  # a value that is older is missing (docs/explanation/prediction.md)
 FOLDER: Final = "models/serving"
 HELD_OUT: Final = ((), ("P03",))  # two people seldom have the same model
-Split = tuple[list[Part], list[Part], list[Part]]
+Split = tuple[list[SessionDecisions], list[SessionDecisions], list[SessionDecisions]]
 Row = tuple[int, int, float]  # stamp and UTC in ns, angle
 
 
@@ -73,7 +73,7 @@ def _changes(world: World, known: dict[str, tuple[str, ...]]) -> Iterator[tuple[
     yield Pointers, "_create", functools.partialmethod(_create, world)
 
 
-def _split(world: World, parts: Sequence[Part], held: Set[str]) -> Split:
+def _split(world: World, parts: Sequence[SessionDecisions], held: Set[str]) -> Split:
     """What is learned from and judged by is looked at in passing."""
     found = choosing.split(parts, held)
     world.classes.split = found
@@ -147,7 +147,7 @@ def _look_at_lessons(world: World, card: Card, split: Split) -> None:
     world.check(not sides[0] & sides[1], "a wearer is on both sides of what is held out", *sides)
 
 
-def _look_at_part(world: World, part: Part, rows: list[Row], said: list[dict[str, Any]]) -> None:
+def _look_at_part(world: World, part: SessionDecisions, rows: list[Row], said: list[dict[str, Any]]) -> None:
     known = {row.number: row for row in world.ledger.rows()}
     stamps = [stamp for stamp, _, _ in rows]
     in_order = [utc for _, utc, _ in rows] == sorted(utc for _, utc, _ in rows)

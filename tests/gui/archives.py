@@ -36,9 +36,19 @@ SECONDS = 12
 RATE_HZ = 50
 
 
-def record(settings: ServerSettings, *, sent: bool = True, facts: Facts = ADA) -> str:
-    """Somebody who walks for `SECONDS`, of whom a model says so for half of it; and a marker."""
+def record(
+    settings: ServerSettings, *, sent: bool = True, facts: Facts = ADA, fault_s: float | None = None
+) -> str:
+    """Somebody who walks for `SECONDS`, of whom a model says so for half of it; and a marker.
+
+    From `fault_s` on the left knee's drive is in fault.
+    """
     walk = walking(SECONDS * RATE_HZ, rate_hz=RATE_HZ).batch
+    if fault_s is not None:
+        fine = round(fault_s * RATE_HZ)
+        broken = len(walk.stamps_ns) - fine
+        walk.columns["left_knee.state"] = [4.0] * fine + [7.0] * broken
+        walk.columns["left_knee.error_code"] = [0.0] * fine + [float(0x2310)] * broken
     with Spool(settings.recorder.spool, reserve_bytes=0) as spool:
         with Recorder(spool) as recorder:
             units = {name: "rad" if name.endswith("position") else "" for name in walk.columns}

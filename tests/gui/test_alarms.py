@@ -187,10 +187,14 @@ def test_rows_that_are_opened_under_the_pointer_are_whole_also_where_a_headline_
     assert "and this goes on for a line or two; and" in tip, "what has no room stands nowhere"
 
 
-@pytest.mark.parametrize(("width", "height"), [(1024, 700), (1366, 768), (1920, 1080)])
+@pytest.mark.parametrize(
+    ("width", "height", "scale"),
+    [(1024, 700, 1.0), (1024, 700, 1.5), (1366, 768, 1.0), (1366, 768, 1.5), (1920, 1080, 1.0)],
+)
 def test_the_joint_table_is_whole_beside_an_alarm(
-    window: MainWindow, bench: Bench, width: int, height: int
+    window: MainWindow, bench: Bench, theme: Theme, width: int, height: int, scale: float
 ) -> None:
+    theme.set(scale=scale)
     fault(bench)
     bench.station.take_prediction(predicted("steady", {"steady": 0.99, "fall": 0.01}, "falling"))
     window.resize(width, height)

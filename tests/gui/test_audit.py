@@ -8,7 +8,7 @@ import pytest
 from PySide6.QtCore import Qt
 
 from gateway.units import Units
-from server_gui.core.archive.collected_journals import Found, Kept, KeptJournals
+from server_gui.core.archive.collected_journals import CollectedJournal, JournalsFound, KeptJournals
 from server_gui.core.audit.chains import chained, problem
 from server_gui.core.follow.events import Journalled
 from server_gui.views.audit.acts_model import (
@@ -173,14 +173,16 @@ class Collected(KeptJournals):
     """Has what the test gives it."""
 
     def __init__(self) -> None:
-        self.found = Found()
+        self.found = JournalsFound()
 
     def look(self) -> None:
         pass
 
     def keep(self, robot: str, told: Journalled) -> None:
         stretches = chained(told.journal.entries)
-        self.found = Found({**self.found.by_robot, robot: Kept(tuple(stretches), problem(stretches))})
+        self.found = JournalsFound(
+            {**self.found.by_robot, robot: CollectedJournal(tuple(stretches), problem(stretches))}
+        )
 
 
 @pytest.fixture
@@ -238,7 +240,7 @@ def test_what_was_altered_on_the_robot_after_it_was_collected_shows(
 
 
 def test_a_store_that_is_away_is_said_calmly(whole: Audit, collected: Collected) -> None:
-    collected.found = Found(problem="s3://lab cannot be reached: Connection refused")
+    collected.found = JournalsFound(problem="s3://lab cannot be reached: Connection refused")
     whole.refresh()
     assert "cannot be read now, and is tried again: s3://lab cannot be reached" in whole.verdict.text()
     assert whole.verdict.property("tone") != "bad"

@@ -1,5 +1,6 @@
 """The store in the window: shown without its keys, uploaded to, verified; jobs can be cancelled."""
 
+import shutil
 import time
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from tests.gui.archives import Shown, cell, record
 from tests.gui.fakes import Bench, destroy
 from tests.gui.rules import settle
 from tests.gui.test_recording import FakeKeeper, report
+from tests.support.desk import described, looked, walking
 
 
 def test_the_store_is_shown_with_where_its_keys_come_from_and_never_the_keys(
@@ -137,3 +139,41 @@ def test_what_came_of_a_job_is_whole(theme: Theme, width: int) -> None:
     assert room.height() >= needs.height() > 0
     assert jobs.close(1.0)
     destroy(table)
+
+
+def test_no_place_is_green_while_the_store_is_gone_and_every_one_is_again_when_it_is_back(
+    whole: Shown, archive: Archive, settings: ServerSettings, bench: Bench, tmp_path: Path
+) -> None:
+    record(settings)
+    keeper = FakeKeeper(report())
+    bench.desk.recording = Recording(By.WINDOW, keeper, lambda call: call(), bench.desk.news)
+    bench.desk.recording.look()
+    bench.station.take([described(), walking(100), looked()])
+    bench.station.predictions.foresees = False
+    strip = whole.window.alarms  # type: ignore[union-attr]
+
+    def said() -> str:
+        return strip.accessibleDescription()
+
+    whole.draw()
+    assert said() == "No alarms; the store is not known"
+    archive.look()
+    whole.until(lambda: said() == "No alarms; all ok", "looked at it")
+    shutil.move(tmp_path / "store", tmp_path / "away")
+    bench.desk.reach.uploads("x")
+    bench.desk.reach.uploads(None)  # so that somebody looks at once
+    archive.look()
+    whole.until(lambda: "any more" in said(), "saw that it is gone")
+    tabs = whole.window.tabs
+    for page, state in (
+        ("Models", tabs.models.state),
+        ("Recordings", tabs.recordings.list.said),
+        ("Cloud", tabs.cloud.state),
+    ):
+        whole.open(page)
+        assert "ot reached" in state.text(), page
+        assert "all ok" not in said(), page
+    shutil.move(tmp_path / "away", tmp_path / "store")
+    archive.library.look(now=True)
+    whole.until(lambda: said() == "No alarms; all ok", "saw that it is back")
+    assert whole.window.tabs.cloud.state.text().startswith("Reached")

@@ -12,10 +12,10 @@ from gateway.units import Units
 from server_gui.core.evidence.comparison import Word, compare
 from server_gui.core.evidence.curves import Curves, Side
 from server_gui.core.evidence.cycles import DRAWN
-from server_gui.core.evidence.edits import Change, State
-from server_gui.core.evidence.file import Told
+from server_gui.core.evidence.edits import EditState, ParameterChange
+from server_gui.core.evidence.file import EditEvidence
 from server_gui.core.tuning.writing import Trial
-from server_gui.views.edits.page import Edits
+from server_gui.views.edits.page import Edits, _by_our_clock
 from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.plot_frame import draw_frame
@@ -29,7 +29,7 @@ from tests.unit.evidence.test_comparison import ERROR, times
 from tests.unit.evidence.test_file import told
 
 
-def worse(write: int = 1, *, is_final: bool = True) -> Told:
+def worse(write: int = 1, *, is_final: bool = True) -> EditEvidence:
     """An edit after which a knee tracks by a fifth worse."""
     before, after = Side((0.1,) * 101, (0.01,) * 101, 40), Side((0.2,) * 101, (0.01,) * 101, 41)
     curves = tuple(Curves(f"left_knee.{name}", before, after) for name in ("position", "following_error"))
@@ -56,7 +56,7 @@ def test_values_and_metrics_are_in_the_units_that_were_chosen(bench: Bench, part
     bench.station.take([looked()])
     one = worse()
     bench.station.judged.take(
-        replace(one, edit=replace(one.edit, changes=(Change("gait.step_length", 0.4, 0.43),)))
+        replace(one, edit=replace(one.edit, changes=(ParameterChange("gait.step_length", 0.4, 0.43),)))
     )
     parts.edits.refresh()
     assert "gait.step_length 400 → 430 mm: worse" in parts.edits.verdict.text()
@@ -191,7 +191,7 @@ def test_evidence_that_grows_lays_no_other_edit_out_again(bench: Bench, parts: P
     assert "so far" not in parts.edits.verdict.text()
 
 
-def running(write: int, state: State = State.ON_TRIAL) -> Told:
+def running(write: int, state: EditState = EditState.ON_TRIAL) -> EditEvidence:
     """A trial, as evidence of it grows."""
     known = worse(write, is_final=False)
     return replace(known, edit=replace(known.edit, state=state))
@@ -222,7 +222,7 @@ def test_a_trial_of_another_day_that_nobody_saw_end_is_not_looked_at(bench: Benc
 
 
 def test_what_has_ended_is_told_as_over_and_its_later_strides_as_such(bench: Bench, parts: Parts) -> None:
-    known = running(1, State.REVERTED)
+    known = running(1, EditState.REVERTED)
     counts = replace(known.evidence, cycles_before=49, cycles_after=41, cycles_back=9)
     bench.station.judged.take(replace(known, evidence=counts))
     parts.edits.refresh()
@@ -244,3 +244,9 @@ def test_strides_are_read_where_the_pointer_is(bench: Bench, parts: Parts) -> No
     assert {one.read for one in parts.edits.curves.values()} == {"50 %: 5.7 → 11.5 °"}
     QApplication.sendEvent(knee, QEvent(QEvent.Type.Leave))
     assert knee.read == ""
+
+
+def test_a_note_that_names_no_time_at_all_stays_as_it_was_written() -> None:
+    wrong = "compared with 2026-13-41T25:00:00Z (ab12), which overlaps"
+    assert _by_our_clock(wrong) == wrong
+    assert "Z (ab12)" not in _by_our_clock("compared with 2026-11-03T14:20:00Z (ab12), which overlaps")

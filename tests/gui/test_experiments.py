@@ -8,8 +8,8 @@ from msgspec.structs import replace
 from gateway.wire.parameter import Reverted, Written
 from server_gui.core.evidence.comparison import Evidence, Word
 from server_gui.core.evidence.experiment import Experiment, Period, Point, Response
-from server_gui.core.evidence.file import Told
-from server_gui.core.experiments.machine import Event, State
+from server_gui.core.evidence.file import EditEvidence
+from server_gui.core.experiments.machine import Event, ExperimentState
 from server_gui.core.tuning.commands import ReadBack
 from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.parameters.panel import ParametersPanel
@@ -22,7 +22,7 @@ from tests.unit.evidence.test_file import told
 NAME = "gait.step_length"
 
 
-def swept() -> Told:
+def swept() -> EditEvidence:
     """A sweep whose second value is the best."""
     points = tuple(
         Point(value, 6, mean, mean - 0.0002, mean + 0.0002)
@@ -100,7 +100,7 @@ def test_stop_and_take_back_is_in_sight_until_it_was_read_back(
     assert parts.edits.list.count() == 0
     parts.experiment.end.click()
     assert bench.first.named("revert") == [(5,)]
-    assert run.state is State.TAKING_BACK
+    assert run.state is ExperimentState.TAKING_BACK
     bench.first.answer(Reverted(5, {NAME: "taken back"}))
     parts.experiment.refresh()
     assert bench.first.named("read_back") == [(NAME,)]

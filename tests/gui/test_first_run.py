@@ -9,10 +9,10 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QMenu, QPushButton
 
 from server_gui.core.desk.desk import Desk
-from server_gui.core.desk.first_steps import FirstSteps, Step
+from server_gui.core.desk.first_steps import FirstStep, FirstSteps
 from server_gui.processes.demo_robot import DemoRobot
 from server_gui.processes.sim_control import ActiveFault, FaultKind, Listed, SimControl, SimulatorRefuses
-from server_gui.processes.simulated import Part
+from server_gui.processes.simulated import RobotPart
 from server_gui.views.first_run.demo_bar import DemoBar
 from server_gui.views.first_run.fault_menu import fill, grouped
 from server_gui.views.first_run.opening import Opening
@@ -302,15 +302,15 @@ def test_the_splash_says_which_step_is_done_and_closes_when_the_robot_walks(
     opening = Opening(own, steps, splash)
     opening.look()
     assert splash.texts[0] == "▸ Simulator: six drives, two insoles, an IMU"
-    own.ready = (Part.SIMULATOR,)
+    own.ready = (RobotPart.SIMULATOR,)
     opening.look()
     assert splash.texts[0].startswith("✓ Simulator")
     assert splash.texts[1].startswith("▸ Gateway")
-    own.ready = (Part.SIMULATOR, Part.GATEWAY)
+    own.ready = (RobotPart.SIMULATOR, RobotPart.GATEWAY)
     opening.look(bench.desk.stations[0], window=True)
-    assert steps.now is Step.DATA  # nothing has come of the robot yet
+    assert steps.now is FirstStep.DATA  # nothing has come of the robot yet
     assert splash.isVisible()
-    for step in Step:
+    for step in FirstStep:
         steps.reach(step)
     opening.look(bench.desk.stations[0], window=True)
     assert not splash.isVisible()

@@ -14,14 +14,14 @@ from ml.serving.trust import Trust
 from server_gui.core.desk.leg_phase import leg_phase
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.events import LinkChanged
-from server_gui.core.prediction.current import OFF, Recalled, Shown
+from server_gui.core.prediction.current import OFF, NewestPrediction, Recalled
 from server_gui.core.prediction.news import Ruled, Serves
 from server_gui.core.prediction.state import Quality
 from server_gui.core.processing.gait_events import Leg
 from server_gui.core.settings.prediction import Action, RuleSettings
 from server_gui.views.frame.header import Header
 from server_gui.views.overview.page import Overview
-from server_gui.views.predictions import activity, lines, model_phases, status
+from server_gui.views.predictions import activity, doing, lines, model_phases, status
 from server_gui.views.theme import Theme
 from tests.gui.fakes import Bench, destroy
 from tests.gui.foreseen import predicted
@@ -199,10 +199,11 @@ def test_a_prediction_that_is_old_is_not_shown_as_one(window: Parts, station: St
     station.predictions.by_task["activity"] = dataclasses.replace(
         newest, came_ns=time.monotonic_ns() - 5 * 10**9
     )
-    shown(window, lambda: "by steps · no prediction now, the last " in chip(window))
-    assert chip(window).startswith("Walking")
-    assert isinstance(newest, Shown)
-    assert window.overview._ring._word == "Walking"
+    shown(window, lambda: "from the steps seen · no prediction now, the last " in chip(window))
+    assert chip(window).startswith("Walk\n"), "in the word that the model has for it"
+    assert isinstance(newest, NewestPrediction)
+    assert window.overview._ring._word == "Walk"
+    assert doing(station)[0].startswith("Walk 120 steps/min · ")
 
 
 def test_without_a_model_it_says_how_to_get_one_and_shows_the_steps(window: Parts, station: Station) -> None:
@@ -213,7 +214,7 @@ def test_without_a_model_it_says_how_to_get_one_and_shows_the_steps(window: Part
         window,
         lambda: chip(window).endswith("not predicted: no model serves activity: gwrms models promote ID"),
     )
-    assert chip(window).startswith("Walking")
+    assert chip(window).startswith("Walk\n"), "in the word that the model has for it"
     assert chip(window).partition("\n")[2].startswith(window.header._chips["status"].detail_text)
     station.predictions.off = True
     shown(window, lambda: f"Not predicted · {OFF}" in window.overview.status_lines.texts)

@@ -61,3 +61,28 @@ def _meet(one: QWidget, other: QWidget) -> bool:
 
 def _name(one: QWidget) -> str:
     return one.accessibleName() or type(one).__name__
+
+
+@pytest.mark.parametrize("scale", [1.0, 1.5])
+@pytest.mark.parametrize("name", ["walker", "exo-of-the-second-laboratory-behind-the-stairs-07"])
+def test_it_is_always_said_which_robot_is_looked_at_and_how_it_is(
+    bench: Bench, theme: Theme, header: Header, scale: float, name: str
+) -> None:
+    theme.set(scale=scale)
+    bench.station.name, bench.station.is_named = name, True
+    header.be_short(True)
+    header.resize(LEAST, header.height())
+    for state in STATES:
+        _told(bench, state)
+        header.refresh()
+        QApplication.processEvents()
+        chip = header._chips["robot"]
+        if state is _unconfirmed and not chip.isVisible():  # then that has the room, and STOP has the name
+            assert "".join(header.stop.lines).replace(" ", "") == name
+            continue
+        assert chip.isVisible(), state.__name__
+        assert chip.main_text == name or state is _never_reached
+        assert chip.detail_text, state.__name__
+        assert header.stop.is_whole
+        halved = rules.halved_numbers(header)
+        assert halved == [], state.__name__

@@ -9,7 +9,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLineEdit, QWidget
 
 from server_gui.core.desk.station import Station
-from server_gui.core.prediction.adaptation import NEXT, Adapting, Happening, State, Tried
+from server_gui.core.prediction.adaptation import NEXT, AdaptationState, Adapting, Happening, Tried
 from server_gui.views.confirmation import Question
 from server_gui.views.frame.recording_chip import ask_name
 from server_gui.views.overview.learned_offer import wordings
@@ -21,7 +21,7 @@ from tests.gui.foreseen import predicted
 from tests.support.desk import looked, walking
 
 HOUR_S = 3600.0
-OFFERED = Adapting("exo-01", 7, State.OFFERED, "P01", tried=Tried(3.4, 2.1, 34, (0.031, 0.002)))
+OFFERED = Adapting("exo-01", 7, AdaptationState.OFFERED, "P01", tried=Tried(3.4, 2.1, 34, (0.031, 0.002)))
 STRIDE = predicted("stride", {"stride": 0.97}, "gait_phase", values={"left": 0.2, "right": 0.7})
 
 
@@ -60,31 +60,35 @@ def test_an_offer_is_accepted_and_taken_back_with_a_click_each(
     assert "3.4 → 2.1 %" in offer.words.text()
     assert offer.accessibleDescription().startswith("learned from P01: 3.4 → 2.1 %")
     QTest.mouseClick(offer.buttons[Happening.ACCEPT], Qt.MouseButton.LeftButton)
-    assert show(overview, station, dataclasses.replace(OFFERED, state=State.SERVING)) == ["Take back"]
+    assert show(overview, station, dataclasses.replace(OFFERED, state=AdaptationState.SERVING)) == [
+        "Take back"
+    ]
     QTest.mouseClick(offer.buttons[Happening.TAKE_BACK], Qt.MouseButton.LeftButton)
     name = station.name
     assert said == [(name, 7, Happening.ACCEPT), (name, 7, Happening.TAKE_BACK)]
-    assert show(overview, station, dataclasses.replace(OFFERED, state=State.TAKEN_BACK)) == ["Learn again"]
-    show(overview, station, dataclasses.replace(OFFERED, state=State.COLLECTING))
+    assert show(overview, station, dataclasses.replace(OFFERED, state=AdaptationState.TAKEN_BACK)) == [
+        "Learn again"
+    ]
+    show(overview, station, dataclasses.replace(OFFERED, state=AdaptationState.COLLECTING))
     assert offer.isHidden(), "there is nothing to decide"
 
 
 def test_the_tip_says_how_often_each_was_wrong() -> None:
     wrong = "off by more than a tenth of the stride: 3.1 → 0.2 % of the time"
     assert OFFERED.tip == f"{OFFERED.text}\n{wrong}"
-    unknown = Adapting("exo-01", 7, State.OFFERED, "P01", tried=Tried(3.4, 2.1, 34))
+    unknown = Adapting("exo-01", 7, AdaptationState.OFFERED, "P01", tried=Tried(3.4, 2.1, 34))
     assert unknown.tip == unknown.text
 
 
 def test_meanwhile_a_line_says_how_it_goes(station: Station) -> None:
-    station.take_prediction(Adapting("exo-01", 1, State.COLLECTING, "P01", 35.2))
+    station.take_prediction(Adapting("exo-01", 1, AdaptationState.COLLECTING, "P01", 35.2))
     line = list(lines(station))[-1]
     assert (line.text, line.detail) == ("Learning 35 of 60 s", "from the steps of P01")
-    station.take_prediction(Adapting("exo-01", 1, State.UNNAMED))
+    station.take_prediction(Adapting("exo-01", 1, AdaptationState.UNNAMED))
     assert "name the wearer" in list(lines(station))[-1].detail
-    station.take_prediction(Adapting("exo-01", 1, State.OFF))
+    station.take_prediction(Adapting("exo-01", 1, AdaptationState.OFF))
     assert not any("earn" in line.text for line in lines(station))
-    assert LEARNED.keys() == set(State) == NEXT.keys()
+    assert LEARNED.keys() == set(AdaptationState) == NEXT.keys()
 
 
 def test_the_model_that_has_learned_from_the_wearer_is_called_so(station: Station) -> None:
@@ -112,9 +116,15 @@ def test_a_recording_is_begun_of_who_is_named(qt: QApplication) -> None:
 
 @pytest.mark.parametrize(
     ("state", "word"),
-    [(State.NO_BETTER, "No better"), (State.SERVING, "erve"), (State.TAKEN_BACK, "aken back")],
+    [
+        (AdaptationState.NO_BETTER, "No better"),
+        (AdaptationState.SERVING, "erve"),
+        (AdaptationState.TAKEN_BACK, "aken back"),
+    ],
 )
-def test_however_little_room_there_is_figures_are_not_taken_for_better(state: State, word: str) -> None:
+def test_however_little_room_there_is_figures_are_not_taken_for_better(
+    state: AdaptationState, word: str
+) -> None:
     one = dataclasses.replace(OFFERED, state=state, wearer="Participant-0017")
     assert all(word in text or word.lower() in text for text in wordings(one)), wordings(one)
     assert len(wordings(one)[-1]) < 12

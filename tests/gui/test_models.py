@@ -1,6 +1,7 @@
 """The page of models: listed by names, compared, trained, and promoted only when that is confirmed."""
 
 import dataclasses
+import itertools
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,7 @@ from ml.registry.registry import Registry
 from server_gui.core.archive.archive import Archive
 from server_gui.core.cloud.jobs import Job, JobState
 from server_gui.core.models.models import Tone
-from server_gui.core.prediction.adaptation import Adapting, State, Tried
+from server_gui.core.prediction.adaptation import AdaptationState, Adapting, Tried
 from server_gui.core.settings.server_file import ServerSettings
 from server_gui.views.models.models_table import SIGNED
 from server_gui.views.models.panel import ModelsPage
@@ -176,11 +177,13 @@ def test_a_training_shows_how_far_it_is_while_the_window_draws_and_serves_nobody
     assert page.form.jobs.isVisible()
     whole.until(lambda: job.done > 0, "said how far it is")
     whole.until(lambda: job.is_over, "ended")
-    assert (job.state, job.said.split(":")[0]) == (JobState.DONE, "Better")
+    assert (job.state, job.said.split(":")[0]) == (JobState.DONE, "Not compared")
     whole.until(lambda: page.chosen, "listed and chose it")
     assert page.chosen is not None
     assert list(archive.models.trained) == [page.chosen.card.id]
-    assert page.said.property("tone") == "good"
+    assert page.said.property("tone") == "", "it is no better than anything"
+    assert "what came with GWRMS" in page.compare.notes.text()
+    assert not {"▼ worse", "▲ better"} & set(itertools.chain.from_iterable(figures(page).values()))
     assert not page.form.isVisible(), "what came of it is looked at next"
     assert "F1, mean over classes, on held-out people" in page.said.text()
     assert registry.history("activity") == []
@@ -242,8 +245,12 @@ def test_a_copy_that_has_learned_from_the_wearer_is_told_with_since_when_and_how
 ) -> None:
     page = ModelsPage(archive.models, theme, bench.desk)
     page.show()
-    serving = Adapting("exo-01", 7, State.SERVING, "P01", tried=Tried(3.4, 2.1, 34), since_s=0.0)
-    for state, said in ((State.SERVING, "serves since"), (State.TRYING, "does not serve"), (State.OFF, "")):
+    serving = Adapting("exo-01", 7, AdaptationState.SERVING, "P01", tried=Tried(3.4, 2.1, 34), since_s=0.0)
+    for state, said in (
+        (AdaptationState.SERVING, "serves since"),
+        (AdaptationState.TRYING, "does not serve"),
+        (AdaptationState.OFF, ""),
+    ):
         bench.station.take_prediction(dataclasses.replace(serving, state=state))
         page._show_learned()
         assert said in page.learned.text()

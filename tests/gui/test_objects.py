@@ -15,7 +15,7 @@ from gateway.wire.dictionary import ObjectValue
 from gateway.wire.parameter import PARAMETER_WRITE
 from gateway.wire.robot import Hello
 from server_gui.core.follow.events import Described, LinkChanged
-from server_gui.core.objects.rows import Kind
+from server_gui.core.objects.rows import RowKind
 from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.objects.choice_bar import READ_NO_MORE
 from server_gui.views.objects.objects_model import AGE, HOLDS, NAME, OTHER, PARAMETER
@@ -106,11 +106,11 @@ def test_words_and_kinds_choose(page: ObjectsPage) -> None:
     page.bar.words.setText("0x60*")
     assert [info.object[:4] for info in page.table.rows] == ["0x60"] * 4
     page.bar.words.setText("")
-    page.bar.kinds[Kind.DIFFERENT].click()
+    page.bar.kinds[RowKind.DIFFERENT].click()
     assert [info.object for info in page.table.rows] == ["0x6040:0", "0x6065:0", "0x6072:0"]
-    page.bar.kinds[Kind.PARAMETERS].click()
+    page.bar.kinds[RowKind.PARAMETERS].click()
     assert [info.object for info in page.table.rows] == ["0x6072:0"]
-    assert page.bar.kinds[Kind.ALL].text() == f"All {len(OBJECTS)}"
+    assert page.bar.kinds[RowKind.ALL].text() == f"All {len(OBJECTS)}"
 
 
 def test_the_chosen_one_stays_chosen_when_it_is_found_again(page: ObjectsPage) -> None:
@@ -120,6 +120,19 @@ def test_the_chosen_one_stays_chosen_when_it_is_found_again(page: ObjectsPage) -
     current = page.table.current
     assert current is not None
     assert current.object == "0x6041:0"
+
+
+def test_the_facts_are_of_the_chosen_object_also_while_text_of_another_is_marked(page: ObjectsPage) -> None:
+    page.table.choose("0x6041:0")
+    page.facts.text.selectAll()
+    page.table.choose("0x6065:0")
+    assert "operation enabled" not in page.facts.text.toPlainText()
+    assert "to release in [joint.left_knee]" in page.facts.text.toPlainText()
+    said = page.facts.text.toPlainText()
+    page.facts.text.selectAll()
+    page.look()
+    assert page.facts.text.toPlainText() == said
+    assert page.facts.text.textCursor().hasSelection(), "what is marked to be copied stays marked"
 
 
 def test_its_facts_have_bits_by_name_and_why_it_is_locked(page: ObjectsPage) -> None:
@@ -259,7 +272,7 @@ def test_an_object_is_pinned_for_its_robot(page: ObjectsPage, bench: Bench) -> N
     page.facts.pin.click()
     assert bench.desk.pins.of("exo-01") == {"left_knee.0x6041:0"}
     assert _cell(page, "0x6041:0", NAME) == "★ Statusword"
-    page.bar.kinds[Kind.PINNED].click()
+    page.bar.kinds[RowKind.PINNED].click()
     assert [info.object for info in page.table.rows] == ["0x6041:0"]
 
 

@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from msgspec.structs import replace
-from PySide6.QtCore import Qt
-from PySide6.QtGui import QImage
+from PySide6.QtCore import QPointF, QRectF, QSizeF, Qt
+from PySide6.QtGui import QFontMetricsF, QImage
 from PySide6.QtWidgets import QWidget
 
 from gateway.client import ConnectionState
@@ -30,7 +30,7 @@ from server_gui.views.overview.joint_table import ERROR, STATE, STOP, TORQUE, Jo
 from server_gui.views.overview.now_line import NowLine
 from server_gui.views.overview.page import Overview
 from server_gui.views.theme import Theme
-from server_gui.views.widgets.figure import ANKLE, SHANK, THIGH, Pose, chain
+from server_gui.views.widgets.figure import ANKLE, SHANK, THIGH, Pose, chain, placed_names
 from server_gui.views.widgets.gait_ring import GaitRing, Phases
 from server_gui.views.widgets.pressure_map import COLUMNS, ROWS, PressureMap, weights
 from tests.gui.fakes import Bench, destroy
@@ -184,6 +184,25 @@ def test_who_leans_forward_with_a_flexed_hip_keeps_the_thigh_upright() -> None:
 def test_flexing_the_ankle_lifts_the_toes() -> None:
     _, _, heel, toe = chain(Pose(0.0, 0.0, 0.3), 0.0)
     assert toe.y() < heel.y()
+
+
+@pytest.mark.parametrize("size", [(130, 96), (190, 170), (400, 300)])
+def test_names_of_several_joints_in_trouble_never_lie_over_each_other(
+    theme: Theme, size: tuple[int, int]
+) -> None:
+    joints = [(side, joint) for side in ("left", "right") for joint in ("hip", "knee", "ankle")]
+    room, metrics = QSizeF(*size), QFontMetricsF(theme.text_font(bold=True))
+    places = [QPointF(size[0] / 2 + 10 * at, size[1] * (0.5 + 0.07 * at)) for at in range(3)] * 2
+    where = dict(zip(joints, places, strict=True))
+    for count in range(1, len(joints) + 1):
+        for some in itertools.combinations(joints, count):
+            found = placed_names({one: where[one] for one in some}, metrics, 5.0, room)
+            boxes = [box for _, box, _ in found]
+            assert not any(one.intersects(other) for one, other in itertools.combinations(boxes, 2)), some
+            assert all(QRectF(QPointF(), room).contains(box) for box in boxes), some
+            assert sum(len(points) for _, _, points in found) == count
+            for side, joint in some:
+                assert any(name in (f"{side} {joint}", f"both {joint}s") for name, _, _ in found), some
 
 
 def test_pressure_lies_where_its_cell_is_and_mirrors_on_the_other_foot() -> None:

@@ -7,15 +7,19 @@ from PySide6.QtWidgets import QApplication
 from server_gui.views.overview.joint_table import (
     CURRENT,
     ERROR,
+    STATE,
     TEMPERATURE,
     TORQUE,
     VELOCITY,
     JointModel,
     JointTable,
+    in_few_words,
 )
+from server_gui.views.overview.joint_words import JointWords
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card
 from server_gui.views.widgets.shrinking_label import ShrinkingLabel
+from tests.gui import rules
 from tests.gui.fakes import Bench, destroy
 from tests.support.desk import looked, telemetry, walking
 
@@ -74,7 +78,9 @@ def test_the_joint_table_cuts_no_number(theme: Theme, bench: Bench, width: int, 
             continue
         numbers = 2 <= column <= 6
         metrics = QFontMetrics(theme.number_font() if numbers else theme.text_font())
-        assert table.columnWidth(column) >= model.widest(column, metrics)
+        said = in_few_words if column == STATE and width < 640 else str
+        assert table.columnWidth(column) >= model.widest(column, metrics, said)
+    assert rules.halved_numbers(table, [table]) == []
     assert not table.isColumnHidden(TORQUE)
     assert not table.isColumnHidden(ERROR)
     destroy(table)
@@ -102,4 +108,72 @@ def test_the_value_that_a_fault_is_about_is_always_shown(
     assert table.columnViewportPosition(column) + table.columnWidth(column) <= table.viewport().width()
     metrics = QFontMetrics(theme.text_font())
     assert table.columnWidth(ERROR) >= metrics.horizontalAdvance("0x4210")
+    destroy(table)
+
+
+@pytest.mark.parametrize("scale", [1.0, 1.5])
+@pytest.mark.parametrize("width", [300, 420, 640, 1100])
+def test_the_words_of_a_fault_are_all_there(theme: Theme, bench: Bench, width: int, scale: float) -> None:
+    theme.set(scale=scale)
+    bench.station.take([walking(10), looked()])
+    newest_ns = bench.station.rings.newest_ns or 0
+    model, below = JointModel(bench.desk, theme), JointWords(theme)
+    table = JointTable(model, theme)
+    for part in (table, below):
+        part.resize(round(width * scale), 300)
+        part.show()
+    high = below.height()
+    codes: dict[str, list[float | None]] = {}
+    for joint in ("left_knee", "right_knee"):
+        codes[f"{joint}.error_code"] = [float(0x2310)]
+        bench.station.take([telemetry([newest_ns + len(codes)], codes)])
+        model.refresh()
+        below.say(table.unsaid)
+        QApplication.processEvents()
+        metrics = QFontMetrics(theme.text_font())
+        if table.unsaid:
+            assert "0x2310 continuous overcurrent at the output" in below.text()
+            assert "more" not in below.text()
+            assert rules.cut_words(below, [below]) == []
+        else:
+            assert table.columnWidth(ERROR) >= metrics.horizontalAdvance(model.errors[0][1])
+        if width >= 420:
+            assert table.columnWidth(ERROR) >= metrics.horizontalAdvance("0x2310")
+            assert joint.replace("_", " ") in below.text() or not table.unsaid
+        assert below.height() == high, "what is around has moved"
+    destroy(table)
+    destroy(below)
+
+
+def test_of_many_errors_the_first_is_whole_and_the_others_are_counted(theme: Theme) -> None:
+    below = JointWords(theme)
+    below.resize(500, 20)
+    below.show()
+    below.say([(f"joint {at}", f"0x{at:04X} something has happened to this drive") for at in range(6)])
+    assert below.text().startswith("joint 0: 0x0000 something has happened to this drive · ")
+    assert below.text().endswith(" · 5 more")
+    assert rules.cut_words(below, [below]) == []
+    below.say([])
+    assert below.text().startswith("Bars: ")
+    destroy(below)
+
+
+@pytest.mark.parametrize("code", [0x0, 0x2310, 0x4210])
+@pytest.mark.parametrize("scale", [1.0, 1.5])
+@pytest.mark.parametrize("width", range(260, 700, 40))
+def test_what_is_shown_of_the_joint_table_is_whole_at_every_width(
+    theme: Theme, bench: Bench, width: int, scale: float, code: int
+) -> None:
+    theme.set(scale=scale)
+    bench.station.take([walking(10), looked()])
+    newest_ns = bench.station.rings.newest_ns or 0
+    bench.station.take([telemetry([newest_ns + 1], {"left_knee.error_code": [float(code)]})])
+    model = JointModel(bench.desk, theme)
+    model.refresh()
+    table = JointTable(model, theme)
+    table.resize(round(width * scale), 300)
+    table.show()
+    assert rules.halved_numbers(table, [table]) == []
+    assert not table.isColumnHidden(STATE)
+    assert not code or table.unsaid or not table.isColumnHidden(ERROR)
     destroy(table)

@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QApplication, QLineEdit, QMenu, QTreeWidget, QWidg
 from gateway.units import Units
 from server_gui.core.desk.flags import FlagKind
 from server_gui.core.workspace.layouts import Layouts
-from server_gui.core.workspace.trigger import Condition, Mode, On, State
+from server_gui.core.workspace.trigger import Condition, Mode, On, TriggerState
 from server_gui.views.confirmation import Question
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.dragging import CURVES, dragged, dropped
@@ -77,7 +77,7 @@ def said(signals: Signals) -> str:
     return f"{signals.said.text()}{signals.refused.text()}"
 
 
-def state(signals: Signals) -> State:
+def state(signals: Signals) -> TriggerState:
     return signals.scene.trigger.state
 
 
@@ -287,14 +287,14 @@ def test_a_trigger_keeps_what_was_before_and_after_it(signals: Signals, bench: B
     signals.trigger.level.setText("a lot")
     signals.trigger.arm.click()
     assert "a number that is none" in said(signals)
-    assert state(signals) is State.OFF
+    assert state(signals) is TriggerState.OFF
     signals.trigger.level.setText("28.648 °")
     signals.trigger.arm.click()
     signals.refresh()
-    assert state(signals) is State.ARMED
+    assert state(signals) is TriggerState.ARMED
     feed(bench, 500, 50)
     signals.refresh()
-    assert state(signals) is State.TRIGGERED
+    assert state(signals) is TriggerState.TRIGGERED
     assert signals.scene.frozen is None
     feed(bench, 550, 300)
     assert "Kept by the trigger" in said(signals)
@@ -335,10 +335,10 @@ def test_an_emcy_is_waited_for_by_a_drives_state_where_it_tells_no_code(
     signals.refresh()
     bench.station.take([telemetry([START_NS + 6_000_000_000], {"left_knee.state": [4.0]})])
     signals.refresh()
-    assert state(signals) is State.ARMED
+    assert state(signals) is TriggerState.ARMED
     bench.station.take([telemetry([START_NS + 6_010_000_000], {"left_knee.state": [7.0]})])
     signals.refresh()
-    assert state(signals) is State.SHOWN
+    assert state(signals) is TriggerState.SHOWN
     assert "tells no errors" in signals.scene.trigger_problem(Condition(On.EMCY, "trunk"))
 
 

@@ -23,7 +23,7 @@ from drivers.joint.cia402 import DriveState
 from drivers.joint.drive import JointDrive
 from drivers.joint.quick_stop import StopOutcome
 from drivers.joint.settings import JointSettings
-from drivers.samples import State
+from drivers.samples import ComponentState
 from tests.support.waiting import WAIT_S, until
 from tests.unit.joint.test_drive import quality, read
 
@@ -124,7 +124,7 @@ def test_a_bench_master_starts_the_drive_and_moves_it_by_sync(
     drive.move(500)
     knee = joint(drive, Role.MASTER)
     knee.start()
-    until(lambda: quality(knee)[0] is State.OK and knee.frames > 3)
+    until(lambda: quality(knee)[0] is ComponentState.OK and knee.frames > 3)
     assert read(knee, "position") == pytest.approx(math.pi)
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from gateway.config.guard import WATCHES
-from gateway.guard.watcher import State
+from gateway.guard.watcher import RuleState
 from hil_sim.drive.power_state import Command, PowerState
 from hil_sim.exoskeleton import Exoskeleton
 from hil_sim.gait.activity import Activity
@@ -255,7 +255,7 @@ def test_a_joint_that_drifts_while_a_stop_is_held_is_said_again_and_again_until_
     assert watched.reasons("drift")[0].startswith("left_knee.position: 0.05")
     watched.faults.clear()
     assert knee.power_state is PowerState.SWITCH_ON_DISABLED
-    assert watched.until(lambda: watched.states()["drift"] is State.CLEARED, 2.0)
+    assert watched.until(lambda: watched.states()["drift"] is RuleState.CLEARED, 2.0)
 
 
 def test_a_rule_is_blind_where_what_it_watches_stays_away_and_sees_again(
@@ -270,14 +270,14 @@ def test_a_rule_is_blind_where_what_it_watches_stays_away_and_sees_again(
     seeing = {"lost", "controller_lost", "slow_sdo", "foot", "bus", "sync"}  # what is not heard is lost
     watched.run(4.0)
     states = watched.states()
-    assert {states[name] for name in seeing} == {State.TRIPPED}
+    assert {states[name] for name in seeing} == {RuleState.TRIPPED}
     assert {name: state for name, state in states.items() if name not in seeing} == dict.fromkeys(
-        states.keys() - seeing, State.BLIND
+        states.keys() - seeing, RuleState.BLIND
     )
     watched.faults.clear()
     watched.run(5.0)
     after = watched.states()
-    assert {name for name, state in after.items() if state in (State.BLIND, State.TRIPPED)} == set()
+    assert {name for name, state in after.items() if state in (RuleState.BLIND, RuleState.TRIPPED)} == set()
 
 
 def test_every_rule_is_tripped_here() -> None:
@@ -294,7 +294,7 @@ def test_walking_trips_nothing_and_nothing_is_blind(
     watched = Watched(tmp_path, monkeypatch, rules, send_inputs_by_pdo)
     watched.run(float(seconds))
     assert watched.changes == []
-    assert set(watched.states().values()) == {State.WATCHING}
+    assert set(watched.states().values()) == {RuleState.WATCHING}
     watched.run(0.03)  # between two answers to SDO
     watched.faults.begin("sto", "left_knee")
     assert watched.until(lambda: watched.reasons("emergency_stop"), 0.02), "a frame brings it"

@@ -16,7 +16,7 @@ from drivers.bus.settings import CanSettings, DeviceSettings
 from drivers.joint.drive import JointDrive
 from drivers.joint.quick_stop import StopOutcome
 from drivers.joint.settings import JointSettings
-from drivers.samples import State
+from drivers.samples import ComponentState
 from hil_sim.robot import SimulatedRobot
 from tests.support.waiting import WAIT_S, until
 from tests.unit.joint.test_drive import quality, read
@@ -55,7 +55,7 @@ def test_a_walking_robot_is_read_and_stopped_against_its_controller(robot: Simul
 
 
 def _is_read_and_stopped(joints: Sequence[JointDrive], gait: CanDevice) -> None:
-    until(lambda: all(quality(joint)[0] is State.OK for joint in joints))
+    until(lambda: all(quality(joint)[0] is ComponentState.OK for joint in joints))
     first = {joint.name: read(joint, "position") for joint in joints}
 
     moved: set[str] = set()
@@ -68,7 +68,7 @@ def _is_read_and_stopped(joints: Sequence[JointDrive], gait: CanDevice) -> None:
         return len(moved) == len(joints)
 
     until(all_moved)
-    assert gait.quality(time.monotonic_ns()).state is State.OK
+    assert gait.quality(time.monotonic_ns()).state is ComponentState.OK
     assert joints[0].reading is not None
     assert joints[0].reading.options == {"quick_stop": 2, "abort_connection": 3}
 

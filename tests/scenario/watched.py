@@ -21,8 +21,8 @@ from drivers.bus.frames import ERROR
 from drivers.bus.sdo.channel import SdoChannel
 from drivers.errors import DeviceAbort, DeviceTimeout, DriverError
 from gateway.config import RobotConfig, load
-from gateway.config.guard_rules import Rule
-from gateway.guard.watcher import Change, State, Watcher
+from gateway.config.guard_rules import GuardRule
+from gateway.guard.watcher import RuleState, RuleTransition, Watcher
 from gateway.guard.wiring import Wiring
 from gateway.modules.component.assembly import Robot, assemble
 from gateway.process.futures import done, failed
@@ -190,7 +190,7 @@ class Watched:
         self.simulated = Exoskeleton(Scenario.WALK)
         self.clock = self.simulated.clock
         self.faults = Faults(self.simulated, folder)
-        self.changes: list[tuple[float, str, Change]] = []
+        self.changes: list[tuple[float, str, RuleTransition]] = []
         self.held = False
         self._wirings: dict[str, Wiring] = {}
         self._replace(monkeypatch)
@@ -204,7 +204,7 @@ class Watched:
         self._watch({} if config.guard is None else config.guard.rule)
         self.run(0.6)
 
-    def _watch(self, rules: Mapping[str, Rule]) -> None:
+    def _watch(self, rules: Mapping[str, GuardRule]) -> None:
         for name, rule in rules.items():
             changed = partial(self._changed, name)
             wiring = Wiring(rule, self.robot, self.now_ns(), changed, held=lambda: self.held)
@@ -226,7 +226,7 @@ class Watched:
             self.run(0.01)
         return bool(condition())
 
-    def states(self) -> dict[str, State]:
+    def states(self) -> dict[str, RuleState]:
         """The worst of each rule's inputs."""
         return {
             name: max(watcher.state for watcher in wiring.watchers) for name, wiring in self._wirings.items()
@@ -236,7 +236,7 @@ class Watched:
         """Why a rule has tripped."""
         return [change.reason for _at_s, rule, change in self.changes if rule == name and change.acts]
 
-    def _changed(self, name: str, _watcher: Watcher, change: Change) -> None:
+    def _changed(self, name: str, _watcher: Watcher, change: RuleTransition) -> None:
         self.changes.append((self.clock.now_s, name, change))
 
     def _look(self) -> None:

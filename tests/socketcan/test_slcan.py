@@ -18,7 +18,7 @@ from drivers.bus.interfaces.netlink import read_link
 from drivers.bus.settings import CanSettings
 from drivers.joint.drive import JointDrive
 from drivers.joint.settings import JointSettings
-from drivers.samples import State
+from drivers.samples import ComponentState
 from tests.socketcan.link import NAME, needs_vcan
 from tests.socketcan.serial_adapter import SerialAdapter
 from tests.support.waiting import WAIT_S, until
@@ -90,7 +90,7 @@ def test_a_joint_behind_the_kernels_slcan_and_an_adapter_that_is_pulled_out(
         with attached(adapter.port):
             sees_a_quarter_turn(knee)
         until(lambda: f"there is no interface {name}" in quality(knee)[1])
-        assert quality(knee)[0] is State.LOST
+        assert quality(knee)[0] is ComponentState.LOST
         assert read(knee, "position") is None
         with attached(adapter.port):
             sees_a_quarter_turn(knee)

@@ -22,7 +22,7 @@ from drivers.bus.settings import CanSettings
 from drivers.joint.drive import JointDrive
 from drivers.joint.quick_stop import StopOutcome
 from drivers.joint.settings import JointSettings
-from drivers.samples import State
+from drivers.samples import ComponentState
 from tests.socketcan.link import NAME, needs_vcan, set_up
 from tests.support.waiting import WAIT_S, until
 from tests.unit.bus.fake_node import FakeNode
@@ -198,13 +198,13 @@ def test_a_joint_lives_on_it_and_survives_the_link(bus: CanBus, tmp_path: Path) 
         assert knee.quick_stop().result(WAIT_S) in StopOutcome
     set_up(False)
     until(lambda: "vcan0 is down; run: sudo ip link set vcan0 up" in quality(knee)[1])
-    assert quality(knee)[0] is State.LOST
+    assert quality(knee)[0] is ComponentState.LOST
     assert read(knee, "position") is None
     set_up(True)
     with FakeNode(NAME, 2, objects, interface="socketcan") as fake:
         until(lambda: knee.node.ready)
         fake.send(0x182, struct.pack("<Hi", 0x0027, 250))
-        until(lambda: quality(knee)[0] is State.OK)
+        until(lambda: quality(knee)[0] is ComponentState.OK)
         knee.stop()
 
 

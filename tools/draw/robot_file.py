@@ -14,7 +14,7 @@ from drivers.imu.settings import CanImuSettings, ImuSettings
 from drivers.insole import formats as insole_formats
 from drivers.insole.settings import InsoleSettings
 from gateway.config.guard import GuardSettings
-from gateway.config.guard_rules import Rule
+from gateway.config.guard_rules import GuardRule
 from gateway.config.robot import (
     ControlLoopSettings,
     DeviceTable,
@@ -51,7 +51,7 @@ _TABLES: Final[tuple[tuple[str, type[Struct], tuple[str, ...]], ...]] = (
     ("`[[stop.controller]]`", ControllerStop, ()),
     ("`[control_loop]`", ControlLoopSettings, ()),
     ("`[guard]`", GuardSettings, ("rule",)),
-    ("`[guard.rule.NAME]`", Rule, ()),
+    ("`[guard.rule.NAME]`", GuardRule, ()),
 )
 _TIMES: Final = """`stale_after_s` and `lost_after_s` are the silence after which its values are `null`, and
 after which it is lost."""

@@ -23,7 +23,7 @@ def blocking_problem(name: str, link: NetworkInterface, bitrate: int | None) -> 
 
 
 def warning(name: str, link: NetworkInterface, bitrate: int | None) -> str | None:
-    """Return what differs from the robot's file, or will hurt later; `None` when all is well."""
+    """Return deviations from the robot's file, and likely trouble; `None` if all is well."""
     if link.bitrate is not None and bitrate is not None and link.bitrate != bitrate:
         return (
             f"{name} runs at {link.bitrate} bit/s, the robot's file says {bitrate}; "

@@ -140,7 +140,7 @@ def _fields(payload: bytes) -> list[tuple[int, bytes]] | None:
 
 
 def _values(descriptor_set: int, fields: list[tuple[int, bytes]]) -> Values | None:
-    """Return what the fields say; `None` where one has another size, or a number that is none."""
+    """Return the fields' values; `None` if one has a wrong size, or is not a number."""
     values = Values({}, {})
     for descriptor, data in fields:
         field = FIELDS.get((descriptor_set, descriptor)) or FIELDS.get((None, descriptor))

@@ -165,7 +165,7 @@ def _cells(wanted: str | tuple[Column, ...], places: Mapping[str, int]) -> tuple
 
 
 def _numbers_in(text: str) -> list[tuple[int, str]]:
-    """Return what names are ordered by, so that ch2 comes before ch10; however many digits somebody sends."""
+    """Return the sort key of a name: ch2 comes before ch10, whatever the number of digits."""
     numbers = [digits.lstrip("0") for digits in re.findall(r"\d+", text)]
     return [(len(digits), digits) for digits in numbers]
 

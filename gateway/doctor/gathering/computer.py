@@ -17,7 +17,7 @@ _UNLIMITED = "unlimited"
 
 
 def computer(config: RobotConfig, root: Path = ROOT) -> Computer:
-    """Return what it tells; what it does not is `None` or not there."""
+    """Return the facts about this computer; unknown ones are `None` or missing."""
     names = {link for settings in config.can.values() if (link := links(settings)) is not None}
     paths = {sensor.port for _, sensor in config.on_ports()}
     return Computer(
@@ -44,7 +44,7 @@ def links(settings: CanSettings) -> str | None:
 
 
 def usb_name(port: str) -> str:
-    """Return what sysfs calls the device behind a port: `ttyUSB0`; a slash in it is written `!`."""
+    """Return sysfs's name of the device behind a port, `ttyUSB0`; a slash in it is written `!`."""
     real = os.path.realpath(port)
     return real.removeprefix("/dev/").replace("/", "!")
 

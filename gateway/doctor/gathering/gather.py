@@ -8,7 +8,7 @@ from pathlib import Path
 
 import eds
 from drivers.bus.interfaces.opening import obstacle
-from drivers.scan.asking import Told
+from drivers.scan.asking import NodeAnswers
 from drivers.scan.products import Library, files
 from eds.shipped import SHIPPED
 from gateway.client import Address, ClientError, LinkSettings, Robot, Unreachable
@@ -186,6 +186,6 @@ def _proposals(
             yield place.name, path.name if path.parent == SHIPPED else str(path)
 
 
-def _told(vendor: int, product: int) -> Told:
+def _told(vendor: int, product: int) -> NodeAnswers:
     """Return a device of which only that is known."""
-    return Told(0, None, None, None, None, vendor, product, None, None, None, (), ())
+    return NodeAnswers(0, None, None, None, None, vendor, product, None, None, None, (), ())

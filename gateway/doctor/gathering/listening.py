@@ -10,8 +10,8 @@ from typing import Self
 from drivers.bus.bus import CanBus
 from drivers.bus.frames import STANDARD_IDS
 from drivers.bus.settings import SDO_REQUEST, CanSettings
-from drivers.scan.traffic import Seen, Traffic
-from gateway.doctor.observations import BusFacts, Heard
+from drivers.scan.traffic import IdentifierTraffic, Traffic
+from gateway.doctor.observations import BusFacts, IdentifierFrames
 
 OPEN_S = 3.0
 LEAST_S = 0.1
@@ -46,7 +46,7 @@ class Listening:
         self._ending.close()
 
     def facts(self, asked_by_us: Mapping[str, Mapping[int, int]]) -> dict[str, BusFacts]:
-        """Return what was heard until now; before the end."""
+        """Return the facts heard so far; to be called before the end."""
         return {name: ear.facts(asked_by_us.get(name, {})) for name, ear in self._ears.items()}
 
     def asked(self, bus: str) -> frozenset[int]:
@@ -90,9 +90,9 @@ class _Ear:
             asked_by_us=asked_by_us,
         )
 
-    def _heard(self, can_id: int, seen: Seen) -> Heard:
+    def _heard(self, can_id: int, seen: IdentifierTraffic) -> IdentifierFrames:
         period_s = seen.period_s
-        return Heard(seen.count, 1 / period_s if period_s else 0.0, self._asks[can_id])
+        return IdentifierFrames(seen.count, 1 / period_s if period_s else 0.0, self._asks[can_id])
 
     def _taking(self, can_id: int) -> Callable[[int, bytes], None]:
         def take(stamp_ns: int, data: bytes) -> None:

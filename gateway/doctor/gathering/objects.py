@@ -39,7 +39,7 @@ _MAPPINGS: tuple[Object, ...] = tuple(
 
 
 def wanted(place: Place, description: Description | None) -> Iterator[Object]:
-    """Yield what to ask its device: what its file has of it, and who it is whatever the file says."""
+    """Yield the objects to read: those of its file, and its identity in any case."""
     for index, subindex in _NODE:
         if index == 0x1018 or description is None or description.has(index, subindex):
             yield index, subindex

@@ -36,7 +36,7 @@ def begun_between(before: Buses, after: Buses) -> dict[str, dict[int, int]]:
 
 
 def by_figures(before: Buses, after: Buses) -> dict[str, BusFacts]:
-    """Return what a gateway elsewhere tells of its buses: no identifiers."""
+    """Return the facts that a remote gateway has about its buses: no identifiers."""
     seconds = max((after.stamp_ns - before.stamp_ns) / 1e9, 0.1)
     old = {bus.name: bus.error_frames for bus in before.buses}
     return {
@@ -87,7 +87,7 @@ def samples(robot: Robot, described: Robots, seconds: float) -> Samples:
 def objects(
     robot: Robot, places: Iterable[Place], descriptions: Mapping[str, Description]
 ) -> dict[str, dict[Object, Value]]:
-    """Return what each device holds; one that does not answer, or has no EDS, is left out."""
+    """Return the values of each device; devices without answer or EDS are left out."""
     found = {}
     for place in places:
         description = descriptions.get(place.name)
@@ -110,7 +110,7 @@ def _held(robot: Robot, component: str, asked: list[Object]) -> dict[Object, Val
 
 
 def _number(told: ObjectValue) -> Iterator[Value]:
-    """Yield what it holds; `None` of what the device does not have, and nothing of what is not known."""
+    """Yield the value; `None` if the device lacks the object, and nothing if the value is unknown."""
     if isinstance(told.value, int | float):
         yield told.value
     elif told.value is None and ABORTED in (told.problem or ""):

@@ -14,7 +14,7 @@ from drivers.bus.outlet import Requests
 from drivers.bus.sdo.channel import SdoChannel
 from drivers.bus.settings import Role
 from drivers.bus.values import unsigned
-from drivers.component import Component, Kind
+from drivers.component import Component, ComponentKind
 from drivers.errors import DeviceAbort, DriverError
 from drivers.imu.settings import NodeImuSettings
 from drivers.scan.asking import TIMEOUT_S
@@ -63,7 +63,9 @@ def samples(config: RobotConfig, seconds: float, wait: Wait, *, active: bool) ->
 
 def _only_listens(config: RobotConfig, component: Component) -> bool:
     imu = config.imu.get(component.name)
-    return component.kind is Kind.INSOLE or (imu is not None and not isinstance(imu, NodeImuSettings))
+    return component.kind is ComponentKind.INSOLE or (
+        imu is not None and not isinstance(imu, NodeImuSettings)
+    )
 
 
 def _columns(chosen: list[Component], seconds: float, wait: Wait) -> dict[str, tuple[float | None, ...]]:
@@ -90,7 +92,7 @@ def objects(
     asked_by_others: Mapping[str, frozenset[int]],
     wait: Wait,
 ) -> dict[str, dict[Object, Value]]:
-    """Return what each device holds that nobody else asks; one that does not answer is left out."""
+    """Return the values of each device that nobody else asks; devices without answer are left out."""
     found: dict[str, dict[Object, Value]] = {}
     with ExitStack() as ending:
         buses = {name: CanBus(name, settings) for name, settings in config.can.items()}

@@ -198,7 +198,7 @@ def following_window(seen: Observations) -> Iterator[Verdict]:
 
 
 def reaction(seen: Observations) -> Iterator[Verdict]:
-    """Yield what leaves a drive moving when its master dies, or it is stopped."""
+    """Yield drives that keep moving when their master dies, or when they are stopped."""
     for place in seen.joints():
         if any(seen.unanswered(place, index) for index in MOVES_ON):
             yield Unknown("reaction", place.header, seen.why_no_objects)
@@ -232,6 +232,6 @@ def _whole(seen: Observations, index: int, place: Place) -> int | None:
 
 
 def _usual(seen: Observations, value: Callable[[Place], int | None], least: int, most: int) -> int | None:
-    """Return what the other joints have, of what can be meant."""
+    """Return the other joints' median of a setting, within plausible bounds."""
     found = [one for place in seen.joints() if (one := value(place)) is not None and least <= one <= most]
     return int(median(found)) if found else None

@@ -17,7 +17,7 @@ _TPDOS = range(4)
 
 
 def eds_product(seen: Observations) -> Iterator[Verdict]:
-    """Yield what 1018h says is not what the EDS was written for."""
+    """Yield devices whose identity (1018h) is not that of their EDS."""
     for place in seen.nodes():
         description = seen.descriptions.get(place.name)
         vendor, product = seen.whole(place, 0x1018, 1), seen.whole(place, 0x1018, 2)
@@ -211,7 +211,7 @@ def _slow_sync(seen: Observations, bus: str, period_s: float, wanted_s: float | 
 
 
 def _interpolation_s(seen: Observations, places: list[Place]) -> float | None:
-    """Return what most of the drives interpolate over (60C2h)."""
+    """Return the interpolation period of most drives (60C2h)."""
     found = []
     for place in places:
         time, exponent = seen.whole(place, 0x60C2, 1), seen.whole(place, 0x60C2, 2)

@@ -13,7 +13,7 @@ from drivers.bus.bus import CanBus
 from drivers.bus.device import CanDevice
 from drivers.bus.interfaces.opening import needs_python_can
 from drivers.bus.settings import DeviceSettings
-from drivers.component import Component, Kind
+from drivers.component import Component, ComponentKind
 from drivers.errors import DriverError
 from drivers.imu.build import build_imu
 from drivers.insole.build import build_insole, join_insoles
@@ -34,7 +34,9 @@ class Robot:
     buses: dict[str, CanBus] = field(default_factory=dict)
     components: dict[str, Component] = field(default_factory=dict)
     descriptions: dict[str, eds.Description] = field(default_factory=dict)
-    absent: dict[str, tuple[Kind, str]] = field(default_factory=dict)  # component → kind, why it is not there
+    absent: dict[str, tuple[ComponentKind, str]] = field(
+        default_factory=dict
+    )  # component → kind, why it is not there
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +82,7 @@ def _import_canopen(*, with_can: bool) -> None:
         import_canopen()
 
 
-def _add(robot: Robot, kind: Kind, name: str, build: Callable[[], Component]) -> None:
+def _add(robot: Robot, kind: ComponentKind, name: str, build: Callable[[], Component]) -> None:
     try:
         robot.components[name] = build()
     except (DriverError, eds.EdsError, OSError) as error:
@@ -105,16 +107,16 @@ def _on_can(
     return Builder(build, join)
 
 
-BUILDERS: Mapping[Kind, Builder] = {
-    Kind.JOINT: _on_can(JointDrive, join_joints),
-    Kind.DEVICE: _on_can(CanDevice),
-    Kind.INSOLE: Builder(build_insole, join_insoles),
-    Kind.IMU: Builder(build_imu),
+BUILDERS: Mapping[ComponentKind, Builder] = {
+    ComponentKind.JOINT: _on_can(JointDrive, join_joints),
+    ComponentKind.DEVICE: _on_can(CanDevice),
+    ComponentKind.INSOLE: Builder(build_insole, join_insoles),
+    ComponentKind.IMU: Builder(build_imu),
 }
 
 
 def facts(config: RobotConfig, name: str, description: eds.Description) -> Mapping[str, str | int]:
-    """Return what `robot.describe` tells of a device: what its EDS says, and where it is."""
+    """Return the device facts of `robot.describe`: those of its EDS, and its place."""
     tables: dict[str, Any] = {name: one for kind in BUILDERS for name, one in getattr(config, kind).items()}
     bus, bitrate = tables[name].bus, config.can[tables[name].bus].bitrate
     found: dict[str, str | int] = {

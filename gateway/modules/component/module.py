@@ -13,7 +13,7 @@ from msgspec import UNSET, UnsetType
 
 from drivers.component import Component
 from drivers.latest import Latest, Listener
-from drivers.samples import Channel, State
+from drivers.samples import Channel, ComponentState
 from gateway.handlers import Handlers, on
 from gateway.modules.component.assembly import BUILDERS, Robot, assemble, facts
 from gateway.modules.component.findings import bus_infos, emcy_info, finding_infos
@@ -147,7 +147,7 @@ class ComponentModule:
     def quality(self, name: str, now_ns: int) -> QualityInfo:
         """One component's state, age and counters, and in words what is wrong."""
         if name in self.robot.absent:
-            return {"state": State.LOST.value, "age_ms": None, "problem": self.robot.absent[name][1]}
+            return {"state": ComponentState.LOST.value, "age_ms": None, "problem": self.robot.absent[name][1]}
         quality = self.robot.components[name].quality(now_ns)
         return {
             **quality.counters,
@@ -186,7 +186,7 @@ class ComponentModule:
     def _absent_info(self, name: str) -> ComponentInfo:
         kind, why = self.robot.absent[name]
         device, angle = self._device(name), self._angle(name)
-        return ComponentInfo(name, kind.value, State.LOST.value, why, device, angle=angle)
+        return ComponentInfo(name, kind.value, ComponentState.LOST.value, why, device, angle=angle)
 
     def _angle(self, name: str) -> AngleInfo | UnsetType:
         """As the robot's file says it, whether the drive is there or not."""
@@ -223,7 +223,7 @@ class ComponentModule:
 
     def _is_there(self, name: str) -> bool:
         component = self.robot.components.get(name)
-        return component is None or component.quality(time.monotonic_ns()).state is not State.LOST
+        return component is None or component.quality(time.monotonic_ns()).state is not ComponentState.LOST
 
     def _is_late(self, name: str) -> bool:
         """Whether it is being read for the first time, and is worth waiting for."""

@@ -14,7 +14,7 @@ from gateway.records.records import Records
 from gateway.wire.role import Role
 
 if TYPE_CHECKING:
-    from gateway.access.known import Known
+    from gateway.access.known import KnownClients
 
 log = logging.getLogger(__name__)
 
@@ -53,7 +53,7 @@ class AccessJournal:
         except OSError as error:
             log.warning("who is let in cannot be seen, and is not told: %s", error)
 
-    def tell(self, known: "Known") -> None:
+    def tell(self, known: "KnownClients") -> None:
         """Record the changes since the last time. In one thread at a time."""
         now, before = _people(known), self._kept() if self._told is None else self._told
         self._told = now
@@ -82,7 +82,7 @@ class AccessJournal:
             log.warning("%s cannot be written: %s", self._file, error.strerror or error)
 
 
-def _people(known: "Known") -> People:
+def _people(known: "KnownClients") -> People:
     found = {f"client {one.name}": Admission(one.role, one.fingerprint) for one in known.by_key.values()}
     found |= {f"user {name}": Admission(role) for name, role in known.table.users.items()}
     return found | {f"group {name}": Admission(role) for name, role in known.table.groups.items()}

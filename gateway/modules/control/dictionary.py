@@ -30,7 +30,7 @@ from gateway.wire.dictionary import (
     ObjectValue,
     ObjectValues,
 )
-from gateway.wire.framing import Kind, refuse
+from gateway.wire.framing import ErrorKind, refuse
 from gateway.wire.limits import OBJECTS_LISTED
 from gateway.wire.object_search import fitting
 
@@ -86,7 +86,7 @@ class Objects:
         self._ask = ask
 
     def listed(self, params: ObjectListParams) -> ObjectList:
-        """Return what the EDS says of those that fit.
+        """Return the matching objects of the EDS.
 
         Raises:
             RpcError: there is no such component, or it has no object dictionary.
@@ -103,7 +103,7 @@ class Objects:
         return ObjectList(params.component, shown, len(found) - len(shown))
 
     def read(self, params: ObjectReadParams, client: Client) -> "Future[ObjectValues]":
-        """Return what the device holds of them now; raises `RpcError` for one that its EDS lacks."""
+        """Return the device's present values of objects; raises `RpcError` for one that its EDS lacks."""
         description = self._description(params.component)
         wanted = [self._wanted(params.component, text, description) for text in dict.fromkeys(params.objects)]
         ready = self._component.when_ready({params.component})
@@ -117,15 +117,17 @@ class Objects:
         if component in self._tables and component in descriptions:
             return descriptions[component]
         if component in self._component.absent:
-            raise refuse(Kind.UNAVAILABLE, f"{component}: {self._component.absent[component]}")
+            raise refuse(ErrorKind.UNAVAILABLE, f"{component}: {self._component.absent[component]}")
         known = ", ".join(one for one in descriptions if one in self._tables) or "none"
-        raise refuse(Kind.UNKNOWN_NAME, f"{component!r} has no object dictionary; those that have: {known}")
+        raise refuse(
+            ErrorKind.UNKNOWN_NAME, f"{component!r} has no object dictionary; those that have: {known}"
+        )
 
     def _wanted(self, component: str, text: str, description: Description) -> Wanted:
         index, _, subindex = text.partition(":")
         wanted = Wanted(component, int(index, 16), int(subindex))
         if not description.has(wanted.index, wanted.subindex):
-            raise refuse(Kind.UNKNOWN_NAME, f"{description.path.name} has no object {wanted.name}")
+            raise refuse(ErrorKind.UNKNOWN_NAME, f"{description.path.name} has no object {wanted.name}")
         return wanted
 
     def _mapped_in(self, component: str, description: Description) -> Mapping[tuple[int, int], list[str]]:
@@ -211,7 +213,7 @@ def address(index: int, subindex: int) -> str:
 
 
 def by_eds(variable: "ODVariable") -> ObjectInfo:
-    """Return what the EDS alone says of an object."""
+    """Return the description of an object from its EDS alone."""
     known, default = DATA_TYPES.get(variable.data_type or 0), variable.default
     return ObjectInfo(
         address(variable.index, variable.subindex),

@@ -153,7 +153,7 @@ class _Offer:
         return lock or (None if matches(name, release) else Lock.UNRELEASED)
 
     def _unmatched(self, variables: list["ODVariable"], names: list[str]) -> Iterator[Parameter]:
-        """Yield what is to be released and does not exist, to be seen where parameters are."""
+        """Yield released names that do not exist, so that they are visible among the parameters."""
         addresses = {_address(one) for one in variables}
         known = {*names, *(one.partition(".")[2] for one in self._taken.values() if self._is_own(one))}
         for entry in self._table.release:
@@ -171,7 +171,7 @@ class _Offer:
 
 
 def own_lock(index: int, *, is_led: bool) -> Lock | None:
-    """Return what locks an object by what it is, whoever describes it.
+    """Return the lock of an object by its nature, independent of any description.
 
     `is_led`: an RPDO of the EDS brings it.
     """

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from gateway.process.loop import Loop, Timer
 from gateway.wire.control import Lease
-from gateway.wire.framing import Kind, refuse
+from gateway.wire.framing import ErrorKind, refuse
 
 if TYPE_CHECKING:
     from gateway.connections.session import Session
@@ -46,12 +46,12 @@ class Leases:
         if held is not None and held.session is not session:
             left_s = (held.expires_ns - time.monotonic_ns()) / 1e9
             raise refuse(
-                Kind.LEASE_HELD,
+                ErrorKind.LEASE_HELD,
                 f"{held.session.who} has the lease for up to {left_s:.1f} s more; ask again then, "
                 "or have it released there (in a window: Release, on its page Parameters)",
             )
         if session.closed:
-            raise refuse(Kind.NO_LEASE, "the connection has ended")
+            raise refuse(ErrorKind.NO_LEASE, "the connection has ended")
         expires_ns = time.monotonic_ns() + round(ttl_s * 1e9)
         timer = self._loop.call_later(ttl_s, lambda: self._end(session, "lease ran out"))
         if held is None:
@@ -68,13 +68,13 @@ class Leases:
         """Give it back; raises `RpcError` (no_lease) where there is nothing to give."""
         self.require(session)
         if token is not None and self._lease is not None and token != self._lease.token:
-            raise refuse(Kind.NO_LEASE, f"the lease of this connection is not {token!r}")
+            raise refuse(ErrorKind.NO_LEASE, f"the lease of this connection is not {token!r}")
         self._end(session, "lease given back")
 
     def require(self, session: "Session") -> None:
         """Raise `RpcError` (no_lease) where the connection may not write."""
         if not self.held_by(session):
-            raise refuse(Kind.NO_LEASE, "this connection holds no lease; call control.acquire first")
+            raise refuse(ErrorKind.NO_LEASE, "this connection holds no lease; call control.acquire first")
 
     def held_by(self, session: "Session") -> bool:
         """Whether the connection may write now."""

@@ -12,13 +12,13 @@ from contextlib import contextmanager, suppress
 
 import msgspec
 
-from gateway.modules.control.objects import Change
+from gateway.modules.control.objects import ObjectWrite
 from gateway.modules.control.parameters import Parameter
 from gateway.modules.stop.authority import Address
 from gateway.records.journal import Share
 from gateway.records.records import Records
 from gateway.records.undo import Undo, UndoChange
-from gateway.wire.framing import Kind, RpcError, refuse
+from gateway.wire.framing import ErrorKind, RpcError, refuse
 
 log = logging.getLogger(__name__)
 
@@ -49,7 +49,7 @@ class WriteLedger:
         """What is in the undo file: on trial, or what a failed roll-back has left."""
         return self.undos.get(self.number)
 
-    def replaced(self, changes: Sequence[Change]) -> tuple[Undo, ...]:
+    def replaced(self, changes: Sequence[ObjectWrite]) -> tuple[Undo, ...]:
         """Return the trials on the same parameters, which only another trial takes over.
 
         Raises:
@@ -64,22 +64,22 @@ class WriteLedger:
                 continue
             if not other.trial:
                 text = f"write {other.write} of {other.who} is still being taken back; wait for that"
-                raise shared[0].refusal(Kind.TRIAL_PENDING, text)
+                raise shared[0].refusal(ErrorKind.TRIAL_PENDING, text)
             if self.trial_s is None:
                 text = f"it is on trial (write {other.write} of {other.who}); confirm or revert that first"
-                raise shared[0].refusal(Kind.TRIAL_PENDING, text)
+                raise shared[0].refusal(ErrorKind.TRIAL_PENDING, text)
             found.append(other)
         return tuple(found)
 
-    def goal(self, change: Change, before: bytes) -> bytes | None:
-        """Return what the end of this trial would take a parameter back to."""
+    def goal(self, change: ObjectWrite, before: bytes) -> bytes | None:
+        """Return the value to which the end of this trial would revert a parameter."""
         if self.trial_s is None:
             return None
         trials = self.replaced([change])
         goals = {one.parameter: one.before for other in trials for one in other.changes}
         return bytes.fromhex(goals.get(change.name, before.hex()))
 
-    def begin(self, changes: Sequence[Change], before: Mapping[str, bytes]) -> None:
+    def begin(self, changes: Sequence[ObjectWrite], before: Mapping[str, bytes]) -> None:
         """Before the first download; raises `RpcError` where it cannot be kept, and nothing is written."""
         self.changes = tuple(self._entry(change, before[change.name]) for change in changes)
         undo = Undo(self.number, self._who, time.time_ns(), self.trial_s is not None, self.changes)
@@ -87,7 +87,7 @@ class WriteLedger:
             self.undos.change(put=[undo])
             self._say("write", Share.ASKED, before=undo.before(), after=undo.values(), trial_s=self.trial_s)
 
-    def refused(self, changes: Sequence[Change], error: RpcError) -> None:
+    def refused(self, changes: Sequence[ObjectWrite], error: RpcError) -> None:
         """Nothing was sent; nobody waits for the journal."""
         self.undos.leave(self.number, ())
         what = {change.name: change.parameter.decode(change.data) for change in changes}
@@ -122,7 +122,7 @@ class WriteLedger:
 
     def rolled_back(self, error: RpcError, left: tuple[UndoChange, ...]) -> None:
         """Note the failure, and the values that must still be reverted."""
-        failed = error.kind is Kind.ROLLBACK_FAILED
+        failed = error.kind is ErrorKind.ROLLBACK_FAILED
         if failed:
             self.problem = str(error)
             log.critical("A ROLL-BACK FAILED: %s", error)
@@ -134,7 +134,7 @@ class WriteLedger:
     def _say(self, what: str, share: Share = Share.OUTCOME, /, **details: object) -> None:
         self._journal.append(self._who, what, share, write=self.number, **details).result()
 
-    def _entry(self, change: Change, before: bytes) -> UndoChange:
+    def _entry(self, change: ObjectWrite, before: bytes) -> UndoChange:
         parameter = change.parameter
         return UndoChange(
             parameter.name,
@@ -152,7 +152,7 @@ class WriteLedger:
             yield
         except OSError as error:
             text = f"what is written could not be recorded, {so}: {error.strerror or error}"
-            raise refuse(Kind.UNAVAILABLE, text) from error
+            raise refuse(ErrorKind.UNAVAILABLE, text) from error
 
 
 def _made(changes: Sequence[UndoChange], name: str, data: bytes) -> tuple[UndoChange, ...]:

@@ -78,7 +78,7 @@ from gateway.wire.stop import (
 LOOK_S = 1.0  # between looks who is let in
 
 if TYPE_CHECKING:
-    from gateway.access.known import Known
+    from gateway.access.known import KnownClients
     from gateway.connections.session import Session
     from gateway.modules.component.module import ComponentModule
     from gateway.registry import Context
@@ -182,7 +182,7 @@ class ControlModule:
         """Take back everything that is on trial. In the loop's thread."""
         self._tuning.trials.revert_all(why)
 
-    def who_is_known(self, known: "Known") -> None:
+    def who_is_known(self, known: "KnownClients") -> None:
         """Who is let in, or what they may, has changed. In the loop's thread."""
         self._admissions.tell(known)
 

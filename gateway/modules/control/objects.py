@@ -15,7 +15,7 @@ from drivers.errors import DeviceAbort, DeviceTimeout, DriverError
 from gateway.modules.control.parameters import Parameter
 from gateway.modules.stop.authority import Address
 from gateway.process.futures import outcome
-from gateway.wire.framing import Kind, RpcError, refuse
+from gateway.wire.framing import ErrorKind, RpcError, refuse
 
 T = TypeVar("T")
 K = TypeVar("K")
@@ -59,7 +59,7 @@ class Node(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class ObjectWrite:
     """One parameter and the bytes it shall hold."""
 
     parameter: Parameter
@@ -72,7 +72,7 @@ class Change:
 
 
 def result(future: "Future[T]", more_s: float = 0.0) -> T:
-    """Return what comes of it; raises `TimeoutError`, and asks no more, where that takes too long."""
+    """Return the result of a future; raises `TimeoutError`, and cancels it, if it takes too long."""
     try:
         return future.result(ANSWER_S + more_s)
     except TimeoutError:
@@ -81,7 +81,7 @@ def result(future: "Future[T]", more_s: float = 0.0) -> T:
 
 
 def results(futures: "Mapping[K, Future[T]]") -> "dict[K, T | Exception]":
-    """Return what comes of all of them, in the time of one; an error stands in its place as itself."""
+    """Return the results of all futures, in the time of one; an error takes the place of its result."""
     wait(futures.values(), ANSWER_S)
     found: dict[K, T | Exception] = dict.fromkeys(futures, TimeoutError("no answer"))
     for key, future in futures.items():
@@ -106,7 +106,7 @@ def read(parameter: Parameter, node: Node) -> bytes:
 
 
 def ask_patiently(node: Node, address: Address) -> "Future[bytes]":
-    """Read what must be known: where no answer comes, it is asked once more and waited for longer."""
+    """Read a value that must be known: without an answer, ask once more and wait longer."""
     _bus, _node_id, index, subindex = address
 
     def ask(sdo: SdoChannel) -> bytes:
@@ -143,9 +143,9 @@ def download(
 
 
 def device_error(parameter: Parameter, doing: str, error: Exception) -> RpcError:
-    """Return what a driver could not do, as an answer."""
-    kinds = ((DeviceAbort, Kind.DEVICE_ABORT), (TimeoutError, Kind.DEVICE_TIMEOUT))
-    kind = next((kind for type_, kind in kinds if isinstance(error, type_)), Kind.UNAVAILABLE)
+    """Return a driver's error as an answer for the client."""
+    kinds = ((DeviceAbort, ErrorKind.DEVICE_ABORT), (TimeoutError, ErrorKind.DEVICE_TIMEOUT))
+    kind = next((kind for type_, kind in kinds if isinstance(error, type_)), ErrorKind.UNAVAILABLE)
     return refuse(
         kind,
         f"{parameter.name}: {doing} {parameter.object}: {str(error) or 'no answer'}",

@@ -11,7 +11,7 @@ from drivers.bus.values import size_of
 from eds.datatypes import DATA_TYPES
 from gateway.coding import NUMBERS, Coding, CodingError, Limit, Number, broken_limit, text, words
 from gateway.config.robot import ParameterSettings
-from gateway.wire.framing import Kind, RpcError, refuse
+from gateway.wire.framing import ErrorKind, RpcError, refuse
 from gateway.wire.parameter import ParameterInfo
 
 READABLE = ("rw", "rwr", "rww", "ro", "const")
@@ -135,26 +135,28 @@ class Parameter:
             default=self.default,
         )
 
-    def refusal(self, kind: Kind, text: str, limit: float | None = None) -> RpcError:
+    def refusal(self, kind: ErrorKind, text: str, limit: float | None = None) -> RpcError:
         """Return an error about this parameter."""
         return refuse(kind, f"{self.name}: {text}", component=self.component, object=self.object, limit=limit)
 
     def check_readable(self) -> None:
         """Raise `RpcError` where it cannot be read."""
         if self.problem is not None:
-            raise self.refusal(Kind.UNAVAILABLE, self.problem)
+            raise self.refusal(ErrorKind.UNAVAILABLE, self.problem)
         if self.access not in READABLE:
             raise self.refusal(
-                Kind.NOT_ALLOWED, f"{self.object} cannot be read, the EDS says {self.access!r}"
+                ErrorKind.NOT_ALLOWED, f"{self.object} cannot be read, the EDS says {self.access!r}"
             )
 
     def check_writable(self) -> None:
         """Raise `RpcError` where it cannot be written, or not be read back."""
         self.check_readable()
         if self.access not in WRITABLE:
-            raise self.refusal(Kind.READ_ONLY, f"{self.object} is read-only, the EDS says {self.access!r}")
+            raise self.refusal(
+                ErrorKind.READ_ONLY, f"{self.object} is read-only, the EDS says {self.access!r}"
+            )
         if self.lock is not None:
-            raise self.refusal(Kind.READ_ONLY, f"{self.object} is read-only: {self.remedy(self.lock)}")
+            raise self.refusal(ErrorKind.READ_ONLY, f"{self.object} is read-only: {self.remedy(self.lock)}")
 
     def remedy(self, lock: Lock) -> str:
         """In full words, what to do about this lock of it."""
@@ -175,7 +177,7 @@ class Parameter:
         try:
             data = self.coding.encode(value)
         except CodingError as error:
-            raise self.refusal(Kind.OUT_OF_LIMIT, str(error)) from error
+            raise self.refusal(ErrorKind.OUT_OF_LIMIT, str(error)) from error
         held = self.decode(data)
         would_hold = f"{text(held)} {unit}, which is what the device would hold of {text(value)},"
         self._check_limits(held, said if is_real else would_hold)
@@ -190,13 +192,13 @@ class Parameter:
         """
         self.check_writable()
         if len(data) != size_of(self.data_type):
-            raise self.refusal(Kind.MISMATCH, f"{data.hex(' ')} is no {self.coding.type.name}")
+            raise self.refusal(ErrorKind.MISMATCH, f"{data.hex(' ')} is no {self.coding.type.name}")
         value = self.decode(data)
         self._check_limits(value, f"{text(value)} {self.settings.unit}")
         return value
 
     def told(self, data: bytes) -> Number | str:
-        """Return what the device's bytes mean: a value, or a text.
+        """Return the meaning of the device's bytes: a value, or a text.
 
         Raises `RpcError` (mismatch) as `decode`.
         """
@@ -210,11 +212,11 @@ class Parameter:
         try:
             return self.coding.decode(data)
         except CodingError as error:
-            raise self.refusal(Kind.MISMATCH, f"the device holds what is no value: {error}") from error
+            raise self.refusal(ErrorKind.MISMATCH, f"the device holds what is no value: {error}") from error
 
     def _check_limits(self, value: Number, said: str) -> None:
         broken = broken_limit(self, self.coding, value)
         if broken is not None:
             limit: Number = getattr(self, broken)
             text_ = f"{said} is {_BEYOND[broken]} {text(limit)} {self.settings.unit}"
-            raise self.refusal(Kind.OUT_OF_LIMIT, text_, limit)
+            raise self.refusal(ErrorKind.OUT_OF_LIMIT, text_, limit)

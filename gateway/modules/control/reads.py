@@ -49,7 +49,7 @@ class _Reading(Generic[P, V]):
         return next((name for name, left in self._by_device().items() if left and name not in busy), None)
 
     def take(self, device: str) -> list[P]:
-        """Return what is to be read of it now."""
+        """Return the parameters to be read now from a device."""
         left = self._by_device()[device]
         return [left.popleft() for _ in range(min(OBJECTS, len(left)))]
 

@@ -15,7 +15,7 @@ from drivers.joint.cia402 import ENERGISED, STATE_WORDS, DriveState, drive_state
 from drivers.joint.commands import STATUSWORD
 from drivers.joint.quantities import AXIS_OFFSET
 from drivers.joint.settings import JointSettings
-from drivers.samples import State
+from drivers.samples import ComponentState
 from gateway.coding import Limit, broken_limit
 from gateway.config.robot import RobotConfig
 from gateway.modules.component.module import ComponentModule
@@ -23,7 +23,7 @@ from gateway.modules.control.objects import Node, results
 from gateway.modules.control.parameters import Parameter
 from gateway.modules.stop.authority import Address
 from gateway.records.undo import UndoChange
-from gateway.wire.framing import Kind
+from gateway.wire.framing import ErrorKind
 
 HEARD_S = 2.0  # a node that has said something within it is there
 Known = tuple[DriveState | None, str]  # a drive's state; in words where that is from, or why it is not known
@@ -68,7 +68,7 @@ class Rules:
         """Return the node; raises `RpcError` (unavailable) if its device could not be built."""
         component: Any = self._component.robot.components.get(parameter.component)
         if component is None:
-            raise parameter.refusal(Kind.UNAVAILABLE, parameter.problem or "its device is not there")
+            raise parameter.refusal(ErrorKind.UNAVAILABLE, parameter.problem or "its device is not there")
         node: Node = component.node
         return node
 
@@ -89,7 +89,7 @@ class Rules:
         now_ns = time.monotonic_ns()
         quality = self._component.quality(component, now_ns)
         found: Any = self._component.robot.components.get(component)
-        if quality["state"] != State.LOST:
+        if quality["state"] != ComponentState.LOST:
             return None
         if component in self._config.joint and found is not None and found.node.ready:
             heard_ns = found.node.life.heard_ns
@@ -98,7 +98,7 @@ class Rules:
         return str(quality["problem"] or "it is silent")
 
     def reach(self, change: UndoChange) -> tuple[Parameter, Node]:
-        """Return what was written, as long as the robot's file still means the same by its name.
+        """Return a written parameter and its node, if its name in the robot's file still means the same.
 
         Raises:
             OutOfReach: it does not, or the device is not there now.
@@ -138,7 +138,7 @@ class Rules:
         if broken_limit(parameter, parameter.coding, value, before) is Limit.MAX_STEP:
             step = abs(value - before)
             text = f"from {before:g} {unit} it may change by {most:g} {unit} at once, not by {step:g}"
-            raise parameter.refusal(Kind.OUT_OF_LIMIT, text, most)
+            raise parameter.refusal(ErrorKind.OUT_OF_LIMIT, text, most)
 
     def bars(self, parameter: str, joints: Iterable[str]) -> bool:
         """Whether a parameter cannot be written any more once one of these joints is enabled."""
@@ -159,7 +159,7 @@ class Rules:
                 said = f"unknown: {why}" if state is None else STATE_WORDS[state]
                 wanted = ", ".join(sorted(STATE_WORDS[one] for one in allowed))
                 text = f"the state of {drive} is {said}; this parameter may be written in: {wanted}"
-                raise parameter.refusal(Kind.WRONG_STATE, text)
+                raise parameter.refusal(ErrorKind.WRONG_STATE, text)
 
     def states(self, drives: Collection[str]) -> dict[str, Known]:
         """Each drive's state as it says now, all of them asked at once."""

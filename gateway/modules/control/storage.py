@@ -24,7 +24,7 @@ from gateway.modules.control.writer import Turn, Writer
 from gateway.process.futures import then
 from gateway.records.journal import Share
 from gateway.records.records import Records
-from gateway.wire.framing import Kind, RpcError, refuse
+from gateway.wire.framing import ErrorKind, RpcError, refuse
 from gateway.wire.parameter import Stored
 
 if TYPE_CHECKING:
@@ -89,7 +89,9 @@ class Storage:
         """
         if component not in self.tables:
             known = ", ".join(self.tables) or "none"
-            raise refuse(Kind.UNKNOWN_NAME, f"{component!r} is no device that can store; here are: {known}")
+            raise refuse(
+                ErrorKind.UNKNOWN_NAME, f"{component!r} is no device that can store; here are: {known}"
+            )
         ready = self._component.when_ready({component, *self.config.drives_of(component)})
         return then(ready, lambda _none: self._begin(command, who, component, leave))
 
@@ -97,7 +99,7 @@ class Storage:
         found: Any = self._component.robot.components.get(component)
         if found is None:
             why = self._component.absent.get(component, "it is not there")
-            raise refuse(Kind.UNAVAILABLE, f"{component}: {why}", component=component)
+            raise refuse(ErrorKind.UNAVAILABLE, f"{component}: {why}", component=component)
         return self._writer.submit(_Run(self, command, who, component, found.node, leave).do, Turn.WRITE)
 
 
@@ -135,7 +137,7 @@ class _Run:
         except RpcError as error:
             self._record(f"{command.name} FAILED", str(error), kind=error.kind, result=str(error))
             raise
-        self._record(f"{command.name} done", command.done, kind=Kind.MISMATCH, result=command.done)
+        self._record(f"{command.name} done", command.done, kind=ErrorKind.MISMATCH, result=command.done)
         return Stored(self._component, command.done)
 
     # Before
@@ -149,9 +151,9 @@ class _Run:
             before = self._values() if self._command is STORING else {}
             self._check_drives()
         except RpcError as error:
-            if error.kind is Kind.DEVICE_TIMEOUT:
+            if error.kind is ErrorKind.DEVICE_TIMEOUT:
                 said, component = f"{error}; nothing was sent", self._component
-                raise refuse(Kind.UNAVAILABLE, said, component=component) from error
+                raise refuse(ErrorKind.UNAVAILABLE, said, component=component) from error
             raise
         return before
 
@@ -160,7 +162,7 @@ class _Run:
         if said is not None:
             raise self._refusal(self._leave.kind(said), f"{said}; nothing was sent")
         if self._node.distrust is not None:
-            raise self._refusal(Kind.NOT_ALLOWED, self._node.distrust)
+            raise self._refusal(ErrorKind.NOT_ALLOWED, self._node.distrust)
 
     def _check_trials(self) -> None:
         """Refuse while a trial is pending: it would become permanent, and its revert would wait."""
@@ -168,14 +170,14 @@ class _Run:
             how = "on trial; confirm or revert" if undo.trial else "still being taken back; wait for"
             names = ", ".join(change.parameter for change in undo.changes)
             said = f"{names}: {how} that first (write {undo.write} of {undo.who})"
-            raise self._refusal(Kind.TRIAL_PENDING, said)
+            raise self._refusal(ErrorKind.TRIAL_PENDING, said)
 
     def _check_capability(self) -> None:
         capability = self._capability()
         if not capability & _ON_COMMAND:
             why = "it does that by itself, not on command" if capability & _BY_ITSELF else "it cannot"
             said = f"the device says that {why} ({self._command.object} reads 0x{capability:08X})"
-            raise self._refusal(Kind.NOT_ALLOWED, said)
+            raise self._refusal(ErrorKind.NOT_ALLOWED, said)
 
     def _check_drives(self) -> None:
         drives = self._storage.config.drives_of(self._component)
@@ -183,7 +185,7 @@ class _Run:
             if state is None or state in ENERGISED:
                 said = f"unknown: {why}" if state is None else STATE_WORDS[state]
                 raise self._refusal(
-                    Kind.WRONG_STATE,
+                    ErrorKind.WRONG_STATE,
                     f"the state of {drive} is {said}; a device may not answer while it writes its memory: "
                     "stop the drives first",
                 )
@@ -196,12 +198,12 @@ class _Run:
             download(self._node, self._address, command.signature, self._leave.objection, self._timeout_s)
         except NotPermitted as error:
             self._check_leave()
-            raise self._refusal(Kind.NOT_ALLOWED, f"{error}; nothing was sent") from error
+            raise self._refusal(ErrorKind.NOT_ALLOWED, f"{error}; nothing was sent") from error
         except DeviceAbort as error:
             raise self._device_error(error) from error
         except (DriverError, TimeoutError) as error:
             said = f"{self._device_error(error)}; {_UNKNOWN}"
-            kind, component = Kind.DEVICE_TIMEOUT, self._component
+            kind, component = ErrorKind.DEVICE_TIMEOUT, self._component
             raise refuse(kind, said, component=component, object=command.object) from error
 
     # Afterwards
@@ -212,10 +214,10 @@ class _Run:
             self._check_answers()
             self._check_unchanged(before)
         except RpcError as error:
-            if error.kind is Kind.MISMATCH:
+            if error.kind is ErrorKind.MISMATCH:
                 raise
             said = f"the device confirmed, but then: {error}"
-            raise refuse(Kind.DEVICE_TIMEOUT, said, component=self._component) from error
+            raise refuse(ErrorKind.DEVICE_TIMEOUT, said, component=self._component) from error
 
     def _check_answers(self) -> None:
         """Wait until the busy device answers again, and still says that it can store."""
@@ -224,7 +226,7 @@ class _Run:
             try:
                 return self._check_capability()
             except RpcError as error:
-                if error.kind is not Kind.DEVICE_TIMEOUT or time.monotonic() > deadline:
+                if error.kind is not ErrorKind.DEVICE_TIMEOUT or time.monotonic() > deadline:
                     raise
 
     def _capability(self) -> int:
@@ -234,7 +236,7 @@ class _Run:
             raise self._device_error(error) from error
 
     def _values(self) -> dict[str, tuple[Number, bytes]]:
-        """Return what can be changed in the device, as it is now."""
+        """Return the device's writable values, as of now."""
         found = {}
         for one in self._storage.parameters.values():
             usable = one.problem is None and one.lock is None and one.access in READABLE
@@ -251,7 +253,7 @@ class _Run:
             if after[name][1] != data
         ]
         if changed:
-            raise self._refusal(Kind.MISMATCH, f"it was done, but {', '.join(changed)}")
+            raise self._refusal(ErrorKind.MISMATCH, f"it was done, but {', '.join(changed)}")
 
     # Words
 
@@ -261,7 +263,7 @@ class _Run:
         so: str,
         share: Share = Share.OUTCOME,
         /,
-        kind: Kind = Kind.UNAVAILABLE,
+        kind: ErrorKind = ErrorKind.UNAVAILABLE,
         **details: str,
     ) -> None:
         """Append an entry durably; raises `RpcError` if that fails, `so` says what then."""
@@ -273,11 +275,11 @@ class _Run:
             raise self._refusal(kind, said) from error
 
     def _device_error(self, error: Exception) -> RpcError:
-        kinds = ((DeviceAbort, Kind.DEVICE_ABORT), (TimeoutError, Kind.DEVICE_TIMEOUT))
-        kind = next((kind for type_, kind in kinds if isinstance(error, type_)), Kind.UNAVAILABLE)
+        kinds = ((DeviceAbort, ErrorKind.DEVICE_ABORT), (TimeoutError, ErrorKind.DEVICE_TIMEOUT))
+        kind = next((kind for type_, kind in kinds if isinstance(error, type_)), ErrorKind.UNAVAILABLE)
         return self._refusal(kind, str(error) or "no answer", getattr(error, "abort_code", None))
 
-    def _refusal(self, kind: Kind, said: str, abort_code: int | None = None) -> RpcError:
+    def _refusal(self, kind: ErrorKind, said: str, abort_code: int | None = None) -> RpcError:
         command = self._command
         return refuse(
             kind,

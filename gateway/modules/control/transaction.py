@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 from drivers.errors import DriverError, NotPermitted
 from gateway.modules.control.ledger import WriteLedger
-from gateway.modules.control.objects import Change, device_error, download, read
+from gateway.modules.control.objects import ObjectWrite, device_error, download, read
 from gateway.modules.control.reverting import AS_IT_SHOULD_BE, TAKEN_BACK, Attempt
 from gateway.modules.control.rules import Rules, allowed_states
 from gateway.modules.stop.authority import Address, Permit
-from gateway.wire.framing import Kind, RpcError, internal_error, refuse
+from gateway.wire.framing import ErrorKind, RpcError, internal_error, refuse
 from gateway.wire.parameter import PARAMETER_WRITE
 
 ENDING = "the gateway is ending"
@@ -34,16 +34,16 @@ class Leave:
         """Why an object must not be written now, in words. From any thread."""
         return self.overtaken() or self.permit.objection(address)
 
-    def kind(self, said: str) -> Kind:
-        """Return what an objection means."""
+    def kind(self, said: str) -> ErrorKind:
+        """Return the kind of error of an objection."""
         if said == ENDING:
-            return Kind.UNAVAILABLE
+            return ErrorKind.UNAVAILABLE
         allowed = said not in (self.overtaken(), self.permit.authority.frozen())
-        return Kind.STOPPED if allowed else Kind.NOT_ALLOWED
+        return ErrorKind.STOPPED if allowed else ErrorKind.NOT_ALLOWED
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class TransactionResult:
     """Values as the devices hold them."""
 
     before: dict[str, float]
@@ -55,7 +55,7 @@ class Transaction:
 
     def __init__(
         self,
-        changes: list[Change],
+        changes: list[ObjectWrite],
         rules: Rules,
         leave: Leave,
         ledger: WriteLedger,
@@ -69,7 +69,7 @@ class Transaction:
         self._before: dict[str, bytes] = {}
         self._touched: set[str] = set()
 
-    def run(self) -> Outcome:
+    def run(self) -> TransactionResult:
         """Do it.
 
         Raises:
@@ -94,7 +94,7 @@ class Transaction:
             raise self._roll_back(error) from error
         except Exception as error:
             raise self._roll_back(internal_error(PARAMETER_WRITE.name, error)) from error
-        return Outcome(
+        return TransactionResult(
             {one.name: self._value_before(one) for one in self._changes},
             {one.name: one.parameter.decode(one.data) for one in self._changes},
         )
@@ -120,18 +120,18 @@ class Transaction:
         self._changes.sort(key=lambda one: abs(one.parameter.decode(one.data)) > abs(self._value_before(one)))
         self._ledger.begin(self._changes, self._before)
 
-    def _check_leave(self, change: Change) -> None:
+    def _check_leave(self, change: ObjectWrite) -> None:
         said = self._leave.objection(self._rules.address(change.parameter))
         if said is not None:
             raise change.parameter.refusal(self._leave.kind(said), said)
         silence = self._rules.silence(change.parameter.component)
         if silence is not None:
-            raise change.parameter.refusal(Kind.UNAVAILABLE, silence)
+            raise change.parameter.refusal(ErrorKind.UNAVAILABLE, silence)
         if change.node.distrust is not None:
-            raise change.parameter.refusal(Kind.NOT_ALLOWED, change.node.distrust)
+            raise change.parameter.refusal(ErrorKind.NOT_ALLOWED, change.node.distrust)
 
     def _current(self) -> dict[str, bytes]:
-        """Return what the devices hold.
+        """Return the devices' present values.
 
         Read anew where a trial that this one takes over has ended meanwhile.
         """
@@ -144,10 +144,10 @@ class Transaction:
             if self._ledger.replaced(self._changes) == replaced:
                 return found
 
-    def _value_before(self, change: Change) -> float:
+    def _value_before(self, change: ObjectWrite) -> float:
         return change.parameter.decode(self._before[change.name])
 
-    def _check_way_back(self, change: Change) -> None:
+    def _check_way_back(self, change: ObjectWrite) -> None:
         """Refuse a trial that could not be reverted at its end."""
         goal = self._ledger.goal(change, self._before[change.name])
         if goal is None:
@@ -160,7 +160,7 @@ class Transaction:
 
     # The downloads
 
-    def _apply(self, change: Change) -> None:
+    def _apply(self, change: ObjectWrite) -> None:
         self._let_pass()
         parameter, node = change.parameter, change.node
         self._check_leave(change)
@@ -171,18 +171,18 @@ class Transaction:
         except NotPermitted as error:
             self._touched.remove(change.name)
             self._check_leave(change)
-            raise parameter.refusal(Kind.NOT_ALLOWED, str(error)) from error
+            raise parameter.refusal(ErrorKind.NOT_ALLOWED, str(error)) from error
         except (DriverError, TimeoutError) as error:
             raise device_error(parameter, f"writing {parameter.decode(change.data):g} to", error) from error
         self._verify(change, read(parameter, node))
 
-    def _verify(self, change: Change, found: bytes) -> None:
+    def _verify(self, change: ObjectWrite, found: bytes) -> None:
         if found == change.data:
             return
         self._ledger.made(change.name, found)
         parameter, value = change.parameter, change.parameter.decode(change.data)
         text = f"{value:g} was written, the device holds {found.hex(' ')} ({parameter.object})"
-        raise parameter.refusal(Kind.MISMATCH, text)
+        raise parameter.refusal(ErrorKind.MISMATCH, text)
 
     # Afterwards
 
@@ -201,7 +201,7 @@ def _answer(cause: RpcError, outcome: dict[str, str]) -> RpcError:
     """Why a write has failed, and what became of each parameter."""
     failed = [name for name, what in outcome.items() if what not in {NOT_WRITTEN, *AS_IT_SHOULD_BE}]
     taken_back = TAKEN_BACK in outcome.values()
-    kind = Kind.ROLLBACK_FAILED if failed else Kind.ROLLED_BACK if taken_back else cause.kind
+    kind = ErrorKind.ROLLBACK_FAILED if failed else ErrorKind.ROLLED_BACK if taken_back else cause.kind
     text = str(cause)
     if failed:
         text += f"; and could not be taken back: {', '.join(failed)}; read them before you go on"

@@ -19,7 +19,7 @@ from gateway.process.futures import outcome
 from gateway.records.journal import Share
 from gateway.records.records import Records
 from gateway.records.undo import Undo, UndoChange
-from gateway.wire.framing import Kind, RpcError, refuse
+from gateway.wire.framing import ErrorKind, RpcError, refuse
 
 log = logging.getLogger(__name__)
 
@@ -37,7 +37,7 @@ class TrialJobs:
         self._let_pass = partial(writer.let_pass, Turn.TRIAL)
 
     def confirm(self, write: int) -> dict[str, float] | None:
-        """Keep what the devices still hold; `None` where nothing of it is left.
+        """Keep the values that the devices still hold; `None` if none is left.
 
         Raises:
             RpcError: it stays on trial.
@@ -54,7 +54,7 @@ class TrialJobs:
         except OSError as error:
             text = f"the confirmation could not be recorded, it stays on trial: {error.strerror or error}"
             self._journal.append(undo.who, "trial NOT confirmed", Share.ASKED, write=write, result=text)
-            raise refuse(Kind.UNAVAILABLE, text) from error
+            raise refuse(ErrorKind.UNAVAILABLE, text) from error
         return undo.values()
 
     def _check_held(self, change: UndoChange) -> None:
@@ -62,9 +62,9 @@ class TrialJobs:
             parameter, node = self._rules.reach(change)
             held = result(node.upload(parameter.index, parameter.subindex))
         except (OutOfReach, DriverError, TimeoutError) as error:
-            raise _stays(Kind.UNAVAILABLE, change, f": {str(error) or 'no answer'}") from error
+            raise _stays(ErrorKind.UNAVAILABLE, change, f": {str(error) or 'no answer'}") from error
         if held.hex() != change.written:
-            raise _stays(Kind.MISMATCH, change, f" holds {held.hex(' ')} and not what was written")
+            raise _stays(ErrorKind.MISMATCH, change, f" holds {held.hex(' ')} and not what was written")
 
     def take_back(self, write: int, why: str, known: str | None) -> TakenBack | None:
         """One attempt; `None` where nothing is to be taken back any more. `known` was said before."""
@@ -86,7 +86,7 @@ class TrialJobs:
         return any(change.address in self._authority.locked for change in changes)
 
     def claim(self) -> list[int]:
-        """Return what stops a controller is never taken back: a stop has set it.
+        """End trials of values that stop a controller: a stop has set them, so they are never reverted.
 
         Returns the writes concerned.
         """
@@ -112,5 +112,5 @@ class TrialJobs:
         outcome(self._journal.append(GATEWAY, what, **details))
 
 
-def _stays(kind: Kind, change: UndoChange, text: str) -> RpcError:
+def _stays(kind: ErrorKind, change: UndoChange, text: str) -> RpcError:
     return refuse(kind, f"{change.parameter}{text}; it stays on trial", component=change.component)

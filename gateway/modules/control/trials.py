@@ -18,7 +18,7 @@ from gateway.modules.control.writer import Turn, Writer
 from gateway.process.futures import back, done, outcome, then
 from gateway.process.loop import Loop, Timer
 from gateway.records.undo import Undo, UndoFile
-from gateway.wire.framing import Kind, RpcError, refuse
+from gateway.wire.framing import ErrorKind, RpcError, refuse
 from gateway.wire.parameter import Confirmed, Reverted, TrialInfo
 
 if TYPE_CHECKING:
@@ -125,7 +125,7 @@ class Trials:
         self._changed()
 
     def confirm(self, write: int) -> "Future[Confirmed]":
-        """Keep what is on trial, if the devices still hold it.
+        """Keep the values on trial, if the devices still hold them.
 
         Raises:
             RpcError: at once, or as the future's error. unknown_name: it has ended, and how; mismatch,
@@ -229,7 +229,7 @@ class Trials:
         text = (
             f"write {trial.undo.write} could not be taken back yet: {trial.problem}; the gateway keeps trying"
         )
-        self._fail(trial, refuse(Kind.ROLLBACK_FAILED, text, outcome=dict(trial.outcome)))
+        self._fail(trial, refuse(ErrorKind.ROLLBACK_FAILED, text, outcome=dict(trial.outcome)))
         if not self._closed:
             trial.set_timer(self._loop.call_later(trial.retry_s, lambda: self._take_back(trial, "")))
             trial.retry_s = min(2 * trial.retry_s, LAST_RETRY_S)
@@ -270,8 +270,8 @@ class Trials:
         if why is None and write in self._trials:
             why = f"it is being taken back: {self._trials[write].why}"
         said = why or "there is no such write, or it was not on trial"
-        return refuse(Kind.UNKNOWN_NAME, f"write {write} is not on trial: {said}")
+        return refuse(ErrorKind.UNKNOWN_NAME, f"write {write} is not on trial: {said}")
 
 
 def _ending() -> RpcError:
-    return refuse(Kind.UNAVAILABLE, "the gateway is ending")
+    return refuse(ErrorKind.UNAVAILABLE, "the gateway is ending")

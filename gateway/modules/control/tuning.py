@@ -22,12 +22,12 @@ from gateway.modules.component.module import ComponentModule
 from gateway.modules.control.catalogue import resolve
 from gateway.modules.control.dictionary import Objects, Wanted
 from gateway.modules.control.ledger import WriteLedger
-from gateway.modules.control.objects import Change, Node, device_error
+from gateway.modules.control.objects import Node, ObjectWrite, device_error
 from gateway.modules.control.parameters import Parameter
 from gateway.modules.control.reads import Reads
 from gateway.modules.control.rules import Rules
 from gateway.modules.control.storage import Command, Storage
-from gateway.modules.control.transaction import ENDING, Leave, Outcome, Transaction
+from gateway.modules.control.transaction import ENDING, Leave, Transaction, TransactionResult
 from gateway.modules.control.trial_jobs import TrialJobs
 from gateway.modules.control.trials import Coming, Trials
 from gateway.modules.control.unanswered import Unanswered
@@ -38,7 +38,7 @@ from gateway.process.futures import back, done, gather, then
 from gateway.process.loop import Loop
 from gateway.records.records import Records
 from gateway.records.undo import Undo
-from gateway.wire.framing import Kind, RpcError, refuse
+from gateway.wire.framing import ErrorKind, RpcError, refuse
 from gateway.wire.parameter import ParameterInfo, ParameterValue, ParameterValues, Stored, Written
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ Changed = Callable[[], None]
 class _Asked:
     """One write, and what it may do."""
 
-    changes: list[Change]
+    changes: list[ObjectWrite]
     who: str
     trial_s: float | None
     coming: Coming
@@ -106,7 +106,7 @@ class Tuning:
         self._writer.close()
 
     def load(self) -> list[Undo]:
-        """Return what the last gateway left to be taken back. Before anything is written."""
+        """Return the writes that the last gateway left to be reverted; to be called before any write."""
         undos, problem = self._records.undo.load()
         if problem is not None:
             log.critical("%s", problem)
@@ -117,7 +117,7 @@ class Tuning:
         return undos
 
     def resume(self, undos: Iterable[Undo]) -> None:
-        """Take that back, the newest first, as soon as its devices are there; but what a stop has claimed."""
+        """Revert those writes, newest first, once their devices are there; not values claimed by a stop."""
         left = [undo for one in undos if (undo := self._records.undo.get(one.write)) is not None]
         ready = self._component.when_ready({one.component for undo in left for one in undo.changes})
         for undo in reversed(left):
@@ -125,7 +125,7 @@ class Tuning:
             self.trials.take_up(undo, f"the gateway ended {how}", ready)
 
     def claim(self) -> "Future[None]":
-        """Return what stops the controllers is as a stop has set it now, and never taken back.
+        """Keep the values that stop controllers as a stop has set them: they are never reverted.
 
         From any thread.
         """
@@ -146,13 +146,13 @@ class Tuning:
         return self._infos
 
     def listed(self, names: list[str] | None) -> ParameterValues:
-        """Return what is known without asking: the last value read, as long as its device is there."""
+        """Return the last known values, without asking; only of devices that are there."""
         chosen = self._parameters.chosen(names)
         lost = self._lost(chosen)
         return ParameterValues({one.name: self._last(one, lost) for one in chosen})
 
     def read(self, names: list[str] | None, client: Client) -> "Future[ParameterValues]":
-        """Return what the devices hold now; where one does not tell, `problem` says why."""
+        """Return the devices' present values; `problem` says why one is missing."""
         chosen = self._parameters.chosen(names)
         ready = self._component.when_ready({one.component for one in chosen})
         values = then(ready, lambda _none: self._reads.ask(client, chosen))
@@ -169,7 +169,7 @@ class Tuning:
         """
         changes = [self._change(name, value) for name, value in values.items()]
         if len({change.parameter.name for change in changes}) != len(changes):
-            raise refuse(Kind.BAD_PARAMS, "a parameter is written twice, by its name and by its address")
+            raise refuse(ErrorKind.BAD_PARAMS, "a parameter is written twice, by its name and by its address")
         ready = self._component.when_ready({one.parameter.component for one in changes})
         asked = _Asked(
             changes,
@@ -232,7 +232,7 @@ class Tuning:
     def _each(
         self, asked: Sequence[Parameter], node: Node, told: "Sequence[bytes | DriverError] | Exception"
     ) -> Iterator[bytes | Exception]:
-        """Return what is told of each; where a device did not answer, that is so for all that is left."""
+        """Return each parameter's answer; after a missing answer, the same error for all the rest."""
         found: list[bytes | Exception] = [told] if isinstance(told, Exception) else [*told]
         last = found[-1]
         if isinstance(last, DeviceTimeout):
@@ -248,7 +248,7 @@ class Tuning:
         """Why it is not asked for."""
         problem = parameter.problem or unasked
         if problem is not None:
-            return parameter.refusal(Kind.UNAVAILABLE, problem)
+            return parameter.refusal(ErrorKind.UNAVAILABLE, problem)
         try:
             parameter.check_readable()
         except RpcError as error:
@@ -270,11 +270,13 @@ class Tuning:
 
     # Writing
 
-    def _change(self, name: str, value: float) -> Change:
+    def _change(self, name: str, value: float) -> ObjectWrite:
         parameter = self._parameters.get(name)
         if parameter is None:
-            raise refuse(Kind.UNKNOWN_NAME, f"there is no parameter {name!r}; parameter.list has them all")
-        return Change(parameter, self._rules.node(parameter), parameter.encode(value))
+            raise refuse(
+                ErrorKind.UNKNOWN_NAME, f"there is no parameter {name!r}; parameter.list has them all"
+            )
+        return ObjectWrite(parameter, self._rules.node(parameter), parameter.encode(value))
 
     def _begin(self, asked: "_Asked") -> "Future[Written]":
         self._check_enabling(asked.changes)
@@ -293,16 +295,16 @@ class Tuning:
         self._asked.discard(asked)
         self.trials.dismiss(asked.coming)
 
-    def _check_enabling(self, changes: Iterable[Change]) -> None:
+    def _check_enabling(self, changes: Iterable[ObjectWrite]) -> None:
         """Refuse a change that bars an enabling under way, as `enabling_objection` does the reverse."""
         if self._authority.state.phase is not Phase.ENABLING:
             return
         for change in changes:
             if self._rules.bars(change.name, self._joints):
                 text = "an enabling is under way; wait for its answer"
-                raise change.parameter.refusal(Kind.WRONG_STATE, text)
+                raise change.parameter.refusal(ErrorKind.WRONG_STATE, text)
 
-    def _follow(self, asked: "_Asked", ledger: WriteLedger, ended: "Future[Outcome]") -> None:
+    def _follow(self, asked: "_Asked", ledger: WriteLedger, ended: "Future[TransactionResult]") -> None:
         """Keep a write's trial, or the values that could not be rolled back."""
         kept = ledger.kept
         if kept is None:
@@ -312,7 +314,7 @@ class Tuning:
         else:
             self.trials.take_up(kept, "its roll-back failed", done(None), ledger.problem)
 
-    def _written(self, outcome: Outcome, ledger: WriteLedger) -> Written:
+    def _written(self, outcome: TransactionResult, ledger: WriteLedger) -> Written:
         now_ns = time.monotonic_ns()
         self._known.update({name: (now_ns, value) for name, value in outcome.after.items()})
         kept = ledger.kept

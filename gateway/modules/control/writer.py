@@ -13,7 +13,7 @@ from enum import IntEnum
 from typing import Any, TypeVar
 
 from gateway.process.futures import failed
-from gateway.wire.framing import Kind, refuse
+from gateway.wire.framing import ErrorKind, refuse
 
 T = TypeVar("T")
 
@@ -56,7 +56,7 @@ class Writer:
         """Do it when its turn comes; the future's callbacks run in the writer's thread."""
         with self._changed:
             if self._closed:
-                return failed(refuse(Kind.UNAVAILABLE, "the gateway is ending"))
+                return failed(refuse(ErrorKind.UNAVAILABLE, "the gateway is ending"))
             job = _Job(turn, next(self._numbers), work)
             heapq.heappush(self._jobs, job)
             self._changed.notify()
@@ -66,12 +66,12 @@ class Writer:
         return job.future
 
     def let_pass(self, turn: Turn) -> None:
-        """Do what waits and is more urgent; for a job of this turn, in its own thread."""
+        """Run waiting jobs that are more urgent; for a job of this turn, in its own thread."""
         while (job := self._take(turn)) is not None:
             job.do()
 
     def close(self) -> None:
-        """Do what was submitted, and end."""
+        """Run the submitted jobs, and end."""
         with self._changed:
             self._closed = True
             self._changed.notify()

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, cast
 from gateway.handlers import Handlers, on
 from gateway.modules.resource.overruns import NOTHING, Blame, Deadline, Judge, Late
 from gateway.modules.resource.tasks import TICK_NS, Id, Look, Tasks
-from gateway.wire.framing import Kind, refuse
+from gateway.wire.framing import ErrorKind, refuse
 from gateway.wire.method import Params
 from gateway.wire.resource import RESOURCE_OVERRUNS, Overrun, Overruns, RanInstead
 
@@ -145,7 +145,7 @@ class BlameModule:
     def _answer(self, session: "Session", _params: Params) -> Overruns:
         if self._bus is None:
             raise refuse(
-                Kind.UNAVAILABLE,
+                ErrorKind.UNAVAILABLE,
                 "the robot's file does not say when its control loop is late: [control_loop] bus, period_ms",
             )
         told = self._told.get(session)

@@ -38,7 +38,7 @@ class Counters(Protocol):
         """Of the whole computer."""
 
     def own_rss_bytes(self) -> int:
-        """Return what this process holds itself."""
+        """Return the resident memory of this process."""
 
     def command_line(self, pid: int) -> list[str]:
         """Its words, none where there is none to be seen."""

@@ -18,7 +18,7 @@ from gateway.connections.fair_queue import FairQueue
 from gateway.handlers import Handlers, on
 from gateway.process.futures import back, done, pass_on, then
 from gateway.streaming.sources import Selection, whole
-from gateway.wire.framing import Kind, refuse
+from gateway.wire.framing import ErrorKind, refuse
 from gateway.wire.resource import RESOURCE_SNAPSHOT, ResourceSnapshot, ResourceSnapshotParams
 
 if TYPE_CHECKING:
@@ -148,7 +148,7 @@ class ResourceModule:
         return self._host.meter()
 
     def own_rss_bytes(self) -> int:
-        """Return what the gateway holds."""
+        """Return the gateway's resident memory."""
         return self._host.own_rss_bytes()
 
     def selections(self) -> list[Selection]:
@@ -178,7 +178,9 @@ class ResourceModule:
     def _snapshot(self, session: "Session", params: ResourceSnapshotParams) -> "Future[msgspec.Raw]":
         """As it goes on the wire."""
         if "control" in params.include and not self._control:
-            raise refuse(Kind.BAD_PARAMS, "control: the robot's file names no processes in [control_loop]")
+            raise refuse(
+                ErrorKind.BAD_PARAMS, "control: the robot's file names no processes in [control_loop]"
+            )
         meter = self._meter_of(session, RESOURCE_SNAPSHOT.name)
         return self._for(session, lambda: msgspec.Raw(_encoder.encode(meter.snapshot(params))))
 

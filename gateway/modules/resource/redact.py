@@ -63,7 +63,7 @@ def _without(line: str, find: Callable[[str], Iterator[Span]]) -> str:
 
 
 def _named(line: str) -> Iterator[Span]:
-    """Yield what follows a name that says that it is a secret.
+    """Yield the values that follow names of secrets.
 
     Each letter is looked at a few times at most.
     """

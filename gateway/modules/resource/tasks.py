@@ -75,7 +75,7 @@ class Tasks:
         return new
 
     def look(self) -> Look:
-        """Return what each thread that was met has had so far."""
+        """Return the processor and waiting time of each known thread so far."""
         found: Look = {}
         for task, descriptor in self._open.items():
             with suppress(OSError):  # it has ended

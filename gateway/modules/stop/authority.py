@@ -11,10 +11,18 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from gateway.modules.stop.machine import Event, Finding, Input, State, Step, step, unproved
+from gateway.modules.stop.machine import (
+    Event,
+    Input,
+    ResetFinding,
+    StopMachineState,
+    Transition,
+    step,
+    unproved,
+)
 
 Address = tuple[str, int, int, int]  # bus, node id, index, sub-index
-Act = Callable[[Step], None]
+Act = Callable[[Transition], None]
 
 LOCKED = "it stops a controller, and a stop is held: reset it first"
 
@@ -37,7 +45,7 @@ class Authority:
     """One robot's. `locked` are the objects that stop its controllers."""
 
     def __init__(self, targets: Iterable[str], locked: Iterable[Address]) -> None:
-        self.state = State(frozenset(targets))
+        self.state = StopMachineState(frozenset(targets))
         self.locked = frozenset(locked)
         self.standing: Callable[[], Mapping[str, str]] = dict  # the guard's: tripped rules that stop, and why
         self.frozen: Callable[[], str | None] = lambda: None  # the guard's: why no parameter may be changed
@@ -56,9 +64,9 @@ class Authority:
         at_ns: int | None = None,
         target: str = "",
         number: int = 0,
-        findings: Mapping[str, Finding] = MappingProxyType({}),
-    ) -> Step:
-        """Tell what has happened; `act` is given what follows, in the order of events: it must not block."""
+        findings: Mapping[str, ResetFinding] = MappingProxyType({}),
+    ) -> Transition:
+        """Feed an event; `act` receives the transition, in the order of events, and must not block."""
         with self._lock:
             standing = tuple(f"{name} ({why})" for name, why in self.standing().items())
             now_ns = time.monotonic_ns() if at_ns is None else at_ns
@@ -76,7 +84,7 @@ class Authority:
         """Whether nothing has begun since the undertaking of this number."""
         return self.state.number == number
 
-    def unproved(self, findings: Mapping[str, Finding]) -> list[str]:
+    def unproved(self, findings: Mapping[str, ResetFinding]) -> list[str]:
         """Return the targets that are not known to rest."""
         return list(unproved(self.state, findings))
 

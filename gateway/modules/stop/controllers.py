@@ -14,7 +14,7 @@ from eds import Description
 from eds.datatypes import DATA_TYPES
 from gateway.coding import NUMBERS, Coding, CodingError
 from gateway.config.stop import ControllerStop
-from gateway.modules.stop.machine import Finding
+from gateway.modules.stop.machine import ResetFinding
 from gateway.modules.stop.target import OneAtATime, Report
 from gateway.process.futures import failed
 
@@ -60,9 +60,9 @@ class Controller:
     def wake(self) -> None:
         self.node.wake()
 
-    def look(self) -> "Future[Finding]":
+    def look(self) -> "Future[ResetFinding]":
         """Read whether it is stopped; fails with `DriverError` where it does not tell."""
-        found: Future[Finding] = self.node.run(lambda sdo: _read_all(sdo, self.writes))
+        found: Future[ResetFinding] = self.node.run(lambda sdo: _read_all(sdo, self.writes))
         return found
 
 
@@ -108,7 +108,7 @@ def _write(
 
 
 def write_of(one: ControllerStop, description: Description) -> Write:
-    """Return what stops it, as its device is told; raises `CodingError` where its EDS has no such number."""
+    """Return the write that stops a controller; raises `CodingError` if its EDS has no such number."""
     variable = description.variable(*one.address)
     known = None if variable is None else DATA_TYPES.get(variable.data_type or 0)
     if variable is None or known is None or known.kind not in NUMBERS:
@@ -142,9 +142,9 @@ def _write_all(sdo: SdoChannel, writes: tuple[Write, ...], patience_s: float) ->
     return _read_all(sdo, writes, patience_s).at_rest
 
 
-def _read_all(sdo: SdoChannel, writes: tuple[Write, ...], patience_s: float | None = None) -> Finding:
+def _read_all(sdo: SdoChannel, writes: tuple[Write, ...], patience_s: float | None = None) -> ResetFinding:
     asked_ns = time.monotonic_ns()
     held = [sdo.upload(one.index, one.subindex, attempts=1, timeout_s=patience_s) for one in writes]
-    return Finding(
+    return ResetFinding(
         all(data[: len(one.data)] == one.data for one, data in zip(writes, held, strict=True)), asked_ns
     )

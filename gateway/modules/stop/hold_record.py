@@ -95,7 +95,7 @@ class HoldFile:
             self.held = self.kept = self.problem = None
 
     def close(self) -> None:
-        """Write what was asked for, and end."""
+        """Finish the pending writes, and end."""
         self._writer.shutdown(wait=True)
 
     def _write_newest(self, kept: "Future[str | None]") -> None:

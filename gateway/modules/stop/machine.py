@@ -129,7 +129,7 @@ _ENDS = frozenset({_I.ANSWERED, _I.PROVED, _I.UNPROVED, _I.REMOVED, _I.KEPT, _I.
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class ResetFinding:
     """What a reset found of a drive or controller, and when the request for that answer was sent."""
 
     at_rest: bool
@@ -137,7 +137,7 @@ class Finding:
 
 
 @dataclass(frozen=True, slots=True)
-class State:
+class StopMachineState:
     """Everything that the machine knows. Times are ns of the monotonic clock."""
 
     targets: frozenset[str]  # every drive and controller of the robot's file, there or not
@@ -167,14 +167,14 @@ class Event:
     target: str = ""
     number: int = 0
     standing: tuple[str, ...] = ()  # the guard's rules that stop, and are tripped at this moment, in words
-    findings: Mapping[str, Finding] = field(default_factory=dict)  # of `PROVED`
+    findings: Mapping[str, ResetFinding] = field(default_factory=dict)  # of `PROVED`
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class Transition:
     """Where an event has led, what is to be done now, and why what was asked for is not done."""
 
-    state: State
+    state: StopMachineState
     actions: tuple[Action, ...] = ()
     refusal: str | None = None
 
@@ -183,37 +183,37 @@ class Step:
         return self.state.number
 
 
-def step(state: State, event: Event) -> Step:
-    """Return what follows from an event."""
+def step(state: StopMachineState, event: Event) -> Transition:
+    """Return the transition for an event."""
     if event.input in _ENDS and event.number != state.number:
-        return Step(state)
+        return Transition(state)
     if event.input in (Input.SEEN, Input.LOST):
         state = _disturbed(state, event)
     if event.input in REFUSALS and event.at_ns <= state.asked_ns:
-        return Step(state, (), OVERTAKEN)
+        return Transition(state, (), OVERTAKEN)
     if event.standing and event.input in REFUSALS:
-        return Step(state, (), f"the guard's rule is tripped: {', '.join(event.standing)}")
+        return Transition(state, (), f"the guard's rule is tripped: {', '.join(event.standing)}")
     happened = event.input
     if happened is Input.PROVED and (event.standing or any(unproved(state, event.findings))):
         happened = Input.UNPROVED
     row = TRANSITIONS[state.phase].get(happened)
     if row is None:
-        return Step(state, (), REFUSALS.get(happened, {}).get(state.phase))
+        return Transition(state, (), REFUSALS.get(happened, {}).get(state.phase))
     phase, actions = row
     state = replace(state, phase=phase, number=state.number + (not _BEGIN.isdisjoint(actions)))
     if not _HOLD.isdisjoint(actions):
         state = replace(state, stopped_ns=event.at_ns)
     if Action.STOP_ALL in actions:
         state = replace(state, stops=state.stops + 1, asked_ns=event.at_ns)
-    return Step(state, actions)
+    return Transition(state, actions)
 
 
-def _disturbed(state: State, event: Event) -> State:
+def _disturbed(state: StopMachineState, event: Event) -> StopMachineState:
     at_ns = max(event.at_ns, state.disturbed_ns.get(event.target, 0))
     return replace(state, disturbed_ns={**state.disturbed_ns, event.target: at_ns})
 
 
-def unproved(state: State, findings: Mapping[str, Finding]) -> Iterator[str]:
+def unproved(state: StopMachineState, findings: Mapping[str, ResetFinding]) -> Iterator[str]:
     """Targets that are not known to rest.
 
     A reading counts that was asked for after the last stop, and after the target was last seen enabled, or

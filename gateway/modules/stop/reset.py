@@ -13,7 +13,7 @@ from drivers.joint.cia402 import DriveState
 from drivers.joint.transitions import OVERTAKEN, Led
 from gateway.modules.stop.controllers import Controllers
 from gateway.modules.stop.drive import Drive
-from gateway.modules.stop.machine import Finding
+from gateway.modules.stop.machine import ResetFinding
 from gateway.modules.stop.target import stop_all
 from gateway.process.futures import back, done, failed, gather, then, within
 from gateway.process.loop import Loop
@@ -25,7 +25,7 @@ NOT_STOPPED = "it does not hold the value that stops it"
 # How long a controller may take to tell: where one out of reach is asked to stop again and again, because it
 # enables drives, its reading has no turn, and the reset must end for these to be watched as usual.
 LOOK_S = 2.0
-_UNREAD = Finding(at_rest=False, asked_ns=0)
+_UNREAD = ResetFinding(at_rest=False, asked_ns=0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +34,7 @@ class Descent:
 
     drives: dict[str, str]
     problems: dict[str, str]
-    findings: dict[str, Finding] = field(default_factory=dict)
+    findings: dict[str, ResetFinding] = field(default_factory=dict)
 
     def with_problems(self, unproved: Iterable[str]) -> "Descent":
         """Each target that is not known to rest has its reason."""
@@ -82,19 +82,19 @@ class Lowering:
         self,
         led: Mapping[str, Led | Exception],
         seen: Mapping[str, Led | Exception],
-        found: Mapping[str, Finding | Exception],
+        found: Mapping[str, ResetFinding | Exception],
     ) -> Descent:
         last = {name: _last(as_led(led[name]), as_led(seen[name])) for name in self._drives}
         last |= {name: Led(None, self._absent[name]) for name in self._joints if name not in last}
         problems = {name: one.problem for name, one in last.items() if one.problem is not None}
         for name, one in found.items():
-            if not isinstance(one, Finding):
+            if not isinstance(one, ResetFinding):
                 problems[name] = str(one)
             elif not one.at_rest:
                 problems[name] = f"it was not read within {LOOK_S:g} s" if one is _UNREAD else NOT_STOPPED
         problems |= {name: why for name, why in self._absent.items() if name not in last}
-        findings = {name: Finding(one.state in AT_REST, one.asked_ns) for name, one in last.items()}
-        findings |= {name: one for name, one in found.items() if isinstance(one, Finding)}
+        findings = {name: ResetFinding(one.state in AT_REST, one.asked_ns) for name, one in last.items()}
+        findings |= {name: one for name, one in found.items() if isinstance(one, ResetFinding)}
         return Descent({name: state_words(one.state) for name, one in last.items()}, problems, findings)
 
 

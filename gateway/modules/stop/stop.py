@@ -12,7 +12,7 @@ from drivers.joint.quick_stop import StopOutcome
 from gateway.config.stop import Fallback, StopSettings
 from gateway.modules.stop.controllers import Controllers
 from gateway.modules.stop.stopper import Stopper, Tell, nmt_stop
-from gateway.modules.stop.target import Report, Target
+from gateway.modules.stop.target import Report, StopTarget
 from gateway.process.futures import back, done, gather, outcome, then
 from gateway.process.loop import Loop
 from gateway.wire.stop import StopOutcome as Said
@@ -44,7 +44,7 @@ class StopAnswers:
         self._settings = settings
         self._stoppers = stoppers
         self._controllers = controllers
-        self._targets: Mapping[str, Target] = {**stoppers, **controllers.targets}
+        self._targets: Mapping[str, StopTarget] = {**stoppers, **controllers.targets}
         self._unreachable = {name: Report(StopOutcome.UNREACHABLE) for name in (*absent, *controllers.absent)}
         self._when_ready = when_ready
         self._tell = tell
@@ -106,7 +106,7 @@ def _is_confirmed(stop: "Future[Report]") -> bool:
 
 
 def _so_far(stops: "Mapping[str, Future[Report]]", last: "Future[dict[str, Report]]") -> dict[str, Report]:
-    """Return what is known by now; a target that has not answered yet is not confirmed."""
+    """Return the reports so far; a target without an answer yet is unconfirmed."""
     reports = dict.fromkeys(stops, Report(StopOutcome.UNCONFIRMED))
     for name, stop in stops.items():
         if stop.done():

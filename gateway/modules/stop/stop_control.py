@@ -20,20 +20,20 @@ from gateway.modules.stop.controllers import Controllers
 from gateway.modules.stop.drive import Drive
 from gateway.modules.stop.enabling import Enabling
 from gateway.modules.stop.hold_record import HeldStop, HoldFile
-from gateway.modules.stop.machine import OVERTAKEN, Action, Input, Step
+from gateway.modules.stop.machine import OVERTAKEN, Action, Input, Transition
 from gateway.modules.stop.reset import Descent, Lowering
 from gateway.modules.stop.stop import StopAnswers
 from gateway.modules.stop.stopper import Stopper
-from gateway.modules.stop.target import Report, Target, stop_all
-from gateway.modules.stop.thread import Ended, StopThread
-from gateway.modules.stop.watch import LOOK_S, Watch
+from gateway.modules.stop.target import Report, StopTarget, stop_all
+from gateway.modules.stop.thread import StopThread, StopThreadEnded
+from gateway.modules.stop.watch import LOOK_S, StopWatch
 from gateway.process.boot import boot_id
 from gateway.process.futures import back, done, gather, outcome, pass_on, then
 from gateway.process.loop import Loop
 from gateway.records.journal import Share
 from gateway.records.records import Records
 from gateway.streaming.sources import check_globs, matches
-from gateway.wire.framing import Kind, refuse
+from gateway.wire.framing import ErrorKind, refuse
 from gateway.wire.stop import DriveReaction, Enabled, Reset, StopInfo, Stopped
 
 if TYPE_CHECKING:
@@ -100,12 +100,12 @@ class StopControl:
             name: Stopper(drive, config.stop.fallback, self._tell_fallback)
             for name, drive in self.drives.items()
         }
-        self._targets: Mapping[str, Target] = {**stoppers, **self._controllers.targets}
+        self._targets: Mapping[str, StopTarget] = {**stoppers, **self._controllers.targets}
         self.authority = Authority(
             (*self.drives, *self._absent, *self._controllers.names), locked_objects(config)
         )
         self._record = HoldFile(records.folder.hold, records.unusable, self._wrote)
-        self._watch = Watch(
+        self._watch = StopWatch(
             self.authority, stoppers, self._controllers.targets, self._happened, self._tell_again
         )
         self._thread = StopThread(self._look, lambda: self.authority.held, LOOK_S)
@@ -155,14 +155,14 @@ class StopControl:
     def _happened(self, what: Input, target: str, stamp_ns: int) -> None:
         """Take the observations of the watch."""
         asked = Asked(GATEWAY, f"{target}: {what.value} while the hold was ending")
-        with contextlib.suppress(Ended):
+        with contextlib.suppress(StopThreadEnded):
             self.authority.feed(what, partial(self._act, asked, target), at_ns=stamp_ns, target=target)
 
     def _ask(self, what: Input, asked: Asked) -> "Future[Stopped]":
         self.authority.feed(what, partial(self._act, asked, ""))
         return asked.answer
 
-    def _act(self, asked: Asked, target: str, step: Step) -> None:
+    def _act(self, asked: Asked, target: str, step: Transition) -> None:
         """Under the machine's lock: in the order of events, and without waiting for anything."""
         for action in step.actions:
             if action is Action.STOP_ALL:
@@ -269,7 +269,7 @@ class StopControl:
     def _prove(self, who: str, number: int, descent: Descent) -> "Future[Reset]":
         removed: list[Future[None]] = []
 
-        def act(step: Step) -> None:
+        def act(step: Transition) -> None:
             if Action.REMOVE in step.actions:
                 removed.append(self._record.remove())
 
@@ -298,10 +298,10 @@ class StopControl:
                 f"every drive is disabled, but the stop stays held: its record cannot be removed: {failure}"
             )
             self._journal.append(GATEWAY, "hold not ended", reason=text)
-            raise refuse(Kind.UNAVAILABLE, text)
+            raise refuse(ErrorKind.UNAVAILABLE, text)
         return self._told(who, descent)
 
-    def _release(self, step: Step) -> None:
+    def _release(self, step: Transition) -> None:
         if Action.RELEASE in step.actions:
             self._watch.end()
             self._record.forget()
@@ -322,10 +322,10 @@ class StopControl:
         if step.refusal is None:
             return step.number
         if what is Input.ENABLE and step.state.held:
-            raise refuse(Kind.STOPPED, self._hold_words())
+            raise refuse(ErrorKind.STOPPED, self._hold_words())
         stopped = step.refusal == OVERTAKEN or self.authority.standing()
         said = f"the stop is not reset: {step.refusal}" if stopped and step.state.held else step.refusal
-        raise refuse(Kind.STOPPED if stopped else Kind.WRONG_STATE, said)
+        raise refuse(ErrorKind.STOPPED if stopped else ErrorKind.WRONG_STATE, said)
 
     # Enabling; in the loop.
 
@@ -349,14 +349,14 @@ class StopControl:
         """
         if self._config.gateway.role is not Role.MASTER:
             raise refuse(
-                Kind.NOT_ALLOWED,
+                ErrorKind.NOT_ALLOWED,
                 'enabling is the part of the controller that owns the bus; [gateway] role is "observer"',
             )
         check_globs("joint", self.drives, globs, self._absent)
         chosen = {name: drive for name, drive in self.drives.items() if matches(name, globs)}
         pending = on_trial(list(chosen))
         if pending is not None:
-            raise refuse(Kind.TRIAL_PENDING, pending)
+            raise refuse(ErrorKind.TRIAL_PENDING, pending)
         number = self._begin(Input.ENABLE, asked_ns)
 
         def objects() -> str | None:
@@ -378,7 +378,9 @@ class StopControl:
         def begin(written: Mapping[str, Exception | None]) -> "Future[Enabled]":
             error = written["journal"]
             if error is not None:
-                raise refuse(Kind.UNAVAILABLE, f"it cannot be journaled, so nothing was enabled: {error}")
+                raise refuse(
+                    ErrorKind.UNAVAILABLE, f"it cannot be journaled, so nothing was enabled: {error}"
+                )
             return enabling.run()
 
         return then(entry, begin)
@@ -428,12 +430,12 @@ def locked_objects(config: RobotConfig) -> frozenset[Address]:
     )
 
 
-def _nothing(_step: Step) -> None:
+def _nothing(_step: Transition) -> None:
     """Leave the next step to the caller."""
 
 
 def _reaction(drive: Drive, armed: bool) -> DriveReaction:
-    """Return what a drive does by itself, as it said when it came up."""
+    """Return a drive's own reaction to a lost master, as read when it came up."""
     options = {} if drive.reading is None else drive.reading.options
     quick_stop, abort_connection = options.get("quick_stop"), options.get("abort_connection")
     return DriveReaction(

@@ -19,7 +19,7 @@ class Report:
     fallback: str | None = None
 
 
-class Target(Protocol):
+class StopTarget(Protocol):
     """One drive, or one controller."""
 
     @property
@@ -33,7 +33,7 @@ class Target(Protocol):
         """Follow what was asked for with `wake=False`."""
 
 
-def stop_all(targets: Mapping[str, Target]) -> "dict[str, Future[Report]]":
+def stop_all(targets: Mapping[str, StopTarget]) -> "dict[str, Future[Report]]":
     """Every request first, then those who wait for the answers."""
     stops = {name: target.stop(wake=False) for name, target in targets.items()}
     for target in targets.values():

@@ -18,7 +18,7 @@ log = logging.getLogger(__name__)
 Work = Callable[[], object]
 
 
-class Ended(Exception):
+class StopThreadEnded(Exception):
     """What was asked for came too late: the module that carries out stops is ending."""
 
 
@@ -40,7 +40,7 @@ class StopThread:
         self._thread.start()
 
     def close(self) -> None:
-        """Do what was given, and end."""
+        """Finish the given work, and end."""
         with self._closing:
             self._closed = True
             self._work.put(None)
@@ -56,7 +56,7 @@ class StopThread:
         """
         with self._closing:
             if self._closed:
-                raise Ended("the stop's thread has ended; ask again")
+                raise StopThreadEnded("the stop's thread has ended; ask again")
             self._work.put(work)
 
     def _run(self) -> None:

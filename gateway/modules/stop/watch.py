@@ -18,9 +18,9 @@ from drivers.samples import Sample
 from gateway.modules.stop.authority import Authority
 from gateway.modules.stop.controllers import Controller
 from gateway.modules.stop.drive import Drive, is_enabled
-from gateway.modules.stop.machine import Finding, Input, Phase
+from gateway.modules.stop.machine import Input, Phase, ResetFinding
 from gateway.modules.stop.stopper import Stopper
-from gateway.modules.stop.target import Target, stop_all
+from gateway.modules.stop.target import StopTarget, stop_all
 from gateway.process.futures import outcome
 
 log = logging.getLogger(__name__)
@@ -36,7 +36,7 @@ SAY_AGAIN_S = 5.0  # how often one target that is started again and again is tol
 _LED = (Phase.RESETTING, Phase.RELEASING)
 
 
-class Watch:
+class StopWatch:
     """Over all drives and controllers, between `begin` and `end`; both idempotent, for any thread.
 
     `happened(what, target, stamp_ns)` is told at once what was seen, in the thread that saw it, and
@@ -99,7 +99,7 @@ class Watch:
 
     def stop_again(self, name: str) -> None:
         """One that was seen enabled or running, and its controllers with it. In the stop's thread."""
-        target: Target = self._stoppers.get(name) or self._controllers[name]
+        target: StopTarget = self._stoppers.get(name) or self._controllers[name]
         if target.running:
             return
         self._times[name] = self._times.get(name, 0) + 1
@@ -129,11 +129,11 @@ class Watch:
             self._looking.add(name)
             controller.look().add_done_callback(lambda seen: self._found(name, controller, seen))
 
-    def _found(self, name: str, controller: Controller, seen: Future[Finding]) -> None:
+    def _found(self, name: str, controller: Controller, seen: Future[ResetFinding]) -> None:
         """In the thread of the controller's node."""
         self._looking.discard(name)
         found = outcome(seen)
-        if isinstance(found, Finding):
+        if isinstance(found, ResetFinding):
             if not found.at_rest:
                 self._seen(name, found.asked_ns)
         elif isinstance(found, DriverError):

@@ -15,7 +15,7 @@ Numbers = npt.NDArray[Any]
 
 
 def scaled_rows(scale: Pipeline, x: Features) -> Features:
-    """Return what `ml.neural.scaled()` makes of rows; the same bits."""
+    """Return the rows scaled as `ml.neural.scaled()` does, bit for bit."""
     return within(_standard(scale[0], x))
 
 

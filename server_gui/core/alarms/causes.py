@@ -20,6 +20,7 @@ AT_ONCE: Final = 0.6  # of it, that the rows are of which then come in one piece
 CATCHES_UP_S: Final = 1.0  # a gateway sends what it is late with only as far back
 BEFORE_S: Final = 0.5  # clocks, and looks at a robot, are no more exact
 AFTER_S: Final = 5.0  # and then something is found to have missed its time
+NEWS_TIMES: Final = 2.0  # as long as the longest before it: the others are in the alarm
 EPISODE_S: Final = 60.0  # between two stalls that are told as one
 TOLD_S: Final = 10.0  # how long a stall is told after which nothing was wrong
 OWN_S: Final = 30.0  # what lasts longer than that after a stall is not the stall's
@@ -56,6 +57,12 @@ class Stalls:
         self.latest: tuple[Stall, ...] = ()  # those that are told as one, oldest first
         self._before: tuple[int, int, int] | None = None  # stream, newest stamp, when it came
         self._known: deque[Stall] = deque(maxlen=32)
+
+    def is_news(self, stall: Stall) -> bool:
+        """Whether it is to be told: it is long, and far longer than those before it that are told with it."""
+        told = (one.lasted_s for one in self.latest[:-1] if one.lasted_s >= STOOD_S)
+        before = max(told, default=0.0)
+        return stall.lasted_s >= max(STOOD_S, NEWS_TIMES * before)
 
     def forget(self) -> None:
         """Another link: what lies between is not the gateway's."""

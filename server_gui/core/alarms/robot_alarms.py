@@ -14,11 +14,13 @@ from server_gui.core.alarms.alarm import Alarm
 from server_gui.core.alarms.causes import Stall, stood_still
 from server_gui.core.alarms.marks import ENABLED, age_text
 from server_gui.core.alarms.texts import Kind, check_of, error_check, error_text
-from server_gui.core.follow.robot import Part, Robot
+from server_gui.core.follow.robot import FollowedComponent, Robot
 from server_gui.core.prediction.current import ShownDanger
 from server_gui.core.processing import bus_health
 from server_gui.core.tuning.stop import StopProgress, StopState
 
+EVERY_OFF: Final = "every drive is off"
+OFF: Final = frozenset({"switch on disabled"})
 MOVES: Final = 0.1  # rad/s: what turns faster is not at rest
 SOON_NS: Final = 3_000_000_000  # for so long a link without a row is nothing strange
 _QUICK_STOP: Final = "quick stop active"
@@ -27,6 +29,7 @@ _CODE: Final = re.compile(r"0x([0-9A-Fa-f]{4})\b")
 _PREFIX: Final = re.compile(r"^(the drive is in fault: |it reports )")
 _LASTING: Final = re.compile(r" \(for \d+ s\)")  # an alarm says by itself since when
 _ADVICE: Final = re.compile(r": (?=(?:check|plug|see) )")  # with which what the robot says of a part may end
+_ANOTHER: Final = re.compile(r"(?:it reports|the drive is|its|no|nothing|node|\d+ %|0x[0-9A-Fa-f]{4}) ?\b")
 # What shows it best, by the code's beginning; else the position.
 _SHOWN_BY: Final = (
     ("2", ("current", "torque")),
@@ -96,9 +99,8 @@ def _of_stop(robot: Robot, stopping: StopProgress) -> Iterator[Alarm]:
             aside=by,
         )
     elif stopping.was_ended and not any_enabled(robot):
-        yield Alarm(
-            Kind.RESET, "", "every drive is off", check=check_of(Kind.RESET), since_s=stopping.since_s
-        )
+        what = EVERY_OFF if set(_words(robot).values()) <= OFF else _drives_did(robot) or EVERY_OFF
+        yield Alarm(Kind.RESET, "", what, check=check_of(Kind.RESET), since_s=stopping.since_s)
 
 
 def remedy(robot: Robot) -> str:
@@ -110,7 +112,10 @@ def remedy(robot: Robot) -> str:
 def _after_stop(robot: Robot, stopping: StopProgress) -> str:
     """Return what the drives' states have shown; where not all have shown it, how they are."""
     shown = set(stopping.proofs) >= set(robot.names("joint")) and not any_enabled(robot)
-    return stopping.proof if shown else "; ".join(filter(None, (stopping.proof, _drives_did(robot))))
+    every = "all " if len({proof.state for proof in stopping.proofs.values()}) == 1 else ""
+    return (
+        f"{every}{stopping.proof}" if shown else "; ".join(filter(None, (stopping.proof, _drives_did(robot))))
+    )
 
 
 def _after_unconfirmed(robot: Robot) -> str:
@@ -157,7 +162,7 @@ def _drives_did(robot: Robot) -> str:
 
 def _counted(words: Mapping[str, str | None], state: str, states: int) -> str:
     count = list(words.values()).count(state)
-    return f"all {state}" if states == 1 else f"{count} {state}"
+    return f"all {count} drives in {state}" if states == 1 else f"{count} {state}"
 
 
 def _did(robot: Robot, stopping: StopProgress) -> str:
@@ -213,7 +218,7 @@ def _of_drive(robot: Robot, name: str, stopping: StopProgress) -> Iterator[Alarm
     )
 
 
-def _cause(robot: Robot, part: Part) -> tuple[str, int | None]:
+def _cause(robot: Robot, part: FollowedComponent) -> tuple[str, int | None]:
     """Why a drive is in fault, and its code: as the robot says, else by the code that the drive tells."""
     said = _LASTING.sub("", _PREFIX.sub("", part.problem or ""))
     found = _CODE.search(said)
@@ -225,7 +230,7 @@ def _cause(robot: Robot, part: Part) -> tuple[str, int | None]:
     return said or "the drive does not say why", None
 
 
-def _of_part(robot: Robot, part: Part, stopping: StopProgress) -> Iterator[Alarm]:
+def _of_part(robot: Robot, part: FollowedComponent, stopping: StopProgress) -> Iterator[Alarm]:
     if robot.is_recording:
         return
     where, problem = _where(robot, part.name), _LASTING.sub("", part.problem or "")
@@ -265,11 +270,14 @@ def _of_part(robot: Robot, part: Part, stopping: StopProgress) -> Iterator[Alarm
 
 
 def _advised(problem: str) -> tuple[str, str]:
-    """Split a problem into what is wrong and what to check: `this: check that; it goes on; more: …`."""
+    """Split a problem into what is wrong and what to check: `this: check that; it goes on; more: …`.
+
+    What goes on after an advice belongs to it, unless it begins as only what is wrong does.
+    """
     things, advice = list[str](), list[str]()
     for clause in problem.split("; "):
         thing, *check = _ADVICE.split(clause, maxsplit=1)
-        if not check and advice:
+        if not check and advice and not _ANOTHER.match(clause):
             advice[-1] += f"; {clause}"
         else:
             things.append(thing)
@@ -339,7 +347,7 @@ def _of_buses(robot: Robot) -> Iterator[Alarm]:
         if said is None or (bus.state == CLOSED and bus.problem is None):
             continue
         what, check = said
-        kind = Kind.BUS_FAILS if bus_health.level(bus) is bus_health.Level.ALARM else Kind.BUS
+        kind = Kind.BUS_FAILS if bus_health.level(bus) is bus_health.BusHealthLevel.ALARM else Kind.BUS
         where, is_now = bus.name, now is not None
         yield Alarm(kind, f"bus.{bus.name}", what, where, check=check or check_of(kind), is_now=is_now)
 

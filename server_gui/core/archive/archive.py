@@ -13,6 +13,7 @@ from server_gui.core.archive.recording_comparison import RecordingComparison
 from server_gui.core.cloud.jobs import Job, Jobs, JobState
 from server_gui.core.cloud.tape import Tape
 from server_gui.core.desk.desk import Desk
+from server_gui.core.desk.recording import By
 from server_gui.core.follow.news import NewsKind
 from server_gui.core.models.models import Models
 from server_gui.core.settings.server_file import ServerSettings
@@ -36,14 +37,16 @@ class Archive:
     ) -> None:
         self.settings = settings
         self.file = file
-        self.library = Library(settings, deliver)
+        self.library = Library(settings, deliver, desk.reach)
         self.journals = KeptJournals(settings, self.library.reading.do, deliver)
         self._reading = Background("playback")
         self.playback = Playback(self._reading.do, deliver, desk.shown)
         self.compared = RecordingComparison(settings, self._reading.do, deliver)
         self.labels = SessionLabels(settings, self._reading.do, deliver, author)
         self.jobs = Jobs(lambda job: deliver(lambda: self._over(job)))
-        self.models = Models(settings.store.url, deliver, self._robots, author, settings.promoters)
+        self.models = Models(
+            settings.store.url, deliver, self._robots, author, settings.promoters, desk.reach
+        )
         self.tape: Tape | None = None  # of the session that is chosen
         self.problem = ""  # why there is none
         self.chosen: Session | None = None
@@ -54,6 +57,11 @@ class Archive:
         """End everything; False where something hangs, which only the end of the process ends."""
         ended = [part.close(within_s) for part in (self.jobs, self.models, self.library, self._reading)]
         return all(ended)
+
+    def look(self) -> None:
+        """See now and then whether the store is reached, where something is to go there or was away."""
+        if self._desk.recording.by is not By.NOBODY or self._desk.reach.problem is not None:
+            self.library.knock()
 
     def choose(self, session: Session | None) -> None:
         """Look into this session; its tape comes when it has been read."""

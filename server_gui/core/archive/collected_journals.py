@@ -30,7 +30,7 @@ AGAIN_S: Final = 5.0  # before a store that was away is tried again
 
 
 @dataclass(frozen=True, slots=True)
-class Kept:
+class CollectedJournal:
     """One robot's journal as far as it was collected: stretches without a hole, oldest first."""
 
     stretches: tuple[list[Entry], ...]
@@ -48,10 +48,10 @@ class Kept:
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class JournalsFound:
     """What a look has found, by the robot's name in the store; `problem` says why nothing could be read."""
 
-    by_robot: Mapping[str, Kept] = field(default_factory=lambda: MappingProxyType({}))
+    by_robot: Mapping[str, CollectedJournal] = field(default_factory=lambda: MappingProxyType({}))
     problem: str | None = None
 
 
@@ -61,10 +61,10 @@ class KeptJournals:
     def __init__(
         self,
         settings: ServerSettings,
-        do: Callable[[Callable[[], Found]], "Future[Found]"],
+        do: Callable[[Callable[[], JournalsFound]], "Future[JournalsFound]"],
         deliver: Deliver,
     ) -> None:
-        self.found = Found()
+        self.found = JournalsFound()
         self.revision = 0
         self._settings = settings
         self._do = do
@@ -82,19 +82,19 @@ class KeptJournals:
         work = functools.partial(look, self._settings)
         when_done(self._do(work), self._deliver, self._came, self._failed)
 
-    def _came(self, found: Found) -> None:
+    def _came(self, found: JournalsFound) -> None:
         self._looking, self._looked_s = False, time.monotonic()
         if found.problem is not None:  # what was read before is still so
-            found = Found(self.found.by_robot, found.problem)
+            found = JournalsFound(self.found.by_robot, found.problem)
         self.found = found
         self.revision += 1
 
     def _failed(self, error: Exception) -> None:
-        self._came(Found(problem=f"internal error, {type(error).__name__}"))
+        self._came(JournalsFound(problem=f"internal error, {type(error).__name__}"))
 
 
-def look(settings: ServerSettings) -> Found:
-    """Return what store and spool have now; blocks."""
+def look(settings: ServerSettings) -> JournalsFound:
+    """Return the journals in store and spool; blocks."""
     entries: dict[str, list[Entry]] = {}
     try:
         waiting = spool_reader.rows(settings.recorder.spool, JOURNAL)
@@ -103,15 +103,15 @@ def look(settings: ServerSettings) -> Found:
     try:
         rows = [*_stored(settings.store.url), *waiting]
     except StoreError as error:
-        return Found(problem=str(error))
+        return JournalsFound(problem=str(error))
     for row in rows:
         entries.setdefault(row["robot"], []).append(msgspec.json.decode(row["entry"]))
-    return Found({robot: _kept(found) for robot, found in sorted(entries.items())})
+    return JournalsFound({robot: _kept(found) for robot, found in sorted(entries.items())})
 
 
-def _kept(entries: Iterable[Entry]) -> Kept:
+def _kept(entries: Iterable[Entry]) -> CollectedJournal:
     stretches = chains.chained(entries)
-    return Kept(tuple(stretches), chains.problem(stretches))
+    return CollectedJournal(tuple(stretches), chains.problem(stretches))
 
 
 def _stored(url: str) -> list[dict[str, Any]]:

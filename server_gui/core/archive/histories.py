@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from gateway.wire.robot import Description
-from server_gui.core.archive.collected_journals import Found, Kept
+from server_gui.core.archive.collected_journals import CollectedJournal, JournalsFound
 from server_gui.core.audit import chains
 from server_gui.core.audit.acts import Act, acts
 from server_gui.core.audit.chains import Entry
@@ -21,7 +21,7 @@ class History:
     """What there was when it was made; two that are equal tell the same. `kept` is what was collected."""
 
     station: Station | None
-    kept: Kept | None
+    kept: CollectedJournal | None
     revision: int = 0  # of what the robot tells
     description: Description | None = None
 
@@ -65,7 +65,7 @@ class History:
         return chains.fork(self._stretches) if self.kept is not None and self.kept.problem is None else None
 
 
-def histories(desk: Desk, found: Found) -> dict[str, History]:
+def histories(desk: Desk, found: JournalsFound) -> dict[str, History]:
     """By title: the robots of the desk, then those of which something was collected, though they are away."""
     away = dict(found.by_robot)
     called = {

@@ -35,7 +35,7 @@ class _Moment:
 
 
 def from_truth(store: Store, session: Session, path: Path) -> list[Label]:
-    """Return what a simulated wearer did, from the file that `gwrms sim --truth` wrote beside this session.
+    """Return a simulated wearer's activities, from the file of `gwrms sim --truth` for this session.
 
     Raises:
         BadLabel: it is no such file, or of another time, or computer, than the session.
@@ -80,7 +80,7 @@ def from_events(store: Store, session: Session) -> list[Label]:
 def from_table(
     session: Session, path: Path, author: str, time: Callable[[str], datetime | None]
 ) -> list[Label]:
-    """Return what a CSV file with the columns `from`, `to` and `label` says; `to` is empty for an instant.
+    """Return the labels of a CSV file with the columns `from`, `to` and `label`; `to` is empty for instants.
 
     `time` makes an instant of what stands in a cell, and raises `ValueError`. Raises `BadLabel`.
     """

@@ -80,7 +80,7 @@ class Labelling:
         author: str,
         source: str = "person",
     ) -> Kept:
-        """Say what robot and wearer did; raises as `add_all`."""
+        """Add a label to a session; raises as `add_all`."""
         whole = self.session(session, robot).session
         return self.add_all(
             [Label(robot, whole, began_utc_ns, ended_utc_ns, label, author, LabelSource(source))]

@@ -36,7 +36,7 @@ class SessionLabels:
         self._read()
 
     def add(self, text: str, began_ns: int, ended_ns: int) -> None:
-        """Say what robot and wearer did from `began_ns` to `ended_ns`, UTC."""
+        """Add a label from `began_ns` to `ended_ns`, UTC."""
         session = self.session
         if session is None:
             return

@@ -12,6 +12,7 @@ from ml.store import NoSuchTable, Store, StoreError
 from ml.store.objects import Object
 from ml.store.sessions import UNTOLD, Session, in_order, sessions
 from server_gui.core.cloud import spool_reader, usage
+from server_gui.core.cloud.store_reach import StoreReach
 from server_gui.core.cloud.usage import Usage
 from server_gui.core.recording.errors import RecordingError
 from server_gui.core.recording.receipts import RECEIPTS, Receipts
@@ -37,14 +38,17 @@ class Found:
 class Library:
     """For the window's thread. `revision` rises with every look that has found something else."""
 
-    def __init__(self, settings: ServerSettings, deliver: Deliver) -> None:
+    def __init__(self, settings: ServerSettings, deliver: Deliver, reach: StoreReach | None = None) -> None:
+        """`reach` is told what each look says of the store."""
         self.settings = settings
+        self.reach = reach or StoreReach()
         self.found = Found()
         self.revision = 0
         self.looked_s: float | None = None  # when the newest look came back, on our monotonic clock
         self.reading = Background("store")
         self._deliver = deliver
         self._looking = False
+        self._knocking = False
 
     def close(self, within_s: float) -> bool:
         """Look no more; False where a look under way hangs. Idempotent."""
@@ -65,6 +69,14 @@ class Library:
         settings = self.settings
         when_done(self.reading.do(lambda: look(settings)), self._deliver, self._looked, self._failed)
 
+    def knock(self) -> None:
+        """See whether the store is there, where it is time: one small file of it, whoever looks at a page."""
+        if self._knocking or self._looking or not self.reach.is_due:
+            return
+        self._knocking = True
+        settings = self.settings
+        when_done(self.reading.do(lambda: knock(settings)), self._deliver, self._knocked, self._knock_failed)
+
     def session(self, robot: str, name: str) -> Session | None:
         """Return the session of this name, as the newest look has found it."""
         named = (each for each in self.found.sessions if (each.robot, each.session) == (robot, name))
@@ -84,9 +96,17 @@ class Library:
         ) or self.revision == 0:
             self.revision += 1
         self.found = found
+        self.reach.looked(found.problem, is_empty=found.is_empty)
 
     def _failed(self, error: Exception) -> None:
         self._looked(Found(problem=f"internal error, {type(error).__name__}"))
+
+    def _knocked(self, found: Found) -> None:
+        self._knocking = False
+        self.reach.looked(found.problem, is_empty=found.is_empty)
+
+    def _knock_failed(self, error: Exception) -> None:
+        self._knocked(Found(problem=f"internal error, {type(error).__name__}"))
 
 
 def look(settings: ServerSettings) -> Found:
@@ -103,6 +123,18 @@ def look(settings: ServerSettings) -> Found:
     except StoreError as error:
         return Found(_joined([], waiting), problem=str(error))
     return Found(_joined(stored, waiting), used, size_bytes)
+
+
+def knock(settings: ServerSettings) -> Found:
+    """Return only whether the store is reached; blocks."""
+    try:
+        Store.existing(settings.store.url)
+    except NoSuchTable:
+        gone = _gone(settings)
+        return Found(problem=gone, is_empty=gone is None)
+    except StoreError as error:
+        return Found(problem=str(error))
+    return Found()
 
 
 def _gone(settings: ServerSettings) -> str | None:

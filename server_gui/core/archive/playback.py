@@ -16,7 +16,7 @@ from gateway.wire.component import ChannelInfo, ComponentInfo
 from gateway.wire.robot import Clock, Description, GuardInfo
 from gateway.wire.stop import StopInfo
 from server_gui.core.archive.outline import Outline
-from server_gui.core.archive.recorded_predictions import Said
+from server_gui.core.archive.recorded_predictions import PastPrediction
 from server_gui.core.archive.timeline_events import TimelineEvents
 from server_gui.core.cloud.tape import Rows, Tape
 from server_gui.core.desk.desk import Desk, Shown
@@ -115,19 +115,21 @@ class Piece:
     """A stretch of a recording: its rows, and what models said of them then, in time's order."""
 
     rows: Rows
-    said: Sequence[Said]
+    said: Sequence[PastPrediction]
 
     def between(self, begin_ns: int, end_ns: int) -> "Piece":
-        """Return what is from `begin_ns` up to before `end_ns`."""
+        """Return the rows and predictions from `begin_ns` up to before `end_ns`."""
         first, last = (bisect_left(self.said, at, key=lambda one: one.utc_ns) for at in (begin_ns, end_ns))
         return Piece(self.rows.between(begin_ns, end_ns), self.said[first:last])
 
 
 Read = Callable[[Callable[[], Any]], "Future[Any]"]  # does it in a thread
-Recall = Callable[[int, int], Sequence[Said]]  # what was said from one instant up to before another; blocks
+Recall = Callable[
+    [int, int], Sequence[PastPrediction]
+]  # what was said from one instant up to before another; blocks
 
 
-def nothing_said(_begin_ns: int, _end_ns: int) -> Sequence[Said]:
+def nothing_said(_begin_ns: int, _end_ns: int) -> Sequence[PastPrediction]:
     """Of a recording without predictions."""
     return ()
 
@@ -154,7 +156,7 @@ class Playback:
         self._recall: Recall = nothing_said
         self.happened = TimelineEvents(read, deliver)
         self.outline = Outline(read, deliver)
-        self._said: dict[str, Said] = {}  # the newest of each task
+        self._said: dict[str, PastPrediction] = {}  # the newest of each task
         self._pieces: dict[int, Piece] = {}
         self._reading: int | None = None
         self._fed_ns: int | None = None  # up to where the station has seen the recording; None: it jumps
@@ -275,7 +277,7 @@ class Playback:
         self._robot.judge()
 
     def _flags(self, rows: Rows) -> Iterator[Flag]:
-        """Yield what happened meanwhile, on the clock of the rows."""
+        """Yield the flags within these rows, on their clock."""
         behind_ns = int(rows.stamps_ns[-1] - rows.utc_ns[-1])
         for flag in self.happened.flags.between(int(rows.utc_ns[0]), int(rows.utc_ns[-1]) + 1):
             if flag.kind not in (FlagKind.FAULT, FlagKind.STOP):  # these the rows tell themselves
@@ -327,7 +329,7 @@ def _words(tape: Tape, told: Mapping[str, dict[str, str]]) -> dict[str, dict[str
 
 
 def _description(tape: Tape, jumps: int, words: Mapping[str, dict[str, str]]) -> Description:
-    """Return what the robot said it was made of, as far as its channels tell."""
+    """Return the robot's description, as far as its channels show it."""
     channels = []
     for name, unit in tape.units.items():
         component, _, quantity = name.rpartition(".")

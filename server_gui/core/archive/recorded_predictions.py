@@ -21,15 +21,15 @@ _numbers = msgspec.json.Decoder(dict[str, float])
 
 
 @dataclass(frozen=True, slots=True)
-class Said:
+class PastPrediction:
     """What a model said of the window that ended at `utc_ns`."""
 
     utc_ns: int
     prediction: Prediction
 
 
-def said(settings: ServerSettings, session: Session, begin_ns: int, end_ns: int) -> list[Said]:
-    """Return what was said from `begin_ns` up to before `end_ns`, in time's order; blocks.
+def said(settings: ServerSettings, session: Session, begin_ns: int, end_ns: int) -> list[PastPrediction]:
+    """Return the predictions from `begin_ns` up to before `end_ns`, in time's order; blocks.
 
     Raises:
         StoreError: the store cannot be reached, or the table not be read.
@@ -62,7 +62,7 @@ def _stored(
     return found
 
 
-def _said(row: Mapping[str, Any]) -> Said:
+def _said(row: Mapping[str, Any]) -> PastPrediction:
     names = ("task", "model", "stamp_ns", "label", "probability", "novelty")
     tables = (_numbers.decode(row[name]) for name in ("probabilities", "values"))
-    return Said(utc_ns(row["utc"]), Prediction(*(row[name] for name in names), *tables))
+    return PastPrediction(utc_ns(row["utc"]), Prediction(*(row[name] for name in names), *tables))

@@ -5,7 +5,7 @@ from concurrent.futures import Future
 from typing import Any
 
 from ml.store.sessions import Session
-from server_gui.core.cloud.configuration_changes import Changes, Told, changes
+from server_gui.core.cloud.configuration_changes import Changes, SessionConfiguration, changes
 from server_gui.core.cloud.metric_changes import moved, walk
 from server_gui.core.cloud.recordings import Recordings
 from server_gui.core.evidence.comparison import Evidence
@@ -71,7 +71,7 @@ def _reached(settings: ServerSettings) -> Recordings:
 
 def _facts(settings: ServerSettings, pair: tuple[Session, Session]) -> Changes:
     known = _reached(settings)
-    before, after = (Told.of(known, known.find(one.session, one.robot)) for one in pair)
+    before, after = (SessionConfiguration.of(known, known.find(one.session, one.robot)) for one in pair)
     return changes(before, after)
 
 

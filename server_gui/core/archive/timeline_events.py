@@ -35,7 +35,7 @@ class TimelineEvents:
         self._look(tape, words, self._watch)
 
     def tell(self, entries: Iterable[Entry]) -> None:
-        """Take what the robot's journal tells, as far as it was while it was recorded."""
+        """Take entries of the robot's journal from the time of the recording."""
         if self._tape is not None:
             begin_ns, end_ns = self._tape.first_ns, self._tape.last_ns
             self.flags.add(

@@ -19,13 +19,13 @@ from server_gui.core.cloud import exports, partial_copy, spool_upload, transfer,
 from server_gui.core.cloud.jobs import Job, Work
 from server_gui.core.cloud.mcap import write_mcap
 from server_gui.core.cloud.recordings import Recordings
-from server_gui.core.cloud.selection import Choice, Recording, choose
+from server_gui.core.cloud.selection import Choice, SelectedRecording, choose
 from server_gui.core.cloud.tabular import write_csv, write_parquet
 from server_gui.core.fleet.collector import connect
 from server_gui.core.recording.errors import Damaged
 from server_gui.core.settings.server_file import ServerSettings
 
-FORMATS: Final[dict[str, Callable[[Path, Recording], int]]] = {
+FORMATS: Final[dict[str, Callable[[Path, SelectedRecording], int]]] = {
     "csv": write_csv,
     "parquet": write_parquet,
     "mcap": write_mcap,

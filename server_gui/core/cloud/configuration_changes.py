@@ -21,7 +21,7 @@ NOT_THERE: Final = "not there"
 DIGITS: Final = 6
 
 
-class Kind(StrEnum):
+class ChangeKind(StrEnum):
     """What a difference is of; the order is that in which they are told."""
 
     ROBOT = "robot"
@@ -41,21 +41,21 @@ class Kind(StrEnum):
 
 
 # By section of `Session.setup`.
-SECTIONS: Final[Mapping[str, Kind]] = {
-    "zero": Kind.CALIBRATION,
-    "scale": Kind.CALIBRATION,
-    "calibration": Kind.CALIBRATION,
-    "firmware": Kind.FIRMWARE,
-    "hardware": Kind.DEVICE,
-    "vendor": Kind.DEVICE,
-    "product": Kind.DEVICE,
-    "revision": Kind.FIRMWARE,
-    "serial number": Kind.DEVICE,
-    "EDS": Kind.EDS,
-    "limits": Kind.LIMITS,
-    "guard": Kind.GUARD,
-    "component": Kind.COMPONENT,
-    "robot.toml": Kind.FILE,
+SECTIONS: Final[Mapping[str, ChangeKind]] = {
+    "zero": ChangeKind.CALIBRATION,
+    "scale": ChangeKind.CALIBRATION,
+    "calibration": ChangeKind.CALIBRATION,
+    "firmware": ChangeKind.FIRMWARE,
+    "hardware": ChangeKind.DEVICE,
+    "vendor": ChangeKind.DEVICE,
+    "product": ChangeKind.DEVICE,
+    "revision": ChangeKind.FIRMWARE,
+    "serial number": ChangeKind.DEVICE,
+    "EDS": ChangeKind.EDS,
+    "limits": ChangeKind.LIMITS,
+    "guard": ChangeKind.GUARD,
+    "component": ChangeKind.COMPONENT,
+    "robot.toml": ChangeKind.FILE,
 }
 _TITLES: Final = {
     "zero": "{} zero offset (rad)",
@@ -68,7 +68,7 @@ _TITLES: Final = {
 class Difference(Struct, frozen=True):
     """One thing that was otherwise; both in words."""
 
-    kind: Kind
+    kind: ChangeKind
     what: str
     before: str
     after: str
@@ -83,7 +83,7 @@ class Changes(Struct, frozen=True):
     same: int  # that both tell, and alike
 
 
-class Told(Struct, frozen=True):
+class SessionConfiguration(Struct, frozen=True):
     """A session and what is read of it beside its row: who wore the robot, which models predicted."""
 
     session: Session
@@ -91,7 +91,7 @@ class Told(Struct, frozen=True):
     models: Mapping[str, str]
 
     @classmethod
-    def of(cls, known: Recordings, session: Session) -> "Told":
+    def of(cls, known: Recordings, session: Session) -> "SessionConfiguration":
         """Read it; raises `StoreError`, `SpoolUnusable`."""
         labelled = (wearer(str(row["label"])) for row in known.labels(session))
         said = {session.wearer, *(name for name in labelled if name)} - {""}
@@ -102,12 +102,12 @@ class Told(Struct, frozen=True):
         return cls(session, frozenset(said), served)
 
 
-def changes(before: Told, after: Told) -> Changes:
-    """Return what differs between two sessions."""
+def changes(before: SessionConfiguration, after: SessionConfiguration) -> Changes:
+    """Return the differences between two sessions."""
     found = [one for pair in _facts(before, after) for one in _compared(*pair)]
     known = [one for one in found if NOT_RECORDED not in (one.before, one.after)]
     differ = [one for one in known if one.before != one.after]
-    order = list(Kind)
+    order = list(ChangeKind)
     differ.sort(key=lambda one: (order.index(one.kind), -one.size, one.what))
     unrecorded = [one for one in found if NOT_RECORDED in (one.before, one.after)]
     return Changes(tuple(differ), tuple(_gathered(unrecorded)), len(known) - len(differ))
@@ -115,16 +115,16 @@ def changes(before: Told, after: Told) -> Changes:
 
 Facts = Mapping[str, Any]
 _Pair = tuple[
-    Kind, str, Facts, Facts, bool
+    ChangeKind, str, Facts, Facts, bool
 ]  # kind, title, of both, and whether what is missing was not there
 
 
-def _facts(before: Told, after: Told) -> Iterator[_Pair]:
+def _facts(before: SessionConfiguration, after: SessionConfiguration) -> Iterator[_Pair]:
     one, other = before.session, after.session
-    yield Kind.ROBOT, "{}", {"name": one.robot}, {"name": other.robot}, False
+    yield ChangeKind.ROBOT, "{}", {"name": one.robot}, {"name": other.robot}, False
     worn: list[Facts] = [{"wearer": ", ".join(sorted(it.wearers)) or None} for it in (before, after)]
-    yield Kind.WEARER, "{}", worn[0], worn[1], False
-    yield Kind.PARAMETER, "{}", one.parameters, other.parameters, False
+    yield ChangeKind.WEARER, "{}", worn[0], worn[1], False
+    yield ChangeKind.PARAMETER, "{}", one.parameters, other.parameters, False
     sections = dict.fromkeys([*(_sections(one.setup)), *SECTIONS, *(_sections(other.setup))])
     for section in sections:
         if section in SECTIONS:
@@ -136,9 +136,15 @@ def _facts(before: Told, after: Told) -> Iterator[_Pair]:
                 _part(other.setup, section),
                 bool(one.setup and other.setup),
             )
-    yield Kind.MODEL, "model of {}", before.models, after.models, False
-    yield Kind.SOFTWARE, "{}", one.versions, other.versions, False
-    yield Kind.OPERATOR, "{}", {"operator": one.operator or None}, {"operator": other.operator or None}, False
+    yield ChangeKind.MODEL, "model of {}", before.models, after.models, False
+    yield ChangeKind.SOFTWARE, "{}", one.versions, other.versions, False
+    yield (
+        ChangeKind.OPERATOR,
+        "{}",
+        {"operator": one.operator or None},
+        {"operator": other.operator or None},
+        False,
+    )
 
 
 def _sections(setup: Facts) -> Iterator[str]:
@@ -149,12 +155,14 @@ def _part(setup: Facts, section: str) -> Facts:
     return {key.partition("/")[2]: value for key, value in setup.items() if key.partition("/")[0] == section}
 
 
-def _compared(kind: Kind, title: str, before: Facts, after: Facts, are_told: bool) -> Iterator[Difference]:
-    """Yield what a section has on both sides. `are_told`: both sessions tell what they are made of."""
-    whole = are_told and kind in (Kind.COMPONENT, Kind.GUARD, Kind.LIMITS)
+def _compared(
+    kind: ChangeKind, title: str, before: Facts, after: Facts, are_told: bool
+) -> Iterator[Difference]:
+    """Yield the differences of a section. `are_told`: both sessions have a configuration."""
+    whole = are_told and kind in (ChangeKind.COMPONENT, ChangeKind.GUARD, ChangeKind.LIMITS)
     if not before and not after and not whole:
-        if kind is not Kind.OPERATOR:
-            of_devices = kind in (Kind.FIRMWARE, Kind.DEVICE)
+        if kind is not ChangeKind.OPERATOR:
+            of_devices = kind in (ChangeKind.FIRMWARE, ChangeKind.DEVICE)
             what = title.removeprefix("{} ") if of_devices else str(kind)
             yield Difference(kind, what, NOT_RECORDED, NOT_RECORDED)
         return
@@ -180,7 +188,7 @@ def _size(old: object, new: object) -> float:
 
 def _gathered(found: Iterable[Difference]) -> Iterator[Difference]:
     """Yield a line a kind where nothing of it was recorded on a side, instead of one for each joint."""
-    by_kind: dict[tuple[Kind, bool, bool], list[Difference]] = {}
+    by_kind: dict[tuple[ChangeKind, bool, bool], list[Difference]] = {}
     for one in found:
         sides = (one.before == NOT_RECORDED, one.after == NOT_RECORDED)
         by_kind.setdefault((one.kind, *sides), []).append(one)

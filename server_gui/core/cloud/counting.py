@@ -20,7 +20,7 @@ from ml.store.store import Store
 from ml.store.tables import TELEMETRY
 from ml.store.translation import translated
 from server_gui.core.cloud import extents
-from server_gui.core.recording.receipts import Mark, Part
+from server_gui.core.recording.receipts import Mark, ReceiptPart
 from server_gui.core.recording.tally import NAMING, NUMBER, Units, named, times_us
 
 Advance = Callable[[int], object]
@@ -62,7 +62,7 @@ class Claim:
     """
 
     batch: Batch
-    part: Part
+    part: ReceiptPart
     is_old: bool = False
     rest: Mark | None = None
     is_all: bool = True
@@ -180,7 +180,7 @@ def _rows(
     """Yield these columns and the times, or all; `told` gets wrong statistics of times."""
     name = f"{file.location}/{file.path}"
     with translated(f"{store.url}/{name} cannot be read"), store.files.open_input_file(name) as opened:
-        parquet, extent = pq.ParquetFile(opened), extents.Seen()
+        parquet, extent = pq.ParquetFile(opened), extents.RowExtents()
         there = [each for each in parquet.schema_arrow.names if each in known]
         for batch in parquet.iter_batches(columns=[*naming, TIME] if naming else there):
             extent.add(batch)
@@ -281,7 +281,7 @@ def _sums(batch: pa.RecordBatch, same: Mapping[str, str]) -> checksums.Sums:
 
 
 def _seen(claims: Mapping[Batch, Claim], batch: pa.RecordBatch, values: bool) -> Sequence[_Seen]:
-    """Return what these rows of another table are of each claim."""
+    """Return the contribution of these rows of another table to each claim."""
     each = checksums.of_rows(pa.Table.from_batches([batch])) if values else None
     rows = _Rows(each, None if values else named(batch, NUMBER), times_us(batch[TIME]))
     found: dict[Batch, list[int]] = defaultdict(list)

@@ -21,7 +21,7 @@ def keys_told(url: str, environment: Mapping[str, str] = os.environ) -> str:
 
 
 def endpoint_told(url: str, environment: Mapping[str, str] = os.environ) -> str:
-    """Return which service is asked."""
+    """Return the name of the service."""
     if url.startswith("file://"):
         return "this computer"
     options = s3_options()

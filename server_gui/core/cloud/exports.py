@@ -21,7 +21,7 @@ from server_gui.core.atomic_files import draft
 from server_gui.core.settings.server_file import exports_folder
 
 
-class State(Enum):
+class ExportState(Enum):
     """Of an exported file or a copy, when it is looked for again."""
 
     AS_MADE = "as it was made"
@@ -46,7 +46,7 @@ class Exported:
     """A place with something of somebody."""
 
     place: str
-    state: State
+    state: ExportState
     why: str = ""
 
 
@@ -83,11 +83,11 @@ def found(sessions: Collection[Name], but: str) -> list[Exported]:
 
 
 def _in(file: Path, wanted: Set[Name], but: str) -> Exported | None:
-    """Return what an entry of the list says, where it is of somebody's sessions."""
+    """Return an entry of the list, if it is of the wanted sessions."""
     try:
         note = _read(file)
     except (OSError, msgspec.MsgspecError) as error:
-        return Exported(str(file), State.UNREADABLE, _why(error))
+        return Exported(str(file), ExportState.UNREADABLE, _why(error))
     is_theirs = note.sessions is None or not wanted.isdisjoint(note.sessions)
     return _looked(note, sorted(wanted)) if is_theirs and note.place != but else None
 
@@ -97,8 +97,8 @@ def remove(sessions: Collection[Name], but: str) -> list[str]:
 
     Whatever was found before somebody was asked may be somebody else's by now.
     """
-    tried = [_removed(each) if each.state is State.AS_MADE else each for each in found(sessions, but)]
-    return [_told(each) for each in tried if each.state is not State.GONE]
+    tried = [_removed(each) if each.state is ExportState.AS_MADE else each for each in found(sessions, but)]
+    return [_told(each) for each in tried if each.state is not ExportState.GONE]
 
 
 def _removed(each: Exported) -> Exported:
@@ -106,17 +106,17 @@ def _removed(each: Exported) -> Exported:
         Path(each.place).unlink(missing_ok=True)
         _note_of(each.place).unlink(missing_ok=True)
     except OSError as error:
-        return Exported(each.place, State.CLOSED, _why(error))
-    return Exported(each.place, State.GONE)
+        return Exported(each.place, ExportState.CLOSED, _why(error))
+    return Exported(each.place, ExportState.GONE)
 
 
 def _told(each: Exported) -> str:
     why = f" ({each.why})" if each.why else ""
-    if each.state in (State.CHANGED, State.LINKED, State.CLOSED):
+    if each.state in (ExportState.CHANGED, ExportState.LINKED, ExportState.CLOSED):
         return (
             f"{each.place} was exported with rows of theirs, and {each.state.value}{why}: look, and remove it"
         )
-    if each.state is State.UNREADABLE:
+    if each.state is ExportState.UNREADABLE:
         return f"{each.place} is {each.state.value}{why}: what was exported there is unknown"
     return f"{each.place} is {each.state.value}{why}: gwrms cloud forget --url {each.place}, or remove it"
 
@@ -127,17 +127,17 @@ def _looked(note: _Note, wanted: Sequence[Name]) -> Exported | None:
     try:
         return Exported(note.place, _state(Path(note.place), note.sha256))
     except (FileNotFoundError, NotADirectoryError):
-        return Exported(note.place, State.GONE)
+        return Exported(note.place, ExportState.GONE)
     except OSError as error:
-        return Exported(note.place, State.CLOSED, _why(error))
+        return Exported(note.place, ExportState.CLOSED, _why(error))
 
 
-def _state(file: Path, sha256: str) -> State:
+def _state(file: Path, sha256: str) -> ExportState:
     """Of a file; a link in its place is none. Raises `OSError`."""
     found = file.lstat()
     if not (sha256 and stat.S_ISREG(found.st_mode) and _sha256(file) == sha256):
-        return State.CHANGED
-    return State.AS_MADE if found.st_nlink == 1 else State.LINKED
+        return ExportState.CHANGED
+    return ExportState.AS_MADE if found.st_nlink == 1 else ExportState.LINKED
 
 
 def _store(note: _Note, wanted: Sequence[Name]) -> Exported | None:
@@ -148,8 +148,8 @@ def _store(note: _Note, wanted: Sequence[Name]) -> Exported | None:
     except StoreError as error:
         parts = urlsplit(note.place)
         is_gone = parts.scheme == "file" and not Path(unquote(parts.path)).exists()
-        return Exported(note.place, State.GONE if is_gone else State.UNKNOWN, str(error))
-    return Exported(note.place, State.HAS_ROWS) if has_some else None
+        return Exported(note.place, ExportState.GONE if is_gone else ExportState.UNKNOWN, str(error))
+    return Exported(note.place, ExportState.HAS_ROWS) if has_some else None
 
 
 def _why(error: Exception) -> str:
@@ -180,7 +180,7 @@ def _read(file: Path) -> _Note:
 
 
 def _known(place: str) -> _Note | None:
-    """Return what was noted of it before; one that cannot be read is written anew."""
+    """Return the earlier note of a place; an unreadable one is rewritten."""
     try:
         return _read(_note_of(place))
     except (FileNotFoundError, msgspec.MsgspecError):

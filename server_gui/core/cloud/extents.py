@@ -17,7 +17,7 @@ _Extent = tuple[Any, Any]  # the first and the last; None where there is none
 
 
 @dataclass(slots=True)
-class Seen:
+class RowExtents:
     """From when to when rows are that were read."""
 
     _found: dict[str, _Extent] = field(default_factory=dict)

@@ -40,7 +40,7 @@ class CannotForget(Exception):
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
+class ErasurePlan:
     """What there is of somebody: sessions, rows in the store by location, and what else has some of them."""
 
     sessions: Sequence[Name]
@@ -54,7 +54,9 @@ class Plan:
     others: Sequence[str]  # spools of other computers that have written to this store
 
 
-def plan(store: Store, spool: Path, name: str, learned: Callable[[Sequence[Name]], Sequence[str]]) -> Plan:
+def plan(
+    store: Store, spool: Path, name: str, learned: Callable[[Sequence[Name]], Sequence[str]]
+) -> ErasurePlan:
     """Look; nothing is changed. `learned` says which models have learned from sessions.
 
     Raises:
@@ -73,7 +75,7 @@ def plan(store: Store, spool: Path, name: str, learned: Callable[[Sequence[Name]
             "(gwrms label --ls)"
         )
     names = sorted({*found.sessions, *_begun(spool, name)})
-    return Plan(
+    return ErasurePlan(
         names,
         forgetting.counted(store, names),
         sum(not spool_reader.is_empty(spool, number) for number in spool_reader.waiting(spool)),
@@ -99,7 +101,7 @@ def _worn(store: Store, spool: Path, name: str) -> Worn:
     return forgetting.worn(sessions, labels, name)
 
 
-def upload(store: Store, spool: Spool, known: Plan, name: str, expect: Expect) -> None:
+def upload(store: Store, spool: Spool, known: ErasurePlan, name: str, expect: Expect) -> None:
     """Bring what waits into the store, and see that it is whole: what is missing later is known to be theirs.
 
     Where it was begun before, that was seen then.
@@ -124,7 +126,7 @@ def upload(store: Store, spool: Spool, known: Plan, name: str, expect: Expect) -
         )
 
 
-def _are_theirs(found: mend.Plan, spool: Path, known: Plan) -> bool:
+def _are_theirs(found: mend.RepairPlan, spool: Path, known: ErasurePlan) -> bool:
     """Whether all that is missing is in batches with rows of theirs: another computer has forgotten them.
 
     It comes back whole, with what is missing of others, and then goes with all else of theirs.
@@ -134,7 +136,7 @@ def _are_theirs(found: mend.Plan, spool: Path, known: Plan) -> bool:
     return all(not spool_reader.named(spool, one).isdisjoint(known.sessions) for one in found.batches)
 
 
-def forget(store: Store, spool: Spool, known: Plan, name: str, expect: Expect) -> list[str]:
+def forget(store: Store, spool: Spool, known: ErasurePlan, name: str, expect: Expect) -> list[str]:
     """Remove everything of the plan, tell it in the recording, and prove it; what is left, in words.
 
     Raises:
@@ -155,7 +157,7 @@ def forget(store: Store, spool: Spool, known: Plan, name: str, expect: Expect) -
     return left
 
 
-def proof(store: Store, spool: Path, known: Plan) -> list[str]:
+def proof(store: Store, spool: Path, known: ErasurePlan) -> list[str]:
     """Look again, into every file of store and spool; what is left of it, in words."""
     wanted = set(known.sessions)
     found = [f"{store.url}/{path} has rows of theirs" for path in forgetting.left(store, known.sessions)]
@@ -176,7 +178,7 @@ class _Begun(msgspec.Struct, frozen=True):
     sessions: list[Name]
 
 
-def _begin(folder: Path, known: Plan, name: str) -> None:
+def _begin(folder: Path, known: ErasurePlan, name: str) -> None:
     data = msgspec.json.encode(_Begun(digest(name), list(known.sessions)))
     (folder / _BEGUN).unlink(missing_ok=True)
     durable.create(folder / _BEGUN, data)
@@ -196,7 +198,7 @@ def digest(name: str) -> str:
     return hashlib.sha256(f"gwrms wearer {person(name)}".encode()).hexdigest()
 
 
-def _tell(store: Store, spool: Spool, known: Plan, name: str) -> None:
+def _tell(store: Store, spool: Spool, known: ErasurePlan, name: str) -> None:
     """Record an event for each robot."""
     if not known.sessions:
         return
@@ -206,7 +208,7 @@ def _tell(store: Store, spool: Spool, known: Plan, name: str) -> None:
         send(spool, number, store)
 
 
-def _event(robot: str, known: Plan, name: str) -> Record:
+def _event(robot: str, known: ErasurePlan, name: str) -> Record:
     count = sum(one == robot for one, _ in known.sessions)
     data = {"wearer_sha256": digest(name), "sessions": count, "rows": dict(known.rows)}
     fields = {

@@ -116,7 +116,7 @@ class Jobs:
 
 
 def _failed(job: Job, error: Exception) -> tuple[JobState, str]:
-    """Return what a job that raised has come to.
+    """Return the end of a job that raised.
 
     Libraries may hand a `Cancelled` on as an error of their own.
     """

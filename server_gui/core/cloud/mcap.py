@@ -11,7 +11,7 @@ import pyarrow as pa
 from ml.store.sessions import Session
 from server_gui.core.atomic_files import draft
 from server_gui.core.cloud.ros import definition, header
-from server_gui.core.cloud.selection import Recording, Row
+from server_gui.core.cloud.selection import Row, SelectedRecording
 from server_gui.core.cloud.topics import Message, Topic, ros_name, topics
 from server_gui.core.recording.batching import EventKind
 
@@ -25,7 +25,7 @@ _WARN: Final = 1
 _EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
 
 
-def write_mcap(file: Path, recording: Recording) -> int:
+def write_mcap(file: Path, recording: SelectedRecording) -> int:
     """Telemetry as the topics of `topics`, events as diagnostics, labels as text; how many messages.
 
     The session is in the file's metadata, and so are the channels' units, which ROS's messages do not say.

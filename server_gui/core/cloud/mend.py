@@ -30,14 +30,14 @@ from server_gui.core.cloud.receipt_check import Proof, prove
 from server_gui.core.cloud.repeated_upload import Again, Untouched, Whose, whose
 from server_gui.core.recording.batching import EventKind
 from server_gui.core.recording.errors import Damaged, SpoolUnusable
-from server_gui.core.recording.receipts import RECEIPTS, Altered, Part, Receipt, Receipts
+from server_gui.core.recording.receipts import RECEIPTS, Altered, Receipt, ReceiptPart, Receipts
 from server_gui.core.recording.segment import Segment
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.upload import Sent, upload
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
+class RepairPlan:
     """What is to be done: files to take out, second copies to bring again, what nobody can bring."""
 
     files: Sequence[DataFile]
@@ -47,10 +47,10 @@ class Plan:
     behind: Sequence[int] = ()  # second copies that cannot be brought as a whole while these are there
 
     @property
-    def accepted(self) -> "Plan":
+    def accepted(self) -> "RepairPlan":
         """The same, where somebody accepts that such rows are lost."""
         batches = sorted({*self.batches, *self.behind})
-        return Plan([*self.files, *self.kept], batches, self.lost)
+        return RepairPlan([*self.files, *self.kept], batches, self.lost)
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +62,7 @@ class Mended:
     problems: Sequence[str]
 
 
-def plan(store: Store, spool: Spool, expect: Callable[[int], AbstractContextManager[Advance]]) -> Plan:
+def plan(store: Store, spool: Spool, expect: Callable[[int], AbstractContextManager[Advance]]) -> RepairPlan:
     """Look what there is to mend; nothing is changed.
 
     Raises:
@@ -94,7 +94,7 @@ def plan(store: Store, spool: Spool, expect: Callable[[int], AbstractContextMana
     now = {number for number in again if copies[number] in open_ or copies[number] not in behind}
     lost += [_told(store, file) for file in staying]
     later = sorted(number for number in again if copies[number] in behind)
-    return Plan(going, sorted(now), lost, staying, later)
+    return RepairPlan(going, sorted(now), lost, staying, later)
 
 
 def _nowhere(store: Store, batches: Sequence[int]) -> str:
@@ -120,8 +120,8 @@ def _told(store: Store, file: DataFile) -> str:
     )
 
 
-def _held(store: Store, spool: Spool, numbers: Collection[int]) -> dict[Batch, tuple[Part, ...]]:
-    """Return what second copies, and batches that wait, could bring; nothing of those that cannot be read."""
+def _held(store: Store, spool: Spool, numbers: Collection[int]) -> dict[Batch, tuple[ReceiptPart, ...]]:
+    """Return the rows that second copies and pending batches could restore; unreadable ones are left out."""
     found = {}
     untouched = Untouched.existing(store.url) if numbers else store
     for number in numbers:
@@ -131,7 +131,9 @@ def _held(store: Store, spool: Spool, numbers: Collection[int]) -> dict[Batch, t
     return found
 
 
-def _kept(broken: Iterable[DataFile], proof: Proof, held: Mapping[Batch, Iterable[Part]]) -> set[Whose]:
+def _kept(
+    broken: Iterable[DataFile], proof: Proof, held: Mapping[Batch, Iterable[ReceiptPart]]
+) -> set[Whose]:
     """Where damaged files hold more than comes back when they go."""
     rows: Counter[tuple[Batch, Whose, object]] = Counter()
     for batch, parts in held.items():
@@ -148,12 +150,12 @@ def _kept(broken: Iterable[DataFile], proof: Proof, held: Mapping[Batch, Iterabl
     return {each for each in goes if each in nowhere or comes[each] < goes[each]}
 
 
-def _name(batch: Batch, part: Part) -> tuple[Batch, Whose, object]:
+def _name(batch: Batch, part: ReceiptPart) -> tuple[Batch, Whose, object]:
     """By what a receipt's part is found again in a second copy, of which some may be damaged."""
     return batch, whose(part), part.stream and (part.stream.connection, part.stream.stream)
 
 
-def mend(store: Again, spool: Spool, plan: Plan, advance: Callable[[int], object]) -> Mended:
+def mend(store: Again, spool: Spool, plan: RepairPlan, advance: Callable[[int], object]) -> Mended:
     """Do it.
 
     Raises:

@@ -81,7 +81,7 @@ def walk(
 
 
 def moved(before: Walk, after: Walk) -> Evidence:
-    """Return what differs between two walks, in the words of edits."""
+    """Return the differences between two walks, in the words of edits."""
     sides = [before.cycles, after.cycles]
     notes = [f"before: {one}" for one in before.notes] + [f"after: {one}" for one in after.notes]
     if before.knows_activity != after.knows_activity:

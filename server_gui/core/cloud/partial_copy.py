@@ -17,14 +17,14 @@ Advance = Callable[[int], object]
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class CopyScope:
     """The rows of a robot, or of one of its sessions."""
 
     robot: str
     session: str | None = None
 
     def values(self, table: Table) -> dict[str, str]:
-        """Return what its rows in this table have in common; a robot's journal belongs to no session."""
+        """Return the values that its rows in this table share; a robot's journal belongs to no session."""
         named = {"robot": self.robot, "session": self.session}
         return {name: value for name, value in named.items() if value and name in table.schema.names}
 
@@ -42,8 +42,8 @@ def copy(
             is copied. Or rows are missing afterwards.
 
     """
-    parts = {Part(each.robot, None if each.robot in robots else each.session) for each in sessions}
-    parts |= {Part(robot) for robot in robots}
+    parts = {CopyScope(each.robot, None if each.robot in robots else each.session) for each in sessions}
+    parts |= {CopyScope(robot) for robot in robots}
     others = [table for table in TABLES.values() if table is not TELEMETRY]
     merges = [
         (_merge(source, target, table, part), table, part) for table in others for part in _sorted(parts)
@@ -56,20 +56,20 @@ def copy(
     return copied
 
 
-def _sorted(parts: Collection[Part]) -> list[Part]:
+def _sorted(parts: Collection[CopyScope]) -> list[CopyScope]:
     return sorted(parts, key=str)
 
 
-def _merge(source: Store, target: Store, table: Table, part: Part) -> Merge:
+def _merge(source: Store, target: Store, table: Table, part: CopyScope) -> Merge:
     return Merge(source, target, table, part.values(table))
 
 
 def _of(source: Store, target: Store, session: Session) -> Merge:
-    return _merge(source, target, TELEMETRY, Part(session.robot, session.session))
+    return _merge(source, target, TELEMETRY, CopyScope(session.robot, session.session))
 
 
 def _telemetry(source: Store, target: Store, session: Session, advance: Advance) -> int:
-    part = Part(session.robot, session.session)
+    part = CopyScope(session.robot, session.session)
     added = _add(target, _of(source, target, session), TELEMETRY, part, advance)
     there = _rows(target, session)
     if there < session.rows:  # there are more where it went on meanwhile
@@ -86,7 +86,9 @@ def _rows(store: Store, session: Session) -> int:
     return sum(file.rows for file in files if (file.robot, file.session) == mine)
 
 
-def _add(target: Store, merge: Merge, table: Table, part: Part, advance: Advance = lambda _: None) -> int:
+def _add(
+    target: Store, merge: Merge, table: Table, part: CopyScope, advance: Advance = lambda _: None
+) -> int:
     """Add what is new; how many rows that are."""
     added = 0
 

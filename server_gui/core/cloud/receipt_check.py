@@ -18,8 +18,8 @@ from server_gui.core.recording.receipts import (
     RECEIPTS,
     Altered,
     Mark,
-    Part,
     Receipt,
+    ReceiptPart,
     canonical,
     is_of_batch,
     units_told,
@@ -44,10 +44,16 @@ class Proof:
     elsewhere: int = 0  # batches that went to other stores
     problems: list[str] = field(default_factory=list)
     lacking: set[Batch] = field(default_factory=set)  # of which rows are missing
-    missing: list[tuple[Batch, Part, int]] = field(default_factory=list)  # how many rows of which parts
-    vague: list[tuple[Batch, Part]] = field(default_factory=list)  # how many retention has left nobody knows
+    missing: list[tuple[Batch, ReceiptPart, int]] = field(
+        default_factory=list
+    )  # how many rows of which parts
+    vague: list[tuple[Batch, ReceiptPart]] = field(
+        default_factory=list
+    )  # how many retention has left nobody knows
     misread: Sequence[DataFile] = ()  # files that have not the columns that they should have
-    wrong: dict[Batch, tuple[Part, ...]] = field(default_factory=dict)  # what of these is there instead
+    wrong: dict[Batch, tuple[ReceiptPart, ...]] = field(
+        default_factory=dict
+    )  # what of these is there instead
 
 
 def prove(
@@ -130,7 +136,7 @@ def _judge(store: Store, claim: Claim, proof: Proof, *, values: bool) -> bool:
 
 
 def tables(store: Store) -> set[str]:
-    """Return what the store's tables are called for ever."""
+    """Return the permanent identities of the store's tables."""
     found = set()
     for location in (each for table in TABLES.values() for each in table.locations(store.about.shards)):
         try:
@@ -190,8 +196,8 @@ def _columns_gone(
             )
 
 
-def _found(claim: Claim, told: Mapping[str, Units], units: Mapping[str, Units]) -> Part:
-    """Return what is there of a claim, as its receipt would say it."""
+def _found(claim: Claim, told: Mapping[str, Units], units: Mapping[str, Units]) -> ReceiptPart:
+    """Return the rows of a claim that were found, in the form of its receipt."""
     part, there = claim.part, units.get(claim.part.location, {})
     return msgspec.structs.replace(
         part,
@@ -203,7 +209,7 @@ def _found(claim: Claim, told: Mapping[str, Units], units: Mapping[str, Units]) 
     )
 
 
-def _claim(batch: Batch, part: Part, retained: datetime | None) -> Claim:
+def _claim(batch: Batch, part: ReceiptPart, retained: datetime | None) -> Claim:
     if retained is None or part.begin_us is None or _time(part.begin_us) >= retained:
         return Claim(batch, part)
     from_us = (retained - _EPOCH) // _US
@@ -215,7 +221,7 @@ def _claim(batch: Batch, part: Part, retained: datetime | None) -> Claim:
 
 
 def _problem(claim: Claim, *, values: bool) -> str | None:
-    """Return what is wrong with the rows of a claim, in words."""
+    """Return the problem of a claim's rows, in words."""
     part, (writer, batch) = claim.part, claim.batch
     (sent, total), (rows, found) = claim.expected, claim.there
     if claim.is_open:

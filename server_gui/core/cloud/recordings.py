@@ -22,9 +22,9 @@ import pyarrow.dataset
 from ml.store import NoSuchTable, StoreError, StoreRefused, StoreUnreachable, Table, sessions
 from ml.store.labels import holding
 from ml.store.precedence import recorded_order
-from ml.store.sessions import Channel, Piece, Session, TelemetrySource
+from ml.store.sessions import Channel, Session, SessionPiece, TelemetrySource
 from ml.store.snapshot import Snapshot
-from ml.store.tables import EVENTS, LABELS, SESSIONS, TELEMETRY, Known, columns
+from ml.store.tables import EVENTS, LABELS, SESSIONS, TELEMETRY, ColumnFacts, columns
 from ml.store.translation import translated
 from server_gui.core.cloud import spool_reader
 from server_gui.core.recording import missing_rows
@@ -135,7 +135,7 @@ class Recordings:
         return recorded_order([*stored, *told])
 
     def labels(self, session: Session) -> list[Row]:
-        """Return what somebody says that robot and wearer did, as far as it has not been taken back."""
+        """Return the valid labels of a session."""
         return holding(self.rows_of(session, LABELS))
 
     def counted(self, session: Session) -> Session:
@@ -243,7 +243,7 @@ class _Waiting:
         spool: Path,
         batches: Mapping[int, Lacking],
         session: Session,
-        there: Mapping[str, Known],
+        there: Mapping[str, ColumnFacts],
         shards: int,
     ) -> None:
         self._spool = spool
@@ -251,7 +251,9 @@ class _Waiting:
         self._session = session
         self._there = there
         self._shards = shards
-        self._before: dict[int, Mapping[str, Known]] = {}  # the table's columns when a batch comes to it
+        self._before: dict[
+            int, Mapping[str, ColumnFacts]
+        ] = {}  # the table's columns when a batch comes to it
         self._samples: Counter[str] = Counter()
         self._pieces = {batch: piece for batch in batches if (piece := self._looked_into(batch))}
         self.rows = sum(piece.rows for piece in self._pieces.values())
@@ -277,7 +279,7 @@ class _Waiting:
         return [Channel(name, told.get(name, self._unit(name)), samples[name]) for name in sorted(samples)]
 
     def _unit(self, column: str) -> str | None:
-        return self._there.get(column, Known()).unit
+        return self._there.get(column, ColumnFacts()).unit
 
     def added_to(self, session: Session) -> Session:
         """Return the session with the extent of all of its rows."""
@@ -288,7 +290,7 @@ class _Waiting:
         last = max((time for time in (session.last, *(each.last for each in pieces)) if time), default=None)
         return msgspec.structs.replace(session, first=first, last=last, rows=session.rows + self.rows)
 
-    def _looked_into(self, batch: int) -> Piece | None:
+    def _looked_into(self, batch: int) -> SessionPiece | None:
         self._before[batch] = self._there
         rows = self._table(batch)
         self._there = {**self._there, **columns(rows.schema)}
@@ -298,7 +300,7 @@ class _Waiting:
             if name not in OWN and (samples := rows.num_rows - rows[name].null_count):
                 self._samples[name] += samples
         utc, stamps = (pc.min_max(rows[name]).as_py() for name in sessions.KEYS)
-        return Piece(utc["min"], utc["max"] + _US, stamps["min"], stamps["max"], rows.num_rows)
+        return SessionPiece(utc["min"], utc["max"] + _US, stamps["min"], stamps["max"], rows.num_rows)
 
     def _table(self, batch: int) -> pa.Table:
         """With the columns to which the upload brings the batch, which has other robots' channels too."""

@@ -12,13 +12,13 @@ from ml.store.snapshot import Snapshot
 from ml.store.store import Batches, Store
 from ml.store.tables import TELEMETRY, Table
 from server_gui.core.recording import missing_rows
-from server_gui.core.recording.receipts import Part
+from server_gui.core.recording.receipts import ReceiptPart
 
 Whose = tuple[str, str | None, str | None]  # location; robot and session where rows of these lie together
 NOBODYS: Final = (None, None)
 
 
-def whose(of: DataFile | Part) -> Whose:
+def whose(of: DataFile | ReceiptPart) -> Whose:
     """Return where the rows lie that a file or a batch's part holds."""
     if isinstance(of, DataFile):
         return of.location, of.robot, of.session

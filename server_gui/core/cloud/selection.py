@@ -51,7 +51,7 @@ class Choice:
 
 
 @dataclass(frozen=True, slots=True)
-class Recording:
+class SelectedRecording:
     """A session or a part of it. `tables` are its rows in time's order: `utc`, `stamp_ns`, the channels."""
 
     session: Session
@@ -61,8 +61,8 @@ class Recording:
     labels: Sequence[Row]
 
 
-def choose(recordings: Recordings, recorded: Recorded, choice: Choice) -> Recording:
-    """Return what is wanted of a session that was opened among these; telemetry is read while `tables` is.
+def choose(recordings: Recordings, recorded: Recorded, choice: Choice) -> SelectedRecording:
+    """Return the chosen part of an open session; telemetry is read while `tables` is iterated.
 
     Raises:
         StoreError: there is nothing of it or of that time, or the store cannot be read.
@@ -75,7 +75,7 @@ def choose(recordings: Recordings, recorded: Recorded, choice: Choice) -> Record
     choice.check(session)
     channels = choice.of(recorded.channels)
     names = [each.name for each in channels]
-    return Recording(
+    return SelectedRecording(
         session,
         channels,
         recorded.telemetry(names, choice.begin, choice.end),

@@ -141,7 +141,7 @@ def damaged(spool: Path) -> list[tuple[int, Path]]:
 
 
 def batch(spool: Path, number: int) -> Batch:
-    """Return what is in a batch."""
+    """Return the contents of a batch."""
     robots = frozenset(robot for (robot,) in _read(spool, number, "SELECT DISTINCT robot FROM run"))
     tables = frozenset(record.table for _, record in _records(spool, number))
     return Batch(writer(spool, number), number, robots, tables)

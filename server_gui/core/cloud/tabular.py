@@ -12,10 +12,10 @@ import pyarrow.parquet as pq
 from ml.store.sessions import KEYS, Channel
 from ml.store.tables import TELEMETRY, field
 from server_gui.core.atomic_files import draft
-from server_gui.core.cloud.selection import Recording
+from server_gui.core.cloud.selection import SelectedRecording
 
 
-def write_csv(file: Path, recording: Recording) -> int:
+def write_csv(file: Path, recording: SelectedRecording) -> int:
     """Columns like `left_knee.position [rad]`; a value that is missing is empty. How many rows."""
     schema = _schema(recording.channels)
     names = [f"{each.name} [{unit}]" if (unit := _unit(each)) else each.name for each in schema]
@@ -38,7 +38,7 @@ def iso_8601(utc: pa.ChunkedArray | pa.Array) -> pa.ChunkedArray | pa.Array:
     return pc.binary_join_element_wise(text, "Z", "")
 
 
-def write_parquet(file: Path, recording: Recording) -> int:
+def write_parquet(file: Path, recording: SelectedRecording) -> int:
     """Write a column a channel, with units and session in the metadata; return how many rows."""
     schema = _schema(recording.channels).with_metadata({"session": msgspec.json.encode(recording.session)})
     with draft(file) as written, pq.ParquetWriter(written, schema, compression="zstd") as writer:

@@ -59,7 +59,7 @@ def open_target(source: Store, url: str) -> Objects:
 
 
 def missing(source: Objects, target: Objects) -> list[Object]:
-    """Return what the target lacks, in the order in which it is to be copied.
+    """Return the objects that the target lacks, in the order in which they are to be copied.
 
     Raises:
         StoreError: the target is no earlier state of the source, has another model, pointer to one or pin

@@ -110,7 +110,7 @@ def _notes(
     receipts: Sequence[Receipt | Altered],
     gone: Sequence[mending.TakenOut],
 ) -> Iterator[str]:
-    """Yield what can be done about it, what was done, and what is still to come."""
+    """Yield remedies, notes on earlier repairs, and pending work."""
     if any(isinstance(each, Altered) for each in receipts):
         yield (
             f"bring {spool / RECEIPTS} back from a copy; without one, gwrms cloud mend --accept-loss goes on "
@@ -143,7 +143,7 @@ def second_copies(spool: Path) -> dict[int, Batch]:
 
 
 def sent_to(url: str, spool: Path) -> int:
-    """Return how many batches of the spool went to the store of this URL."""
+    """Return the number of the spool's batches that went to the store of this URL."""
     return len({(each.writer, each.batch) for each in went_to(_known(spool), url) if each.is_of_batch})
 
 
@@ -210,7 +210,7 @@ def files(store: Store) -> list[DataFile]:
 
 
 def damages(store: Store, wanted: Sequence[DataFile], advance: Advance, *, deep: bool) -> Iterator[str]:
-    """Yield what is wrong with these files, in words: absent, of another size, unreadable, other rows.
+    """Yield the damage of these files, in words: absent, of another size, unreadable, other rows.
 
     Each file's footer is read, and with `deep` every value.
 

@@ -13,9 +13,15 @@ from enum import Enum
 from typing import Final, Protocol
 
 from server_gui.core.commissioning import messages
-from server_gui.core.commissioning.messages import Message, Reading, Step, Stopped, Written
+from server_gui.core.commissioning.messages import (
+    Message,
+    ReadingMessage,
+    StepMessage,
+    StoppedMessage,
+    WrittenMessage,
+)
 from server_gui.core.commissioning.request import CommissioningRequest
-from server_gui.core.commissioning.stages import LOOKS, Look, Stage
+from server_gui.core.commissioning.stages import LOOKS, Stage, StageView
 
 MOST_LINES: Final = 2000  # of what was said
 MOST_NEWS: Final = 16  # and since the last answer
@@ -70,7 +76,7 @@ class Talker(Protocol):
 Talk = Callable[[Sequence[str], str], Talker]  # `gwrms` with these arguments, on this computer ("": here)
 
 
-class Kind(Enum):
+class LogLineKind(Enum):
     """Of a line of the log: what stands before it."""
 
     SAID = "  "
@@ -86,9 +92,9 @@ class Commissioning:
         self.wish: CommissioningRequest | None = None
         self.stage = Stage.NOT_STARTED
         self.question: Message | None = None
-        self.steps: tuple[Step, ...] = ()
+        self.steps: tuple[StepMessage, ...] = ()
         self.proposed: tuple[str, str] | None = None  # the file's name and text, before it is written
-        self.written: Written | None = None
+        self.written: WrittenMessage | None = None
         self.problem = ""  # in words, of whatever is wrong now
         self.log: deque[str] = deque(maxlen=MOST_LINES)
         self.logged = 0  # lines ever
@@ -100,9 +106,9 @@ class Commissioning:
         self._ending = False
         self._powered = False  # a joint was under power, and nobody has said since that it no longer is
         self._stop_s: float | None = None  # when STOP was asked for
-        self._stopped: Stopped | None = None
+        self._stopped: StoppedMessage | None = None
         self._error = ""
-        self._live: tuple[Reading, ...] = ()
+        self._live: tuple[ReadingMessage, ...] = ()
         self._live_s = 0.0
         self._asked_s = 0.0
         self._heard_s = 0.0
@@ -110,7 +116,7 @@ class Commissioning:
     # --- what is so
 
     @property
-    def look_of(self) -> Look:
+    def look_of(self) -> StageView:
         return LOOKS[self.stage]
 
     @property
@@ -133,7 +139,7 @@ class Commissioning:
         return self.wish is not None and self.stage is not Stage.STOPPING
 
     @property
-    def live(self) -> tuple[Reading, ...]:
+    def live(self) -> tuple[ReadingMessage, ...]:
         """What devices tell now; nothing where that is old, or does not come."""
         return self._live if self._clock() - self._live_s < OLD_S else ()
 
@@ -162,7 +168,7 @@ class Commissioning:
         self.problem, self._error, self._stopped, self._stop_s, self._ending = "", "", None, None, False
         self._live, self._powered = (), False
         self.news.clear()
-        self._note(Kind.NOTED, wish.typed)
+        self._note(LogLineKind.NOTED, wish.typed)
         self._heard_s = self._clock()
         self.stage = Stage.STARTING
         self._talker = self._talk(wish.arguments("--json"), wish.computer)
@@ -173,7 +179,7 @@ class Commissioning:
         if question is None or talker is None or not self.can_answer:
             return False
         line = " ".join(text.split())
-        self._note(Kind.ANSWERED, line or (question.default or ("done" if question.press else "")))
+        self._note(LogLineKind.ANSWERED, line or (question.default or ("done" if question.press else "")))
         self.question, self._live, self.problem = None, (), ""
         self.news.clear()
         self._heard_s = self._clock()
@@ -240,7 +246,7 @@ class Commissioning:
             self._stopped = line.stopped
             self._stop_s = self._clock() if self._stop_s is None else self._stop_s  # by itself, too
             self._powered = self._powered and not line.stopped.confirmed
-            self._note(Kind.NOTED, line.stopped.words)
+            self._note(LogLineKind.NOTED, line.stopped.words)
         elif line.error is not None:
             self._error = line.error.message
         if self.stage is Stage.STARTING:
@@ -248,7 +254,7 @@ class Commissioning:
 
     def _moves(self, words: str) -> None:
         if self.stage is not Stage.MOVING:
-            self._note(Kind.NOTED, words)
+            self._note(LogLineKind.NOTED, words)
         self._powered = True
         if self.runs:
             self.stage, self.problem, self.question, self._live = Stage.MOVING, words, None, ()
@@ -259,7 +265,7 @@ class Commissioning:
             self.stage, self.problem = Stage.WORKING, ""
 
     def _said(self, line: Message) -> None:
-        self._note(Kind.SAID, line.say or "")
+        self._note(LogLineKind.SAID, line.say or "")
         if line.file:
             self.proposed = (line.file, line.say or "")
         else:
@@ -268,7 +274,7 @@ class Commissioning:
     def _asked(self, line: Message) -> None:
         if self.question == line or not self.runs:  # told twice
             return
-        self._note(Kind.ASKED, line.question)
+        self._note(LogLineKind.ASKED, line.question)
         self.question, self._live, self.problem = line, (), ""
         self._asked_s = self._clock()
         self.stage = Stage.HAND if line.press else Stage.ASKING
@@ -301,7 +307,7 @@ class Commissioning:
         if talker is not None and talker.ended is None and since_s > STOP_S:
             talker.kill()
         if talker is None or talker.ended is not None or since_s > STOP_S + KILL_S:
-            self._note(Kind.NOTED, "STOP: the command did not do it, another one asks the drives")
+            self._note(LogLineKind.NOTED, "STOP: the command did not do it, another one asks the drives")
             self._stopper = self._talk(self.wish.stopping, self.wish.computer)
 
     def _end_stop(self, stage: Stage) -> None:
@@ -316,7 +322,7 @@ class Commissioning:
         self._talker, self.question, self._live = None, None, ()
         self.stage, self.problem = self._end_of(ended)
         if self.problem:
-            self._note(Kind.NOTED, self.problem)
+            self._note(LogLineKind.NOTED, self.problem)
         if self._powered:  # what it has put under power nobody else would stop
             self.stop()
             self._see_to_stop()
@@ -335,7 +341,7 @@ class Commissioning:
             return Stage.DIED if self.steps else Stage.FAILED, words
         return Stage.DIED, words or _status_text(ended.status)
 
-    def _note(self, kind: Kind, text: str) -> None:
+    def _note(self, kind: LogLineKind, text: str) -> None:
         for place, line in enumerate(text.splitlines() or [""]):
             self.log.append((kind.value if place == 0 else "  ") + line)
             self.logged += 1

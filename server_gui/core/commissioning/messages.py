@@ -9,7 +9,7 @@ from gateway.units import with_minus
 ENTER: Final = " Then press Enter."
 
 
-class Reading(msgspec.Struct, frozen=True):
+class ReadingMessage(msgspec.Struct, frozen=True):
     """What a device tells while a question waits; `value` is `None` where it tells nothing."""
 
     name: str
@@ -25,7 +25,7 @@ class Reading(msgspec.Struct, frozen=True):
         return f"{told} {self.unit}".rstrip()
 
 
-class Step(msgspec.Struct, frozen=True):
+class StepMessage(msgspec.Struct, frozen=True):
     """One step: of which part of the robot, and whether it is done, now, next or passed."""
 
     part: str
@@ -33,7 +33,7 @@ class Step(msgspec.Struct, frozen=True):
     state: str
 
 
-class Written(msgspec.Struct, frozen=True):
+class WrittenMessage(msgspec.Struct, frozen=True):
     """What became of the robot's file."""
 
     file: str
@@ -44,7 +44,7 @@ class Written(msgspec.Struct, frozen=True):
     not_journaled: str = ""
 
 
-class Stopped(msgspec.Struct, frozen=True):
+class StoppedMessage(msgspec.Struct, frozen=True):
     """What came of a stop."""
 
     confirmed: bool
@@ -71,12 +71,12 @@ class Message(msgspec.Struct, frozen=True):
     bounds: tuple[float, float] | None = None
     press: bool = False
     refused: str = ""
-    live: tuple[Reading, ...] | None = None
+    live: tuple[ReadingMessage, ...] | None = None
     problem: str = ""
     moving: str | msgspec.UnsetType | None = msgspec.UNSET  # a joint is under power; None: no longer
-    steps: tuple[Step, ...] | None = None
-    written: Written | None = None
-    stopped: Stopped | None = None
+    steps: tuple[StepMessage, ...] | None = None
+    written: WrittenMessage | None = None
+    stopped: StoppedMessage | None = None
     error: Error | None = None
 
     @property

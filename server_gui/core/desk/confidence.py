@@ -6,11 +6,11 @@ from enum import Enum
 from typing import Final
 
 from ml.registry.card import DataSource
-from ml.serving.trust import Level
+from ml.serving.trust import TrustLevel
 from server_gui.core.alarms.robot_alarms import undriven
 from server_gui.core.desk.station import Station
 from server_gui.core.models.names import told_name
-from server_gui.core.prediction.current import Recalled, Shown, Told
+from server_gui.core.prediction.current import NewestPrediction, Recalled, Told
 from server_gui.core.prediction.state import Quality
 
 NOT_SEEN: Final = ("lost", "stale")
@@ -42,9 +42,9 @@ def belief(told: Told) -> Confidence:
     if isinstance(told, Recalled):
         return Confidence(Worth.UNCHECKED, (f"said then by {told_name(told.prediction.model)}", "said then"))
     predicted = told.predicted
-    if predicted.trust.level is Level.DRIFTED:
+    if predicted.trust.level is TrustLevel.DRIFTED:
         return Confidence(Worth.DOUBTFUL, (_drifted(told), "unlike its learning", "do not rely on it"))
-    if predicted.trust.level is Level.UNSURE:
+    if predicted.trust.level is TrustLevel.UNSURE:
         return Confidence(Worth.DOUBTFUL, ("mostly unsure here: do not rely on it", "mostly unsure"))
     quality = predicted.quality
     if quality is None or not quality.labelled:
@@ -73,7 +73,7 @@ def _checked(quality: Quality) -> tuple[str, ...]:
     return f"{short} ({quality.labelled} checked)", short
 
 
-def _drifted(told: Shown) -> str:
+def _drifted(told: NewestPrediction) -> str:
     channels = ", ".join(told.predicted.trust.drifted[:2])
     return f"unlike what it has learned{f' ({channels})' if channels else ''}: do not rely on it"
 

@@ -4,10 +4,11 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 from gateway.units import Units
+from server_gui.core.cloud.store_reach import StoreReach
 from server_gui.core.desk.pins import Pins
 from server_gui.core.desk.recording import By, Recording
 from server_gui.core.desk.station import Station
-from server_gui.core.evidence.file import Told
+from server_gui.core.evidence.file import EditEvidence
 from server_gui.core.follow.news import News
 from server_gui.core.prediction.adaptation import Happening
 
@@ -33,9 +34,10 @@ class Desk:
         self.selected: Station | None = None
         self.news = News()
         self.shown = Shown()
+        self.reach = StoreReach()  # of the store that is recorded into, and read from
         self._recording = Recording(By.NOBODY, None, lambda call: call(), self.news)
         self.pins = Pins()
-        self.keep_evidence: Callable[[str, Told], None] = lambda _robot, _told: None  # on the disk
+        self.keep_evidence: Callable[[str, EditEvidence], None] = lambda _robot, _told: None  # on the disk
         self.adapt: Callable[[str, int, Happening], None] = lambda _robot, _number, _what: None
         self.on_select: list[Callable[[Station | None], None]] = []
 
@@ -50,6 +52,7 @@ class Desk:
     @recording.setter
     def recording(self, recording: Recording) -> None:
         self._recording = recording
+        recording.rely_on(self.reach)
         recording.on_mark.append(self._marked)
 
     def _marked(self, text: str, ago_s: float) -> None:

@@ -16,7 +16,7 @@ from msgspec.structs import replace
 
 from gateway.client import Address
 from server_gui.core.desk.recording import By, Recording
-from server_gui.core.evidence.file import EvidenceFile, Told, folder_beside
+from server_gui.core.evidence.file import EditEvidence, EvidenceFile, folder_beside
 from server_gui.core.evidence.service import EvidenceService
 from server_gui.core.evidence.service import Tell as TellEvidence
 from server_gui.core.fleet.collector import Collector, whole
@@ -114,7 +114,7 @@ class Feeds:
         self._end_showing_only()
         self._ending.shutdown()
 
-    def keep(self, robot: str, told: Told, session: str) -> None:
+    def keep(self, robot: str, told: EditEvidence, session: str) -> None:
         """Keep what came of an experiment beside the evidence for edits; nobody waits for the disk."""
 
         def add() -> None:

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from enum import Enum
 
 
-class Step(Enum):
+class FirstStep(Enum):
     """What has to be so before a robot walks in the window, in the order in which people expect it."""
 
     SIMULATOR = "Simulator: six drives, two insoles, an IMU"
@@ -20,12 +20,12 @@ class FirstSteps:
 
     def __init__(
         self,
-        told: Callable[[Step, float], None] = lambda _step, _seconds: None,
-        steps: Sequence[Step] = tuple(Step),
+        told: Callable[[FirstStep, float], None] = lambda _step, _seconds: None,
+        steps: Sequence[FirstStep] = tuple(FirstStep),
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.steps = tuple(steps)
-        self.took_s: dict[Step, float] = {}
+        self.took_s: dict[FirstStep, float] = {}
         self._told = told
         self._clock = clock
         self._began_s = clock()
@@ -41,11 +41,11 @@ class FirstSteps:
         return all(step in self.took_s for step in self.steps)
 
     @property
-    def now(self) -> Step | None:
+    def now(self) -> FirstStep | None:
         """The first that is missing."""
         return next((step for step in self.steps if step not in self.took_s), None)
 
-    def reach(self, step: Step) -> None:
+    def reach(self, step: FirstStep) -> None:
         """Note that this is so."""
         if step in self.steps and step not in self.took_s:
             self.took_s[step] = self.elapsed_s

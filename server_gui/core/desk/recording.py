@@ -10,11 +10,13 @@ from typing import Final, Protocol
 from gateway.amounts import size
 from server_gui.core.alarms.alarm import Alarm, Alarms
 from server_gui.core.alarms.texts import Kind, check_of
+from server_gui.core.cloud.store_reach import StoreReach
 from server_gui.core.fleet.collector import CollectorReport
 from server_gui.core.fleet.link_statistics import LinkReport
 from server_gui.core.follow.frame_time import now_ns
 from server_gui.core.follow.news import News, NewsKind
 from server_gui.core.recording.recorder import AlarmKind
+from server_gui.core.settings.server_file import Upload
 from server_gui.core.threads.answers import Deliver, when_done
 from server_gui.core.threads.supervision import Trouble
 
@@ -101,6 +103,7 @@ class Recording:
         self.report: CollectorReport | None = None
         self.problem: str | None = None  # why nobody can be asked
         self.on_mark: list[Callable[[str, float], None]] = []  # told what was marked, and how many s ago
+        self.reach = StoreReach()  # of the store; `rely_on` says whose
         self._keeper = keeper
         self._pausing = pausing
         self._alarms = Alarms()
@@ -111,6 +114,11 @@ class Recording:
         self._alone_since_ns: int | None = None  # when whoever records elsewhere did not answer any more
         self._trouble: dict[str, str] = {}  # kind → what was told of it
         self._threads: dict[By, tuple[Trouble, ...]] = {}  # by whose they are
+
+    def rely_on(self, reach: StoreReach) -> None:
+        """Judge the store by this, which others look at too."""
+        self.reach = reach
+        reach.on_return.append(self._returned)
 
     def look(self) -> None:
         """Ask again, now and then."""
@@ -228,16 +236,15 @@ class Recording:
         said, report = self.said(None), self.report
         if said.tone is Tone.BAD:
             yield Alarm(Kind.NOT_RECORDED, "", said.detail or said.text, check=check_of(Kind.NOT_RECORDED))
+        if self.reach.trouble is not None:
+            yield Alarm(Kind.UPLOAD, "", self.reach.trouble, check=check_of(Kind.UPLOAD))
         if report is None:
             return
         for one in report.recorder.alarms:
             if one.kind not in STOPPED:
                 where, check = "recorder", check_of(Kind.RECORDING)
                 yield Alarm(Kind.RECORDING, one.kind.value, one.text, where, check=check)
-        uploader = report.uploader
-        if uploader.problem is not None:
-            yield Alarm(Kind.UPLOAD, "", uploader.problem, check=check_of(Kind.UPLOAD))
-        for text in (*uploader.lost, *uploader.ahead):
+        for text in (*report.uploader.lost, *report.uploader.ahead):
             yield Alarm(Kind.UPLOAD, text, text, "what is kept", check=DAMAGED)
 
     def said(self, address: str | None, *, is_live: bool = True) -> Said:
@@ -275,14 +282,14 @@ class Recording:
         rows = sum(link.rows_per_s for link in report.robots.values())
         problems = [trouble.text for threads in self._threads.values() for trouble in threads]
         problems += [alarm.text for alarm in report.recorder.alarms]
-        problems += [] if report.uploader.problem is None else [report.uploader.problem]
+        problems += [] if self.reach.trouble is None else [self.reach.trouble]
         problems += (*report.uploader.lost, *report.uploader.ahead)
         facts = [
             f"Recording{who}",
             _coming(rows, [link for link in report.robots.values() if address in (None, link.address)])
             if comes
             else NOTHING,
-            *_queue(report),
+            *_queue(report, is_reached=self.reach.trouble is None),
             f"{size(report.disk_free_bytes)} free",
         ]
         detail = [*problems, f"spool {report.spool}", f"store {report.store}", self.why]
@@ -297,10 +304,11 @@ class Recording:
             return
         self._asking, self.report, self.problem = False, report, None
         self._alone_since_ns = None
+        self.reach.uploads(report.uploader.problem)
         if self.by is By.OTHER:
             self.see(report.threads, By.OTHER)
         now = {alarm.kind.value: alarm.text for alarm in report.recorder.alarms}
-        now |= {} if report.uploader.problem is None else {"store": report.uploader.problem}
+        now |= {} if self.reach.trouble is None else {"store": self.reach.trouble}
         now |= {text: text for text in (*report.uploader.lost, *report.uploader.ahead)}
         for kind in now.keys() - self._trouble.keys():
             self._news.add(NewsKind.WARNING, WHO, now[kind])
@@ -312,9 +320,18 @@ class Recording:
         if keeper is not self._keeper:
             return
         self._asking, self.report, self.problem = False, None, str(error)
+        self.reach.uploads(None)  # nobody says so any more
         if self.by is By.OTHER and self._alone_since_ns is None:
             self._alone_since_ns = time.monotonic_ns()
             self._news.add(NewsKind.WARNING, WHO, f"nobody else records any more; {SOON}")
+
+    def _returned(self) -> None:
+        """Send what waits now that the store is back, not when the next attempt would be due."""
+        report, keeper = self.report, self._keeper
+        if keeper is None or report is None or report.upload is not Upload.ALWAYS:
+            return
+        if report.uploader.problem is not None:
+            keeper.upload()  # whether that helps, the next report says
 
     def _ask(
         self, ask: Callable[[Keeper], "Future[int]"], done: Callable[[int], tuple[NewsKind, str]]
@@ -333,10 +350,10 @@ class Recording:
         self._news.add(kind, WHO, text)
 
 
-def _queue(report: CollectorReport) -> list[str]:
+def _queue(report: CollectorReport, *, is_reached: bool) -> list[str]:
     uploader = report.uploader
     spool = f"spool {size(uploader.backlog_bytes)}"
-    if uploader.problem is not None:
+    if not is_reached:
         return [spool, f"store not reached, {uploader.waiting} to upload"]
     return [spool, f"{uploader.waiting} to upload" if uploader.waiting else "all uploaded"]
 

@@ -19,7 +19,7 @@ from gateway.wire.robot import Description
 from gateway.wire.stop import Reset, Stopped
 from ml.danger.levels import Level
 from server_gui.core.alarms.alarm import Alarms
-from server_gui.core.alarms.causes import STOOD_S, Stalls, gathered
+from server_gui.core.alarms.causes import Stalls, gathered
 from server_gui.core.alarms.marks import Mark
 from server_gui.core.alarms.robot_alarms import Facts, any_enabled
 from server_gui.core.alarms.robot_alarms import alarms as found
@@ -29,8 +29,8 @@ from server_gui.core.desk.flags import Flag, FlagKind, Flags, StateWatch, of_jou
 from server_gui.core.desk.resetting import after_reset, without_answer
 from server_gui.core.desk.rings import Rings
 from server_gui.core.evidence.edit_list import EditList
-from server_gui.core.evidence.file import Told
-from server_gui.core.experiments.plan import Plan
+from server_gui.core.evidence.file import EditEvidence
+from server_gui.core.experiments.plan import ExperimentPlan
 from server_gui.core.experiments.run import Run, begun
 from server_gui.core.follow.events import (
     Costs,
@@ -53,7 +53,7 @@ from server_gui.core.processing.robot_processing import RobotProcessing
 from server_gui.core.threads.answers import Deliver, Result, when_done
 from server_gui.core.tuning.commands import Commands
 from server_gui.core.tuning.comparison import Comparison
-from server_gui.core.tuning.edits import Change, Edits
+from server_gui.core.tuning.edits import Edits, ReviewedEdit
 from server_gui.core.tuning.flash import Flash
 from server_gui.core.tuning.lease import LeaseState
 from server_gui.core.tuning.link import LEASE_S
@@ -177,9 +177,9 @@ class Station:
         """How it is, in one mark and word: the same wherever it is shown."""
         return worst(self.robot, self.alarms)
 
-    def tell(self, kind: NewsKind, text: str) -> None:
-        """Note something about this robot."""
-        self.news.add(kind, self.title, text)
+    def tell(self, kind: NewsKind, text: str, about: str = "") -> None:
+        """Note something about this robot, or about a component of it."""
+        self.news.add(kind, self.title, text, about)
 
     def flag(self, text: str, ago_s: float = 0.0) -> None:
         """Flag this instant, or the one `ago_s` before it, which somebody has marked."""
@@ -244,7 +244,7 @@ class Station:
             return
         received_s = self.robot.now_s() - (time.monotonic_ns() - batch.received_ns) / 1e9
         stall = self._stalls.take(event.stream, batch.stamps_ns, batch.received_ns, received_s)
-        if stall is not None and stall.lasted_s >= STOOD_S:
+        if stall is not None and self._stalls.is_news(stall):
             self.tell(NewsKind.WARNING, f"the robot's computer stood still for {stall.lasted_s:.1f} s")
 
     def _described(self, description: Description, before: Description | None) -> None:
@@ -290,12 +290,12 @@ class Station:
                 self.flags.add(Flag(news.verdict.stamp_ns, happened, FlagKind.DANGER))
 
     @property
-    def trial_evidence(self) -> Told | None:
+    def trial_evidence(self) -> EditEvidence | None:
         """What is known of what is on trial."""
         trial = self.writing.trial
         return None if trial is None else self.judged.on_trial(trial.write)
 
-    def begin(self, plan: Plan) -> Run:
+    def begin(self, plan: ExperimentPlan) -> Run:
         """Begin an experiment; raises `BadPlan` where one goes on, or something is on trial."""
         self.experiment = begun(plan, self.experiment, self.robot, self._commands, self._deliver)
         return self.experiment
@@ -400,11 +400,11 @@ class Station:
 
     # --- parameters
 
-    def difference(self, units: Units) -> tuple[Change, ...]:
+    def difference(self, units: Units) -> tuple[ReviewedEdit, ...]:
         """Return what would be written."""
         return self.edits.difference(self.robot.parameters, self.known, units)
 
-    def write(self, changes: tuple[Change, ...], trial_s: float | None = None) -> None:
+    def write(self, changes: tuple[ReviewedEdit, ...], trial_s: float | None = None) -> None:
         """Write exactly these changes in one transaction."""
         self.writing.began(changes)
         future = self._commands.write({change.name: change.new for change in changes}, trial_s)
@@ -415,7 +415,7 @@ class Station:
             lambda error: self._write_failed(changes, error),
         )
 
-    def _written(self, changes: tuple[Change, ...], written: Written) -> None:
+    def _written(self, changes: tuple[ReviewedEdit, ...], written: Written) -> None:
         self.control.renewed(LEASE_S)
         self.writing.done(written)
         self.robot.hold(written.after)
@@ -423,7 +423,7 @@ class Station:
         self.edits.drop(*(change.name for change in changes))
         self.tell(NewsKind.PARAMETER, ", ".join(written_line(change, written) for change in changes))
 
-    def _write_failed(self, changes: tuple[Change, ...], error: Exception) -> None:
+    def _write_failed(self, changes: tuple[ReviewedEdit, ...], error: Exception) -> None:
         self.writing.failed(changes, error)
         self.tell(NewsKind.PARAMETER, f"{self.writing.state.value}: {error}")
 

@@ -25,7 +25,7 @@ TRIAL_NS: Final = 300_000_000_000  # the longest trial that a robot takes
 ID: Final = 10  # digits of the hash of the journal's entry
 
 
-class State(StrEnum):
+class EditState(StrEnum):
     """What became of an edit."""
 
     ASKED = "NOT KNOWN how it ended"
@@ -36,7 +36,7 @@ class State(StrEnum):
     FAILED = "failed"  # it was never in force as a whole
 
 
-class Change(Struct, frozen=True):
+class ParameterChange(Struct, frozen=True):
     """One parameter; SI."""
 
     name: str
@@ -58,10 +58,10 @@ class Edit(Struct, frozen=True):
     boot_id: str
     who: str
     utc_ns: int
-    changes: tuple[Change, ...]
+    changes: tuple[ParameterChange, ...]
     trial_s: float | None
     began_ns: int
-    state: State = State.ASKED
+    state: EditState = EditState.ASKED
     in_force_ns: int | None = None
     ended_ns: int | None = None
     not_back: tuple[str, ...] = ()  # parameters that its end has left with another value, and why
@@ -113,7 +113,7 @@ class JournalEdits:
     def lose_sight(self, at_ns: int) -> None:
         """Of trials that go on nobody hears from now on how they end."""
         self.all = [
-            replace(edit, state=State.ASKED, ended_ns=at_ns) if edit.state is State.ON_TRIAL else edit
+            replace(edit, state=EditState.ASKED, ended_ns=at_ns) if edit.state is EditState.ON_TRIAL else edit
             for edit in self.all
         ]
 
@@ -129,12 +129,12 @@ class JournalEdits:
             return
         edit, stamp_ns = self.all[places[-1]], int(entry["monotonic_ns"])
         in_force_ns = edit.in_force_ns
-        if outcome in (State.ON_TRIAL, State.KEPT) and in_force_ns is None:
+        if outcome in (EditState.ON_TRIAL, EditState.KEPT) and in_force_ns is None:
             in_force_ns = stamp_ns
         ended_ns = edit.ended_ns  # the first end, where a stop has claimed a part
-        if ended_ns is None and outcome in (State.REVERTED, State.FAILED):
+        if ended_ns is None and outcome in (EditState.REVERTED, EditState.FAILED):
             ended_ns = stamp_ns
-        if outcome is State.ON_TRIAL:
+        if outcome is EditState.ON_TRIAL:
             self._take_over(edit, stamp_ns)
         not_back = tuple(dict.fromkeys([*edit.not_back, *_not_back(entry)]))
         self.all[places[-1]] = replace(
@@ -146,18 +146,18 @@ class JournalEdits:
         names = {change.name for change in by.changes}
         for place, edit in enumerate(self.all):
             shares = names & {change.name for change in edit.changes}
-            if edit.write != by.write and edit.state is State.ON_TRIAL and shares:
-                self.all[place] = replace(edit, state=State.TAKEN_OVER, ended_ns=stamp_ns)
+            if edit.write != by.write and edit.state is EditState.ON_TRIAL and shares:
+                self.all[place] = replace(edit, state=EditState.TAKEN_OVER, ended_ns=stamp_ns)
 
 
-_OUTCOMES: Final[Mapping[str, State]] = {
-    "write done": State.KEPT,
-    "trial begun": State.ON_TRIAL,
-    "trial confirmed": State.KEPT,
-    "taken back": State.REVERTED,
-    "claimed by the stop": State.REVERTED,
-    "write taken back": State.FAILED,
-    "ROLL-BACK FAILED": State.FAILED,
+_OUTCOMES: Final[Mapping[str, EditState]] = {
+    "write done": EditState.KEPT,
+    "trial begun": EditState.ON_TRIAL,
+    "trial confirmed": EditState.KEPT,
+    "taken back": EditState.REVERTED,
+    "claimed by the stop": EditState.REVERTED,
+    "write taken back": EditState.FAILED,
+    "ROLL-BACK FAILED": EditState.FAILED,
 }
 
 
@@ -165,9 +165,9 @@ OLD_VALUE: Final = frozenset({"taken back", "unchanged"})  # what a robot says o
 
 
 def _not_back(entry: Entry) -> Iterator[str]:
-    """Yield what a stop has set, somebody else has changed, or was given up."""
+    """Yield parameters that were not reverted: set by a stop, changed by others, or given up."""
     outcome = entry.get("outcome")
-    if _OUTCOMES.get(str(entry.get("what"))) is State.REVERTED and isinstance(outcome, Mapping):
+    if _OUTCOMES.get(str(entry.get("what"))) is EditState.REVERTED and isinstance(outcome, Mapping):
         yield from (f"{name}: {said}" for name, said in outcome.items() if said not in OLD_VALUE)
 
 
@@ -182,7 +182,7 @@ def _begun(robot: str, entry: Entry) -> Edit:
         boot_id=str(entry.get("boot_id")),
         who=str(entry.get("who")),
         utc_ns=int(entry.get("utc_ns") or 0),
-        changes=tuple(Change(name, before.get(name), new) for name, new in after.items()),
+        changes=tuple(ParameterChange(name, before.get(name), new) for name, new in after.items()),
         trial_s=float(trial_s) if isinstance(trial_s, int | float) else None,
         began_ns=int(entry["monotonic_ns"]),
     )
@@ -195,7 +195,7 @@ def _numbers(found: object) -> dict[str, float]:
 
 
 def _last_ns(edit: Edit, now_ns: int) -> int:
-    if edit.state is State.ASKED:
+    if edit.state is EditState.ASKED:
         return edit.began_ns
     until_ns = due_ns(edit)
     return now_ns if until_ns is None else until_ns
@@ -203,11 +203,11 @@ def _last_ns(edit: Edit, now_ns: int) -> int:
 
 def due_ns(edit: Edit) -> int | None:
     """Return until when there may be more to be seen of an edit; None while that is open."""
-    if edit.state is State.FAILED or edit.in_force_ns is None:
+    if edit.state is EditState.FAILED or edit.in_force_ns is None:
         return edit.ended_ns
     if edit.ended_ns is not None:
         return edit.ended_ns + BACK_NS
-    return None if edit.state is State.ON_TRIAL else edit.in_force_ns + AFTER_NS
+    return None if edit.state is EditState.ON_TRIAL else edit.in_force_ns + AFTER_NS
 
 
 def spell(edit: Edit, edits: Sequence[Edit]) -> tuple[Spell, tuple[str, ...]]:
@@ -241,7 +241,7 @@ def spell(edit: Edit, edits: Sequence[Edit]) -> tuple[Spell, tuple[str, ...]]:
 
 
 def within(found: Spell, since_ns: int, until_ns: int) -> Spell:
-    """Return what of it lies in one recording: who wears the robot before or after that, nobody knows."""
+    """Return the parts within one recording: outside of it the wearer is unknown."""
     sides = (
         [(max(since, since_ns), min(until, until_ns)) for since, until in spans]
         for spans in (found.before, found.after)
@@ -253,7 +253,9 @@ def _is_taken_over(edit: Edit, by: Edit) -> bool:
     """Whether a trial's end is the other one's beginning: the same entry of the journal."""
     names = {change.name for change in by.changes}
     shares = any(change.name in names for change in edit.changes)
-    return edit.state is State.TAKEN_OVER and edit.ended_ns == by.in_force_ns and edit.id != by.id and shares
+    return (
+        edit.state is EditState.TAKEN_OVER and edit.ended_ns == by.in_force_ns and edit.id != by.id and shares
+    )
 
 
 def _instants(edit: Edit) -> Iterator[int]:

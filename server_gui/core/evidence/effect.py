@@ -65,7 +65,7 @@ class Effects:
 
 
 def effects(values: Floats, step: Floats, design: Floats, after: Bools) -> Effects:
-    """Return what `step` did to each column of `values` (cycles × metrics), all in the order of time.
+    """Return the effects of `step` on each column of `values` (cycles × metrics), all in the order of time.
 
     `design` has what else explains them, the constant among it (cycles × terms); `after` says on which side
     of the step each cycle is.
@@ -110,7 +110,7 @@ def _autoregressive(
 
 
 def _together(correlations: Floats) -> Floats:
-    """Return what each metric has for itself, and at least what half of them have."""
+    """Return each metric's own correlation, but at least the median of all."""
     clipped = np.clip(correlations, 0.0, MOST_CORRELATION)
     return np.asarray(np.maximum(clipped, np.median(clipped)))
 
@@ -148,7 +148,7 @@ def bootstrap_variance(residuals: Floats, weights: Floats, length: int) -> Float
 
 
 def block_lengths(residuals: Floats, after: Bools) -> npt.NDArray[np.int64]:
-    """Return how many cycles belong together, for each column: 1 where none resembles its neighbour."""
+    """Return the block length of each column in cycles: 1 if none resembles its neighbour."""
     correlation = np.clip(np.abs(_correlation(residuals, after)), 0.0, MOST_CORRELATION)
     cycles = len(residuals)
     best: Floats = (6.0 * (correlation / (1.0 - correlation**2)) ** 2 * cycles) ** (1.0 / 3.0)

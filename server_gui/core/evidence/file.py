@@ -30,7 +30,7 @@ log = logging.getLogger(__name__)
 FORMAT: Final = 1
 
 
-class Told(Struct, frozen=True):
+class EditEvidence(Struct, frozen=True):
     """An edit and its evidence; `is_final` where no more of it can come. `session` is the recording's."""
 
     edit: Edit
@@ -68,7 +68,7 @@ class EvidenceFile:
     def __init__(self, folder: Path, robot: str) -> None:
         self.path = folder / (re.sub(r"[^A-Za-z0-9_.-]", "_", robot).strip(".") + ".jsonl")
 
-    def add(self, told: Told) -> None:
+    def add(self, told: EditEvidence) -> None:
         """Add a line, durably; raises `OSError`."""
         private_folder(self.path.parent)
         with turn(self.path.parent), open(self.path, "ab", opener=opener) as file:
@@ -77,9 +77,9 @@ class EvidenceFile:
             file.flush()
             os.fsync(file.fileno())
 
-    def read(self) -> dict[str, Told]:
-        """Return what is known of each edit, by its id, oldest first; raises `OSError`."""
-        found: dict[str, Told] = {}
+    def read(self) -> dict[str, EditEvidence]:
+        """Return the evidence of each edit, by its id, oldest first; raises `OSError`."""
+        found: dict[str, EditEvidence] = {}
         with contextlib.suppress(FileNotFoundError), self.path.open("rb") as lines:
             for number, line in enumerate(lines, 1):
                 told = self._told(line, number)
@@ -88,14 +88,14 @@ class EvidenceFile:
                     found[told.edit.id] = told
         return dict(sorted(found.items(), key=lambda item: item[1].edit.utc_ns))
 
-    def _told(self, line: bytes, number: int) -> Told | None:
+    def _told(self, line: bytes, number: int) -> EditEvidence | None:
         if not line.strip():
             return None
         try:
             if msgspec.json.decode(line, type=_Line).format != FORMAT:
                 log.warning("%s, line %d: another format; a newer gwrms can read it", self.path, number)
                 return None
-            return msgspec.json.decode(line, type=Told)
+            return msgspec.json.decode(line, type=EditEvidence)
         except (msgspec.DecodeError, RecursionError) as error:
             log.warning("%s, line %d is damaged and left out: %s", self.path, number, error)
             return None
@@ -139,7 +139,7 @@ def _whose(line: bytes) -> tuple[str, str] | None:
     return found.edit.robot, found.session
 
 
-def read_all(folder: Path) -> list[Told]:
+def read_all(folder: Path) -> list[EditEvidence]:
     """Return every edit that is kept there, oldest first; raises `OSError`."""
     paths = sorted(folder.glob("*.jsonl")) if folder.is_dir() else []
     found = [told for path in paths for told in EvidenceFile(folder, path.stem).read().values()]

@@ -20,7 +20,7 @@ _SECOND: Final = 2.0 * np.linalg.pinv(np.vander(_AROUND, 4, increasing=True).ast
 
 
 def of_joint(curves: Mapping[str, Floats], seconds: float) -> dict[str, float]:
-    """Return what these curves tell, by the keys of `metrics.OF_JOINTS`; the rest is missing.
+    """Return the measures of these curves, by the keys of `metrics.OF_JOINTS`; unknown ones are missing.
 
     Each curve has `POINTS` values, evenly over the `seconds` of the stride, in SI units. What holds still has
     neither lag nor overshoot: of noise, they would be anything.

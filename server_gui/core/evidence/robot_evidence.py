@@ -18,13 +18,13 @@ from server_gui.core.evidence.edits import (
     BEFORE_NS,
     TRIAL_NS,
     Edit,
+    EditState,
     JournalEdits,
-    State,
     due_ns,
     spell,
     within,
 )
-from server_gui.core.evidence.file import Told
+from server_gui.core.evidence.file import EditEvidence
 from server_gui.core.follow.events import (
     BusesSeen,
     Described,
@@ -80,7 +80,7 @@ class RobotEvidence:
         self.cut = 0  # cycles, also those that were forgotten
         self._over: set[str] = set()
 
-    def take(self, event: Event | Recorded) -> list[Told]:
+    def take(self, event: Event | Recorded) -> list[EditEvidence]:
         """Take one fact; what can become no more where it ends something."""
         match event:
             case Recorded():
@@ -101,19 +101,19 @@ class RobotEvidence:
         return []
 
     def session_of(self, edit: Edit) -> str:
-        """Return what the recording was called in which the edit was made."""
+        """Return the name of the recording in which the edit was made."""
         return self._recordings[self._place(edit)][1]
 
     def label(self, stamp_ns: int, activity: str) -> None:
-        """Take what a model says that the wearer does at an instant."""
+        """Take a model's activity of the wearer at an instant."""
         self._cutter.label(stamp_ns, activity)
 
-    def look(self) -> list[Told]:
+    def look(self) -> list[EditEvidence]:
         """Return the edits of which something new is known since the last look."""
         return [told for edit in self._open() if (told := self._look(edit)) is not None]
 
-    def end(self) -> list[Told]:
-        """Return what is known of the edits that were still followed; nothing more will come."""
+    def end(self) -> list[EditEvidence]:
+        """Return the final evidence of the edits that were still followed."""
         told = [self._told(_left(edit), is_final=True) for edit in self._open()]
         self._over |= {one.edit.id for one in told}
         return told
@@ -128,13 +128,13 @@ class RobotEvidence:
 
     # --- inside
 
-    def _told(self, edit: Edit, *, is_final: bool) -> Told:
-        """Return what an edit has done, as far as the cycles until now tell."""
+    def _told(self, edit: Edit, *, is_final: bool) -> EditEvidence:
+        """Return the effect of an edit, from the cycles until now."""
         windows, notes = self._spell(edit)
         edited = [joint for joint in self.joints if joint in edit.components]
         found = compare(self.cycles, windows, self.joints, edited)
         drawn = curves(self.cycles, windows, told_joints(found, edited))
-        return Told(edit, replace(found, notes=found.notes + notes), is_final, curves=drawn)
+        return EditEvidence(edit, replace(found, notes=found.notes + notes), is_final, curves=drawn)
 
     def _recorded(self, session: str) -> None:
         """Begin another recording: its data is not compared with edits of the one before."""
@@ -202,8 +202,8 @@ class RobotEvidence:
         self._divide(self._told_ns, session)
         self._divide(max(until_ns, self._told_ns), session)
 
-    def _described(self, description: Description) -> list[Told]:
-        ended: list[Told] = []
+    def _described(self, description: Description) -> list[EditEvidence]:
+        ended: list[EditEvidence] = []
         self._description = description
         if self._boot_id not in (None, description.boot_id):
             ended = self.end()
@@ -225,17 +225,19 @@ class RobotEvidence:
 
     def _ours(self) -> list[Edit]:
         return [
-            edit for edit in self._edits.all if edit.state is not State.ASKED or edit.in_force_ns is not None
+            edit
+            for edit in self._edits.all
+            if edit.state is not EditState.ASKED or edit.in_force_ns is not None
         ]
 
     def _open(self) -> Iterator[Edit]:
         first_ns = self._first_ns
         for edit in self._ours():
             followed = first_ns is not None and edit.began_ns >= first_ns
-            if followed and edit.state is not State.FAILED and edit.id not in self._over:
+            if followed and edit.state is not EditState.FAILED and edit.id not in self._over:
                 yield edit
 
-    def _look(self, edit: Edit) -> Told | None:
+    def _look(self, edit: Edit) -> EditEvidence | None:
         until_ns = due_ns(edit)
         is_final = until_ns is not None and self.newest_ns > until_ns + LATE_NS
         windows, _ = self._spell(edit)
@@ -253,7 +255,7 @@ class RobotEvidence:
 
 def _left(edit: Edit) -> Edit:
     """Return an edit that nobody follows any more: of a trial nobody here hears how it ends."""
-    return replace(edit, state=State.ASKED) if edit.state is State.ON_TRIAL else edit
+    return replace(edit, state=EditState.ASKED) if edit.state is EditState.ON_TRIAL else edit
 
 
 def _load(buses: tuple[BusInfo, ...] | None) -> float | None:

@@ -11,7 +11,7 @@ from typing import Final, Self
 from msgspec.structs import replace
 
 from ml.serving.predictor import Prediction
-from server_gui.core.evidence.file import EvidenceFile, Told
+from server_gui.core.evidence.file import EditEvidence, EvidenceFile
 from server_gui.core.evidence.robot_evidence import Recorded, RobotEvidence
 from server_gui.core.follow.events import Event, without_processes
 from server_gui.core.prediction.inbox import Inbox
@@ -25,7 +25,7 @@ STILL_S: Final = 2.0
 ACTIVITY: Final = "activity"  # the task
 MOST_SAID: Final = 4096  # what may wait of what models say
 
-Tell = Callable[[str, Told], None]  # (robot, what is known now), in the service's thread
+Tell = Callable[[str, EditEvidence], None]  # (robot, what is known now), in the service's thread
 
 
 class EvidenceService:
@@ -59,7 +59,7 @@ class EvidenceService:
         self.worker.join()
 
     def take(self, robot: str, event: Event) -> None:
-        """Take what a robot's feed tells; from any thread, returns at once."""
+        """Take an event of a robot's feed; from any thread, returns at once."""
         session = self._session(robot)
         if self._recorded.get(robot) != session:
             self._recorded[robot] = session
@@ -67,7 +67,7 @@ class EvidenceService:
         self._inbox.put(robot, without_processes(event))
 
     def predicted(self, news: Iterable[PredictionNews]) -> None:
-        """Take what models say; from any thread, returns at once."""
+        """Take models' predictions; from any thread, returns at once."""
         for one in news:
             if isinstance(one, Predicted) and one.prediction.task == ACTIVITY:
                 self._said.append((one.robot, one.prediction))
@@ -91,7 +91,7 @@ class EvidenceService:
         for robot in list(self._robots):
             self._guarded(robot, RobotEvidence.end)
 
-    def _guarded(self, robot: str, work: Callable[[RobotEvidence], Iterable[Told]]) -> None:
+    def _guarded(self, robot: str, work: Callable[[RobotEvidence], Iterable[EditEvidence]]) -> None:
         """Isolate errors of one robot from the others."""
         self.worker.beat()
         known = self._robots.get(robot)
@@ -130,7 +130,7 @@ class EvidenceService:
         except OSError as error:
             log.error("the edits of %s that were kept cannot be read: %s", robot, error)
 
-    def _told(self, robot: str, told: Told) -> None:
+    def _told(self, robot: str, told: EditEvidence) -> None:
         session = self._robots[robot].session_of(told.edit)
         if told.is_final and session:
             try:
@@ -142,5 +142,5 @@ class EvidenceService:
             self._tell(robot, told)
 
 
-def _taken(events: Iterable[Event | Recorded], known: RobotEvidence) -> list[Told]:
+def _taken(events: Iterable[Event | Recorded], known: RobotEvidence) -> list[EditEvidence]:
     return [told for event in events for told in known.take(event)]

@@ -7,13 +7,13 @@ from msgspec.structs import replace
 from gateway.units import Unit, Units
 from server_gui.core.evidence.comparison import Measured
 from server_gui.core.evidence.experiment import Experiment, Point, Response
-from server_gui.core.evidence.file import Told
+from server_gui.core.evidence.file import EditEvidence
 from server_gui.core.tuning.edits import unit_of
 
 Si = Callable[[str], str | None]  # the SI unit of a parameter, None where it is not known
 
 
-def in_units(told: Told, units: Units, si: Si) -> Told:
+def in_units(told: EditEvidence, units: Units, si: Si) -> EditEvidence:
     """Return the same, its values, metrics and responses in these units; curves stay SI.
 
     A value whose unit is not known stays as it was told.
@@ -33,7 +33,7 @@ def in_units(told: Told, units: Units, si: Si) -> Told:
     )
 
 
-def symbols(told: Told, units: Units, si: Si) -> dict[str, str]:
+def symbols(told: EditEvidence, units: Units, si: Si) -> dict[str, str]:
     """Return the symbol of each parameter's unit, empty where it has none or it is not known."""
     return {one.name: _unit(one.name, units, si).symbol for one in told.edit.changes}
 

@@ -6,8 +6,8 @@ from typing import Final
 
 from gateway.amounts import NONE, counted
 from server_gui.core.evidence.comparison import Evidence, Measured, Word
-from server_gui.core.evidence.edits import Edit, State
-from server_gui.core.evidence.file import Told
+from server_gui.core.evidence.edits import Edit, EditState
+from server_gui.core.evidence.file import EditEvidence
 
 PERCENT: Final = "%"
 POINTS: Final = " points"  # of a percentage: from 10 to 15 % it is 5 more, and not 50 %
@@ -59,10 +59,10 @@ def interval(one: Measured) -> str:
     return f"{low:+.1f} to {high:+.1f} %"
 
 
-def word(told: Told) -> str:
-    """Return what an edit did, and in which tense: what has ended was so, however many strides still come."""
+def word(told: EditEvidence) -> str:
+    """Return the judgement of an edit, and its tense: past for an edit that has ended."""
     found = told.evidence.word
-    if told.edit.state in (State.REVERTED, State.TAKEN_OVER) and told.experiment is None:
+    if told.edit.state in (EditState.REVERTED, EditState.TAKEN_OVER) and told.experiment is None:
         return f"was {found}" if found in (Word.BETTER, Word.WORSE, Word.MIXED) else str(found)
     return str(found) if told.is_final else f"{found} so far"
 

@@ -9,7 +9,7 @@ from enum import Enum
 from typing import Final
 
 
-class State(Enum):
+class ExperimentState(Enum):
     """Of an experiment; the last three are its ends."""
 
     LOOKING = "watching the walk before anything is written"
@@ -55,14 +55,14 @@ class Action(Enum):
     READ = "the value that the device holds"
 
 
-S, E, A = State, Event, Action
+S, E, A = ExperimentState, Event, Action
 ENDS: Final = frozenset({S.NOTHING_DONE, S.OVER, S.NOT_CONFIRMED})
 # What was written after all is taken back wherever it is heard of.
 _WRITTEN_LATE: Final = {
     (state, E.WRITTEN): (S.TAKING_BACK, A.REVERT)
     for state in (S.TAKING_BACK, S.READING, S.OVER, S.NOT_CONFIRMED)
 }
-TABLE: Final[Mapping[tuple[State, Event], tuple[State, Action]]] = {
+TABLE: Final[Mapping[tuple[ExperimentState, Event], tuple[ExperimentState, Action]]] = {
     (S.LOOKING, E.READY): (S.WRITING, A.WRITE),
     (S.LOOKING, E.HALT): (S.NOTHING_DONE, A.NONE),
     (S.LOOKING, E.LATE): (S.NOTHING_DONE, A.NONE),
@@ -86,6 +86,6 @@ TABLE: Final[Mapping[tuple[State, Event], tuple[State, Action]]] = {
 }
 
 
-def after(state: State, event: Event) -> tuple[State, Action]:
+def after(state: ExperimentState, event: Event) -> tuple[ExperimentState, Action]:
     """Return where it stands then, and what is asked; what means nothing there changes nothing."""
     return TABLE.get((state, event), (state, A.NONE))

@@ -34,7 +34,7 @@ UNEVEN: Final = 2  # pairs at most that more begin with one value than with the 
 BENT: Final = 0.5  # of what that would be where all early ones begin with the one, all late with the other
 
 
-class Kind(StrEnum):
+class ExperimentKind(StrEnum):
     """Of experiment."""
 
     AB = "A/B trial"
@@ -54,7 +54,7 @@ class Bounds:
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class ExperimentStep:
     """A value to be held; what only leads to the first one is not measured."""
 
     value: float
@@ -84,14 +84,14 @@ class Dwell:
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
+class ExperimentPlan:
     """`steps` in their order; of an A/B trial two make a pair, drawn with `seed`."""
 
-    kind: Kind
+    kind: ExperimentKind
     name: str
     original: float
     values: tuple[float, ...]  # that are measured, each once: A and B, or upwards
-    steps: tuple[Step, ...]
+    steps: tuple[ExperimentStep, ...]
     dwell: Dwell = field(default_factory=Dwell)
     bounds: Bounds = field(default_factory=Bounds)
     seed: int | None = None
@@ -118,7 +118,7 @@ def ab(
     dwell: Dwell = Dwell(),
     bounds: Bounds = Bounds(),
     seed: int | None = None,
-) -> Plan:
+) -> ExperimentPlan:
     """Plan an A/B trial of two values of a parameter that now is `held`; raises `BadPlan`."""
     if not FEWEST_PAIRS <= pairs <= MOST_PAIRS:
         raise BadPlan(
@@ -131,8 +131,8 @@ def ab(
         raise BadPlan(f"{info.name}: both values are the same to the device; nothing could differ")
     seed = random.SystemRandom().randrange(2**31) if seed is None else seed
     chosen = random.Random(seed).choice(orders(pairs).tolist())
-    steps = [Step(one) for sign in chosen for one in (values if sign > 0 else values[::-1])]
-    return Plan(Kind.AB, info.name, held, values, tuple(steps), dwell, bounds, seed, unit)
+    steps = [ExperimentStep(one) for sign in chosen for one in (values if sign > 0 else values[::-1])]
+    return ExperimentPlan(ExperimentKind.AB, info.name, held, values, tuple(steps), dwell, bounds, seed, unit)
 
 
 def sweep(
@@ -143,7 +143,7 @@ def sweep(
     *,
     dwell: Dwell = Dwell(),
     bounds: Bounds = Bounds(),
-) -> Plan:
+) -> ExperimentPlan:
     """Plan a sweep from, to, by steps of; of a parameter that now is `held`; raises `BadPlan`."""
     first, last, step = span
     if not all(map(math.isfinite, span)) or step <= 0 or last <= first:
@@ -160,8 +160,10 @@ def sweep(
     lead = [_tidy(held + (first - held) * part / between) for part in range(1, between)]
     way = [held, *lead, *measured]
     _check(info, unit, [*itertools.pairwise(way), *((held, one) for one in measured)], dwell)
-    steps = (*(Step(one, is_measured=False) for one in lead), *map(Step, measured))
-    return Plan(Kind.SWEEP, info.name, held, tuple(measured), steps, dwell, bounds, unit=unit)
+    steps = (*(ExperimentStep(one, is_measured=False) for one in lead), *map(ExperimentStep, measured))
+    return ExperimentPlan(
+        ExperimentKind.SWEEP, info.name, held, tuple(measured), steps, dwell, bounds, unit=unit
+    )
 
 
 @functools.lru_cache(maxsize=16)
@@ -176,8 +178,8 @@ def orders(pairs: int) -> npt.NDArray[np.int8]:
     return np.asarray(every[(np.abs(every.sum(axis=1)) <= UNEVEN) & (early <= BENT)])
 
 
-def signs(plan: Plan) -> npt.NDArray[np.int8]:
-    """Return which of each pair comes first: 1 A, -1 B."""
+def signs(plan: ExperimentPlan) -> npt.NDArray[np.int8]:
+    """Return the order of each pair: 1 if A comes first, else -1."""
     first = plan.values[0]
     return np.array([1 if step.value == first else -1 for step in plan.steps[::2]], dtype=np.int8)
 

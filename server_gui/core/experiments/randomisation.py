@@ -34,7 +34,7 @@ class Randomised:
 
 
 def randomised(differences: Floats, chosen: npt.NDArray[np.int8], orders: npt.NDArray[np.int8]) -> Randomised:
-    """Return what differs.
+    """Return the effect, by a randomisation test.
 
     `differences` has of each pair the later minus the earlier mean (pairs × metrics), `chosen` the order that
     was drawn (1: the first value came first), `orders` all that could be, `chosen` among them.

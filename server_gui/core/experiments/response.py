@@ -14,7 +14,7 @@ from server_gui.core.evidence.comparison import Evidence, Word
 from server_gui.core.evidence.experiment import Point, Response
 from server_gui.core.evidence.metrics import Better
 from server_gui.core.evidence.wording import number
-from server_gui.core.experiments.verdict import FEWEST, Held, Series, all_series
+from server_gui.core.experiments.verdict import FEWEST, HeldPeriod, Series, all_series
 
 CONFIDENCE: Final = 0.95
 MOST_ALIKE: Final = 0.9
@@ -32,8 +32,10 @@ class Swept:
     reason: str
 
 
-def respond(periods: Sequence[Held], joints: Sequence[str], edited: Sequence[str], original: float) -> Swept:
-    """Return what the values did; judged by the tracking error of what was edited, else of all joints."""
+def respond(
+    periods: Sequence[HeldPeriod], joints: Sequence[str], edited: Sequence[str], original: float
+) -> Swept:
+    """Return the responses to the values, judged by the tracking error of the edited joints, else of all."""
     series = [one for one in all_series(joints, periods) if not one.metric.is_slope]
     responses = [found for one in series if (found := _response(one, periods)) is not None]
     wanted = [one for one in series if one.metric.key == JUDGED and one.component in (edited or joints)]
@@ -54,7 +56,7 @@ def respond(periods: Sequence[Held], joints: Sequence[str], edited: Sequence[str
     return Swept(evidence, tuple(responses), judged.series, proposal, reason)
 
 
-def _response(one: Series, periods: Sequence[Held]) -> Response | None:
+def _response(one: Series, periods: Sequence[HeldPeriod]) -> Response | None:
     rows = [
         (held.value, [cycle.values[one.key] for cycle in held.of(one.leg) if one.key in cycle.values])
         for held in periods

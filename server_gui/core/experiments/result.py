@@ -8,11 +8,11 @@ from msgspec.structs import replace
 
 from server_gui.core.evidence.comparison import Evidence, Spell
 from server_gui.core.evidence.curves import Curves, curves, told_joints
-from server_gui.core.evidence.edits import ID, Change, Edit, State
+from server_gui.core.evidence.edits import ID, Edit, EditState, ParameterChange
 from server_gui.core.evidence.experiment import Experiment
-from server_gui.core.evidence.file import Told
-from server_gui.core.experiments.machine import State as Stands
-from server_gui.core.experiments.plan import Kind, signs
+from server_gui.core.evidence.file import EditEvidence
+from server_gui.core.experiments.machine import ExperimentState as Stands
+from server_gui.core.experiments.plan import ExperimentKind, signs
 from server_gui.core.experiments.response import Swept, respond
 from server_gui.core.experiments.run import Run
 from server_gui.core.experiments.verdict import judge
@@ -20,14 +20,14 @@ from server_gui.core.experiments.verdict import judge
 LEFT_OUT: Final = "right after a change"
 
 
-def result(run: Run, who: str, unit: str, session: str = "") -> Told | None:
-    """Return what is to be kept of an experiment that is over; None where nothing was written."""
+def result(run: Run, who: str, unit: str, session: str = "") -> EditEvidence | None:
+    """Return the record of a finished experiment; None if nothing was written."""
     if run.state is Stands.NOTHING_DONE:
         return None
     plan, held = run.plan, [one for _, one in run.periods]
     swept: Swept | None = None
     drawn: tuple[Curves, ...] = ()
-    if plan.kind is Kind.AB:
+    if plan.kind is ExperimentKind.AB:
         evidence = judge((plan.values[0], plan.values[1]), signs(plan), held, run.joints, run.edited)
         drawn = _curves(run, evidence)
     else:
@@ -57,11 +57,11 @@ def result(run: Run, who: str, unit: str, session: str = "") -> Told | None:
         writes=tuple(run.writes),
     )
     told = replace(evidence, left_out=counted)
-    return Told(_edit(run, who), told, is_final=True, session=session, curves=drawn, experiment=kept)
+    return EditEvidence(_edit(run, who), told, is_final=True, session=session, curves=drawn, experiment=kept)
 
 
 def _edit(run: Run, who: str) -> Edit:
-    """Return what stands for all its trials in a list of edits."""
+    """Return the one edit that represents all trials of an experiment."""
     plan = run.plan
     first, last = plan.values[0], plan.values[-1]
     name = hashlib.sha256(f"{run.robot} {run.boot_id} {run.utc_ns} {plan.name}".encode()).hexdigest()[:ID]
@@ -74,10 +74,10 @@ def _edit(run: Run, who: str) -> Edit:
         boot_id=run.boot_id,
         who=who,
         utc_ns=run.utc_ns,
-        changes=(Change(plan.name, first, last),),
+        changes=(ParameterChange(plan.name, first, last),),
         trial_s=plan.dwell.trial_s,
         began_ns=periods[0].began_ns if periods else 0,
-        state=State.REVERTED if run.state is Stands.OVER else State.ASKED,
+        state=EditState.REVERTED if run.state is Stands.OVER else EditState.ASKED,
         in_force_ns=periods[0].began_ns if periods else None,
         ended_ns=periods[-1].ended_ns if periods else None,
     )

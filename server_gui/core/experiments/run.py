@@ -11,14 +11,14 @@ from typing import Final
 from gateway.client import NotConnected, RemoteError
 from gateway.wire.parameter import Reverted, Written
 from server_gui.core.alarms.alarm import Alarm
-from server_gui.core.alarms.texts import Kind as AlarmKind
+from server_gui.core.alarms.texts import Kind
 from server_gui.core.evidence.cycles import Cycle
 from server_gui.core.evidence.experiment import Period
 from server_gui.core.evidence.robot_evidence import RobotEvidence
-from server_gui.core.experiments.machine import Action, Event, State, after
-from server_gui.core.experiments.plan import BadPlan, Kind, Plan
-from server_gui.core.experiments.verdict import Held
-from server_gui.core.experiments.watch import Watch
+from server_gui.core.experiments.machine import Action, Event, ExperimentState, after
+from server_gui.core.experiments.plan import BadPlan, ExperimentKind, ExperimentPlan
+from server_gui.core.experiments.verdict import HeldPeriod
+from server_gui.core.experiments.watch import ExperimentWatch
 from server_gui.core.follow.events import Described, Looked, Telemetry
 from server_gui.core.follow.events import Event as Fact
 from server_gui.core.follow.robot import Robot
@@ -33,11 +33,18 @@ WATCHED_S: Final = 5.0  # without a sign of who watches a sweep
 STALE_S: Final = 2.0  # without telemetry
 STANDS_S: Final = 6.0  # without a gait cycle: nobody walks any more
 AGAIN_NS: Final = SECOND  # between looks at what is held
-LIMITS_S: Final = {State.LOOKING: 30.0, State.WRITING: 35.0, State.TAKING_BACK: 35.0, State.READING: 60.0}
-IN_THE_WAY: Final = frozenset({AlarmKind.GUARD, AlarmKind.STOPPED, AlarmKind.NOT_STOPPED})
+LIMITS_S: Final = {
+    ExperimentState.LOOKING: 30.0,
+    ExperimentState.WRITING: 35.0,
+    ExperimentState.TAKING_BACK: 35.0,
+    ExperimentState.READING: 60.0,
+}
+IN_THE_WAY: Final = frozenset({Kind.GUARD, Kind.STOPPED, Kind.NOT_STOPPED})
 
 
-def begun(plan: Plan, before: "Run | None", robot: Robot, commands: Commands, deliver: Deliver) -> "Run":
+def begun(
+    plan: ExperimentPlan, before: "Run | None", robot: Robot, commands: Commands, deliver: Deliver
+) -> "Run":
     """Return a new one; raises `BadPlan` where the one `before` goes on, or the robot is not known."""
     if before is not None and not before.is_over:
         raise BadPlan(f"{before.plan.kind.value} of {before.plan.name} goes on: stop it, or wait for its end")
@@ -51,7 +58,7 @@ class Run:
 
     def __init__(
         self,
-        plan: Plan,
+        plan: ExperimentPlan,
         robot: str,
         commands: Commands,
         deliver: Deliver,
@@ -60,12 +67,12 @@ class Run:
     ) -> None:
         self.plan = plan
         self.robot = robot
-        self.state = State.LOOKING
+        self.state = ExperimentState.LOOKING
         self.why = ""  # it ended early
         self.back = ""  # what is known of the original value
         self.utc_ns = time.time_ns()
         self.boot_id = described.description.boot_id
-        self.periods: list[tuple[Period, Held]] = []
+        self.periods: list[tuple[Period, HeldPeriod]] = []
         self.writes: list[int] = []  # its trials, in the robot's journal
         self.transients = 0  # cycles that were left out
         self._commands = commands
@@ -76,7 +83,7 @@ class Run:
         self.joints = self._walk.joints
         component = plan.name.partition(".")[0]
         self.edited = tuple(joint for joint in self.joints if joint == component)
-        self.watch = Watch(plan.name, self.edited or self.joints, plan.bounds, plan.said)
+        self.watch = ExperimentWatch(plan.name, self.edited or self.joints, plan.bounds, plan.said)
         self.watch.take(described)
         self.place = 0  # of the step
         self._write: int | None = None  # that is on trial
@@ -99,7 +106,7 @@ class Run:
     @property
     def is_whole(self) -> bool:
         """Whether every value was held as planned."""
-        return not self.why and self.state is State.OVER
+        return not self.why and self.state is ExperimentState.OVER
 
     @property
     def cycles(self) -> int:
@@ -111,7 +118,7 @@ class Run:
         """About how long it goes on, as the last stride lasted."""
         stride_s = self._walk.cycles[-1].seconds if self._walk.cycles else 1.2
         whole_s = self.plan.expected_s(stride_s)
-        held_s = (self._clock() - self._since_ns) / SECOND if self.state is State.HOLDING else 0.0
+        held_s = (self._clock() - self._since_ns) / SECOND if self.state is ExperimentState.HOLDING else 0.0
         return max(0.0, whole_s * (1.0 - self.place / len(self.plan.steps)) - held_s)
 
     @property
@@ -122,7 +129,7 @@ class Run:
     # --- what comes
 
     def take(self, fact: Fact) -> None:
-        """Take what the robot's feed tells."""
+        """Take an event of the robot's feed."""
         self._walk.take(fact)
         self.watch.take(fact)
         match fact:
@@ -139,7 +146,11 @@ class Run:
 
     def halt(self, why: str) -> None:
         """End it, and take back what is on trial; says why once."""
-        if not self.is_over and self.state in (State.LOOKING, State.WRITING, State.HOLDING):
+        if not self.is_over and self.state in (
+            ExperimentState.LOOKING,
+            ExperimentState.WRITING,
+            ExperimentState.HOLDING,
+        ):
             self.why = self.why or why
         self._do(Event.HALT)
 
@@ -149,17 +160,25 @@ class Run:
             return
         self.watch.see(alarms, self._clock())
         broken = self._broken()
-        if broken is not None and self.state in (State.LOOKING, State.WRITING, State.HOLDING):
+        if broken is not None and self.state in (
+            ExperimentState.LOOKING,
+            ExperimentState.WRITING,
+            ExperimentState.HOLDING,
+        ):
             self.halt(broken)
-        elif self.state is State.LOOKING:
+        elif self.state is ExperimentState.LOOKING:
             self._look(alarms)
-        elif self.state is State.HOLDING and self._is_enough():
+        elif self.state is ExperimentState.HOLDING and self._is_enough():
             self._close_period()
             self._do(Event.NEXT if self.place < len(self.plan.steps) else Event.LAST)
         if self._is_late():
             self.why = self.why or self._late()
             self._do(Event.LATE)
-        elif self.state is State.READING and self._read_ns is not None and self._clock() >= self._read_ns:
+        elif (
+            self.state is ExperimentState.READING
+            and self._read_ns is not None
+            and self._clock() >= self._read_ns
+        ):
             self._ask_what_is_held()
 
     # --- stop rules that need the time
@@ -170,14 +189,19 @@ class Run:
             return self.watch.why
         if now_ns - self._rows_ns > STALE_S * SECOND:
             return f"no telemetry for {STALE_S:.0f} s: the link is lost, or its values are stale"
-        if self.plan.kind is Kind.SWEEP and now_ns - self._beat_ns > WATCHED_S * SECOND:
+        if self.plan.kind is ExperimentKind.SWEEP and now_ns - self._beat_ns > WATCHED_S * SECOND:
             return "nobody watches it any more"
-        if self.state is State.HOLDING and self._walk.newest_ns - self._walked_ns > STANDS_S * SECOND:
+        if (
+            self.state is ExperimentState.HOLDING
+            and self._walk.newest_ns - self._walked_ns > STANDS_S * SECOND
+        ):
             return f"no gait cycle for {STANDS_S:.0f} s: the robot does not walk any more"
         return None
 
     def _is_late(self) -> bool:
-        limit_s = self.plan.dwell.limit_s if self.state is State.HOLDING else LIMITS_S.get(self.state)
+        limit_s = (
+            self.plan.dwell.limit_s if self.state is ExperimentState.HOLDING else LIMITS_S.get(self.state)
+        )
         return limit_s is not None and self._clock() - self._since_ns > limit_s * SECOND
 
     def _late(self) -> str:
@@ -185,9 +209,9 @@ class Run:
         seen = f"{self._least()} of {LOOKS_AT} gait cycles were seen"
         unseen = f"{seen}: nobody walks, or rows are missing, as where this computer is too busy"
         return {
-            State.LOOKING: unread if self._held is None else unseen,
-            State.WRITING: "the robot has not answered a write in time",
-            State.HOLDING: f"too few gait cycles came in {self.plan.dwell.limit_s:.0f} s",
+            ExperimentState.LOOKING: unread if self._held is None else unseen,
+            ExperimentState.WRITING: "the robot has not answered a write in time",
+            ExperimentState.HOLDING: f"too few gait cycles came in {self.plan.dwell.limit_s:.0f} s",
         }.get(self.state, "the robot has not answered in time")
 
     # --- what is done
@@ -217,7 +241,7 @@ class Run:
             case Action.REVERT | Action.RELEASE:
                 when_done(self._commands.release_control(), self._deliver, self._taken, self._not_taken)
             case Action.READ:
-                self._read_ns = self._clock() + (AGAIN_NS if before is State.READING else 0)
+                self._read_ns = self._clock() + (AGAIN_NS if before is ExperimentState.READING else 0)
         if self.is_over and before is not self.state:
             self._ended()
 
@@ -273,7 +297,7 @@ class Run:
 
     def _ended(self) -> None:
         """Nobody needs the lease any more; that it is given back is nothing that the end waits for."""
-        if self.state is not State.NOTHING_DONE:
+        if self.state is not ExperimentState.NOTHING_DONE:
             self._commands.release_control()
 
     # --- gait cycles
@@ -313,4 +337,4 @@ class Run:
         if step.is_measured:
             ended_ns = self._walk.newest_ns
             period = Period(step.value, self._write or 0, self._began_ns, ended_ns, len(kept))
-            self.periods.append((period, Held(step.value, sorted(kept, key=lambda one: one.ended_ns))))
+            self.periods.append((period, HeldPeriod(step.value, sorted(kept, key=lambda one: one.ended_ns))))

@@ -25,7 +25,7 @@ TOLD: Final = "too few strides are equally long, so that only the cadence can be
 
 
 @dataclass(frozen=True, slots=True)
-class Held:
+class HeldPeriod:
     """A period and its cycles that count, without those that followed the change."""
 
     value: float
@@ -55,7 +55,7 @@ class Series:
         return f"{self.component} {self.metric.title}".strip()
 
 
-def all_series(joints: Sequence[str], periods: Sequence[Held]) -> list[Series]:
+def all_series(joints: Sequence[str], periods: Sequence[HeldPeriod]) -> list[Series]:
     """Return every metric of these joints and of the robot."""
     counts = collections.Counter(cycle.leg for held in periods for cycle in held.cycles)
     most = max(Leg, key=lambda leg: counts[leg])
@@ -70,11 +70,11 @@ def all_series(joints: Sequence[str], periods: Sequence[Held]) -> list[Series]:
 def judge(
     values: tuple[float, float],
     order: npt.NDArray[np.int8],
-    periods: Sequence[Held],
+    periods: Sequence[HeldPeriod],
     joints: Sequence[str],
     edited: Sequence[str],
 ) -> Evidence:
-    """Return what the second value did against the first, as evidence *before* and *after*.
+    """Return the effect of the second value against the first, as evidence *before* and *after*.
 
     `order` has of each planned pair which value came first (1: the first), `periods` what was held, in time.
     """
@@ -105,13 +105,13 @@ def judge(
     )
 
 
-def _strides(sides: Sequence[Sequence[Held]]) -> list[float]:
+def _strides(sides: Sequence[Sequence[HeldPeriod]]) -> list[float]:
     """How long strides lasted with either value (s)."""
     lengths = [[cycle.seconds for held in side for cycle in held.cycles] for side in sides]
     return [float(np.mean(side)) if side else 1.0 for side in lengths]
 
 
-def _left_out(periods: Iterable[Held]) -> dict[str, int]:
+def _left_out(periods: Iterable[HeldPeriod]) -> dict[str, int]:
     return dict(
         collections.Counter(
             f"{joint}: {why}"
@@ -132,13 +132,13 @@ def _notes(pairs: int, strides: Sequence[float], *, is_same: bool) -> Iterator[s
 
 def _family(
     series: Sequence[Series],
-    pairs: Sequence[tuple[Held, Held]],
+    pairs: Sequence[tuple[HeldPeriod, HeldPeriod]],
     order: npt.NDArray[np.int8],
-    sides: Sequence[Sequence[Held]],
+    sides: Sequence[Sequence[HeldPeriod]],
     *,
     is_same: bool,
 ) -> list[tuple[Measured, Metric]]:
-    """Return what is known of each, p still without the other families."""
+    """Return each metric's result; p is not yet adjusted for the other families."""
     means = {one.key: period_means(one, [held for pair in pairs for held in pair]) for one in series}
     groups: dict[bytes, list[Series]] = {}
     found: dict[str, Measured] = {}
@@ -166,7 +166,7 @@ def _family(
     return [(found[one.key], one.metric) for one in series]
 
 
-def period_means(one: Series, periods: Sequence[Held]) -> Floats:
+def period_means(one: Series, periods: Sequence[HeldPeriod]) -> Floats:
     """Return the metric's mean over each period, at equal speed; NaN where there are too few cycles.
 
     How it goes with the stride's time is learned within periods only, where the parameter has no part in it.
@@ -202,12 +202,12 @@ def _mean(period: Floats, metric: Metric, slope: float, usual_s: float) -> float
     return float(period[:, 0].mean() - slope * (period[:, 1].mean() - usual_s))
 
 
-def _values(one: Series, side: Sequence[Held]) -> list[float]:
+def _values(one: Series, side: Sequence[HeldPeriod]) -> list[float]:
     return [cycle.values[one.key] for held in side for cycle in held.of(one.leg) if one.key in cycle.values]
 
 
-def _told(one: Series, sides: Sequence[Sequence[Held]]) -> Measured:
-    """Return what both sides have, without a word."""
+def _told(one: Series, sides: Sequence[Sequence[HeldPeriod]]) -> Measured:
+    """Return both sides' values, without a judgement."""
     values = [_values(one, side) for side in sides]
     means = [float(np.mean(side)) if side and not one.metric.is_slope else None for side in values]
     word = Word.SAME if any(values) else Word.NO_DATA
@@ -223,7 +223,7 @@ def _few(told: Measured, why: str) -> Measured:
 
 
 def _measured(
-    told: Measured, one: Series, sides: Sequence[Sequence[Held]], numbers: Sequence[float]
+    told: Measured, one: Series, sides: Sequence[Sequence[HeldPeriod]], numbers: Sequence[float]
 ) -> Measured:
     difference, low, high, p = numbers
     before, after = told.before, told.after

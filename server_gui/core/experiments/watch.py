@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 from server_gui.core.alarms.alarm import Alarm
-from server_gui.core.alarms.texts import Kind as AlarmKind
+from server_gui.core.alarms.texts import Kind
 from server_gui.core.experiments.plan import Bounds
 from server_gui.core.follow.events import Described, Event, Journalled, Looked, Telemetry
 
@@ -14,18 +14,18 @@ AS_USUAL: Final = 2.0  # times the largest that was seen before: a bound where n
 SETTLES_NS: Final = 1_500_000_000  # after which what was read is what was written
 GUARD: Final = "guard"
 # What a busy computer has for a moment, and the robot withstands: these count once they last.
-PASSING: Final = frozenset({AlarmKind.PART_STALE, AlarmKind.STALLED})
+PASSING: Final = frozenset({Kind.PART_STALE, Kind.STALLED})
 PASSES_NS: Final = 2_000_000_000
 # Not of the robot's state, or looked at elsewhere: rows that do not come have a rule of their own (`STALE_S`
 # of a run), and what a troubled bus has lost is left out with its strides.
 NO_REASON: Final = frozenset(
     {
-        AlarmKind.STALE,
-        AlarmKind.BUS,
-        AlarmKind.NOT_RECORDED,
-        AlarmKind.RECORDING,
-        AlarmKind.UPLOAD,
-        AlarmKind.DANGER_ADVICE,  # a changed parameter is unusual; from the level alarm on it counts
+        Kind.STALE,
+        Kind.BUS,
+        Kind.NOT_RECORDED,
+        Kind.RECORDING,
+        Kind.UPLOAD,
+        Kind.DANGER_ADVICE,  # a changed parameter is unusual; from the level alarm on it counts
     }
 )
 ENDING: Final = {
@@ -44,7 +44,7 @@ OF_OTHERS: Final = {"write": "a write", "restore": "a restore", "store": "a stor
 
 
 @dataclass(slots=True)
-class Watch:
+class ExperimentWatch:
     """Takes what the robot tells; `why` is the first rule that was broken, None while none is.
 
     `name` is the parameter, `joints` those whose tracking error and current count. Before `begin` it only
@@ -134,7 +134,7 @@ class Watch:
                     yield f"{joint}: {_over(quantity, found, limit)}{self._allowed(quantity)}"
 
     def _allowed(self, quantity: str) -> str:
-        """Return what to do where the bound was nobody's choice."""
+        """Return the way to relax a default bound; empty for a bound that was chosen."""
         if quantity not in self._usual:
             return ""
         return (

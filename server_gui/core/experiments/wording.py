@@ -5,22 +5,22 @@ from typing import Final
 
 from gateway.amounts import counted
 from server_gui.core.evidence.experiment import Experiment, Point
-from server_gui.core.evidence.file import Told
+from server_gui.core.evidence.file import EditEvidence
 from server_gui.core.evidence.wording import changes, number
-from server_gui.core.experiments.machine import State
-from server_gui.core.experiments.plan import Kind, Plan
+from server_gui.core.experiments.machine import ExperimentState
+from server_gui.core.experiments.plan import ExperimentKind, ExperimentPlan
 from server_gui.core.experiments.run import Run
 
 BAR: Final = 24  # letters
 
 
-def stated(plan: Plan) -> Iterator[str]:
-    """Yield what will be done, before it begins."""
+def stated(plan: ExperimentPlan) -> Iterator[str]:
+    """Yield the plan in words, before it begins."""
     dwell = plan.dwell
     each = counted(dwell.cycles, "gait cycle") if dwell.seconds is None else f"{dwell.seconds:g} s"
     left_out = counted(dwell.transient, "gait cycle")
     yield f"{plan.kind.value} of {plan.name}, which is {plan.said(plan.original)}"
-    if plan.kind is Kind.AB:
+    if plan.kind is ExperimentKind.AB:
         first, second = map(plan.said, plan.values)
         pairs = len(plan.steps) // 2
         yield f"  {pairs} pairs of {first} (A) and {second} (B), order drawn with seed {plan.seed}"
@@ -45,11 +45,11 @@ def progress(run: Run) -> str:
     """Where it stands, in a line."""
     plan = run.plan
     what = f"{plan.kind.value} of {plan.name}"
-    if run.state is State.LOOKING:
-        return f"{what}: {State.LOOKING.value} …"
+    if run.state is ExperimentState.LOOKING:
+        return f"{what}: {ExperimentState.LOOKING.value} …"
     if run.is_over:
         return f"{what}: {ending(run)}"
-    if run.state is not State.HOLDING:
+    if run.state is not ExperimentState.HOLDING:
         return f"{what}: {run.state.value} …"
     step = plan.steps[run.place]
     held = (
@@ -70,18 +70,18 @@ def ending(run: Run) -> str:
     return f"{early}{run.state.value}{back}"
 
 
-def what(told: Told) -> str:
-    """Return what was changed: of an experiment all its values."""
+def what(told: EditEvidence) -> str:
+    """Return the changed parameters: of an experiment all its values."""
     one = told.experiment
     if one is None:
         return changes(told.edit)
     values = [number(value) for value in one.values]
-    if one.kind == Kind.AB:
+    if one.kind == ExperimentKind.AB:
         return f"{one.parameter} A/B {values[0]} or {values[-1]}"
     return f"{one.parameter} sweep {values[0]} … {values[-1]}"
 
 
-def whole(found: Sequence[Told], writes: Collection[int] = ()) -> list[Told]:
+def whole(found: Sequence[EditEvidence], writes: Collection[int] = ()) -> list[EditEvidence]:
     """Return the same without edits that are only a part of an experiment; of one that goes on: `writes`."""
     parts = {
         (told.edit.robot, told.edit.boot_id, write)
@@ -98,7 +98,7 @@ def whole(found: Sequence[Told], writes: Collection[int] = ()) -> list[Told]:
 
 
 def record(one: Experiment) -> Iterator[str]:
-    """Yield what was done, and how it ended."""
+    """Yield the course of an experiment and its end, in words."""
     cycles = counted(one.cycles, "gait cycle") if one.seconds is None else f"{one.seconds:g} s"
     drawn = f", order drawn with seed {one.seed}" if one.seed is not None else ""
     held = " ".join(number(period.value) for period in one.periods)

@@ -308,7 +308,7 @@ class Collector:
 
 
 def whole(recorder: RecordingSettings) -> FollowSettings:
-    """Return what is asked of each robot: everything that the store has a table for."""
+    """Return the settings to follow a robot completely: everything that the store has a table for."""
     return FollowSettings(
         client="gwrms collect",
         channels=recorder.channels,

@@ -146,11 +146,11 @@ class Fleet:
             member.go_on(self._notes, self._worn)
 
     def session(self, robot: str) -> str:
-        """Return what a robot's recording that goes on is called."""
+        """Return the name of a robot's present recording."""
         return (self._members.get(robot) or self._left[robot]).session
 
     def wearing(self, robot: str) -> Wearing:
-        """Return whose walk a robot's recording that goes on is of."""
+        """Return the wearer of a robot's present recording."""
         member = self._members.get(robot)
         if member is None or not (session := member.session):
             return Wearing()
@@ -166,7 +166,7 @@ class Fleet:
         return tuple(self._members)
 
     def recorded(self, at_utc_s: float | None) -> list[str]:
-        """Return whose recording goes on, and did at this time, None: now."""
+        """Return the robots that are being recorded, and were at this time; None: now."""
         return [
             robot
             for robot, member in self._members.items()

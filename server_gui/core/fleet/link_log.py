@@ -18,7 +18,7 @@ class LinkLog:
         self._said: dict[str, str] = {}  # what → why, since the link was made
 
     def take(self, event: Event) -> None:
-        """Say what an event tells, if it is news."""
+        """Log an event, if it is news."""
         match event:
             case LinkChanged(state=ConnectionState.CONNECTED):
                 self._linked = True

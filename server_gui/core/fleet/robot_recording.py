@@ -59,7 +59,7 @@ class RobotRecording:
             self._described(self._description)
 
     def take(self, event: Event) -> None:
-        """Keep what an event tells; returns at once."""
+        """Record an event; returns at once."""
         if isinstance(event, Described):
             self._description = event.description
         if self._is_paused and not isinstance(event, Journalled | LinkChanged):

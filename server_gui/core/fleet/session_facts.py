@@ -30,7 +30,7 @@ IDENTITY: Final = {  # CiA 301
 
 
 def facts(description: Description, operator: str, notes: str, worn: Worn = NOBODY) -> Facts:
-    """Return what a session can begin with; parameters' values and the robot's kernel become known later."""
+    """Return the facts at the start of a session; parameters and the robot's kernel become known later."""
     return Facts(
         configuration_hash=configuration_hash(description),
         units={channel.name: channel.unit for channel in description.channels},
@@ -54,7 +54,7 @@ def kernel(known: KernelFacts) -> dict[str, str]:
 
 
 def setup(description: Description) -> dict[str, str | float]:
-    """Return what the robot's file makes of it: EDS files, calibration of joints, limits, guard."""
+    """Return the set-up by the robot's file: EDS files, calibration of joints, limits, guard."""
     found: dict[str, str | float] = {}
     if description.file is not None:
         found["robot.toml/digest"] = description.file[:DIGITS]
@@ -87,7 +87,7 @@ def _limits(known: ParameterInfo) -> str:
 
 
 def identities(devices: Mapping[str, Mapping[str, str]]) -> dict[str, str]:
-    """Return what the devices say that they are."""
+    """Return the identities of the devices, as read from them."""
     return {
         f"{section}/{component}": said
         for component, told in devices.items()

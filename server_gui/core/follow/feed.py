@@ -165,7 +165,7 @@ class Feed:
                 group.create_task(self._repeat_buses(following.buses_s))
 
     def _admit(self, event: Event) -> None:
-        """Tell what the robot has sent, where it may be kept; raises `Unfit` where not."""
+        """Pass an event on if it can be recorded; raises `Unfit` if not."""
         self._arriving.check(event)
         self._tell(event)
 

@@ -45,6 +45,7 @@ class Item:
     text: str
     count: int = 1
     first_s: float | None = None
+    about: str = ""  # a component, as alarms name it
     key: tuple[NewsKind, str, str] = field(init=False, compare=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -59,9 +60,9 @@ class News:
         self.items: collections.deque[Item] = collections.deque()
         self.revision = 0
 
-    def add(self, kind: NewsKind, robot: str, text: str) -> None:
+    def add(self, kind: NewsKind, robot: str, text: str, about: str = "") -> None:
         """Note something; what is told again within a minute is counted, what has not changed is not told."""
-        item = Item(time.time(), kind, robot, text)
+        item = Item(time.time(), kind, robot, text, about=about)
         if self.items and (self.items[0].key[:2], self.items[0].text) == (item.key[:2], text):
             return
         before = None if kind in DONE else next(self._lately(item), None)

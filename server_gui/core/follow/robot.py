@@ -2,7 +2,7 @@
 
 import collections
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import msgspec
@@ -24,15 +24,17 @@ from server_gui.core.follow.events import (
     Resources,
     Telemetry,
 )
+from server_gui.core.follow.missing_pdos import MissingPdos
 
 STALE_NS = 500_000_000  # older than this is shown as old
 RATE_WINDOW_NS = 2_000_000_000
 COMES_UP = "it was not read yet"  # as a gateway says of what it has asked for the first time just now
+BUSY_NS = 5_000_000_000  # what was seen of its computer before is not known now
 SLOW = 0.8  # of the rate that was asked for: below that it is said
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class FollowedComponent:
     """One component as it was last seen."""
 
     name: str
@@ -73,7 +75,7 @@ class Robot:
     description: Description | None = None
     hello: Hello | None = None  # who we are there, and what we may not
     values: dict[str, float | None] = field(default_factory=dict)
-    parts: dict[str, Part] = field(default_factory=dict)
+    parts: dict[str, FollowedComponent] = field(default_factory=dict)
     parameters: dict[str, ParameterValue] = field(default_factory=dict)
     parameters_at_ns: int | None = None
     resources: ResourceSnapshot | None = None
@@ -87,6 +89,7 @@ class Robot:
     _arrivals: collections.deque[tuple[int, int]] = field(
         default_factory=lambda: collections.deque(maxlen=4096)
     )
+    _missing: MissingPdos = field(default_factory=MissingPdos)
     _dropped_seen: int = 0
     _flows_since_ns: int = 0  # the first rows of this link
     _words: dict[str, dict[str, str]] = field(default_factory=dict)
@@ -102,7 +105,8 @@ class Robot:
                 self.resources, self.resources_at_ns = event.snapshot, event.at_ns
                 self.link.round_trip_ns = event.round_trip_ns
             case BusesSeen():
-                self.buses, self.buses_at_ns = event.buses, event.at_ns
+                self.buses_at_ns = event.at_ns
+                self.buses = None if event.buses is None else self._judged(event.buses, event.at_ns)
             case LinkChanged():
                 self._link_changed(event)
             case Described():
@@ -110,8 +114,13 @@ class Robot:
             case Failed():
                 self.last_failure = event
 
+    def _judged(self, buses: Sequence[BusInfo], at_ns: int) -> tuple[BusInfo, ...]:
+        is_new = self.resources_at_ns is not None and at_ns - self.resources_at_ns < BUSY_NS
+        cpu_percent = None if self.resources is None or not is_new else self.resources.cpu.percent
+        return self._missing.take(buses, at_ns, cpu_percent)
+
     def hold(self, values: Mapping[str, float]) -> None:
-        """Take what devices were read to hold just now."""
+        """Take values just read from devices."""
         for name, value in values.items():
             if name in self.parameters:
                 self.parameters[name] = msgspec.structs.replace(self.parameters[name], value=value)
@@ -146,7 +155,7 @@ class Robot:
         return now_ns - self._flows_since_ns > RATE_WINDOW_NS and self.rate_hz(now_ns) < SLOW * self.asked_hz
 
     def rate_text(self, now_ns: int | None = None) -> str:
-        """Return how many rows come a second, of how many where these are fewer."""
+        """Return the row rate in words, with the requested rate if it is lower."""
         of = f" of {self.asked_hz:.0f}" if self.is_slow(now_ns) else ""
         return f"{self.rate_hz(now_ns):.0f}{of} Hz"
 
@@ -158,7 +167,7 @@ class Robot:
         """Return the components of one kind, in the robot's order."""
         return [part.name for part in self.parts.values() if part.kind == kind]
 
-    def not_ok(self) -> list[Part]:
+    def not_ok(self) -> list[FollowedComponent]:
         """Return the components whose values cannot be trusted now."""
         return [part for part in self.parts.values() if part.state != "ok"]
 
@@ -192,7 +201,7 @@ class Robot:
         self.description, self.hello = event.description, event.hello
         self._words = {channel.name: channel.enum for channel in event.description.channels if channel.enum}
         self.parts = {
-            part.name: Part(part.name, part.kind, part.state, None, part.problem)
+            part.name: FollowedComponent(part.name, part.kind, part.state, None, part.problem)
             for part in event.description.components
         }
 
@@ -220,10 +229,10 @@ class Robot:
             self.parameters_at_ns = event.at_ns
 
 
-def _part(known: Part, found: QualityInfo) -> Part:
+def _part(known: FollowedComponent, found: QualityInfo) -> FollowedComponent:
     age_ms = found.get("age_ms")
     problem = found.get("problem")
-    return Part(
+    return FollowedComponent(
         known.name,
         known.kind,
         str(found.get("state", "unknown")),

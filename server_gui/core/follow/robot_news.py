@@ -1,13 +1,18 @@
 """Turns what a robot's state does into news: links, components, drive states, error codes."""
 
-from collections.abc import Callable
-from typing import Final
+from typing import Final, Protocol
 
 from gateway.client import ConnectionState
 from server_gui.core.follow.news import NewsKind
 from server_gui.core.follow.robot import Robot
 
-Tell = Callable[[NewsKind, str], None]
+
+class Tell(Protocol):
+    """How news is told, of a component where that is `about` one."""
+
+    def __call__(self, kind: NewsKind, text: str, about: str = "") -> None:
+        """Tell it."""
+
 
 LINK_WORDS: Final = {
     ConnectionState.CONNECTED: "connected",
@@ -34,7 +39,7 @@ class RobotNews:
         self._failure: object = None
 
     def look(self, robot: Robot) -> None:
-        """Tell what has changed."""
+        """Report changes since the last call."""
         self._look_at_link(robot)
         self._look_at_parts(robot)
         if not robot.is_stale():
@@ -61,7 +66,7 @@ class RobotNews:
             if part.state != before:
                 why = f": {part.problem}" if part.problem else ""
                 kind = KINDS.get(part.state, NewsKind.WARNING)
-                self._tell(kind, f"{_spoken(part.name)} {part.state}{why}")
+                self._tell(kind, f"{_spoken(part.name)} {part.state}{why}", part.name)
             self._parts[part.name] = part.state
 
     def _look_at_drives(self, robot: Robot) -> None:
@@ -86,7 +91,7 @@ class RobotNews:
                 continue
             self._errors[joint] = code
             if code:
-                self._tell(NewsKind.FAULT, f"{_spoken(joint)}: error code 0x{int(code):04X}")
+                self._tell(NewsKind.FAULT, f"{_spoken(joint)}: error code 0x{int(code):04X}", joint)
 
 
 def _spoken(name: str) -> str:

@@ -9,12 +9,12 @@ import msgspec
 
 from server_gui.core.joint_tests.file import NotReadable, Test, read
 from server_gui.core.joint_tests.friction import friction
-from server_gui.core.joint_tests.measures import Result
+from server_gui.core.joint_tests.measures import JointTestResult
 from server_gui.core.joint_tests.relay import relay
 from server_gui.core.joint_tests.response import frequency_response
 from server_gui.core.joint_tests.step import step_response
 
-ANALYSES: Final[Mapping[str, Callable[[Test], Result]]] = {
+ANALYSES: Final[Mapping[str, Callable[[Test], JointTestResult]]] = {
     "step": step_response,
     "chirp": frequency_response,
     "friction": friction,
@@ -30,14 +30,14 @@ _IDENTITY: Final = {  # CiA 301 §7.5.2.19
 
 
 @dataclass(frozen=True, slots=True)
-class Shown:
+class AnalysedTest:
     """A test and what it says."""
 
     test: Test
-    result: Result
+    result: JointTestResult
 
 
-def analysed(path: Path) -> Shown:
+def analysed(path: Path) -> AnalysedTest:
     """Read and compute; raises `NotReadable`, `OSError`."""
     test = read(path)
     analysis = ANALYSES.get(test.head.test)
@@ -47,7 +47,7 @@ def analysed(path: Path) -> Shown:
         )
     if len(test["sync_ns"]) < 2:
         raise NotReadable(f"{path} has no samples: {test.problem or 'nothing was recorded'}")
-    return Shown(test, analysis(test))
+    return AnalysedTest(test, analysis(test))
 
 
 def last_before(test: Test) -> Path | None:
@@ -65,7 +65,7 @@ def last_before(test: Test) -> Path | None:
 
 
 def differences(one: Test, other: Test) -> Iterator[str]:
-    """Yield what else is not the same in both, in words: `other` is the older one."""
+    """Yield the other differences between two tests, in words: `other` is the older one."""
     if one.head.robot != other.head.robot or one.head.joint != other.head.joint:
         yield f"another joint: {other.head.robot} {other.head.joint}, now {one.head.robot} {one.head.joint}"
     for name in _CONDITIONS:
@@ -86,7 +86,7 @@ def _word(value: object) -> str:
     return "not there" if value is None else f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
-def told(shown: Shown, last: Shown | None) -> dict[str, Any]:
+def told(shown: AnalysedTest, last: AnalysedTest | None) -> dict[str, Any]:
     """All of it as plain values, for JSON."""
     before = None
     if last is not None:

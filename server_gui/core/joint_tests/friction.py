@@ -15,7 +15,7 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from server_gui.core.joint_tests.file import Samples, Test
-from server_gui.core.joint_tests.measures import Curve, Measure, Result, unknown
+from server_gui.core.joint_tests.measures import Curve, JointTestResult, Measure, unknown
 
 EDGES: Final = 0.15  # of a run, at either end, in which it gets up to speed and slows down
 LEAST_SAMPLES: Final = 20  # of a run
@@ -36,21 +36,21 @@ class Run:
     torques: Samples
 
 
-def friction(test: Test) -> Result:
+def friction(test: Test) -> JointTestResult:
     """Of a friction test."""
     runs = _runs(test)
     pairs = [found for there, back in pairwise(runs) if (found := _pair(there, back)) is not None]
     if not pairs:
         why = "no speed was run both ways over the same angles"
         names = (("coulomb", "N·m"), ("viscous", "N·m·s/rad"), ("load_swing", "N·m"), ("cogging", "N·m"))
-        return Result([unknown(name, unit, why) for name, unit in names], [])
+        return JointTestResult([unknown(name, unit, why) for name, unit in names], [])
     speeds = np.array([speed for speed, _, _, _ in pairs])
     losses = np.array([loss for _, loss, _, _ in pairs])
     coulomb, viscous = _line(speeds, losses)
     _, _, angles, loads = min(pairs, key=lambda one: one[0])
     cogging, spectrum = _cogging(test, runs)
     order = np.argsort(speeds)
-    return Result(
+    return JointTestResult(
         [
             coulomb,
             viscous,

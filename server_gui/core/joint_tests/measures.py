@@ -33,7 +33,7 @@ class Proposal(Struct, frozen=True):
     source: str
 
 
-class Result(Struct, frozen=True):
+class JointTestResult(Struct, frozen=True):
     """What one test says."""
 
     measures: list[Measure]

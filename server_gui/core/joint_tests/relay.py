@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 from server_gui.core.joint_tests.file import Samples, Test
-from server_gui.core.joint_tests.measures import Curve, Measure, Proposal, Result, unknown
+from server_gui.core.joint_tests.measures import Curve, JointTestResult, Measure, Proposal, unknown
 
 SKIPPED: Final = 2  # cycles, before it has settled
 LEAST_CYCLES: Final = 3
@@ -23,7 +23,7 @@ RULES: Final = {
 }
 
 
-def relay(test: Test) -> Result:
+def relay(test: Test) -> JointTestResult:
     """Of a relay test."""
     times, target, position = test.times, test["target"], test["position"]
     curves = [
@@ -46,7 +46,7 @@ def relay(test: Test) -> Result:
     gain = 4.0 * size / (math.pi * math.sqrt(swing**2 - hysteresis**2))
     period = float(np.mean(periods))
     share = float(np.std(swings, ddof=1)) / swing
-    return Result(
+    return JointTestResult(
         [
             Measure("ultimate_gain", gain, "N·m/rad", gain * share),
             Measure("ultimate_period", period, "s", float(np.std(periods, ddof=1))),
@@ -65,9 +65,9 @@ def _rises(target: Samples) -> list[int]:
     return [int(at) + 1 for at in np.flatnonzero(change > most / 2.0)] if most else []
 
 
-def _none(why: str, curves: list[Curve]) -> Result:
+def _none(why: str, curves: list[Curve]) -> JointTestResult:
     names = (("ultimate_gain", "N·m/rad"), ("ultimate_period", "s"), ("swing", "rad"))
-    return Result([unknown(name, unit, why) for name, unit in names], curves)
+    return JointTestResult([unknown(name, unit, why) for name, unit in names], curves)
 
 
 def _proposal(name: str, gain: float, period: float) -> Proposal:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy import signal
 
 from server_gui.core.joint_tests.file import Samples, Test
-from server_gui.core.joint_tests.measures import Curve, Measure, Result, unknown
+from server_gui.core.joint_tests.measures import Curve, JointTestResult, Measure, unknown
 
 LEAST_COHERENCE: Final = 0.8
 SEGMENTS: Final = 8  # that the sweep is cut into, each half over the next
@@ -32,18 +32,18 @@ class Response:
     coherence: Samples
 
 
-def frequency_response(test: Test) -> Result:
+def frequency_response(test: Test) -> JointTestResult:
     """Of a chirp."""
     response = measured(test)
     if response is None:
         why = "the test has too few samples"
         names = (("bandwidth", "Hz"), ("phase_margin", "°"), ("crossover", "Hz"), ("peak", "dB"))
-        return Result([unknown(name, unit, why) for name, unit in names], [])
+        return JointTestResult([unknown(name, unit, why) for name, unit in names], [])
     magnitude = 20.0 * np.log10(np.abs(response.closed))
     good = response.coherence >= LEAST_COHERENCE
     loop = response.closed / (1.0 - response.closed)
     crossover, margin = _margin(response, loop, good)
-    return Result(
+    return JointTestResult(
         [
             _bandwidth(response.hz, magnitude, good),
             margin,

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from server_gui.core.joint_tests.file import Samples, Test
-from server_gui.core.joint_tests.measures import Curve, Measure, Result, unknown
+from server_gui.core.joint_tests.measures import Curve, JointTestResult, Measure, unknown
 
 TAIL: Final = 0.2  # of the time after a step, in which it is taken to be at rest
 LEAST_SHARE: Final = 0.2  # of the target's way: a joint that goes less has not followed it
@@ -26,18 +26,18 @@ _UNITS: Final = {
 }
 
 
-def step_response(test: Test) -> Result:
+def step_response(test: Test) -> JointTestResult:
     """Of every step of a test."""
     times, target, position = test.times, test["target"], test["position"]
     steps = [_one(times[a:b], target[a:b], position[a:b]) for a, b in _bounds(target)]
     steps = [one for one in steps if one is not None]
     if not steps:
         why = "the joint did not follow its target, or the test ended before it came to rest"
-        return Result([unknown(name, unit, why) for name, unit in _UNITS.items()], [])
+        return JointTestResult([unknown(name, unit, why) for name, unit in _UNITS.items()], [])
     measures = [
         _mean(name, unit, [one[name] for one in steps if one is not None]) for name, unit in _UNITS.items()
     ]
-    return Result(measures, _curves(times, target, position))
+    return JointTestResult(measures, _curves(times, target, position))
 
 
 def _bounds(target: Samples) -> list[tuple[int, int]]:

@@ -43,7 +43,7 @@ class Serving:
         return cls(whom, registry.shipped(), signed)
 
     def told(self, model: str) -> str:
-        """Return whom a model serves, each with who has signed that."""
+        """Return the robots that a model serves, each with the signer of its promotion."""
         pairs = zip(self.whom.get(model, ()), self.signed.get(model, ()), strict=True)
         return ", ".join(f"{whom} ({signed})" for whom, signed in pairs)
 
@@ -70,7 +70,7 @@ class Entry:
 
     @property
     def whom(self) -> str:
-        """Return whom it serves, in words."""
+        """Return the robots that it serves, in words."""
         return "by default" if self.shipped else ", ".join(self.serves) or "nobody"
 
     @property
@@ -133,7 +133,7 @@ class Looking:
         self._record: TrackRecord | None = None
 
     def look(self, robots: Set[str], ending: Callable[[], bool] = lambda: False) -> Catalogue:
-        """Return what there is now; blocks. What goes wrong is a problem in it."""
+        """Return the present catalogue; blocks. Errors are entered in it as problems."""
         try:
             registry = open_registry(self._url, given=False)
             hits, hits_problem = self._hits(robots, ending)

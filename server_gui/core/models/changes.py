@@ -22,7 +22,7 @@ UNPROMOTED: Final = "no promoted model; until then a robot is served by what cam
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class ModelChange:
     """Of what serves one robot, or all ("") that have no model of their own; None: no promoted model."""
 
     task: str
@@ -42,7 +42,7 @@ class Change:
 
     @property
     def outcome(self) -> str:
-        """Return what is so afterwards."""
+        """Return the state afterwards, in words."""
         then = "no model of its own" if self.then is None else self.names[self.then.id]
         return f"{task_name(self.task)}: {then} serves {self.robot or EVERY}"
 
@@ -54,7 +54,7 @@ class Change:
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """Return what changes."""
+        """Return the effects of the change, in words."""
         return tuple(self._sentences())
 
     def _sentences(self) -> Iterator[str]:
@@ -75,8 +75,8 @@ class Change:
         return f"{self.names[card.id]} ({headline(card)} on people never seen)"
 
 
-def promotion(url: str, model: str, robot: str) -> Change:
-    """Return what it would change to let a model serve a robot, or all; blocks.
+def promotion(url: str, model: str, robot: str) -> ModelChange:
+    """Return the effect of promoting a model for a robot, or for all; blocks.
 
     Raises:
         UnusableModel: it is refused, as `gwrms models promote` refuses it.
@@ -87,11 +87,11 @@ def promotion(url: str, model: str, robot: str) -> Change:
     card = registry.promotable(model, robot)
     now = registry.serving(card.task, robot, set(card.channels))
     anew = _signs() and _serves_unsigned(registry, card, robot)
-    return Change(card.task, robot, _card(registry, now), card, False, _names(registry), _signs(), anew)
+    return ModelChange(card.task, robot, _card(registry, now), card, False, _names(registry), _signs(), anew)
 
 
-def way_back(url: str, task: str, robot: str) -> Change:
-    """Return what a rollback would change; blocks.
+def way_back(url: str, task: str, robot: str) -> ModelChange:
+    """Return the effect of a rollback; blocks.
 
     Raises:
         UnusableModel: it is refused, as `gwrms models rollback` refuses it.
@@ -102,11 +102,11 @@ def way_back(url: str, task: str, robot: str) -> Change:
     before = registry.before(task, robot)
     now = registry.serving(task, robot)
     then = _card(registry, before)
-    return Change(task, robot, _card(registry, now), then, True, _names(registry), _signs())
+    return ModelChange(task, robot, _card(registry, now), then, True, _names(registry), _signs())
 
 
-def carry_out(url: str, change: Change, who: str, why: str) -> Pointer:
-    """Do what was confirmed; blocks.
+def carry_out(url: str, change: ModelChange, who: str, why: str) -> Pointer:
+    """Carry out a confirmed change; blocks.
 
     Raises:
         Overtaken: something else serves by now than what was confirmed; that stays.

@@ -1,5 +1,6 @@
 """One model beside another: figures, classes and wearers, each with which of the two is better."""
 
+import dataclasses
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final
@@ -11,6 +12,7 @@ from server_gui.core.models.catalogue import Catalogue, Entry
 from server_gui.core.models.names import class_name
 from server_gui.core.prediction.state import WITHIN_DAYS
 
+OTHERS: Final = "other sessions"  # the verdict where each was judged by its own
 UNKNOWN: Final = "not labelled"
 ALIKE: Final = 0.05  # percent: a difference that is not shown is none
 
@@ -47,6 +49,7 @@ class Row:
     other: float | None
     more_is_better: bool
     decisions: int | None = None
+    is_verdict: bool = True  # both were judged by the same sessions
 
     @property
     def difference(self) -> float | None:
@@ -55,10 +58,15 @@ class Row:
 
     @property
     def verdict(self) -> str:
-        """Return whether the one is better or worse than the other; nothing where that cannot be said."""
+        """Return whether the one is better or worse than the other; nothing where that cannot be said.
+
+        That is for training to say where each was judged by sessions of its own.
+        """
         difference = self.difference
         if difference is None:
             return ""
+        if not self.is_verdict:
+            return OTHERS
         if abs(difference) < ALIKE:
             return "alike"
         return "better" if (difference > 0) == self.more_is_better else "worse"
@@ -67,19 +75,21 @@ class Row:
 def rows(one: Card, other: Card | None) -> list[Row]:
     """Return everything by which the two were judged, each on people whom it had never seen."""
     mine, its = one.metrics, Metrics() if other is None else other.metrics
-    return [*_overall(mine, its), *_classes(mine, its), *_wearers(one, other)]
+    found = [*_overall(mine, its), *_classes(mine, its), *_wearers(one, other)]
+    alike = other is None or set(one.held_out) == set(other.held_out)
+    return found if alike else [dataclasses.replace(row, is_verdict=False) for row in found]
 
 
 def notes(one: Entry, other: Entry | None) -> Iterator[str]:
-    """Yield what is to be known of such a comparison."""
+    """Yield notes on such a comparison."""
     if other is not None and set(one.card.held_out) != set(other.card.held_out):
-        yield "Each was judged on sessions of its own, so compare roughly; training judges both on the same."
+        yield "Each was judged on sessions of its own, so no verdict; training judges both on the same."
     if other is not None and (known := set(other.card.learned) & set(one.card.held_out)):
         yield f"{other.name} has learned from {counted(len(known), 'session')} that judged the other."
 
 
 def last_week(entry: Entry) -> str:
-    """Return how often it was right of late, in words; never a number where nobody has labelled."""
+    """Return the share of its recent correct predictions, in words; without labels, no number."""
     if not entry.hits:
         return f"not known: nothing that it said within {WITHIN_DAYS} days was labelled"
     return "; ".join(f"{robot}: {quality.text}" for robot, quality in sorted(entry.hits.items()))
@@ -93,7 +103,7 @@ def week_short(entry: Entry) -> str:
 
 
 def usual_other(entry: Entry, found: Catalogue) -> Entry | None:
-    """Return what a model is compared with first: what serves in its place, else the newest beside it."""
+    """Return the default model for comparison: the one that serves in its place, else the newest other."""
     if entry.serving and entry.serving != entry.card.id:
         return found.find(entry.serving)
     beside = (each for each in found.entries if each.card.task == entry.card.task and each is not entry)

@@ -8,8 +8,9 @@ from typing import Final
 
 from gateway.user_name import user_name
 from server_gui.core.cloud.jobs import Job, Jobs, JobState, Work
+from server_gui.core.cloud.store_reach import StoreReach
 from server_gui.core.models.catalogue import Catalogue, Looking
-from server_gui.core.models.changes import Change, carry_out, promotion, way_back
+from server_gui.core.models.changes import ModelChange, carry_out, promotion, way_back
 from server_gui.core.models.training import BETTER, Trained, TrainingWish
 from server_gui.core.threads.answers import Deliver, when_done
 from server_gui.core.threads.background import Background
@@ -41,12 +42,14 @@ class Models:
         robots: Callable[[], Set[str]],
         who: str = "",
         promoters: Mapping[str, str] = MappingProxyType({}),
+        reach: StoreReach | None = None,
     ) -> None:
         self.url = url
+        self.reach = reach or StoreReach()  # of the store
         self.found = Catalogue()
         self.revision = 0
         self.looked_s: float | None = None  # when the newest look came back, on our monotonic clock
-        self.change: Change | None = None  # what waits to be confirmed
+        self.change: ModelChange | None = None  # what waits to be confirmed
         self.said = ""  # what came of the newest wish, in words
         self.tone = Tone.PLAIN  # of that
         self.trained: dict[str, Trained] = {}  # what this window has trained, by model
@@ -96,7 +99,7 @@ class Models:
     def ask_promotion(self, model: str, robot: str) -> None:
         """Find out what it would change, for `change` to be confirmed."""
         judged = self.trained.get(model)
-        if judged is not None and not judged.better:
+        if judged is not None and not judged.may_serve:
             self._say(NOT_BETTER.format(why=judged.reasons), Tone.BAD)
             return
         self._ask(lambda: promotion(self.url, model, robot))
@@ -120,19 +123,19 @@ class Models:
 
     # --- inside
 
-    def _ask(self, plan: Callable[[], Change]) -> None:
+    def _ask(self, plan: Callable[[], ModelChange]) -> None:
         self.change = None
         self._say("Looking what that changes …")
         when_done(self._thread.do(plan), self._deliver, self._planned, self._refused)
 
-    def _planned(self, change: Change) -> None:
+    def _planned(self, change: ModelChange) -> None:
         if change.changes_nothing:
             self._say(" ".join(change.sentences))
             return
         self.change = change
         self._say("")
 
-    def _done(self, change: Change) -> None:
+    def _done(self, change: ModelChange) -> None:
         self._say(f"Done. {change.outcome}.", Tone.GOOD)
         self.look(now=True)
 

@@ -18,7 +18,7 @@ ID_SHOWN: Final = 4  # digits of an id, where two models would have one name
 
 
 def task_name(task: str) -> str:
-    """Return what a task is called."""
+    """Return the name of a task for people."""
     return TASKS.get(task, task.replace("_", " ").capitalize())
 
 

@@ -16,6 +16,7 @@ UNITS: Final = {
 }
 
 BETTER: Final = "Better"
+NOT_BETTER: Final = "not better"  # the verdict with which nothing is promoted
 WORDS: Final = {
     "macro_f1": "F1, mean over classes,",
     "rmse_percent": "error of the place in the gait cycle",
@@ -33,10 +34,10 @@ class Progress(msgspec.Struct, frozen=True):
 
 
 class Trained(msgspec.Struct, frozen=True):
-    """What came of it: the model's id, what it may take the place of, and whether it is better."""
+    """What came of it: the model's id, what it may take the place of, and how training has judged it."""
 
     model: str
-    better: bool
+    verdict: str
     why: tuple[str, ...]
     over: str = ""
     left_out: dict[str, str] = {}
@@ -51,9 +52,14 @@ class Trained(msgspec.Struct, frozen=True):
         return why
 
     @property
-    def verdict(self) -> str:
-        """Return it in words."""
-        return f"{BETTER if self.better else 'Not better'}: {self.reasons}"
+    def may_serve(self) -> bool:
+        """Whether the window offers to promote it."""
+        return self.verdict != NOT_BETTER
+
+    @property
+    def said(self) -> str:
+        """Return verdict and reasons in words."""
+        return f"{self.verdict.capitalize()}: {self.reasons}"
 
 
 class _Wrong(msgspec.Struct, frozen=True):

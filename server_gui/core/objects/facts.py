@@ -4,11 +4,11 @@ import time
 from collections.abc import Iterator
 from typing import Final
 
-from gateway.units import Unit
+from gateway.units import Unit, with_minus
 from gateway.wire.dictionary import ObjectInfo
 from gateway.wire.parameter import ParameterInfo
-from server_gui.core.objects.forms import forms
-from server_gui.core.objects.reading import Held
+from server_gui.core.objects.forms import for_reading, forms
+from server_gui.core.objects.reading import ReadValue
 from server_gui.core.objects.rows import Compared, limits
 
 LONGEST: Final = 2000  # letters of a value that are shown
@@ -27,7 +27,7 @@ def facts(
     """Title and text each; `parameter` is one that can be changed, in `unit`, unless it is `refused`."""
     held = compared.held.get((compared.component, info.object))
     return [
-        ("Holds", _holds(held, is_linked=is_linked)),
+        ("Holds", _holds(info, held, is_linked=is_linked)),
         *_notations(info, held),
         *_as_parameter(held, parameter, unit),
         *_beside(info, compared),
@@ -38,20 +38,20 @@ def facts(
     ]
 
 
-def _holds(held: Held | None, *, is_linked: bool) -> str:
+def _holds(info: ObjectInfo, held: ReadValue | None, *, is_linked: bool) -> str:
     if held is None:
         return "not read yet" if is_linked else "not read: the robot is not linked"
     now_ns = time.monotonic_ns()
-    said = held.told.problem or held.told.words[:LONGEST]
+    said = held.told.problem or for_reading(info, held.told.words[:LONGEST])
     is_now = is_linked and not held.is_old(now_ns)
     return said if is_now else f"{said}   (OLD: read {held.age_s(now_ns):.0f} s ago)"
 
 
-def _notations(info: ObjectInfo, held: Held | None) -> Iterator[tuple[str, str]]:
+def _notations(info: ObjectInfo, held: ReadValue | None) -> Iterator[tuple[str, str]]:
     found = [] if held is None or held.told.problem is not None else forms(info, held.told)
     numbers = [text for title, text in found if title in IN_ONE_LINE]
     if numbers:
-        yield ", ".join(title for title, _ in found if title in IN_ONE_LINE), " · ".join(numbers)
+        yield ", ".join(title for title, _ in found if title in IN_ONE_LINE), with_minus(" · ".join(numbers))
     for title, text in found:
         if title not in IN_ONE_LINE:
             yield title, text if len(text) <= LONGEST else f"{text[:LONGEST]} … {len(text)} letters"
@@ -68,7 +68,7 @@ def _kind(info: ObjectInfo) -> Iterator[str]:
 
 
 def _as_parameter(
-    held: Held | None, parameter: ParameterInfo | None, unit: Unit | None
+    held: ReadValue | None, parameter: ParameterInfo | None, unit: Unit | None
 ) -> Iterator[tuple[str, str]]:
     value = None if held is None or held.told.problem is not None else held.told.value
     if parameter is not None and unit is not None and isinstance(value, int | float) and unit.symbol:
@@ -79,7 +79,7 @@ def _beside(info: ObjectInfo, compared: Compared) -> Iterator[tuple[str, str]]:
     other = compared.other(info)
     if other is not None:
         mark = "≠ " if compared.differs(info) else ""
-        yield compared.title, f"{mark}{str(other)[:LONGEST]}"
+        yield compared.title, f"{mark}{for_reading(info, str(other)[:LONGEST])}"
 
 
 def _named(title: str, text: str) -> Iterator[tuple[str, str]]:

@@ -5,6 +5,7 @@ import struct
 from collections.abc import Iterator, Mapping
 from typing import Final
 
+from gateway.units import with_minus
 from gateway.wire.dictionary import ObjectInfo, ObjectValue
 from gateway.wire.method import Number
 
@@ -45,6 +46,11 @@ def place(address: str) -> tuple[int, int]:
     if found is None:
         raise ValueError(f"{address!r} is no object's address")
     return int(found[1], 16), int(found[2])
+
+
+def for_reading(info: ObjectInfo, words: str) -> str:
+    """Return a value's words as they are shown: numbers with the sign for minus, texts as they are."""
+    return words if info.type in (*TEXTS, *BYTES) else with_minus(words)
 
 
 def forms(info: ObjectInfo, held: ObjectValue) -> list[tuple[str, str]]:

@@ -54,7 +54,7 @@ class Objects:
         self.reading = Reading(commands, deliver)
 
     def of(self, component: str, *, ask: bool = True) -> Dictionary:
-        """Return what is known, and ask for it where nobody has on this link."""
+        """Return a device's dictionary; on this link's first use, read it."""
         found = self._by_component.setdefault(component, Dictionary())
         now_ns = time.monotonic_ns()
         is_due = found.tried_ns is None or now_ns - found.tried_ns >= AGAIN_S * 1e9

@@ -23,7 +23,7 @@ Object = tuple[str, str]  # component, and address such as 0x6041:0
 
 
 @dataclass(frozen=True, slots=True)
-class Held:
+class ReadValue:
     """What the device said; as old as the question (our monotonic clock, and UTC for files)."""
 
     told: ObjectValue
@@ -43,7 +43,7 @@ class Reading:
     def __init__(self, commands: Commands, deliver: Deliver) -> None:
         self._commands = commands
         self._deliver = deliver
-        self.held: dict[Object, Held] = {}
+        self.held: dict[Object, ReadValue] = {}
         self.problem: str | None = None  # why the latest question was not answered
         self.revision = 0
         self.left: dict[Object, None] = {}  # of those that are all to be read once
@@ -103,7 +103,7 @@ class Reading:
             self.left.pop(one, None)
             told = values.values.get(one[1])
             if told is not None:
-                self.held[one] = Held(told, at_ns, utc_s)
+                self.held[one] = ReadValue(told, at_ns, utc_s)
 
     def _failed(self, objects: Sequence[Object], error: Exception) -> None:
         """Take a failure; values read before stay, with their age."""

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Final
 
+from gateway.units import with_minus
 from gateway.wire.dictionary import ObjectInfo
 from gateway.wire.method import Number
 from gateway.wire.object_search import fitting
 from server_gui.core.objects.forms import is_other, place
 from server_gui.core.objects.objects import Dictionary
-from server_gui.core.objects.reading import Held, Object
+from server_gui.core.objects.reading import Object, ReadValue
 
 CSV_TITLES: Final = (
     "component",
@@ -37,7 +38,7 @@ CSV_TITLES: Final = (
 BY_EDS: Final = "EDS default"
 
 
-class Kind(Enum):
+class RowKind(Enum):
     """What of a device is shown."""
 
     ALL = "All"
@@ -51,7 +52,7 @@ class Compared:
     """One device's objects beside another device's, or, without one, beside the defaults of its own EDS."""
 
     component: str
-    held: Mapping[Object, Held]
+    held: Mapping[Object, ReadValue]
     with_component: str | None = None
 
     @property
@@ -59,11 +60,11 @@ class Compared:
         return BY_EDS if self.with_component is None else self.with_component.replace("_", " ")
 
     def value(self, info: ObjectInfo) -> Number | str | None:
-        """Return what the device held when it was read; None for what is not known."""
+        """Return the device's value as of the last read; None if unknown."""
         return _value(self.held.get((self.component, info.object)))
 
     def other(self, info: ObjectInfo) -> Number | str | None:
-        """Return what it is compared with."""
+        """Return the value to compare with."""
         if self.with_component is None:
             return info.default
         return _value(self.held.get((self.with_component, info.object)))
@@ -84,11 +85,11 @@ class Finder:
     def __init__(self) -> None:
         self._index: tuple[object, list[tuple[int, int, str]]] = (None, [])
         self._fitting: tuple[object, list[ObjectInfo]] = (None, [])
-        self._found: tuple[object, Mapping[Kind, list[ObjectInfo]]] = (None, {})
+        self._found: tuple[object, Mapping[RowKind, list[ObjectInfo]]] = (None, {})
 
     def find(
         self, dictionary: Dictionary, words: str, compared: Compared, pinned: Collection[str], revision: int
-    ) -> Mapping[Kind, list[ObjectInfo]]:
+    ) -> Mapping[RowKind, list[ObjectInfo]]:
         """Return those that the words mean, of every kind; `revision` rises with what was read."""
         listed = (compared.component, dictionary, dictionary.revision)
         fitted = (*listed, words)
@@ -106,18 +107,18 @@ class Finder:
 
 def _by_kind(
     objects: list[ObjectInfo], compared: Compared, pinned: Collection[str]
-) -> Mapping[Kind, list[ObjectInfo]]:
+) -> Mapping[RowKind, list[ObjectInfo]]:
     return {
-        Kind.ALL: objects,
-        Kind.PARAMETERS: [info for info in objects if info.read_only is None],
-        Kind.DIFFERENT: [info for info in objects if compared.differs(info)],
-        Kind.PINNED: [info for info in objects if pin_of(compared.component, info.object) in pinned],
+        RowKind.ALL: objects,
+        RowKind.PARAMETERS: [info for info in objects if info.read_only is None],
+        RowKind.DIFFERENT: [info for info in objects if compared.differs(info)],
+        RowKind.PINNED: [info for info in objects if pin_of(compared.component, info.object) in pinned],
     }
 
 
 def limits(info: ObjectInfo) -> str:
     """Return the smallest and largest value by the EDS; empty where it names none."""
-    low, high = ("" if one is None else str(one) for one in (info.min, info.max))
+    low, high = ("" if one is None else with_minus(str(one)) for one in (info.min, info.max))
     return f"{low} … {high}" if low or high else ""
 
 
@@ -159,7 +160,7 @@ def cells(objects: Sequence[ObjectInfo], compared: Compared) -> Iterator[tuple[o
         )
 
 
-def _value(held: Held | None) -> Number | str | None:
+def _value(held: ReadValue | None) -> Number | str | None:
     return None if held is None or held.told.problem is not None else held.told.value
 
 

@@ -23,7 +23,7 @@ TRIED_S: Final = 20.0  # of steps that come after those
 UNRECORDED: Final = "nothing is learned from a walk that is not recorded"
 
 
-class State(Enum):
+class AdaptationState(Enum):
     """Where it stands."""
 
     OFF = "off"
@@ -53,29 +53,43 @@ class Happening(Enum):
     AGAIN = "AGAIN"
 
 
-def _table(rows: dict[State, dict[Happening, State]]) -> Mapping[State, Mapping[Happening, State]]:
+def _table(
+    rows: dict[AdaptationState, dict[Happening, AdaptationState]],
+) -> Mapping[AdaptationState, Mapping[Happening, AdaptationState]]:
     return MappingProxyType({state: MappingProxyType(row) for state, row in rows.items()})
 
 
-ANEW: Final = {Happening.AGAIN: State.COLLECTING}
+ANEW: Final = {Happening.AGAIN: AdaptationState.COLLECTING}
 # What is not in a row changes nothing.
 NEXT: Final = _table(
     {
-        State.OFF: {},
-        State.UNNAMED: {},
-        State.COLLECTING: {Happening.ENOUGH: State.LEARNING, Happening.BROKE: State.FAILED},
-        State.LEARNING: {Happening.LEARNED: State.TRYING, Happening.BROKE: State.FAILED},
-        State.TRYING: {
-            Happening.BETTER: State.OFFERED,
-            Happening.NO_BETTER: State.NO_BETTER,
-            Happening.BROKE: State.FAILED,
+        AdaptationState.OFF: {},
+        AdaptationState.UNNAMED: {},
+        AdaptationState.COLLECTING: {
+            Happening.ENOUGH: AdaptationState.LEARNING,
+            Happening.BROKE: AdaptationState.FAILED,
         },
-        State.OFFERED: {Happening.ACCEPT: State.SERVING, Happening.DECLINE: State.DECLINED},
-        State.SERVING: {Happening.TAKE_BACK: State.TAKEN_BACK, Happening.BROKE: State.FAILED},
-        State.NO_BETTER: ANEW,
-        State.DECLINED: ANEW,
-        State.TAKEN_BACK: ANEW,
-        State.FAILED: ANEW,
+        AdaptationState.LEARNING: {
+            Happening.LEARNED: AdaptationState.TRYING,
+            Happening.BROKE: AdaptationState.FAILED,
+        },
+        AdaptationState.TRYING: {
+            Happening.BETTER: AdaptationState.OFFERED,
+            Happening.NO_BETTER: AdaptationState.NO_BETTER,
+            Happening.BROKE: AdaptationState.FAILED,
+        },
+        AdaptationState.OFFERED: {
+            Happening.ACCEPT: AdaptationState.SERVING,
+            Happening.DECLINE: AdaptationState.DECLINED,
+        },
+        AdaptationState.SERVING: {
+            Happening.TAKE_BACK: AdaptationState.TAKEN_BACK,
+            Happening.BROKE: AdaptationState.FAILED,
+        },
+        AdaptationState.NO_BETTER: ANEW,
+        AdaptationState.DECLINED: ANEW,
+        AdaptationState.TAKEN_BACK: ANEW,
+        AdaptationState.FAILED: ANEW,
     }
 )
 BY_PERSON: Final = (Happening.ACCEPT, Happening.DECLINE, Happening.TAKE_BACK, Happening.AGAIN)
@@ -106,11 +120,11 @@ class Context:
     silences: int = 0
 
     @property
-    def first(self) -> State:
+    def first(self) -> AdaptationState:
         """Where everything begins in it."""
         if self.model is None or not self.is_linked or self.why_off:
-            return State.OFF
-        return State.COLLECTING if self.wearing.wearer else State.UNNAMED
+            return AdaptationState.OFF
+        return AdaptationState.COLLECTING if self.wearing.wearer else AdaptationState.UNNAMED
 
     @property
     def why_off(self) -> str:
@@ -149,7 +163,7 @@ class Adapting:
 
     robot: str
     number: int
-    state: State
+    state: AdaptationState
     wearer: str = ""
     stepped_s: float = 0.0  # in this state
     tried: Tried | None = None
@@ -175,11 +189,11 @@ class Adapting:
         since = "" if self.since_s is None else f" since {_time_of_day(self.since_s)}"
         worth = "" if self.tried is None else f" ({self.tried.text})"
         match self.state:
-            case State.SERVING:
+            case AdaptationState.SERVING:
                 return f"{whom}: serves{since}{worth}; window, Overview: Take back"
-            case State.OFFERED:
+            case AdaptationState.OFFERED:
                 return f"{whom}: offered{since}{worth}, does not serve; window, Overview: Use it"
-            case State.TRYING:
+            case AdaptationState.TRYING:
                 return f"{whom}: tried{since} beside the general model, does not serve"
             case _:
                 return ""
@@ -190,26 +204,26 @@ class Adapting:
         tried = "" if self.tried is None else self.tried.text
         strides = "" if self.tried is None else f" of the stride, on {self.tried.strides} later strides"
         match self.state:
-            case State.OFF:
+            case AdaptationState.OFF:
                 return self.why
-            case State.UNNAMED:
+            case AdaptationState.UNNAMED:
                 return "name the wearer to learn from the walk: stop the recording, and start it with a name"
-            case State.COLLECTING:
+            case AdaptationState.COLLECTING:
                 return f"learning from {self.wearer}: {self.stepped_s:.0f} of {LEARNED_S:.0f} s of steps"
-            case State.LEARNING:
+            case AdaptationState.LEARNING:
                 return f"learning from {self.wearer}: a copy of the model is trained"
-            case State.TRYING:
+            case AdaptationState.TRYING:
                 tried_s = f"{self.stepped_s:.0f} of {TRIED_S:.0f} s of steps"
                 return f"learned from {self.wearer}, tried beside the general model: {tried_s}"
-            case State.OFFERED:
+            case AdaptationState.OFFERED:
                 return f"learned from {self.wearer}: {tried}{strides}"
-            case State.SERVING:
+            case AdaptationState.SERVING:
                 return f"learned from {self.wearer}, and serves: {tried}{strides}"
-            case State.NO_BETTER:
+            case AdaptationState.NO_BETTER:
                 return f"learned from {self.wearer}: no better than the general model ({tried})"
-            case State.DECLINED | State.TAKEN_BACK:
+            case AdaptationState.DECLINED | AdaptationState.TAKEN_BACK:
                 return f"learned from {self.wearer}, {self.state.value}: the general model serves"
-            case State.FAILED:
+            case AdaptationState.FAILED:
                 return f"not learned from {self.wearer}: {self.why}"
 
 

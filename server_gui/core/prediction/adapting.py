@@ -22,10 +22,10 @@ from server_gui.core.prediction.adaptation import (
     LEARNED_S,
     NEXT,
     TRIED_S,
+    AdaptationState,
     Adapting,
     Context,
     Happening,
-    State,
     Tried,
     Wearing,
 )
@@ -54,7 +54,7 @@ class Began:
 
 
 @dataclass(frozen=True, slots=True)
-class Said:
+class AttemptEvent:
     """A person, of the attempt of this number; or the thread that predicts, that the model breaks."""
 
     number: int
@@ -62,7 +62,7 @@ class Said:
 
 
 NOTHING: Final = Began(EMPTY, 1, 0)
-Thing = Began | Said | Batch | list[Window]
+Thing = Began | AttemptEvent | Batch | list[Window]
 
 
 class _Attempts:
@@ -70,7 +70,7 @@ class _Attempts:
 
     def __init__(self, robot: str, tell: Callable[[Adapting], None]) -> None:
         self.context, self.turn = EMPTY, 0
-        self.now = Adapting(robot, 0, State.OFF)
+        self.now = Adapting(robot, 0, AdaptationState.OFF)
         self.adapted: Model | None = None
         self._tell = tell
         self._lesson: TrainingData | None = None
@@ -84,7 +84,7 @@ class _Attempts:
     @property
     def serves(self) -> Model | None:
         """The adapted model, while it serves."""
-        return self.adapted if self.now.state is State.SERVING else None
+        return self.adapted if self.now.state is AdaptationState.SERVING else None
 
     def begin(self, began: Began) -> None:
         """Forget everything, and begin anew."""
@@ -98,7 +98,7 @@ class _Attempts:
             self._enter(state, self.now.tried if found is None else found, why)
 
     def take(self, thing: Batch | list[Window], told: Callable[[], None]) -> None:
-        """Take what the robot has sent, or its model was asked."""
+        """Take the robot's rows, or inputs of its model."""
         if self._lesson is None:
             return
         if isinstance(thing, list):
@@ -109,44 +109,44 @@ class _Attempts:
 
     def _look(self, lesson: TrainingData, told: Callable[[], None]) -> None:
         stepped_s, base = lesson.stepped_s, lesson.base
-        if self.now.state is State.COLLECTING and stepped_s >= LEARNED_S:
+        if self.now.state is AdaptationState.COLLECTING and stepped_s >= LEARNED_S:
             self.happened(Happening.ENOUGH)
             self.adapted = learn(base, self.now.robot, self.now.wearer, lesson.rows, told)
             lesson.turn_page()
             self.happened(Happening.LEARNED)
-        elif self.now.state is State.TRYING and self.adapted is not None and _is_enough(lesson):
+        elif self.now.state is AdaptationState.TRYING and self.adapted is not None and _is_enough(lesson):
             found, is_better = tried(base, self.adapted, lesson.rows)
             self.happened(Happening.BETTER if is_better else Happening.NO_BETTER, found=found)
         elif int(stepped_s) != int(self.now.stepped_s):
             self._say(self.now.state, self.now.tried, stepped_s=stepped_s)
 
-    def _enter(self, state: State, found: Tried | None = None, why: str = "") -> None:
+    def _enter(self, state: AdaptationState, found: Tried | None = None, why: str = "") -> None:
         is_new = state is self.context.first
         if is_new:
             found = None
-        if state is State.COLLECTING and self.context.model is not None:
+        if state is AdaptationState.COLLECTING and self.context.model is not None:
             self._lesson = TrainingData(self.context.model, self._every_ns)
-        elif state not in (State.LEARNING, State.TRYING):
+        elif state not in (AdaptationState.LEARNING, AdaptationState.TRYING):
             self._lesson = None  # nothing of the walk is kept
-        if state not in (State.TRYING, State.OFFERED, State.SERVING):
+        if state not in (AdaptationState.TRYING, AdaptationState.OFFERED, AdaptationState.SERVING):
             self.adapted = None
         self._say(state, found, why=why, number=self.now.number + is_new)
 
     def _say(
         self,
-        state: State,
+        state: AdaptationState,
         found: Tried | None,
         *,
         stepped_s: float = 0.0,
         why: str = "",
         number: int | None = None,
     ) -> None:
-        model = self.adapted.card.id if self.adapted is not None and state is State.SERVING else ""
+        model = self.adapted.card.id if self.adapted is not None and state is AdaptationState.SERVING else ""
         number = self.now.number if number is None else number
         wearer = self.context.wearing.wearer
         is_same = (state, number) == (self.now.state, self.now.number)
         since_s = self.now.since_s if is_same else time.time()
-        is_known = state is State.OFF and (self.now.state, self.now.why) == (state, why)
+        is_known = state is AdaptationState.OFF and (self.now.state, self.now.why) == (state, why)
         self.now = Adapting(self.now.robot, number, state, wearer, stepped_s, found, why, model, since_s)
         if not is_known:  # while there is no link, each attempt is a change
             self._tell(self.now)
@@ -224,7 +224,7 @@ class AdaptingService:
     def broke(self, robot: str) -> None:
         """Note that the adapted model cannot predict."""
         if robot in self.now:
-            self._inbox.put(robot, Said(self.now[robot].number, Happening.BROKE))
+            self._inbox.put(robot, AttemptEvent(self.now[robot].number, Happening.BROKE))
 
     def _put(self, robot: str, thing: Batch | list[Window]) -> None:
         with self._lock:
@@ -238,7 +238,7 @@ class AdaptingService:
     def say(self, robot: str, number: int, what: Happening) -> None:
         """Accept, decline, take back, or try again; of an attempt that is over it changes nothing."""
         if what in BY_PERSON:
-            self._inbox.put(robot, Said(number, what))
+            self._inbox.put(robot, AttemptEvent(number, what))
 
     # --- its thread
 
@@ -269,7 +269,7 @@ class AdaptingService:
         match thing:
             case Began():
                 known.begin(thing)
-            case Said():
+            case AttemptEvent():
                 if thing.number == known.now.number:
                     why = "the adapted model cannot be used" if thing.what is Happening.BROKE else ""
                     known.happened(thing.what, why=why)
@@ -302,7 +302,7 @@ class AdaptingService:
 
 
 def _after(before: Context, events: Iterable[Event]) -> Context:
-    """Return what the robot's link and boot are after these events."""
+    """Return the robot's link and boot after these events."""
     boot_id, links, is_linked = before.boot_id, before.links, before.is_linked
     for event in events:
         match event:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from ml.danger.levels import Level
-from ml.danger.watch import Verdict
+from ml.danger.monitor import DangerVerdict
 from ml.serving.predictor import Prediction
 from server_gui.core.follow import frame_time
 from server_gui.core.prediction.adaptation import Adapting
@@ -19,7 +19,7 @@ OFF: Final = "prediction is off: write enabled = true into [prediction] of the s
 
 
 @dataclass(frozen=True, slots=True)
-class Shown:
+class NewestPrediction:
     """The newest prediction of a task, and when it came."""
 
     predicted: Predicted
@@ -46,7 +46,7 @@ class ShownDanger:
 
     said: Endangered
     came_ns: int  # our monotonic clock
-    known: Verdict | None = None
+    known: DangerVerdict | None = None
 
     def is_stale(self, now_ns: int | None = None) -> bool:
         """Return whether it is too old to be called live: nothing is known then."""
@@ -80,7 +80,7 @@ class Recalled:
         return self.old_s > STALE_S
 
 
-Told = Shown | Recalled
+Told = NewestPrediction | Recalled
 
 
 @dataclass(slots=True)
@@ -91,7 +91,7 @@ class StationPredictions:
     `recalled` belongs to who plays a recording; of a robot there is nothing in it.
     """
 
-    by_task: dict[str, Shown] = field(default_factory=dict)
+    by_task: dict[str, NewestPrediction] = field(default_factory=dict)
     recalled: dict[str, Recalled] = field(default_factory=dict)
     danger: ShownDanger | None = None
     adapting: Adapting | None = None  # None: nobody learns from walks here
@@ -127,7 +127,7 @@ class StationPredictions:
         self.revision += 1
         match news:
             case Predicted():
-                self.by_task[news.prediction.task] = Shown(news, time.monotonic_ns())
+                self.by_task[news.prediction.task] = NewestPrediction(news, time.monotonic_ns())
             case Endangered():
                 self.danger = ShownDanger(news, time.monotonic_ns(), self._known(news.verdict))
             case Adapting():
@@ -141,7 +141,7 @@ class StationPredictions:
                 for task in self.by_task.keys() - news.models.keys():
                     del self.by_task[task]
 
-    def _known(self, verdict: Verdict) -> Verdict | None:
+    def _known(self, verdict: DangerVerdict) -> DangerVerdict | None:
         if verdict.level is not Level.UNKNOWN:
             return verdict
         return None if self.danger is None else self.danger.known

@@ -4,14 +4,14 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Final
 
 from gateway.client import Batch
-from ml.danger.combine import Calibration
+from ml.danger.calibration import Calibration
 from ml.danger.levels import URGENT, Level
-from ml.danger.now import CHANNELS
-from ml.danger.watch import Verdict, Watch
+from ml.danger.monitor import DangerMonitor, DangerVerdict
+from ml.danger.observation import CHANNELS
 from ml.serving.predictor import Prediction
 from server_gui.core.prediction.clock import Clock
 from server_gui.core.prediction.news import Endangered, Ruled
-from server_gui.core.prediction.rules import Rule
+from server_gui.core.prediction.rules import PredictionRule
 from server_gui.core.settings.prediction import DANGER, RuleSettings
 
 EVERY_NS: Final = 40_000_000  # between two verdicts, at most as many as rows
@@ -28,13 +28,13 @@ class DangerWatch:
     def __init__(self, robot: str, calibration: Calibration, rules: Iterable[RuleSettings]) -> None:
         self._robot = robot
         self._calibration = calibration
-        self._rules = [Rule(rule, EVERY_NS) for rule in rules if rule.task == DANGER]
-        self._told: Verdict | None = None
+        self._rules = [PredictionRule(rule, EVERY_NS) for rule in rules if rule.task == DANGER]
+        self._told: DangerVerdict | None = None
         self.restart()
 
     def restart(self) -> None:
         """Begin anew: the robot has booted, or another one wears it."""
-        self._watch = Watch(self._calibration)
+        self._watch = DangerMonitor(self._calibration)
 
     def take(self, batch: Batch, clock: Clock) -> Iterator[News]:
         """Take rows; what is to be told of them."""
@@ -45,7 +45,7 @@ class DangerWatch:
             if verdict is not None:
                 yield from self._news(verdict, clock)
 
-    def _news(self, verdict: Verdict, clock: Clock) -> Iterator[News]:
+    def _news(self, verdict: DangerVerdict, clock: Clock) -> Iterator[News]:
         said = Endangered(
             self._robot,
             verdict,
@@ -66,7 +66,7 @@ class DangerWatch:
             yield said
 
 
-def prediction(verdict: Verdict) -> Prediction:
+def prediction(verdict: DangerVerdict) -> Prediction:
     """Return the verdict as rules take it.
 
     Each level that is reached has the probability of harm, others none.

@@ -8,7 +8,7 @@ from typing import Final, Self
 
 from gateway.client import Address
 from gateway.wire.resource import ResourceSnapshotParams
-from ml.danger.now import CHANNELS
+from ml.danger.observation import CHANNELS
 from ml.robot.groups import GROUPS
 from server_gui.core.follow.events import LinkChanged
 from server_gui.core.follow.feed import ONCE, Feed, FollowSettings, Tell

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from ml.danger.detector import DETECTORS
 from ml.danger.levels import Level
-from ml.danger.watch import Verdict
+from ml.danger.monitor import DangerVerdict
 from ml.registry.card import Card
 from ml.serving.predictor import Prediction
 from ml.serving.trust import Trust
@@ -39,7 +39,7 @@ class Endangered:
     """What is foreseen of a robot now; times as in `Predicted`. Rules take the verdict as `prediction`."""
 
     robot: str
-    verdict: Verdict
+    verdict: DangerVerdict
     prediction: Prediction
     utc_ns: int
     took_ns: int | None
@@ -54,8 +54,8 @@ class Endangered:
         return "; ".join([f"{verdict.level.word}, {verdict.number:.2f}, {speak}", *verdict.why])
 
 
-def turn(before: Level, verdict: Verdict) -> str | None:
-    """Return what is to be noted where advice, or what is worse, begins or ends.
+def turn(before: Level, verdict: DangerVerdict) -> str | None:
+    """Return a note for the recording, if advice or a worse level begins or ends.
 
     None where nothing has happened.
     """

@@ -46,7 +46,7 @@ class PhaseTruth:
         return sum(map(self._is_new, found)) > 0  # of all of them
 
     def at(self, stamp_ns: int) -> Instant | None:
-        """Return what is known of an instant by now."""
+        """Return the truth about an instant, as far as it is known by now."""
         left, right = (self._stride(leg, stamp_ns) for leg in (Leg.LEFT, Leg.RIGHT))
         if left is None or right is None:
             return None

@@ -7,7 +7,7 @@ from typing import Final
 from msgspec import Struct
 
 from ml.serving.predictor import Prediction
-from server_gui.core.prediction.rules import Rule
+from server_gui.core.prediction.rules import PredictionRule
 from server_gui.core.settings.prediction import RuleSettings
 
 LEAD_NS: Final = 1_500_000_000  # a rule may begin so long before what it warns of
@@ -51,13 +51,13 @@ def rehearse(rule: RuleSettings, every_ns: int, stretches: Iterable[Stretch]) ->
     for stretch in stretches:
         length_ns += stretch.length_ns
         known |= stretch.causes is not None
-        for at_ns in _begins(Rule(rule, every_ns), stretch.predictions):
+        for at_ns in _begins(PredictionRule(rule, every_ns), stretch.predictions):
             began += 1
             false += not _caused(at_ns, stretch.causes or ())
     return Rehearsed(rule, length_ns / HOUR_NS, began, false, known)
 
 
-def _begins(rule: Rule, predictions: Iterable[Prediction]) -> Iterable[int]:
+def _begins(rule: PredictionRule, predictions: Iterable[Prediction]) -> Iterable[int]:
     own = (one for one in predictions if one.task == rule.settings.task)
     return [one.stamp_ns for one in own if rule.take(one)]
 

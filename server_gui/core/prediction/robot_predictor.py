@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Final
 
 from gateway.client import Batch
-from ml.danger.combine import Calibration
+from ml.danger.calibration import Calibration
 from ml.serving.predictor import Prediction, Row, Window, Windows
 from ml.serving.trust import Trusting
 from server_gui.core.follow.events import Described, Event, Telemetry
@@ -13,7 +13,7 @@ from server_gui.core.prediction.danger import DangerWatch
 from server_gui.core.prediction.danger import News as DangerNews
 from server_gui.core.prediction.model_loading import Model
 from server_gui.core.prediction.news import Predicted, PredictionNews, Ruled, Serves
-from server_gui.core.prediction.rules import Rule
+from server_gui.core.prediction.rules import PredictionRule
 from server_gui.core.prediction.state import Quality
 from server_gui.core.settings.prediction import PredictionSettings, RuleSettings
 
@@ -30,7 +30,7 @@ class Watched:
         self._every_ns = every_ns
         self._windows = Windows(model.learned.recipe, every_ns)
         self._trusting = Trusting(model.learned.recipe.channels, model.card.ranges)
-        self._rules = [Rule(rule, every_ns) for rule in rules if rule.task == model.card.task]
+        self._rules = [PredictionRule(rule, every_ns) for rule in rules if rule.task == model.card.task]
 
     def take(self, batch: Batch) -> None:
         """Take rows; what is due then is in `due`."""
@@ -58,7 +58,7 @@ class Watched:
     def predicted(
         self, robot: str, clock: Clock, quality: Quality | None, predictions: Sequence[Prediction]
     ) -> Iterator[PredictionNews]:
-        """Return what these predictions say of what was due; `quality` is how right the model was of late."""
+        """Yield the news of these predictions; `quality` is the model's recent accuracy."""
         samples = [window.samples[0, :, -1] for window in self.due]
         self.due = []
         self._trusting.take(predictions, samples)
@@ -125,7 +125,7 @@ class RobotPredictor:
             self._danger.restart()
 
     def take(self, events: Iterable[Event]) -> None:
-        """Take what the robot's feed has told, in order."""
+        """Take the events of the robot's feed, in order."""
         for event in events:
             match event:
                 case Telemetry():

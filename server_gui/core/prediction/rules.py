@@ -11,7 +11,7 @@ HOLE: Final = 3  # times `every_ns`: longer without a prediction, and it begins 
 
 
 @dataclass(slots=True)
-class Rule:
+class PredictionRule:
     """One rule for one robot; predictions are those of its task, in time's order, `every_ns` apart."""
 
     settings: RuleSettings

@@ -13,7 +13,7 @@ from ml.serving.grid import Stamps
 from ml.store.labels import Label, LabelSource
 from ml.training.judging import WITHIN
 from ml.training.recorded import Recorded
-from ml.training.truth import NOBODY, Names, Said, activities, phases
+from ml.training.truth import NOBODY, LabelSpan, Names, activities, phases
 from server_gui.core.prediction.state import Quality
 
 STILL: Final = "no stride"  # what it was, where a phase was said and no leg steps
@@ -48,7 +48,7 @@ def compared(
     times = np.array([(one.began_utc_ns, one.ended_utc_ns) for one in known], np.int64)
     begins, ends = clock.at_utc(times[:, 0]).tolist(), clock.at_utc(times[:, 1]).tolist()
     spans = zip(begins, ends, known, strict=True)
-    spoken = [Said(begin, end, one.label, one.source) for begin, end, one in spans]
+    spoken = [LabelSpan(begin, end, one.label, one.source) for begin, end, one in spans]
     about_ns = said.stamps_ns - task.delay_ms * 1_000_000
     if task.fold:
         return _classes(activities(spoken, about_ns)[0], task, classes), said.labels
@@ -72,13 +72,13 @@ def _phases(true: Samples, sources: Names, said: Decisions) -> tuple[Names, Sequ
 
 
 def counted(was: Names, said: Sequence[str]) -> Counts:
-    """Return how often what was said of what, where somebody knows."""
+    """Count the pairs of truth and prediction, where the truth is known."""
     pairs = zip(was.tolist(), said, strict=True)
     return Counter((so, label) for so, label in pairs if so != NOBODY)
 
 
 def quality(counts: Mapping[tuple[str, str], int]) -> Quality:
-    """Return what of that was right."""
+    """Return the accuracy from such counts."""
     confusion: dict[str, dict[str, int]] = {}
     for (was, said), count in sorted(counts.items()):
         confusion.setdefault(was, {})[said] = count

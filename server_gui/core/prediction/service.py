@@ -7,7 +7,7 @@ from typing import Final, Self, TypeVar
 
 from threadpoolctl import threadpool_limits
 
-from ml.danger.combine import Calibration, load
+from ml.danger.calibration import Calibration, load
 from ml.errors import UnusableModel
 from ml.robot.task import TASKS
 from ml.serving.predictor import judged
@@ -89,7 +89,7 @@ class PredictionService:
         return self._worker, self._serving.worker, self._tracking.worker, *adapting
 
     def take(self, robot: str, event: Event) -> None:
-        """Take what a robot's feed tells; from any thread, returns at once."""
+        """Take an event of a robot's feed; from any thread, returns at once."""
         self._inbox.put(robot, event)
 
     def say(self, robot: str, number: int, what: Happening) -> None:
@@ -201,7 +201,7 @@ class PredictionService:
             self._tell([news])
 
     def _own(self, robot: str, events: Iterable[Event], model: Model | None) -> Model | None:
-        """Return what was adapted to the wearer and serves now, where it can be used."""
+        """Return the model adapted to the wearer, if it serves and can be used."""
         if self._adapting is None:
             return None
         trusted = model is not None and model.objection is None
@@ -214,7 +214,7 @@ class PredictionService:
         return None
 
     def _due(self) -> Iterator[tuple[Model, list[tuple[RobotPredictor, Watched]]]]:
-        """Yield what is due, by model: robots that have the same one are judged together."""
+        """Yield the due windows, by model: robots with the same model are judged together."""
         found: dict[str, tuple[Model, list[tuple[RobotPredictor, Watched]]]] = {}
         for robot in self._robots.values():
             for watched in robot.tasks.values():
@@ -225,7 +225,7 @@ class PredictionService:
         yield from found.values()
 
     def _judge(self, model: Model, due: Sequence[tuple[RobotPredictor, Watched]]) -> list[PredictionNews]:
-        """Return what a model says of everything that is due; a model that breaks ends nothing but itself."""
+        """Return a model's predictions for all due windows; an exception disables only this model."""
         windows = [window for _, watched in due for window in watched.due]
         try:
             predictions = iter(judged(model.card.id, model.learned, windows))
@@ -245,7 +245,7 @@ class PredictionService:
 
 
 def _of(robot: str, found: Mapping[tuple[str, str], Thing]) -> dict[str, Thing]:
-    """Return what is of this robot, by task."""
+    """Return the entries of this robot, by task."""
     return {task: found[robot, task] for task in TASKS if (robot, task) in found}
 
 

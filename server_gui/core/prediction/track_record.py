@@ -52,7 +52,7 @@ class TrackRecord:
         self._counts: Mapping[Stretch, Mapping[Key, Counts]] = {}
 
     def figures(self, robots: Set[str], now: datetime, ending: Callable[[], bool] = lambda: False) -> Figures:
-        """Return what was said of these robots within the last days; nothing new where it is `ending`.
+        """Return the predictions about these robots of the last days; nothing new while it is `ending`.
 
         A session that a model has learned from proves nothing of it, and is left out.
 
@@ -108,7 +108,7 @@ class TrackRecord:
         return sorted((Label.of(row) for row in holding(rows)), key=_session)
 
     def _compared(self, stretch: Stretch, version: int) -> Mapping[Key, Counts]:
-        """Return what was said in a stretch, against what was so, by robot, task and model."""
+        """Count predictions in a stretch against its labels, by robot, task and model."""
         robot, session = _session(stretch.labels[0])
         rows = self._said(stretch, version)
         clock = Recorded(

@@ -53,7 +53,7 @@ class TrainingData:
         return len({row.instant.stride_ns for row in self.rows})
 
     def ask(self, windows: Sequence[Window]) -> None:
-        """Take what the serving model was asked."""
+        """Take the inputs of the serving model."""
         self._waiting += windows
         while self._waiting and self._waiting[-1].stamp_ns - self._waiting[0].stamp_ns > LATEST_NS:
             self._waiting.popleft()

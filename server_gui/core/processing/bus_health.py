@@ -9,6 +9,7 @@ from typing import Final
 from gateway.client import ConnectionState
 from gateway.wire.bus import CLOSED, BusInfo, NodeInfo
 from server_gui.core.follow.frame_time import now_ns
+from server_gui.core.follow.missing_pdos import told_percent, told_words
 from server_gui.core.follow.robot import Robot
 
 ACTIVE: Final = "error active"
@@ -16,7 +17,6 @@ OFF: Final = "bus off"
 FULL_PERCENT: Final = 95.0  # of its time: hardly a frame more has room
 TAKEN: Final = "of its time is taken"
 BUSY_PERCENT: Final = 80.0  # as the gateway finds it
-MISSING_PERCENT: Final = 1.0  # of a node's PDOs
 OLD_S: Final = 5.0  # what was seen before is not known now
 FEWER: Final = "look who sends so much, and send fewer PDOs or SYNC less often"
 UNKNOWN: Final = "bus not known"
@@ -24,7 +24,7 @@ FEW: Final = 2  # nodes that are named one by one, also where all of them are me
 NUMBER: Final = re.compile(r"(?<![\w.])\d+(?:\.\d+)?(?![\w.])")
 
 
-class Level(Enum):
+class BusHealthLevel(Enum):
     """How bad it is; what is not known is none of the others."""
 
     GOOD = "ok"
@@ -33,7 +33,7 @@ class Level(Enum):
     ALARM = "alarm"
 
 
-ORDER: Final = tuple(Level)
+ORDER: Final = tuple(BusHealthLevel)
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,19 +56,21 @@ def seen(robot: Robot) -> tuple[BusInfo, ...] | None:
     return None if old else robot.buses
 
 
-def level(bus: BusInfo) -> Level:
+def level(bus: BusInfo) -> BusHealthLevel:
     """Return how bad a bus is."""
     if bus.state in (CLOSED, OFF) or (bus.load_percent or 0.0) >= FULL_PERCENT:
-        return Level.ALARM
+        return BusHealthLevel.ALARM
     if bus.state != ACTIVE or (bus.load_percent or 0.0) >= BUSY_PERCENT or bus.findings or bus.problem:
-        return Level.WARNING
-    of_nodes = max((node_level(node) for node in bus.nodes), key=ORDER.index, default=Level.GOOD)
-    return Level.UNKNOWN if of_nodes is Level.GOOD and bus.load_percent is None else of_nodes
+        return BusHealthLevel.WARNING
+    of_nodes = max((node_level(node) for node in bus.nodes), key=ORDER.index, default=BusHealthLevel.GOOD)
+    return (
+        BusHealthLevel.UNKNOWN if of_nodes is BusHealthLevel.GOOD and bus.load_percent is None else of_nodes
+    )
 
 
-def node_level(node: NodeInfo) -> Level:
+def node_level(node: NodeInfo) -> BusHealthLevel:
     """Return how bad a node is."""
-    return Level.WARNING if node.findings or _misses(node) else Level.GOOD
+    return BusHealthLevel.WARNING if node.findings or _misses(node) else BusHealthLevel.GOOD
 
 
 def load_text(bus: BusInfo) -> str:
@@ -82,13 +84,13 @@ def errors_text(bus: BusInfo) -> str:
     return count if not bus.bus_offs else f"{count}, {bus.bus_offs} × bus off"
 
 
-def worst(robot: Robot) -> tuple[Level, tuple[str, ...]]:
+def worst(robot: Robot) -> tuple[BusHealthLevel, tuple[str, ...]]:
     """Return the worst bus in one line, the fullest wording first."""
     buses = seen(robot)
     if buses is None:
-        return Level.UNKNOWN, (UNKNOWN, "CAN –")
+        return BusHealthLevel.UNKNOWN, (UNKNOWN, "CAN –")
     if not buses:
-        return Level.UNKNOWN, ("no CAN bus", "no bus")
+        return BusHealthLevel.UNKNOWN, ("no CAN bus", "no bus")
     bus = max(buses, key=lambda one: (ORDER.index(level(one)), one.load_percent or 0.0))
     load = f"CAN {bus.name} {load_text(bus)}"
     most = next(iter(talking(bus)), None)
@@ -102,14 +104,14 @@ def worst(robot: Robot) -> tuple[Level, tuple[str, ...]]:
 
 
 def trouble(bus: BusInfo) -> tuple[str, str] | None:
-    """Return what is wrong with a bus, and what to check where that is known; None: nothing."""
+    """Return a bus's problems, and what to check if that is known; None if there are none."""
     told = findings(bus)
     return (_joined(words for words, _ in told), _joined(check for _, check in told)) if told else None
 
 
 def findings(bus: BusInfo) -> list[tuple[str, str]]:
     """Return each thing that is wrong with a bus, and what to check; what several nodes have, once."""
-    if level(bus) in (Level.GOOD, Level.UNKNOWN):
+    if level(bus) in (BusHealthLevel.GOOD, BusHealthLevel.UNKNOWN):
         return []
     load, full = bus.load_percent or 0.0, []
     own = [one for one in bus.findings if not one.words.endswith(TAKEN)]  # by the load of a moment ago
@@ -148,7 +150,7 @@ def reason(bus: BusInfo) -> tuple[str, ...] | None:
 
 
 def talking(bus: BusInfo) -> list[Talking]:
-    """Return who talks on a bus, the most first; `node_id` None is what belongs to no node."""
+    """Return the senders on a bus, the busiest first; `node_id` None stands for frames of no node."""
     names = {node.node_id: tuple(node.components) for node in bus.nodes}
     total = sum(one.frames_per_s for one in bus.talks)
     by_node: dict[int | None, dict[str, float]] = {}
@@ -179,16 +181,16 @@ def _joined(texts: Iterable[str]) -> str:
 
 
 def _misses(node: NodeInfo) -> bool:
-    return (node.pdos_missing_percent or 0.0) >= MISSING_PERCENT
+    return told_percent(node) > 0.0
 
 
 def _gathered(nodes: Sequence[NodeInfo]) -> Iterator[tuple[str, str]]:
-    """Yield what nodes have, those with the same in one: `all 6 nodes: 3–4 % of their PDOs are missing`."""
+    """Yield the nodes' findings, equal ones in one: `all 6 nodes: 3–4 % of their PDOs are missing`."""
     same: dict[tuple[str, str], list[tuple[NodeInfo, str]]] = {}
     for node in nodes:
         said = [(one.words, one.check) for one in node.findings]
         if not said and _misses(node):
-            said = [(f"{node.pdos_missing_percent or 0.0:.0f} % of its PDOs are missing", "")]
+            said = [told_words(node)]
         for words, check in said:
             same.setdefault((NUMBER.sub("#", words), check), []).append((node, words))
     for (_, check), found in same.items():

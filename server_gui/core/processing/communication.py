@@ -159,7 +159,7 @@ class LinkMonitor:
         return [*own, *_complaints(found)]
 
     def _lies(self, now_ns: int) -> Iterator[tuple[Health, bool, str]]:
-        """Yield what the robot itself says that cannot be so."""
+        """Yield impossible statements of the robot."""
         if self._refused is not None:
             at_ns, why = self._refused
             yield Health.POOR, now_ns - at_ns < SECONDS * 1e9, f"it sends what cannot be kept: {why}"
@@ -169,7 +169,7 @@ class LinkMonitor:
 
 
 def _complaints(found: LinkQuality) -> list[tuple[Health, bool, str]]:
-    """Return what can be wrong with a link that is up: how bad, whether it is so, and in words."""
+    """Return possible problems of a link that is up: severity, whether it is present, and words."""
     loss, age, jitter, trip = (
         value or 0.0 for value in (found.loss, found.age, found.jitter, found.round_trip)
     )

@@ -21,7 +21,7 @@ SILENT_NS = 500_000_000  # a source that told nothing for so long leaves its leg
 Columns = Mapping[str, Sequence[float | None]]
 
 
-class Found(NamedTuple):
+class GaitFindings(NamedTuple):
     """What some rows brought."""
 
     events: list[GaitEvent]
@@ -67,10 +67,10 @@ class ComponentProcessing:
         self._wirings: dict[tuple[str, ...], Wiring] = {}
         self._stamp_ns = 0
 
-    def take(self, stamps_ns: Sequence[int], columns: Columns) -> Found:
+    def take(self, stamps_ns: Sequence[int], columns: Columns) -> GaitFindings:
         """Rows as a batch of a stream has them."""
         wiring = self._wiring(tuple(columns))
-        taken = Found([], [])
+        taken = GaitFindings([], [])
         for row, stamp_ns in enumerate(stamps_ns):
             self._stamp_ns = stamp_ns
             self._measures.see(stamp_ns)
@@ -83,7 +83,7 @@ class ComponentProcessing:
         return taken
 
     def shown(self, now_ns: int | None = None) -> Derived:
-        """Return what is derived at `now_ns` on the robot's clock; by default at the newest row."""
+        """Return the derived values at `now_ns` on the robot's clock; by default at the newest row."""
         now_ns = self._stamp_ns if now_ns is None else now_ns
         errors = ((name, error.at(now_ns)) for name, error in self._errors.items())
         return Derived(

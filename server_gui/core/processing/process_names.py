@@ -17,7 +17,7 @@ def command_of(process: ProcessUse) -> str:
 
 
 def arguments_of(process: ProcessUse) -> str:
-    """Return what tells processes of one name apart: the command without the path of its interpreter."""
+    """Return the part that distinguishes processes of one name: the command without its interpreter."""
     words = command_of(process).split()
     while len(words) > 1 and (_is_interpreter(words[0]) or words[0].startswith("-")):
         words.pop(0)

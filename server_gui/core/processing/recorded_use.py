@@ -34,7 +34,7 @@ def looks(rows: Iterable[Mapping[str, Any]]) -> Iterator[tuple[float, Sequence[M
 
 
 def used(seen: Looks) -> list[ProgramUse]:
-    """Return what each program took, the greatest memory first."""
+    """Return the use of each program, the largest memory first."""
     programs: dict[str, list[tuple[float, dict[str, float]]]] = {}
     for time_s, processes in seen:
         for name, sums in by_name(processes).items():

@@ -75,7 +75,7 @@ class Regression:
 
 
 def regressions(before: Sequence[SessionUse], after: Sequence[SessionUse]) -> list[Regression]:
-    """Return what costs more in `after` than in `before`, the greatest ratio first.
+    """Return programs that cost more in `after` than in `before`, the largest ratio first.
 
     A process counts that was seen in both, if its median is a tenth and `MEASURES` more, if three quarters of
     the sessions after lie above three quarters of those before, and if chance is refused by the rank-sum
@@ -122,7 +122,7 @@ def _versions(sessions: Sequence[SessionUse]) -> str:
 
 
 def by_name(processes: Sequence[Mapping[str, object]]) -> dict[str, dict[str, float]]:
-    """Return what the processes of each name use together."""
+    """Return the sums over the processes of each name."""
     sums: dict[str, dict[str, float]] = {}
     for process in processes:
         kept = sums.setdefault(str(process["name"]), {})

@@ -47,7 +47,7 @@ class RobotProcessing:
                 pass  # writes and stops change nothing here
 
     def derived(self) -> Derived:
-        """Return what is known of wearer and joints, as of the newest row."""
+        """Return derived values of wearer and joints, as of the newest row."""
         return self.component.shown()
 
     def link(self, now_ns: int | None = None) -> LinkQuality:

@@ -12,7 +12,7 @@ import numpy as np
 
 from gateway.client import Batch
 from server_gui.core.follow import validation
-from server_gui.core.recording.clocks import Clock, Moment, Reading, Step
+from server_gui.core.recording.clocks import Clock, ClockReading, ClockStep, Moment
 from server_gui.core.recording.rows import Floats, Layout, Record, Run
 
 
@@ -44,7 +44,7 @@ class Notification:
 
     stream: int
     batch: Batch
-    clocks: Reading
+    clocks: ClockReading
 
 
 Timed = tuple[Batch, int]  # and UTC minus the robot's monotonic clock
@@ -136,7 +136,7 @@ class Batching:
         return None
 
     def _happened(
-        self, new: Notification, why: str | None, steps: Iterable[Step], offset_ns: int
+        self, new: Notification, why: str | None, steps: Iterable[ClockStep], offset_ns: int
     ) -> list[Record]:
         """Return the events that a notification tells of."""
         batch, events = new.batch, []

@@ -9,7 +9,7 @@ DATA: Final = 8  # which of a run's columns is its rows; the one after it is its
 
 
 def of_layout(robot: str, description: bytes) -> int:
-    """Return what the checksums of a layout's runs begin with."""
+    """Return the start value of the checksums of a layout's runs."""
     return zlib.crc32(description, zlib.crc32(robot.encode()))
 
 

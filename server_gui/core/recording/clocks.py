@@ -33,7 +33,7 @@ class Moment(NamedTuple):
         return self._replace(utc_ns=self.utc_ns - max(round(ago_s * 1e9), 0))
 
 
-class Reading(NamedTuple):
+class ClockReading(NamedTuple):
     """How the clocks stood when a notification came."""
 
     to_utc_ns: int  # this server's wall clock minus its monotonic one
@@ -41,7 +41,7 @@ class Reading(NamedTuple):
     known: bool  # whether it was asked; else its newest row is taken to have come without delay
 
 
-class Step(NamedTuple):
+class ClockStep(NamedTuple):
     """A clock was set: what it would have said, and what it said."""
 
     whose: str
@@ -63,7 +63,7 @@ class Clock:
     def __init__(self) -> None:
         self._offset_ns: int | None = None  # UTC minus the robot's clock
         self._base_ns = 0  # UTC minus our monotonic clock, as held
-        self._now = Reading(0, 0, known=False)
+        self._now = ClockReading(0, 0, known=False)
         self._newest_ns = 0  # of all stamps of the connection
         self._last: dict[int, tuple[int, int]] = {}  # by stream: its newest stamp, with which offset
         self._begins = True  # with the next row, a connection
@@ -77,7 +77,7 @@ class Clock:
         """Another connection begins."""
         self._begins = True
 
-    def take(self, stream: int, stamps_ns: Sequence[int], reading: Reading) -> int:
+    def take(self, stream: int, stamps_ns: Sequence[int], reading: ClockReading) -> int:
         """UTC minus the robot's clock for these rows."""
         if not stamps_ns:
             return reading.to_utc_ns - reading.robot_ns if self._offset_ns is None else self._offset_ns
@@ -101,18 +101,18 @@ class Clock:
         self._offset_ns = offset_ns
         return offset_ns
 
-    def steps(self, received_ns: int, reading: Reading) -> list[Step]:
+    def steps(self, received_ns: int, reading: ClockReading) -> list[ClockStep]:
         """Clocks that were set since the notification before; to be asked before it is taken."""
         if self._offset_ns is None:
             return []
         found, before = [], self._now
         if abs(reading.to_utc_ns - before.to_utc_ns) > STEP_NS:
             times_ns = (received_ns + each.to_utc_ns for each in (before, reading))
-            found.append(Step("this server's clock", *times_ns))
+            found.append(ClockStep("this server's clock", *times_ns))
         asked = reading.known and before.known and not self._begins
         if asked and abs(reading.robot_ns - before.robot_ns) > JUMP_NS:
             times_ns = (received_ns + each.robot_ns for each in (before, reading))
-            found.append(Step("the robot's monotonic clock", *times_ns))
+            found.append(ClockStep("the robot's monotonic clock", *times_ns))
         return found
 
     def recorded_ns(self, moment: Moment) -> int:
@@ -126,7 +126,7 @@ class Clock:
         """Return an instant of the robot's clock in that UTC; None where no row has come."""
         return None if self._offset_ns is None else stamp_ns + self._offset_ns
 
-    def _may_begin(self, first_ns: int, reading: Reading) -> bool:
+    def _may_begin(self, first_ns: int, reading: ClockReading) -> bool:
         """Whether a new connection may take the clocks as they are."""
         before_ns = max((stamp_ns + offset_ns for stamp_ns, offset_ns in self._last.values()), default=0)
         goes_on = first_ns + reading.to_utc_ns - reading.robot_ns > before_ns

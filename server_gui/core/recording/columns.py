@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 
-from ml.store.tables import TELEMETRY, UTC, Known, field
+from ml.store.tables import TELEMETRY, UTC, ColumnFacts, field
 from server_gui.core.recording.rows import Layout, Run
 
 OWN: Final = frozenset(TELEMETRY.schema.names)
@@ -24,7 +24,7 @@ class Columns:
     column with such a name tells in its metadata whose it is; older ones do not.
     """
 
-    def __init__(self, layouts: Iterable[Layout], there: Mapping[str, Known]) -> None:
+    def __init__(self, layouts: Iterable[Layout], there: Mapping[str, ColumnFacts]) -> None:
         self._there = {name.lower(): known for name, known in there.items()}  # what these tell stays
         self._columns = {name.lower(): (name, known.unit) for name, known in there.items()}
         self._whose = {name: known.channel for name, known in self._there.items() if known.channel}
@@ -52,7 +52,7 @@ class Columns:
 
     def _field(self, name: str) -> pa.Field:
         known = self._there.get(
-            name.lower(), Known(channel=self._whose[name.lower()] if "@" in name else None)
+            name.lower(), ColumnFacts(channel=self._whose[name.lower()] if "@" in name else None)
         )
         return field(name, pa.float64(), self._columns[name.lower()][1], known.channel)
 

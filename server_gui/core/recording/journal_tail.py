@@ -18,7 +18,7 @@ class NewEntries:
 
 
 def news(entries: Sequence[Entry], head: JournalHead | None) -> NewEntries:
-    """Return what a tail (oldest first) says that was not known up to `head`.
+    """Return the entries of a tail (oldest first) after `head`.
 
     A journal that does not hold the head, though it should, has been begun anew: then all of it is news.
     """

@@ -48,7 +48,7 @@ class Mark(msgspec.Struct, frozen=True, array_like=True):
     sum: str
 
 
-class Part(msgspec.Struct, frozen=True, omit_defaults=True):
+class ReceiptPart(msgspec.Struct, frozen=True, omit_defaults=True):
     """Rows of a batch in one table; of telemetry, those of one stream. `sum` is by `ml.store.checksums`.
 
     Their times are from `begin_us` to `end_us`, in µs since 1970; None where they have none. Receipts from
@@ -73,7 +73,7 @@ class Receipt(msgspec.Struct, frozen=True):
     writer: str
     batch: int
     url: str
-    parts: tuple[Part, ...]
+    parts: tuple[ReceiptPart, ...]
     lost: tuple[str, ...] = ()
 
     @property
@@ -135,7 +135,7 @@ class Receipts:
             reason = error.strerror or error
             raise SpoolUnusable(f"the spool's receipts {self.file} cannot be written: {reason}") from error
 
-    def begun_anew(self, url: str, parts: Iterable[Part]) -> dict[str, str]:
+    def begun_anew(self, url: str, parts: Iterable[ReceiptPart]) -> dict[str, str]:
         """Return location and name of another table that others went to than these parts."""
         known = self._seen().tables.get(canonical(url), {})
         now = ((part.location, part.table) for part in parts)
@@ -230,7 +230,7 @@ class _Known:
         ]
         return msgspec.structs.replace(receipt, parts=tuple(parts))
 
-    def _new(self, part: Part) -> dict[str, str | None]:
+    def _new(self, part: ReceiptPart) -> dict[str, str | None]:
         known = self.units.get(part.table, {})
         return {name: unit for name, unit in part.units.items() if known.get(name, ...) != unit}
 

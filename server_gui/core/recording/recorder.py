@@ -17,7 +17,7 @@ from gateway.wire.robot import Description
 from ml.store.tables import EVENTS, LABELS, SESSIONS, TABLES, TELEMETRY
 from server_gui.core.recording import records
 from server_gui.core.recording.batching import EventKind, Notification
-from server_gui.core.recording.clocks import Moment, Reading
+from server_gui.core.recording.clocks import ClockReading, Moment
 from server_gui.core.recording.errors import NotKept, SpoolUnusable
 from server_gui.core.recording.journal_tail import Entry
 from server_gui.core.recording.losses import Losses, Part
@@ -157,7 +157,7 @@ class Recorder:
         if robot_ns is None:  # then the newest row is taken to have come without delay
             newest_ns = batch.stamps_ns[-1] if batch.stamps_ns else batch.received_ns
             robot_ns = newest_ns - batch.received_ns
-        clocks = Reading(Moment.now().to_utc_ns, robot_ns, known=clock_offset_ns is not None)
+        clocks = ClockReading(Moment.now().to_utc_ns, robot_ns, known=clock_offset_ns is not None)
         new = Notification(stream, batch, clocks)
         return self._put(robot, len(batch.stamps_ns), functools.partial(self._robots.take, robot, new))
 
@@ -189,12 +189,12 @@ class Recorder:
         return self._put(robot, 1, functools.partial(self._robots.resources, robot, Moment.now(), snapshot))
 
     def journal(self, robot: str, entries: Sequence[Entry], head: SignedHead | None = None) -> int:
-        """Keep what is new in a tail of the robot's journal; `head` is one of them as the robot signed it."""
+        """Record the new entries in a tail of the robot's journal; `head` is one of them, signed."""
         work = functools.partial(self._robots.journal, robot, entries, Moment.now(), head)
         return self._put(robot, len(entries), work)
 
     def refused(self, robot: str, what: str, why: str) -> int:
-        """Keep that the robot sent what cannot be kept, once for each `what`."""
+        """Record that the robot sent unusable data, once for each `what`."""
         return self._put(robot, 1, functools.partial(self._robots.refused, robot, what, why))
 
     def mark(self, robot: str, text: str, ago_s: float = 0.0, **data: Any) -> int:
@@ -202,7 +202,7 @@ class Recorder:
         return self._event(robot, EventKind.MARKER, text, Moment.now().before(ago_s), data)
 
     def event(self, robot: str, kind: EventKind, text: str, **data: Any) -> int:
-        """Keep that something happened to the robot now."""
+        """Record an event of the robot now."""
         return self._event(robot, kind, text, Moment.now(), data)
 
     def _event(self, robot: str, kind: EventKind, text: str, moment: Moment, data: Mapping[str, Any]) -> int:

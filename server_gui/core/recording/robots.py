@@ -132,7 +132,7 @@ class Robots:
     def journal(
         self, robot: str, entries: Sequence[Entry], now: Moment, head: SignedHead | None = None
     ) -> list[Record]:
-        """Return what is new in a tail of the robot's journal; `head` stands with the entry that it is of.
+        """Return the new entries in a tail of the robot's journal; `head` belongs to one of them.
 
         Raises:
             Unfit: it is no journal; what is recorded of it stays as it was.

@@ -167,7 +167,7 @@ class Segment:
                 raise Damaged(f"the spool's file {self.path} is damaged: its table {table} has no {missing}")
 
     def name(self, writer: str) -> None:
-        """Say who brings it to the store; while nothing is in it."""
+        """Set the name of its writer at the store; while nothing is in it."""
         self._tell("began", str(time.time_ns()))
         self._tell("writer", writer)
         self.writer = writer
@@ -178,7 +178,7 @@ class Segment:
         return int(self._told("cut") or 0)
 
     def cut(self, commits: int) -> None:
-        """Say that so many are missing."""
+        """Note the number of missing commits."""
         self._tell("cut", str(commits))
 
     @property
@@ -370,7 +370,7 @@ class Segment:
 
     @staticmethod
     def size_bytes(path: Path) -> int:
-        """Return what the database's files take on the disk."""
+        """Return the size of the database's files on the disk."""
         size = 0
         for suffix in SUFFIXES:
             with contextlib.suppress(FileNotFoundError):  # SQLite removes its log when it is closed

@@ -21,7 +21,7 @@ from server_gui.core.recording.rows import JournalHead, Record, Run
 from server_gui.core.recording.segment import SUFFIXES, Segment
 from server_gui.core.recording.spool_files import (
     Files,
-    Kept,
+    SegmentState,
     has_log,
     identity,
     is_identity,
@@ -158,14 +158,14 @@ class Spool:
     # --- any thread
 
     def earlier_writers(self) -> set[str]:
-        """Return what the openings before this one were called at the store, as far as anybody knows."""
+        """Return the names at the store of earlier openings, as far as they are known."""
         newest = self.receipts.newest()
         return (self._writers | ({newest.writer} if newest else set())) - {self.writer}
 
     def waiting(self) -> list[int]:
         """Segments that are frozen and not uploaded, oldest first."""
         written = self._current.number  # a higher one may be in the making
-        return [number for number in self._files.all_of(Kept.WAITING) if number < written]
+        return [number for number in self._files.all_of(SegmentState.WAITING) if number < written]
 
     def read(self, number: int) -> Segment:
         """Return a frozen segment; close it after use.
@@ -190,7 +190,7 @@ class Spool:
             SpoolUnusable: it waits for upload as before.
 
         """
-        self._files.rename(number, Kept.UPLOADED)
+        self._files.rename(number, SegmentState.UPLOADED)
 
     def drop(self, number: int) -> None:
         """Remove a second copy, before room is needed.
@@ -201,18 +201,18 @@ class Spool:
         """
         with writing(self.folder):
             for suffix in reversed(SUFFIXES):
-                file = self._files.path(number, Kept.UPLOADED)
+                file = self._files.path(number, SegmentState.UPLOADED)
                 file.with_name(f"{file.name}{suffix}").unlink(missing_ok=True)
             durable.synchronise([self.folder / "id"])
 
     def set_aside(self, number: int) -> Path:
         """Set aside a segment that cannot be read, so that those after it are uploaded; return its file."""
-        self._files.rename(number, Kept.DAMAGED)
-        return self._files.path(number, Kept.DAMAGED)
+        self._files.rename(number, SegmentState.DAMAGED)
+        return self._files.path(number, SegmentState.DAMAGED)
 
     def damaged(self) -> list[Path]:
         """Files that were set aside and are still there."""
-        wanted = (Kept.DAMAGED, Kept.CUT)
+        wanted = (SegmentState.DAMAGED, SegmentState.CUT)
         return [self._files.path(number, kept) for number, kept in self._files.segments() if kept in wanted]
 
     def untold(self) -> dict[int, str]:
@@ -224,15 +224,15 @@ class Spool:
         written = self._current.number  # first: one that is begun now is no gap
         files = self._files.own()
         receipt = self.receipts.newest()
-        kept = [number for number, kept in files if kept is not Kept.DAMAGED]
+        kept = [number for number, kept in files if kept is not SegmentState.DAMAGED]
         first = min([*(number for number, _ in files), *([receipt.batch + 1] if receipt else [])], default=0)
-        aside = {number for number, kept in files if kept is Kept.DAMAGED} - set(kept)
+        aside = {number for number, kept in files if kept is SegmentState.DAMAGED} - set(kept)
         gone = set(range(first, written)) - {number for number, _ in files}
         if found := (aside | gone) - self._settled:
             self._settle(found, gone)
         return {
             number: f"batch {number} of the spool {self.folder} cannot be read, and what it held is lost: "
-            f"its file is kept as {self._files.path(number, Kept.DAMAGED).name}"
+            f"its file is kept as {self._files.path(number, SegmentState.DAMAGED).name}"
             if number in aside
             else f"batch {number} of the spool {self.folder} is gone: its file is not there, and no receipt "
             "says that it was uploaded"
@@ -255,10 +255,10 @@ class Spool:
 
     def is_aside(self, number: int) -> bool:
         """Return whether the segment was set aside, and is still there."""
-        return self._files.path(number, Kept.DAMAGED).exists()
+        return self._files.path(number, SegmentState.DAMAGED).exists()
 
     def loss_name(self, number: int) -> str:
-        """Return what the loss of this batch is called at the store: the same whoever tells it how often.
+        """Return the name of this batch's loss at the store: the same on every report.
 
         Where an older copy of the spool takes its place, and a batch is lost under the number again, it is
         another. Raises `SpoolUnusable`.
@@ -271,10 +271,14 @@ class Spool:
         self._settled.add(number)
 
     def robots_beside(self, number: int) -> set[str]:
-        """Return whose rows a lost batch may have had: the robots of the batches before and after it."""
+        """Return the robots whose rows a lost batch may have had: those of the batches beside it."""
         found: set[str] = set()
         for beside, kept in self._files.own():
-            if abs(beside - number) == 1 and kept is not Kept.DAMAGED and beside < self._current.number:
+            if (
+                abs(beside - number) == 1
+                and kept is not SegmentState.DAMAGED
+                and beside < self._current.number
+            ):
                 with (
                     contextlib.suppress(SpoolUnusable),
                     contextlib.closing(
@@ -285,9 +289,10 @@ class Spool:
         return found
 
     def backlog_bytes(self) -> int:
-        """Return what waits for upload, with what is being written."""
+        """Return the size of the pending data, including the segment being written."""
         return sum(
-            Segment.size_bytes(self._files.path(number)) for number in self._files.all_of(Kept.WAITING)
+            Segment.size_bytes(self._files.path(number))
+            for number in self._files.all_of(SegmentState.WAITING)
         )
 
     def make_room(self) -> bool:
@@ -298,7 +303,10 @@ class Spool:
 
         """
         try:
-            paths = [self._files.path(number, Kept.UPLOADED) for number in self._files.all_of(Kept.UPLOADED)]
+            paths = [
+                self._files.path(number, SegmentState.UPLOADED)
+                for number in self._files.all_of(SegmentState.UPLOADED)
+            ]
             kept = sum(map(Segment.size_bytes, paths))
             for path in paths:
                 if kept <= self._keep_bytes and self._roomy():
@@ -330,7 +338,7 @@ class Spool:
         return named
 
     def _called(self) -> Iterator[str]:
-        """Yield what receipts and segments call this spool, the newest first."""
+        """Yield the spool's names in receipts and segments, the newest first."""
         receipt = self.receipts.newest()
         if receipt:
             yield receipt.spool
@@ -357,25 +365,25 @@ class Spool:
         # Each begins with what the ones before it knew; the newest may have been cut off at its making.
         newest = self._files.own()[-2:]
         for number, kept in newest:
-            if kept is not Kept.DAMAGED:
+            if kept is not SegmentState.DAMAGED:
                 written = (number, kept) != newest[-1] or has_log(self._files.path(number, kept))
                 heads |= self._heads_of(number, kept, written=written)
         return heads
 
-    def _heads_of(self, number: int, kept: Kept, *, written: bool) -> dict[str, JournalHead]:
+    def _heads_of(self, number: int, kept: SegmentState, *, written: bool) -> dict[str, JournalHead]:
         try:
             found = Segment(self._files.path(number, kept), number, written=written)
             with contextlib.closing(found) as segment:
                 self._writers.add(segment.writer or self.id)
                 return segment.heads()
         except Damaged as error:
-            if kept is Kept.WAITING:
+            if kept is SegmentState.WAITING:
                 log.error("%s; it is kept as %s", error, self.set_aside(number))
             return {}
 
     def _resume(self) -> Segment:
         """Return the segment to write now: a new one, unless the newest is still empty."""
-        newest, kept = self._files.own()[-1] if self._files.own() else (0, Kept.UPLOADED)
+        newest, kept = self._files.own()[-1] if self._files.own() else (0, SegmentState.UPLOADED)
         receipt = self.receipts.newest()
         known = receipt.batch if receipt else 0
         if known > newest:
@@ -384,7 +392,7 @@ class Spool:
                 f"newest there is {newest}. What was not uploaded of them is lost"
             )
             log.error("%s", self.missing)
-        if kept is not Kept.WAITING or known > newest:
+        if kept is not SegmentState.WAITING or known > newest:
             return self._begin(max(newest, known) + 1)
         try:
             segment = self._begin(newest)

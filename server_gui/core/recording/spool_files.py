@@ -34,7 +34,7 @@ _LOSS: Final = re.compile(rf"{_ID.pattern}/[0-9]{{16}}-[0-9a-f]{{12}}/lost")
 _NAME: Final = re.compile(r"(\d{8})(\.uploaded|\.damaged|\.cut)?\.db")
 
 
-class Kept(Enum):
+class SegmentState(Enum):
     """What has become of a segment; as its file's name says."""
 
     WAITING = ""
@@ -49,11 +49,11 @@ class Files:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
 
-    def path(self, number: int, kept: Kept = Kept.WAITING) -> Path:
+    def path(self, number: int, kept: SegmentState = SegmentState.WAITING) -> Path:
         """Return where a segment is, or would be."""
         return self.folder / f"{number:08}{kept.value}.db"
 
-    def rename(self, number: int, kept: Kept) -> None:
+    def rename(self, number: int, kept: SegmentState) -> None:
         """Call a segment that has waited by another name, with its log, which a reader may keep open."""
         with writing(self.folder):
             for suffix in SUFFIXES:
@@ -67,24 +67,24 @@ class Files:
         for number, kept in self.own():
             file = self.path(number)
             left = file.with_name(f"{file.name}-wal").exists() and not file.exists()
-            if left and kept is not Kept.WAITING:
+            if left and kept is not SegmentState.WAITING:
                 self.rename(number, kept)
 
-    def segments(self) -> list[tuple[int, Kept]]:
+    def segments(self) -> list[tuple[int, SegmentState]]:
         """Return their numbers, in order, and what has become of them; raises `SpoolUnusable`."""
         try:
             names = [_NAME.fullmatch(path.name) for path in self.folder.iterdir()]
         except OSError as error:
             reason = error.strerror or error
             raise SpoolUnusable(f"the spool {self.folder} cannot be read: {reason}") from error
-        found = [(int(name[1]), Kept(name[2] or "")) for name in names if name]
+        found = [(int(name[1]), SegmentState(name[2] or "")) for name in names if name]
         return sorted(found, key=lambda each: (each[0], each[1].value))
 
-    def own(self) -> list[tuple[int, Kept]]:
+    def own(self) -> list[tuple[int, SegmentState]]:
         """Return the segments themselves, without copies."""
-        return [(number, kept) for number, kept in self.segments() if kept is not Kept.CUT]
+        return [(number, kept) for number, kept in self.segments() if kept is not SegmentState.CUT]
 
-    def all_of(self, wanted: Kept) -> list[int]:
+    def all_of(self, wanted: SegmentState) -> list[int]:
         """Return the numbers of those of which this has become."""
         return [number for number, kept in self.segments() if kept is wanted]
 
@@ -93,7 +93,7 @@ class Files:
         self._write("id", name)
 
     def name_loss(self, number: int, name: str) -> str:
-        """Return what the loss of this batch is called at the store; `name` where it has no name yet."""
+        """Return the name of this batch's loss at the store; `name` if it has none yet."""
         file = self.folder / f"{number:08}.lost"
         known = file.read_bytes().decode(errors="replace").strip() if file.exists() else ""
         if not _LOSS.fullmatch(known):
@@ -113,11 +113,11 @@ class Files:
 
     def keep_damaged_logs(self) -> None:
         """Before SQLite reads a log up to where it is damaged, and forgets the rest: keep it as it is."""
-        for number in self.all_of(Kept.WAITING):
+        for number in self.all_of(SegmentState.WAITING):
             log_ = self.path(number).with_name(f"{self.path(number).name}-wal")
-            if lost_commits(log_, PAGE_BYTES) and number not in self.all_of(Kept.CUT):
+            if lost_commits(log_, PAGE_BYTES) and number not in self.all_of(SegmentState.CUT):
                 self._copy(number)
-        for number in sorted(set(self.all_of(Kept.CUT)) & set(self.all_of(Kept.WAITING))):
+        for number in sorted(set(self.all_of(SegmentState.CUT)) & set(self.all_of(SegmentState.WAITING))):
             self._cut(number)
 
     def _copy(self, number: int) -> None:
@@ -126,7 +126,9 @@ class Files:
             source = self.path(number).with_name(self.path(number).name + suffix)
             if not source.exists():  # the log's index; SQLite makes it anew
                 continue
-            target = self.path(number, Kept.CUT).with_name(self.path(number, Kept.CUT).name + suffix)
+            target = self.path(number, SegmentState.CUT).with_name(
+                self.path(number, SegmentState.CUT).name + suffix
+            )
             draft = target.with_name(f"{target.name}.draft")
             with source.open("rb") as content, open(draft, "wb", opener=opener) as out:
                 shutil.copyfileobj(content, out)
@@ -137,7 +139,7 @@ class Files:
 
     def _cut(self, number: int) -> None:
         """Let the segment itself tell what it has lost, when it goes to the store."""
-        copy = self.path(number, Kept.CUT)
+        copy = self.path(number, SegmentState.CUT)
         lost = lost_commits(copy.with_name(f"{copy.name}-wal"), PAGE_BYTES)
         with (
             contextlib.suppress(Damaged),  # then it is set aside as a whole
@@ -152,7 +154,7 @@ class Files:
 
 
 def identity(folder: Path) -> str:
-    """Return what the spool in this folder is called; nothing where there is none, or its `id` is damaged.
+    """Return the name of the spool in this folder; empty if there is none, or its `id` is damaged.
 
     Raises:
         SpoolUnusable: it may not be read.

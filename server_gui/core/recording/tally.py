@@ -14,7 +14,7 @@ import pyarrow.compute as pc
 from ml.store import checksums
 from ml.store.tables import UTC
 from server_gui.core.recording.missing_rows import numbers_alone
-from server_gui.core.recording.receipts import Mark, Part, Stream
+from server_gui.core.recording.receipts import Mark, ReceiptPart, Stream
 
 Units = Mapping[str, str | None]
 NAMING: Final = ("seq", "row")  # what names a row of telemetry among those of its stream
@@ -106,10 +106,10 @@ class Tally:
         known.names += int(named(batch, NAMING).sum(dtype=np.uint64))
         known.times.add(times, each)
 
-    def parts(self, location: str, table: str, units: Units) -> list[Part]:
-        """Return what was counted, the first with the units of the columns."""
+    def parts(self, location: str, table: str, units: Units) -> list[ReceiptPart]:
+        """Return the counts, the first with the units of the columns."""
         found = [
-            Part(
+            ReceiptPart(
                 location,
                 table,
                 each.rows,
@@ -125,13 +125,13 @@ class Tally:
         return [msgspec.structs.replace(each, units=dict(units)) for each in found[:1]] + found[1:]
 
 
-def tallied(rows: pa.Table, location: str, table: str, units: Units) -> Part:
+def tallied(rows: pa.Table, location: str, table: str, units: Units) -> ReceiptPart:
     """Of a batch's rows of another table."""
     extent = pc.min_max(rows["utc"].cast(pa.int64())).as_py()
     each, timed, times = checksums.of_rows(rows), rows["utc"].is_valid().to_numpy(), _Times()
     times.add(times_us(rows["utc"])[timed], each[timed])
     numbers = sum(int(named(batch, NUMBER).sum(dtype=np.uint64)) for batch in rows.to_batches())
-    return Part(
+    return ReceiptPart(
         location,
         table,
         rows.num_rows,

@@ -24,7 +24,7 @@ from server_gui.core.recording.clocks import Moment
 from server_gui.core.recording.columns import Columns
 from server_gui.core.recording.errors import Contradicted, Damaged
 from server_gui.core.recording.losses import told_time
-from server_gui.core.recording.receipts import ANEW, Part, Receipt, went_to
+from server_gui.core.recording.receipts import ANEW, Receipt, ReceiptPart, went_to
 from server_gui.core.recording.rows import Record
 from server_gui.core.recording.segment import DamagedRecord, DamagedRun, Segment
 from server_gui.core.recording.spool import Spool
@@ -40,7 +40,7 @@ class Sent:
     """What of a segment is in the store now, by which writer; `lost` tells what its damage has taken."""
 
     writer: str
-    parts: tuple[Part, ...]
+    parts: tuple[ReceiptPart, ...]
     lost: tuple[str, ...]
     is_damaged: bool  # itself; what its log has lost is no longer in it
 
@@ -91,7 +91,7 @@ def _tell(spool: Spool, number: int, text: str, store: Store) -> bool:
     return new
 
 
-def _tell_anew(spool: Spool, number: int, parts: Sequence[Part], store: Store) -> None:
+def _tell_anew(spool: Spool, number: int, parts: Sequence[ReceiptPart], store: Store) -> None:
     """Record an event if the store is not the one that earlier batches went to."""
     gone = sorted(spool.receipts.begun_anew(store.url, parts).items())
     if not gone:
@@ -136,8 +136,8 @@ def _bring(store: Store, rows: pa.Table, named: str) -> bool:
     return store.append(EVENTS, EVENTS.name, rows.schema, functools.partial(rows.to_reader, None), named, 1)
 
 
-def _told(store: Store, writer: str, number: int) -> Part:
-    """Return what the store has of such events."""
+def _told(store: Store, writer: str, number: int) -> ReceiptPart:
+    """Return the store's count of such events."""
     column = pyarrow.dataset.field
     mine = (column("spool") == writer) & (column("batch") == number)
     with translated(f"{store.url}/{EVENTS.name} cannot be read"):
@@ -159,7 +159,7 @@ def upload(segment: Segment, spool: str, store: Store) -> Sent:
 
     """
     writer = segment.writer or spool
-    parts: list[Part] = []
+    parts: list[ReceiptPart] = []
     for location, robots in _robots(segment, store).items():
         parts += _telemetry(segment, writer, store, location, robots)
     lost = [*map(_run_lost, segment.damaged()), *_records_lost(segment)]
@@ -199,7 +199,7 @@ def ahead(spool: Spool, store: Store) -> list[str]:
 
 
 def _openings(spool: Spool, store: Store) -> set[str]:
-    """Return what other openings of this spool were called, also those after it was copied.
+    """Return the names of this spool's other openings, even after a copy.
 
     Each begins sessions.
     """
@@ -213,7 +213,7 @@ def _openings(spool: Spool, store: Store) -> set[str]:
 
 def _telemetry(
     segment: Segment, writer: str, store: Store, location: str, robots: set[str]
-) -> Iterable[Part]:
+) -> Iterable[ReceiptPart]:
     """Place the columns anew where another collector has just made one of them, in another unit."""
     for _ in range(_PLACED):
         with contextlib.suppress(ColumnTaken):
@@ -221,7 +221,9 @@ def _telemetry(
     return _placed(segment, writer, store, location, robots)
 
 
-def _placed(segment: Segment, writer: str, store: Store, location: str, robots: set[str]) -> Iterable[Part]:
+def _placed(
+    segment: Segment, writer: str, store: Store, location: str, robots: set[str]
+) -> Iterable[ReceiptPart]:
     layouts = (layout for robot, layout in segment.layouts() if robot in robots)
     columns = Columns(layouts, store.columns(location))
     tally = Tally()
@@ -240,7 +242,7 @@ def _placed(segment: Segment, writer: str, store: Store, location: str, robots: 
     return tally.parts(location, store.identity(location), _units(store, location, columns.schema))
 
 
-def _rows(table: Table, data: pa.Table, writer: str, batch: int, store: Store) -> Part:
+def _rows(table: Table, data: pa.Table, writer: str, batch: int, store: Store) -> ReceiptPart:
     again = functools.partial(data.to_reader, None)
     if not store.append(table, table.name, data.schema, again, writer, batch):
         look = functools.partial(missing_rows.of_rows, store, table, data)

@@ -158,7 +158,7 @@ class Uploader:
 
     @contextlib.contextmanager
     def _alone(self, what: str) -> Iterator[None]:
-        """Keep what is wrong with one batch alone from the others."""
+        """Keep the problem of one batch from the others."""
         try:
             yield
         except (StoreUnreachable, StoreRefused):

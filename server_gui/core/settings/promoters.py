@@ -15,7 +15,7 @@ UNSIGNED: Final = "unsigned"
 
 
 def desk_signature() -> Sign | None:
-    """Return what signs with this desk's key; `None` where it has none."""
+    """Return the function that signs with this desk's key; `None` without a key."""
     folder = keys_folder()
     if not ((folder / KEY).exists() and (folder / CERTIFICATE).exists()):
         return None

@@ -177,7 +177,7 @@ def examined(file: Path, document: dict[str, Any]) -> Examined:
 
 
 def findings(file: Path, tables: dict[str, Any], *, machine: bool) -> Iterator[Told]:  # noqa: ARG001 - of robots
-    """Return what `gwrms check` says of it."""
+    """Return the findings of `gwrms check`."""
     return told(examined(file, tables).findings)
 
 
@@ -205,7 +205,7 @@ class _Reading:
         self._decoding = decoding
 
     def settings(self, document: dict[str, Any], folder: Path) -> ServerSettings:
-        """Return what can be made of it."""
+        """Return the valid parts of the file."""
         self._decoding.tables(document, ServerSettings.__struct_fields__)
         recorder = self._table("recorder", document, RecordingSettings)
         return ServerSettings(
@@ -291,7 +291,7 @@ class _Reading:
 
 
 def _unlikely(settings: ServerSettings) -> Iterator[Finding]:
-    """Yield what can work and is likely not what was meant."""
+    """Yield possible but unlikely settings."""
     if settings.rules and not settings.prediction.enabled:
         yield warning(
             "[prediction]", "enabled", "is false, and without predictions no rule of [[rules]] acts"

@@ -63,7 +63,7 @@ class Worker:
         self._thread.start()
 
     def beat(self) -> None:
-        """Say that it moves; from the thread itself."""
+        """Note that it is alive; from the thread itself."""
         self._beat_s = time.monotonic()
 
     def join(self, within_s: float | None = None) -> bool:
@@ -79,7 +79,7 @@ class Worker:
         return self._thread is not None and self._thread.is_alive()
 
     def look(self) -> Trouble | None:
-        """Return what is wrong with it now; where it has died, it is begun anew."""
+        """Return its present trouble; restart it if it has died."""
         with self._lock:
             return self._look(time.monotonic())
 
@@ -128,7 +128,7 @@ class ThreadWatch:
             self._workers += (worker,)
 
     def look(self) -> tuple[Trouble, ...]:
-        """Return what is wrong now; what has begun or is over since the last time is said in the log."""
+        """Return all present trouble; log its begin and end."""
         with self._lock:
             found = {worker.name: trouble for worker in self._workers if (trouble := worker.look())}
             for name, trouble in found.items():

@@ -38,7 +38,7 @@ class Commands(Protocol):
         ...
 
     def confirm(self, write: int) -> "Future[Confirmed]":
-        """Keep what is on trial."""
+        """Keep the values on trial."""
         ...
 
     def revert(self, write: int) -> "Future[Reverted]":
@@ -58,11 +58,11 @@ class Commands(Protocol):
         ...
 
     def objects(self, component: str, search: str) -> "Future[ObjectList]":
-        """Return what an EDS says of those objects that the search means."""
+        """Return the objects of the EDS that the search selects."""
         ...
 
     def read_objects(self, component: str, objects: Sequence[str]) -> "Future[ObjectValues]":
-        """Return what a device holds of these now."""
+        """Return the device's present values of these objects."""
         ...
 
     def dial(self) -> None:

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from gateway.parameter_files.comparison import Row, Verdict, compare
+from gateway.parameter_files.comparison import ComparisonVerdict, Row, compare
 from gateway.parameter_files.contents import FileProblem, Saved, Scope, WhichDevice
 from gateway.parameter_files.formats import format_of, read_file
 from gateway.records import durable
@@ -33,17 +33,17 @@ class Comparison:
             name: value for name, value in self.saved.values.items() if name in known and known[name].type
         }
         rows = compare(wanted, known, held)
-        self.rows = {row.name: row for row in rows if row.verdict is not Verdict.NOT_IN_FILE}
+        self.rows = {row.name: row for row in rows if row.verdict is not ComparisonVerdict.NOT_IN_FILE}
         self.unchangeable = tuple(name for name in self.saved.values if name not in wanted)
 
     @property
     def different(self) -> list[Row]:
         """What the robot holds otherwise."""
-        return [row for row in self.rows.values() if row.verdict is not Verdict.SAME]
+        return [row for row in self.rows.values() if row.verdict is not ComparisonVerdict.SAME]
 
 
 def open_file(path: Path, description: Description, component: str | None) -> Comparison:
-    """Read what a file says of this robot; `component` is the device that a DCF is for where it does not say.
+    """Read a file's values for this robot; `component` is a DCF's device, if the file does not name it.
 
     Raises:
         FileProblem: it cannot be read, or is another device's.
@@ -59,7 +59,7 @@ def open_file(path: Path, description: Description, component: str | None) -> Co
 
 
 def save_file(path: Path, description: Description, held: Held) -> int:
-    """Write what can be changed, as the robot holds it, as TOML; how many values.
+    """Write the robot's writable values as TOML; return their number.
 
     Raises:
         FileProblem: nothing is held, or the file cannot be written.
@@ -80,5 +80,5 @@ def save_file(path: Path, description: Description, held: Held) -> int:
 
 
 def staged_as(rows: Iterable[Row]) -> dict[str, float]:
-    """Return what is staged to bring these about: each value as the device would hold it."""
+    """Return the edits that apply these rows: each value as the device would hold it."""
     return {row.name: row.file for row in rows if row.file is not None}

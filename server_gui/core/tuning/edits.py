@@ -25,7 +25,7 @@ class Staged:
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class ReviewedEdit:
     """One line of a review: what is there now, and what would be written."""
 
     name: str
@@ -78,8 +78,8 @@ class Edits:
 
     def difference(
         self, held: Values, known: Mapping[str, ParameterInfo], units: Units
-    ) -> tuple[Change, ...]:
-        """Return what would be written, and nothing else, in the robot's order of parameters."""
+    ) -> tuple[ReviewedEdit, ...]:
+        """Return the values that would be written, in the robot's order of parameters."""
         order = {name: place for place, name in enumerate(known)}
         names = sorted(self.staged, key=lambda name: order.get(name, len(order)))
         changes = (self._change(name, held.get(name), known.get(name), units) for name in names)
@@ -87,11 +87,11 @@ class Edits:
 
     def _change(
         self, name: str, held: ParameterValue | None, info: ParameterInfo | None, units: Units
-    ) -> Change:
+    ) -> ReviewedEdit:
         staged = self.staged[name]
         old = None if held is None else held.value
         unit = unit_of(name, "" if info is None else info.unit, units)
-        return Change(
+        return ReviewedEdit(
             name=name,
             unit=unit,
             old=old,

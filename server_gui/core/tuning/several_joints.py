@@ -26,7 +26,7 @@ class Offer:
 def offers(
     name: str, value: Number | None, description: Description, held: Held, units: Units
 ) -> list[Offer]:
-    """Return what can be done with a parameter's value (SI), as it is staged or held, for other joints."""
+    """Return the offers to set a parameter's staged or held value (SI) on other joints."""
     return [] if value is None else list(_offers(name, value, description, held, units))
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
 
+from gateway.amounts import counted
 from gateway.wire.stop import Stopped
 
 ENABLED = "operation enabled"
@@ -158,7 +159,7 @@ class StopProgress:
     def show(
         self, stamps_ns: Sequence[int], columns: Mapping[str, Sequence[str | None]], offset_ns: int
     ) -> None:
-        """Take what drives' states were, in words; `offset_ns` is the robot's clock minus ours."""
+        """Take drives' states in words; `offset_ns` is the robot's clock minus ours."""
         if self.at_ns is None or self.state is StopState.IDLE:
             return
         for drive, words in columns.items():
@@ -176,7 +177,7 @@ class StopProgress:
 
     @property
     def proof(self) -> str:
-        """What each drive's own state has shown since: `all 6 switch on disabled within 34 ms`."""
+        """What drives themselves have shown since: `6 drives confirmed in quick stop active within 3 ms`."""
         if not self.proofs:
             return ""
         slowest = max(1.0, *(proof.after_ms for proof in self.proofs.values()))
@@ -185,9 +186,9 @@ class StopProgress:
             by_state.setdefault(proof.state, []).append(drive)
         if len(by_state) == 1:
             (state,) = by_state
-            return f"seen in their states: all {len(self.proofs)} {state} within {slowest:.0f} ms"
-        told = (f"{_listed(drives)} {state}" for state, drives in by_state.items())
-        return f"seen in their states within {slowest:.0f} ms: {'; '.join(told)}"
+            return f"{counted(len(self.proofs), 'drive')} confirmed in {state} within {slowest:.0f} ms"
+        told = (f"{_listed(drives)} in {state}" for state, drives in by_state.items())
+        return f"drives confirmed within {slowest:.0f} ms: {'; '.join(told)}"
 
     @property
     def proof_lines(self) -> list[str]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from gateway.client import NotConnected, RemoteError
-from gateway.several_joints import Outcome, refused_or_unknown, storing
+from gateway.several_joints import StoreOutcome, refused_or_unknown, storing
 from gateway.wire.parameter import Stored
 from gateway.wire.robot import Description
 from server_gui.core.follow.news import NewsKind
@@ -79,7 +79,7 @@ class Storing:
         self._control = control
         self._tell = tell
         self._left: list[str] = []
-        self._done: list[tuple[str, Outcome, str]] = []
+        self._done: list[tuple[str, StoreOutcome, str]] = []
 
     def begin(self, components: Sequence[str]) -> None:
         """Store these; each names a device."""
@@ -99,19 +99,21 @@ class Storing:
 
     def _stored(self, component: str, stored: Stored) -> None:
         self._control.renewed(LEASE_S)
-        self._note(component, Outcome.STORED, f"{stored.component}: {stored.result}")
+        self._note(component, StoreOutcome.STORED, f"{stored.component}: {stored.result}")
 
     def _failed(self, component: str, error: Exception) -> None:
         if isinstance(error, RemoteError):
             self._note(component, refused_or_unknown(error.kind), str(error))
             return
-        self._done += [(name, Outcome.UNASKED, "the link was lost") for name in self._left[1:]]
+        self._done += [(name, StoreOutcome.UNASKED, "the link was lost") for name in self._left[1:]]
         self._left = [component]
         self._note(
-            component, Outcome.UNASKED if isinstance(error, NotConnected) else Outcome.UNKNOWN, str(error)
+            component,
+            StoreOutcome.UNASKED if isinstance(error, NotConnected) else StoreOutcome.UNKNOWN,
+            str(error),
         )
 
-    def _note(self, component: str, outcome: Outcome, said: str) -> None:
+    def _note(self, component: str, outcome: StoreOutcome, said: str) -> None:
         self._done.append((component, outcome, said))
         self._left.remove(component)
         if self._left:
@@ -122,16 +124,16 @@ class Storing:
         self._tell(NewsKind.PARAMETER, text if state is WriteState.DONE else f"{state.value}: {text}")
 
 
-def _summed(done: Sequence[tuple[str, Outcome, str]]) -> tuple[WriteState, str]:
+def _summed(done: Sequence[tuple[str, StoreOutcome, str]]) -> tuple[WriteState, str]:
     """Return the worst of it, and what came of each; of one device its own words."""
     outcomes = {outcome for _, outcome, _ in done}
-    state = WriteState.DONE if outcomes == {Outcome.STORED} else WriteState.NOT_STORED
-    if Outcome.UNKNOWN in outcomes:
+    state = WriteState.DONE if outcomes == {StoreOutcome.STORED} else WriteState.NOT_STORED
+    if StoreOutcome.UNKNOWN in outcomes:
         state = WriteState.UNKNOWN
     if len(done) == 1:
         return state, done[0][2]
     lines = (
-        f"{name}: {outcome}" + ("" if outcome is Outcome.STORED else f", {said}")
+        f"{name}: {outcome}" + ("" if outcome is StoreOutcome.STORED else f", {said}")
         for name, outcome, said in done
     )
     return state, "\n".join(lines)

@@ -11,7 +11,7 @@ from gateway.client import NotConnected, RemoteError
 from gateway.wire.method import Number
 from gateway.wire.parameter import Written
 from server_gui.core.follow import frame_time
-from server_gui.core.tuning.edits import Change
+from server_gui.core.tuning.edits import ReviewedEdit
 
 UNDO: Final = 100  # writes that can be taken back one after another
 UNSURE: Final = (
@@ -60,7 +60,7 @@ class WriteProgress:
     )
     revision: int = 0
 
-    def began(self, changes: tuple[Change, ...]) -> None:
+    def began(self, changes: tuple[ReviewedEdit, ...]) -> None:
         """Note that these were sent."""
         self._set(WriteState.WRITING, f"writing {_count(len(changes))} …")
         for change in changes:
@@ -80,7 +80,7 @@ class WriteProgress:
         """Note that a device was asked to store."""
         self._set(WriteState.WRITING, f"{component} is storing to its flash …")
 
-    def failed(self, changes: tuple[Change, ...], error: Exception) -> None:
+    def failed(self, changes: tuple[ReviewedEdit, ...], error: Exception) -> None:
         """Take a failed write: refused, rolled back or unknown, with the outcome of each row."""
         refused = isinstance(error, RemoteError) and error.kind not in UNSURE
         nothing_done = refused or isinstance(error, NotConnected)
@@ -122,7 +122,7 @@ def _count(number: int) -> str:
     return f"{number} parameter" if number == 1 else f"{number} parameters"
 
 
-def written_line(change: Change, written: Written) -> str:
+def written_line(change: ReviewedEdit, written: Written) -> str:
     """Return one change of a write as it was read back."""
     before, after = written.before.get(change.name), written.after.get(change.name)
     unit = change.unit

@@ -30,7 +30,7 @@ _KINDS: Final = {
 
 
 def shift_ns(here: Station, beside: Station, by: Align, before_ns: int = 0) -> int | None:
-    """Return what brings the clock of `beside` onto that of `here`; None where one lacks what it is by.
+    """Return the shift of the clock of `beside` to that of `here`; None if one lacks the instant.
 
     `before_ns` is what it was: what hardly differs from that is that.
     """

@@ -37,14 +37,14 @@ class CurveBinding:
     mark: str = ""  # the same in lines, with the place marked
 
     def program(self) -> Program:
-        """Return what computes it, from its first row."""
+        """Return a new program that computes it, from its first row."""
         if self.written is None:
             raise ValueError(f"{self.text} is a channel")
         return Program(self.written, self.text, self.si or {})
 
 
 def meaning(text: str, channels: Channels, units: Units) -> CurveBinding:
-    """Return what this means where there are these channels; never raises."""
+    """Return the meaning of a curve's text, given these channels; never raises."""
     if text in channels:
         info = channels[text]
         return CurveBinding(text, text, units.unit(info.quantity, info.unit), needs=(text,))

@@ -9,7 +9,7 @@ STEADY: Final = 1.3  # an axis that changes by less changes no text
 
 
 def places(least: int, span: float, before: int) -> int:
-    """Return how many to show of values on an axis of this span in their unit; `before` is shown now.
+    """Return the number of decimals for an axis of this span in its unit; `before` is shown now.
 
     `least` is what the unit is read with: 1 of °. A following error of half a degree is read in thousandths.
     """

@@ -40,7 +40,7 @@ class Dimension:
 
     @classmethod
     def of(cls, symbol: str) -> Self:
-        """Return that of an SI unit as robots write it: `N·m`, `rad/s`, `m/s²`."""
+        """Return the dimension of an SI unit as robots write it: `N·m`, `rad/s`, `m/s²`."""
         over, _, under = symbol.partition("/")
         powers: dict[str, int] = {}
         for part, sign in ((over, 1), *((each, -1) for each in under.split("/") if each)):
@@ -80,7 +80,7 @@ class Dimension:
 
 
 def literal(symbol: str) -> tuple[float, Dimension] | None:
-    """Return how many SI one of a unit is, as people write it (`°`, `deg`, `Nm`); None where unknown."""
+    """Return a unit's size in SI, from its written form (`°`, `deg`, `Nm`); None if unknown."""
     wanted = ALIASES.get(symbol, symbol)
     for si, units in UNITS.items():
         for unit in units:

@@ -34,7 +34,7 @@ Step = Callable[[Block], Floats]  # the value of each row, or one for all
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class Subexpression:
     """A part of an expression that can be computed, and its unit."""
 
     step: Step
@@ -69,7 +69,7 @@ class _Compiler:
         self._text = text
         self._units = units
 
-    def part(self, node: ExpressionNode) -> Part:
+    def part(self, node: ExpressionNode) -> Subexpression:
         match node.kind:
             case "number":
                 return self._number(node)
@@ -77,12 +77,12 @@ class _Compiler:
                 return _channel(node.text, self._units[node.text])
             case "negative":
                 inner = self.part(node.parts[0])
-                return Part(lambda block: -inner.step(block), inner.dimension)
+                return Subexpression(lambda block: -inner.step(block), inner.dimension)
             case "call":
                 return self._call(node)
         return self._sign(node, *(self.part(each) for each in node.parts))
 
-    def _number(self, node: ExpressionNode) -> Part:
+    def _number(self, node: ExpressionNode) -> Subexpression:
         factor, dimension = 1.0, NONE
         if node.unit is not None:
             found = literal(node.unit)
@@ -92,20 +92,24 @@ class _Compiler:
                 )
             factor, dimension = found
         value = np.float64(float(node.text) * factor)
-        return Part(lambda _block: np.asarray(value), dimension)
+        return Subexpression(lambda _block: np.asarray(value), dimension)
 
-    def _sign(self, node: ExpressionNode, left: Part, right: Part) -> Part:
+    def _sign(self, node: ExpressionNode, left: Subexpression, right: Subexpression) -> Subexpression:
         one, other = left.step, right.step
         if node.kind in WORDS:
             self._same(node, WORDS[node.kind], left, right)
             if node.kind == "+":
-                return Part(lambda block: one(block) + other(block), left.dimension)
-            return Part(lambda block: one(block) - other(block), left.dimension)
+                return Subexpression(lambda block: one(block) + other(block), left.dimension)
+            return Subexpression(lambda block: one(block) - other(block), left.dimension)
         if node.kind == "*":
-            return Part(lambda block: one(block) * other(block), left.dimension.times(right.dimension))
-        return Part(lambda block: one(block) / other(block), left.dimension.times(right.dimension, -1))
+            return Subexpression(
+                lambda block: one(block) * other(block), left.dimension.times(right.dimension)
+            )
+        return Subexpression(
+            lambda block: one(block) / other(block), left.dimension.times(right.dimension, -1)
+        )
 
-    def _call(self, node: ExpressionNode) -> Part:
+    def _call(self, node: ExpressionNode) -> Subexpression:
         if node.text not in FUNCTIONS:
             raise self._error(
                 f"there is no function {node.text}: there are {', '.join(sorted(FUNCTIONS))}", node
@@ -116,7 +120,7 @@ class _Compiler:
             raise self._error(f"{node.text} takes {many}, not {len(node.parts)}", node)
         return make(self, node, [self.part(each) for each in node.parts])
 
-    def _same(self, node: ExpressionNode, done: str, *parts: Part) -> None:
+    def _same(self, node: ExpressionNode, done: str, *parts: Subexpression) -> None:
         for other in parts[1:]:
             if other.dimension != parts[0].dimension:
                 both = f"{parts[0].dimension.said} and {other.dimension.said}"
@@ -127,7 +131,7 @@ class _Compiler:
                 )
                 raise self._error(f"{both} cannot be {done}{hint}", node)
 
-    def _is(self, node: ExpressionNode, part: Part, wanted: Dimension) -> None:
+    def _is(self, node: ExpressionNode, part: Subexpression, wanted: Dimension) -> None:
         if part.dimension != wanted:
             raise self._error(f"{node.text} is of {wanted.said}, not of {part.dimension.said}", node)
 
@@ -149,21 +153,21 @@ class _Compiler:
 
     # --- functions
 
-    def plain(self, _node: ExpressionNode, parts: Sequence[Part]) -> Part:
+    def plain(self, _node: ExpressionNode, parts: Sequence[Subexpression]) -> Subexpression:
         """`abs`."""
-        return Part(lambda block: np.abs(parts[0].step(block)), parts[0].dimension)
+        return Subexpression(lambda block: np.abs(parts[0].step(block)), parts[0].dimension)
 
-    def least(self, node: ExpressionNode, parts: Sequence[Part]) -> Part:
+    def least(self, node: ExpressionNode, parts: Sequence[Subexpression]) -> Subexpression:
         """`min` of what is at one time."""
         return self._extreme(node, parts, np.minimum)
 
-    def most(self, node: ExpressionNode, parts: Sequence[Part]) -> Part:
+    def most(self, node: ExpressionNode, parts: Sequence[Subexpression]) -> Subexpression:
         """`max` of what is at one time."""
         return self._extreme(node, parts, np.maximum)
 
     def _extreme(
-        self, node: ExpressionNode, parts: Sequence[Part], better: Callable[[Floats, Floats], Floats]
-    ) -> Part:
+        self, node: ExpressionNode, parts: Sequence[Subexpression], better: Callable[[Floats, Floats], Floats]
+    ) -> Subexpression:
         self._same(node, "compared", *parts)
 
         def step(block: Block) -> Floats:
@@ -172,42 +176,42 @@ class _Compiler:
                 found = better(found, part.step(block))
             return found
 
-        return Part(step, parts[0].dimension)
+        return Subexpression(step, parts[0].dimension)
 
-    def root(self, node: ExpressionNode, parts: Sequence[Part]) -> Part:
+    def root(self, node: ExpressionNode, parts: Sequence[Subexpression]) -> Subexpression:
         """`sqrt`."""
         dimension = parts[0].dimension.root()
         if dimension is None:
             raise self._error(f"{parts[0].dimension.said} has no square root", node)
-        return Part(lambda block: np.sqrt(parts[0].step(block)), dimension)
+        return Subexpression(lambda block: np.sqrt(parts[0].step(block)), dimension)
 
-    def angle(self, node: ExpressionNode, parts: Sequence[Part]) -> Part:
+    def angle(self, node: ExpressionNode, parts: Sequence[Subexpression]) -> Subexpression:
         """`sin`, `cos`."""
         self._is(node, parts[0], ANGLE)
         wave = np.sin if node.text == "sin" else np.cos
-        return Part(lambda block: wave(parts[0].step(block)), NONE)
+        return Subexpression(lambda block: wave(parts[0].step(block)), NONE)
 
-    def degrees(self, node: ExpressionNode, parts: Sequence[Part]) -> Part:
+    def degrees(self, node: ExpressionNode, parts: Sequence[Subexpression]) -> Subexpression:
         """`deg`: an angle as a plain number of degrees."""
         self._is(node, parts[0], ANGLE)
-        return Part(lambda block: np.degrees(parts[0].step(block)), NONE)
+        return Subexpression(lambda block: np.degrees(parts[0].step(block)), NONE)
 
-    def slope(self, _node: ExpressionNode, parts: Sequence[Part]) -> Part:
+    def slope(self, _node: ExpressionNode, parts: Sequence[Subexpression]) -> Subexpression:
         """`diff`: by time, from row to row."""
-        return Part(_Slope(parts[0].step), parts[0].dimension.times(SECOND, -1))
+        return Subexpression(_Slope(parts[0].step), parts[0].dimension.times(SECOND, -1))
 
-    def smooth(self, node: ExpressionNode, parts: Sequence[Part]) -> Part:
+    def smooth(self, node: ExpressionNode, parts: Sequence[Subexpression]) -> Subexpression:
         """`lowpass`: of first order."""
-        return Part(_LowPass(parts[0].step, self._constant(node, HERTZ, 1e4)), parts[0].dimension)
+        return Subexpression(_LowPass(parts[0].step, self._constant(node, HERTZ, 1e4)), parts[0].dimension)
 
-    def over(self, node: ExpressionNode, parts: Sequence[Part]) -> Part:
+    def over(self, node: ExpressionNode, parts: Sequence[Subexpression]) -> Subexpression:
         """`rms`, `mean`: over the last seconds."""
         seconds = self._constant(node, SECOND, LONGEST_S)
-        return Part(_Window(parts[0].step, seconds, squared=node.text == "rms"), parts[0].dimension)
+        return Subexpression(_Window(parts[0].step, seconds, squared=node.text == "rms"), parts[0].dimension)
 
 
-def _channel(name: str, unit: str) -> Part:
-    return Part(lambda block: block.columns[name], Dimension.of(unit))
+def _channel(name: str, unit: str) -> Subexpression:
+    return Subexpression(lambda block: block.columns[name], Dimension.of(unit))
 
 
 def _column(step: Step, block: Block) -> Floats:
@@ -312,7 +316,7 @@ class _Window:
         return found
 
 
-Make = Callable[[_Compiler, ExpressionNode, Sequence[Part]], Part]
+Make = Callable[[_Compiler, ExpressionNode, Sequence[Subexpression]], Subexpression]
 FUNCTIONS: Final[Mapping[str, tuple[int, int, Make]]] = {
     "abs": (1, 1, _Compiler.plain),
     "min": (2, 99, _Compiler.least),

@@ -85,7 +85,7 @@ class _Token:
 
 
 def parse(text: str) -> Written:
-    """Return what a curve's text says.
+    """Parse a curve's text.
 
     Raises:
         ExpressionError: it says nothing that can be computed; marks where.

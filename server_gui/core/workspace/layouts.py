@@ -145,7 +145,7 @@ class Layouts:
         return sorted(self._found(), key=str.casefold)
 
     def damaged(self) -> list[str]:
-        """Return what is wrong with the others."""
+        """Return the problems of unreadable layouts."""
         return [problem for _, problem in map(self._tried, self._files()) if problem]
 
     def load(self, name: str) -> Layout:

@@ -22,7 +22,7 @@ from server_gui.core.workspace.curve_binding import (
 )
 from server_gui.core.workspace.layouts import Layout, PlotLayout, TriggerLayout
 from server_gui.core.workspace.series import ALL_S, HELD_S, Beside, Floats, Series
-from server_gui.core.workspace.trigger import Condition, On, State, Trigger
+from server_gui.core.workspace.trigger import Condition, On, Trigger, TriggerState
 from server_gui.core.workspace.workspace import Workspace
 
 KEPT_S: Final = 100.0  # of the past, when a view stands still
@@ -97,13 +97,13 @@ class Scene:
     # --- what is drawn
 
     def meaning(self, text: str) -> CurveBinding:
-        """Return what this text means on the robot."""
+        """Return the meaning of this text on the robot."""
         if text not in self._meanings:
             self._meanings[text] = meaning(text, self.channels, self._shown.units)
         return self._meanings[text]
 
     def meaning_beside(self, text: str) -> CurveBinding:
-        """Return what it means on what is beside it."""
+        """Return its meaning on the recording or robot beside it."""
         key = f"{BESIDE_KEY}{text}"
         if key not in self._meanings:
             self._meanings[key] = meaning(text, self._theirs, self._shown.units)
@@ -198,7 +198,7 @@ class Scene:
             self.freeze(float(kept.times[-1]), kept.trigger_ns)
 
     def go_on(self) -> None:
-        """Show what comes."""
+        """Follow the newest rows again."""
         self.frozen = None
 
     # --- the trigger
@@ -222,7 +222,7 @@ class Scene:
     def look_for_trigger(self, span_s: float) -> None:
         """Look at what has come; stands still with what was waited for, goes on where nothing comes."""
         station, trigger = self._station, self.trigger
-        if station is None or self._series is None or trigger.state is State.OFF:
+        if station is None or self._series is None or trigger.state is TriggerState.OFF:
             return
         rings = station.rings
         if rings.source is not self._source:
@@ -239,7 +239,7 @@ class Scene:
 
     def trigger_text(self) -> str:
         """How the trigger is, in words; empty where there is none."""
-        if self.trigger.state is State.OFF:
+        if self.trigger.state is TriggerState.OFF:
             return ""
         problem = self.trigger_problem(self.trigger.condition)
         return f"cannot trigger: {problem}" if problem else self.trigger.text(self._newest_s())
@@ -280,7 +280,7 @@ class Scene:
         return np.full(rows, np.nan) if errors is None else errors(station, rows)
 
     def _errors(self, component: str) -> Callable[[Station, int], Floats] | None:
-        """Return what tells of a drive's errors.
+        """Return the reader of a drive's errors.
 
         Its error code (603Fh), else whether its state is a fault.
         """
@@ -323,7 +323,7 @@ def _faults(station: Station, channel: str, rows: int) -> Floats:
 
 
 def layout_of(scene: Scene, name: str, span_s: float) -> Layout:
-    """Return what is arranged as a layout; plots without a curve are none."""
+    """Return the arrangement as a layout; plots without a curve are left out."""
     condition = scene.trigger.condition
     plots = [PlotLayout(list(plot.curves), plot.x) for plot in scene.workspace.plots if plot.curves]
     kept = TriggerLayout.of_condition(condition) if condition.of and not condition.problem else None

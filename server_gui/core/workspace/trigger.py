@@ -37,7 +37,7 @@ class Mode(Enum):
     SINGLE = "single"  # keeps the first
 
 
-class State(Enum):
+class TriggerState(Enum):
     """How it is."""
 
     OFF = "off"
@@ -84,7 +84,7 @@ class Trigger:
 
     def __init__(self) -> None:
         self.condition = Condition()
-        self.state = State.OFF
+        self.state = TriggerState.OFF
         self.at_s: float | None = None
         self.count = 0
         self._since_s: float | None = None  # rows before are no news
@@ -96,23 +96,23 @@ class Trigger:
         self._wait(newest_s)
 
     def _wait(self, since_s: float | None) -> None:
-        self.state, self.at_s = State.ARMED, None
+        self.state, self.at_s = TriggerState.ARMED, None
         self._since_s, self._armed_s = since_s, since_s
 
     def off(self) -> None:
         """Wait for nothing."""
-        self.state, self.at_s = State.OFF, None
+        self.state, self.at_s = TriggerState.OFF, None
 
     def begin_anew(self) -> None:
         """Reset for rows with another time axis."""
-        if self.state is not State.OFF and self.state is not State.STOPPED:
+        if self.state is not TriggerState.OFF and self.state is not TriggerState.STOPPED:
             self._wait(None)
 
     def shows_live(self, newest_s: float) -> bool:
         """Whether to show what comes, for want of anything better."""
-        if self.state is State.OFF:
+        if self.state is TriggerState.OFF:
             return True
-        if self.state is not State.ARMED:
+        if self.state is not TriggerState.ARMED:
             return False
         waited = math.inf if self._armed_s is None else newest_s - self._armed_s
         return not self.count or (self.condition.mode is Mode.AUTO and waited > AUTO_S)
@@ -122,17 +122,21 @@ class Trigger:
         if not len(times):
             return False
         newest_s = float(times[-1])
-        if self.state is State.SHOWN and self.at_s is not None and self.condition.mode is not Mode.SINGLE:
+        if (
+            self.state is TriggerState.SHOWN
+            and self.at_s is not None
+            and self.condition.mode is not Mode.SINGLE
+        ):
             due_s = max(self.at_s + self.condition.hold_off_s, self._since_s or -math.inf)
             if newest_s >= due_s:
-                self.state, self._since_s, self._armed_s = State.ARMED, due_s, due_s
-        if self.state is State.ARMED:
+                self.state, self._since_s, self._armed_s = TriggerState.ARMED, due_s, due_s
+        if self.state is TriggerState.ARMED:
             self._look(times, values)
-        if self.state is not State.TRIGGERED or self.at_s is None:
+        if self.state is not TriggerState.TRIGGERED or self.at_s is None:
             return False
         if newest_s < self.at_s + (1.0 - self.condition.before) * span_s:
             return False
-        self.state = State.STOPPED if self.condition.mode is Mode.SINGLE else State.SHOWN
+        self.state = TriggerState.STOPPED if self.condition.mode is Mode.SINGLE else TriggerState.SHOWN
         self._since_s = newest_s
         return True
 
@@ -147,23 +151,27 @@ class Trigger:
         if place is None:
             self._since_s = float(times[-1])
             return
-        self.state, self.at_s, self.count = State.TRIGGERED, float(times[first + place]), self.count + 1
+        self.state, self.at_s, self.count = (
+            TriggerState.TRIGGERED,
+            float(times[first + place]),
+            self.count + 1,
+        )
 
     def text(self, newest_s: float | None) -> str:
         """How it is, in words; times are s until the newest row."""
         if self.at_s is None or newest_s is None:
             return (
                 f"{self.state.value}: waits for {self.condition.of}"
-                if self.state is State.ARMED
+                if self.state is TriggerState.ARMED
                 else self.state.value
             )
         ago = f"{max(newest_s - self.at_s, 0.0):.1f} s ago"
         match self.state:
-            case State.STOPPED:
+            case TriggerState.STOPPED:
                 return f"stopped: triggered {ago}"
-            case State.ARMED:
+            case TriggerState.ARMED:
                 return f"armed: number {self.count} was {ago}"
-            case State.TRIGGERED:
+            case TriggerState.TRIGGERED:
                 return f"triggered {ago}, waits for what comes after"
         return f"number {self.count} triggered {ago}"
 

@@ -20,7 +20,8 @@ from PySide6.QtWidgets import (
 
 from gateway.plain_text import plain
 from server_gui.core.alarms.alarm import Active
-from server_gui.core.alarms.marks import GLYPHS, NEWS, Mark
+from server_gui.core.alarms.marks import GLYPHS, Mark
+from server_gui.core.alarms.severity import event_mark
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.news import Item, NewsKind
@@ -83,7 +84,12 @@ class NewsModel(QAbstractTableModel):
 
     def _take(self) -> None:
         active = [_of_alarm(station, one) for station in self._desk.stations for one in station.alarms.active]
-        news = (_of_item(item) for item in self._desk.news.items if item.kind in self._kinds)
+        alarms = {one.title: one.alarms for one in self._desk.stations}
+        news = (
+            _of_item(item, event_mark(item, alarms.get(item.robot)))
+            for item in self._desk.news.items
+            if item.kind in self._kinds
+        )
         self.beginResetModel()
         self.pinned = len(active)
         self.lines = [*active, *(line for line in news if self._has_words(line))]
@@ -223,10 +229,10 @@ def _of_alarm(station: Station, one: Active) -> EventRow:
     return EventRow(f"since {_clock(one.since_s)}", alarm.mark, station.title, text, at)
 
 
-def _of_item(item: Item) -> EventRow:
+def _of_item(item: Item, mark: Mark) -> EventRow:
     again = "" if item.first_s is None else f"  ({item.count} times since {_clock(item.first_s)})"
     text = f"{item.text}{again}"
-    return EventRow(_clock(item.utc_s), NEWS[item.kind], item.robot, text, utc_s=item.utc_s)
+    return EventRow(_clock(item.utc_s), mark, item.robot, text, utc_s=item.utc_s)
 
 
 def _clock(utc_s: float) -> str:

@@ -184,7 +184,8 @@ class AlarmButtons(QWidget):
         shows = one is not None and one.alarm.channel is not None and one.at_ns is not None
         self.show_signal.setVisible(all_of_them and shows)
         unread = one is not None and not one.is_acknowledged and one.alarm.kind is not Kind.NOT_STOPPED
-        self.acknowledge.setVisible(all_of_them and unread)
+        is_past = station is not None and station.robot.is_recording  # nobody has to have read it
+        self.acknowledge.setVisible(all_of_them and unread and not is_past)
 
 
 class AlarmList(Overlay):

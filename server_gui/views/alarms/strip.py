@@ -10,7 +10,17 @@ from PySide6.QtWidgets import QApplication, QHBoxLayout, QPushButton, QScrollAre
 from server_gui.core.alarms.texts import Kind
 from server_gui.core.desk.desk import Desk
 from server_gui.views.alarms.full_list import AlarmButtons, AlarmList, style
-from server_gui.views.alarms.words import REMEDY, Told, details, fewer, headline, key_of, now_s, quiet
+from server_gui.views.alarms.words import (
+    REMEDY,
+    Told,
+    details,
+    fewer,
+    headline,
+    key_of,
+    leading,
+    now_s,
+    quiet,
+)
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text, set_tone
 from server_gui.views.widgets.clickable_frame import ClickableFrame
@@ -157,12 +167,13 @@ class AlarmStrip(ClickableFrame):
     def _say(self, first: Told | None) -> None:
         """As much of it as has room, the cause before all; laid out only when it says something else."""
         if first is None:
-            mark, main, rest = quiet(self._desk.selected)
+            mark, main, rest = quiet(self._desk.selected, self._desk.recording)
             wordings: tuple[str, ...] = (main,)
             fuller: tuple[str, ...] = (rest,)
         else:
-            mark = first[1].alarm.mark
-            wordings = tuple(headline(first, named=self.named, brief=brief) for brief in range(3))
+            mark, lead = leading(first, self.told)
+            more = "" if lead is first else first[1].alarm.mark.word
+            wordings = tuple(headline(lead, named=self.named, more=more, brief=brief) for brief in range(3))
             wordings = wordings[:1] if first[1].alarm.kind is Kind.NOT_STOPPED else wordings
             fuller = fewer(details(first[1], now_s(first[0])))
         self._icon.show_mark(mark)

@@ -2,11 +2,13 @@
 
 import datetime
 import time
+from collections.abc import Iterable
 from typing import Final
 
 from server_gui.core.alarms.alarm import Active
 from server_gui.core.alarms.marks import age_text
 from server_gui.core.alarms.texts import Kind
+from server_gui.core.desk.recording import Recording
 from server_gui.core.desk.station import Station
 from server_gui.views.marks import Mark
 
@@ -20,7 +22,7 @@ def key_of(told: Told) -> Key:
     return "" if station is None else station.name, one.alarm.key
 
 
-def quiet(station: Station | None) -> tuple[Mark, str, str]:
+def quiet(station: Station | None, recording: Recording | None = None) -> tuple[Mark, str, str]:
     """Return that there is no alarm, where that is known."""
     if station is None:
         return Mark("ring", "dim"), "No robot", ""
@@ -28,10 +30,26 @@ def quiet(station: Station | None) -> tuple[Mark, str, str]:
         return Mark("diamond", "accent"), "A recording", "no fault shown"
     if not station.is_live or not station.robot.parts:
         return Mark("ring", "old"), "Alarms not known", "no live data"
+    if station.mark.colour in ("warn", "bad", "old"):  # as its card says
+        return station.mark, "No alarms", station.mark.word
     known = station.predictions
     if known.foresees and not (known.danger is not None and known.danger.is_known):
         return Mark("ring", "dim"), "No alarms", "danger is not known"
+    if recording is not None and recording.can_ask and not recording.reach.is_known:
+        return Mark("ring", "dim"), "No alarms", "the store is not known"
     return Mark("disc", "good"), "No alarms", "all ok"
+
+
+def leading(told: Told, beside: Iterable[Told]) -> tuple[Mark, Told]:
+    """Return the state that leads, and whose line says it: the worst, as on the robot's card.
+
+    A reset says how to go on, before warnings of its robot; it is not how that robot is.
+    """
+    station, one = told
+    if station is None or one.alarm.kind is not Kind.RESET:
+        return one.alarm.mark, told
+    others = (each for each in beside if each[0] is station and each[1] is not one)
+    return station.mark, min(others, key=lambda each: each[1].alarm.rank, default=told)
 
 
 def headline(told: Told, *, named: bool, more: str = "", brief: int = 0) -> str:

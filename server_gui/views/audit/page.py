@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from server_gui.core.archive.collected_journals import Found, KeptJournals
+from server_gui.core.archive.collected_journals import JournalsFound, KeptJournals
 from server_gui.core.archive.histories import History, histories
 from server_gui.core.desk.desk import Desk
 from server_gui.core.follow.news import NewsKind
@@ -28,11 +28,19 @@ from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.files import ask_save, save_whole
 from server_gui.views.widgets.plain import PlainLabel
 from server_gui.views.widgets.rows import Filtered, Index, RowsTable
+from server_gui.views.widgets.wrapping_label import WrappingLabel
 
 EVERY_ROBOT, EVERYBODY = "All robots", "Everybody"
 WIDEST: Final = 300  # of a column, at text of 100 %: its tip has the rest
 MOST: Final = 4  # robots of which everything is said at once
 AWAY: Final = "What was collected before cannot be read now, and is tried again"
+NONE: Final = (
+    "Nothing was done to a robot yet, as far as its journal has come. Each change is a row here: who, when, "
+    "old → new, what the robot read back, and how it ended; likewise each STOP, reset, trial and store to "
+    "flash, from this window, a command or the robot itself.\n\n"
+    "To make the first: change a value under Parameters, and try it."
+)
+NONE_CHOSEN: Final = "No row is of this robot and person with these words: take one of the filters away."
 CSV_TITLES: Final = (
     "utc",
     "robot",
@@ -101,6 +109,9 @@ class Audit(QWidget):
         self.table = self._table()
         theme.scaled.connect(self._restyle)
         self._restyle()
+        self.empty = WrappingLabel("dim")
+        self.empty.setAlignment(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignVCenter)
+        self.empty.hide()
         self.verdict = PlainLabel()
         self.verdict.setObjectName("banner")
         self.verdict.setWordWrap(True)
@@ -113,13 +124,17 @@ class Audit(QWidget):
         everything.setContentsMargins(8, 8, 8, 8)
         everything.addLayout(row)
         everything.addWidget(self.table, 1)
+        everything.addWidget(self.empty, 0)
+        self._below_empty = QWidget()  # takes the room that is left where there is no row
+        self._below_empty.hide()
+        everything.addWidget(self._below_empty, 1)
         everything.addWidget(self.verdict)
 
     def refresh(self) -> None:
         """Show what has come."""
         if self._kept is not None:
             self._kept.look()
-        kept = Found() if self._kept is None else self._kept.found
+        kept = JournalsFound() if self._kept is None else self._kept.found
         known = self._called
         self._called = {
             name: known[name] if known.get(name) == history else history
@@ -164,6 +179,11 @@ class Audit(QWidget):
         robot = "" if self.robot.currentIndex() <= 0 else self.robot.currentText()
         who = "" if self.who.currentIndex() <= 0 else self.who.currentText()
         self.chosen.show(robot, who, self.words.text())
+        has_rows = bool(self.chosen.rowCount())
+        set_text(self.empty, NONE_CHOSEN if self.model.rows else NONE)
+        self.table.setVisible(has_rows)
+        for part in (self.empty, self._below_empty):
+            part.setVisible(not has_rows)
         asked = {name: history for name, history in self._called.items() if robot in ("", name)}
         told = {name: one for name, one in asked.items() if len(asked) <= MOST or one.is_altered}
         said = [f"{name}: {one.verdict}" for name, one in told.items()]

@@ -116,5 +116,5 @@ def _steps(job: Job) -> int:
 
 
 def under_way(jobs: Sequence[Job]) -> int:
-    """Return how many are not over."""
+    """Return the number of unfinished jobs."""
     return sum(not job.is_over for job in jobs)

@@ -1,6 +1,5 @@
 """The tab of the store: how it is reached, what waits for it, what is in it, and work on it."""
 
-import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
@@ -24,6 +23,7 @@ from ml.store.sessions import Session
 from server_gui.core.archive.archive import Archive
 from server_gui.core.cloud.actions import check, download, upload
 from server_gui.core.cloud.credentials import endpoint_told, keys_told
+from server_gui.core.cloud.store_reach import Reach
 from server_gui.core.desk.recording import Recording
 from server_gui.core.settings.server_file import default_file
 from server_gui.views.cloud.browser import Browser
@@ -45,6 +45,14 @@ NO_STORE: Final = (
     "Upload now brings it at once."
 )
 NOT_READ: Final = "What it holds is not known while it is not reached."
+REACHES: Final = {
+    Reach.NOT_LOOKED: Mark("ring", "dim", "looking"),
+    Reach.REACHED: Mark("disc", "good", "reached"),
+    Reach.EMPTY: Mark("ring", "dim", "empty"),
+    Reach.AWAY: Mark("triangle", "warn", "away"),
+    Reach.FAILING: Mark("triangle", "warn", "an upload failed"),
+    Reach.OLD: Mark("ring", "old", "not known"),
+}
 NO_JOBS: Final = "Uploads, verifications and downloads that you begin here show how far they are."
 
 
@@ -173,12 +181,11 @@ class Cloud(QWidget):
 
     def _refresh_store(self) -> None:
         library = self._archive.library
-        found = library.found
-        mark, text = self._reached()
-        self._icon.show_mark(mark)
-        set_text(self.state, text)
+        found, reach = library.found, library.reach
+        self._icon.show_mark(REACHES[reach.state])
+        set_text(self.state, reach.said)
         set_text(self._facts["Holds"], self._holds())
-        away = library.looked_s is not None and found.problem is not None
+        away = library.looked_s is not None and (found.problem or reach.problem) is not None
         set_text(self.hint, NOT_READ if away and not found.usage else NO_STORE)
         self.hint.setVisible(found.is_empty or (away and not found.usage))
         there = bool(found.usage)
@@ -188,23 +195,10 @@ class Cloud(QWidget):
     def _holds(self) -> str:
         """Return what nobody could look at holds not nothing."""
         library = self._archive.library
-        if library.looked_s is None or library.found.problem is not None:
+        if library.looked_s is None or library.found.problem is not None or library.reach.problem is not None:
             return "not known"
         stored = sum(session.uploaded for session in library.found.sessions)
         return f"{size(library.found.size_bytes)}; recordings: {stored}"
-
-    def _reached(self) -> tuple[Mark, str]:
-        library = self._archive.library
-        if library.looked_s is None:
-            return Mark("ring", "dim", "looking"), "Looking for the first time …"
-        age = f"{time.monotonic() - library.looked_s:.0f} s"
-        if library.found.problem is not None:
-            return Mark(
-                "triangle", "warn", "away"
-            ), f"Not reached, tried again by itself: {library.found.problem}"
-        if library.found.is_empty:
-            return Mark("ring", "dim", "empty"), f"There is no store at this URL yet (looked {age} ago)"
-        return Mark("disc", "good", "reached"), f"Reached; looked {age} ago"
 
     def _refresh_waiting(self) -> None:
         report = self._recording.report

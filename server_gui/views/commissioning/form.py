@@ -92,7 +92,7 @@ class Form(Card):
             self.wished.emit(wish)
 
     def say(self, problem: str) -> None:
-        """Say what is wrong with what was typed."""
+        """Show the problem of the input."""
         self.wrong.setText(problem)
         self.wrong.setVisible(bool(problem))
 

@@ -21,7 +21,7 @@ from server_gui.core.commissioning.stages import Stage
 from server_gui.views.commissioning.bar import Bar
 from server_gui.views.commissioning.form import Form
 from server_gui.views.commissioning.question import Question
-from server_gui.views.commissioning.result import Result
+from server_gui.views.commissioning.result import ResultCard
 from server_gui.views.commissioning.steps import Steps
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card
@@ -44,7 +44,7 @@ class CommissionPage(QWidget):
         self.form = Form()
         self.bar = Bar(commissioning, theme, self.form.start)
         self.question, self.steps = Question(commissioning, theme), Steps(theme)
-        self.result, self.log = Result(commissioning, theme), Log(commissioning, theme)
+        self.result, self.log = ResultCard(commissioning, theme), Log(commissioning, theme)
         self.bar.stopped.connect(commissioning.stop)
         self.bar.interrupted.connect(commissioning.interrupt)
         self.form.wished.connect(self._start)

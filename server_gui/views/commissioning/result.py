@@ -6,7 +6,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QApplication, QHBoxLayout, QPlainTextEdit, QPushButton, QSizePolicy
 
 from server_gui.core.commissioning.commissioning import Commissioning
-from server_gui.core.commissioning.messages import Written
+from server_gui.core.commissioning.messages import WrittenMessage
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_text
 from server_gui.views.widgets.plain import set_tip
@@ -17,7 +17,7 @@ CONNECT: Final = "Start a gateway with it, and connect"
 THERE: Final = "On {computer}: gwrms gateway {file}. Then add {computer}:7420 to this window."
 
 
-class Result(Card):
+class ResultCard(Card):
     """`connect` asks for a gateway on this computer with the robot's file."""
 
     connect_to = Signal(str)
@@ -81,7 +81,7 @@ class Result(Card):
 
     # --- inside
 
-    def _next(self, written: Written | None, there: str) -> str:
+    def _next(self, written: WrittenMessage | None, there: str) -> str:
         if written is None or not written.usable:
             return ""
         if there:
@@ -98,8 +98,8 @@ class Result(Card):
         self.text.setMinimumHeight(self.text.fontMetrics().lineSpacing() * LINES)
 
 
-def checked(written: Written) -> str:
-    """Return what `gwrms check` says of it, a line each."""
+def checked(written: WrittenMessage) -> str:
+    """Return the findings of `gwrms check`, a line each."""
     lines = [f"▲ {severity}: {words}" for severity, words in written.findings]
     if written.unfinished:
         lines.append(f"▲ not in it, because not finished: {', '.join(written.unfinished)}")

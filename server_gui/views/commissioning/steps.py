@@ -6,7 +6,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QGridLayout, QWidget
 
 from server_gui.core.alarms.marks import GLYPHS, Mark
-from server_gui.core.commissioning.messages import Step
+from server_gui.core.commissioning.messages import StepMessage
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_text
 from server_gui.views.widgets.mark import MarkIcon
@@ -30,7 +30,7 @@ class Steps(Card):
     def __init__(self, theme: Theme) -> None:
         super().__init__("Steps")
         self._theme = theme
-        self._known: tuple[Step, ...] | None = None
+        self._known: tuple[StepMessage, ...] | None = None
         self._rows: list[tuple[MarkIcon, WrappingLabel, WrappingLabel]] = []
         self.none = WrappingLabel("dim")
         self.none.setText(NONE)
@@ -48,10 +48,12 @@ class Steps(Card):
         """What it says, part by part."""
         return [f"{title.text()}: {words.text()}" for _, title, words in self._rows if not title.isHidden()]
 
-    def show_steps(self, steps: tuple[Step, ...], *, runs: bool) -> None:
+    def show_steps(self, steps: tuple[StepMessage, ...], *, runs: bool) -> None:
         """Show these; where it does not run, none is gone through."""
         if not runs:
-            steps = tuple(Step(one.part, one.title, NEXT if one.state == NOW else one.state) for one in steps)
+            steps = tuple(
+                StepMessage(one.part, one.title, NEXT if one.state == NOW else one.state) for one in steps
+            )
         if steps == self._known:
             return
         self._known = steps
@@ -80,9 +82,9 @@ class Steps(Card):
         self._rows.append((icon, title, words))
 
 
-def _parts(steps: tuple[Step, ...]) -> list[tuple[str, list[Step]]]:
+def _parts(steps: tuple[StepMessage, ...]) -> list[tuple[str, list[StepMessage]]]:
     """Return steps that follow each other in one part."""
-    parts: list[tuple[str, list[Step]]] = []
+    parts: list[tuple[str, list[StepMessage]]] = []
     for step in steps:
         if not parts or parts[-1][1][-1].part != step.part:
             parts.append((step.part, []))
@@ -90,7 +92,7 @@ def _parts(steps: tuple[Step, ...]) -> list[tuple[str, list[Step]]]:
     return parts
 
 
-def _state(steps: list[Step]) -> str:
+def _state(steps: list[StepMessage]) -> str:
     """Of a part: done only where each step is, or was passed after one that is."""
     states = {step.state for step in steps}
     if NOW in states:
@@ -100,7 +102,7 @@ def _state(steps: list[Step]) -> str:
     return DONE if DONE in states else PASSED
 
 
-def _told(steps: list[Step]) -> str:
+def _told(steps: list[StepMessage]) -> str:
     """Every step of the part that is gone through; of another one what is not as its mark says."""
     state = _state(steps)
     if state == NOW:

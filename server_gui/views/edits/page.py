@@ -24,11 +24,11 @@ from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.evidence.comparison import Measured, Word
 from server_gui.core.evidence.cycles import DRAWN
-from server_gui.core.evidence.edits import State
-from server_gui.core.evidence.file import Told
+from server_gui.core.evidence.edits import EditState
+from server_gui.core.evidence.file import EditEvidence
 from server_gui.core.evidence.shown import in_units, symbols
 from server_gui.core.evidence.wording import changes, from_to, interval, number, share, strides, word
-from server_gui.core.experiments.plan import Kind
+from server_gui.core.experiments.plan import ExperimentKind
 from server_gui.core.experiments.wording import record, what, whole
 from server_gui.views.experiments.form import ExperimentForm, Tried
 from server_gui.views.experiments.response_plot import ResponsePlot
@@ -66,8 +66,8 @@ class Edits(QWidget):
         self._theme = theme
         self._known: tuple[object, ...] = ()  # what is shown was made of this
         self._units: dict[str, dict[str, str]] = {}  # symbols of each edit, by parameter
-        self._shown: list[Told] = []
-        self._drawn: Told | None = None
+        self._shown: list[EditEvidence] = []
+        self._drawn: EditEvidence | None = None
         self._followed = ""  # the trial that was chosen because it had begun
         self.setAccessibleName("Edits")
         self.list = QListWidget()
@@ -125,7 +125,7 @@ class Edits(QWidget):
         running = (
             place
             for place, one in enumerate(self._shown)
-            if one.edit.state is State.ON_TRIAL and not one.is_final
+            if one.edit.state is EditState.ON_TRIAL and not one.is_final
         )
         place = next(running, None)
         if place is not None and self._shown[place].edit.id != self._followed:
@@ -134,7 +134,7 @@ class Edits(QWidget):
             self.list.setCurrentRow(place)
             self.list.blockSignals(False)
 
-    def _in_units(self, known: list[Told], station: Station | None) -> list[Told]:
+    def _in_units(self, known: list[EditEvidence], station: Station | None) -> list[EditEvidence]:
         """Return them as people read values, whose symbols are kept."""
 
         def si(name: str) -> str | None:
@@ -150,8 +150,8 @@ class Edits(QWidget):
         self.ab, self.sweep = QPushButton("A/B trial…"), QPushButton("Sweep…")
         self.ab.setToolTip("Two values of a parameter against each other, several times in a drawn order")
         self.sweep.setToolTip("Values of a parameter upwards in small steps, while you watch")
-        self.ab.clicked.connect(lambda: self._ask(Kind.AB, self._desk.selected))
-        self.sweep.clicked.connect(lambda: self._ask(Kind.SWEEP, self._desk.selected))
+        self.ab.clicked.connect(lambda: self._ask(ExperimentKind.AB, self._desk.selected))
+        self.sweep.clicked.connect(lambda: self._ask(ExperimentKind.SWEEP, self._desk.selected))
         buttons, column = QHBoxLayout(), QVBoxLayout()
         buttons.addWidget(self.ab)
         buttons.addWidget(self.sweep)
@@ -167,16 +167,16 @@ class Edits(QWidget):
             return
         ((name, value),) = trial.values.items()
         station.end_trial()
-        self._ask(Kind.AB, station, Tried(name, float(trial.before[name]), float(value)))
+        self._ask(ExperimentKind.AB, station, Tried(name, float(trial.before[name]), float(value)))
 
-    def _ask(self, kind: Kind, station: Station | None, tried: Tried | None = None) -> None:
+    def _ask(self, kind: ExperimentKind, station: Station | None, tried: Tried | None = None) -> None:
         if station is not None:
             tried = tried or self._chosen_edit(station)
             self.form = ExperimentForm(self, self._desk, station, self._theme, kind, tried)
             self.form.show()
 
     def _chosen_edit(self, station: Station) -> Tried | None:
-        """Return what is looked at, unless something was staged or tried since."""
+        """Return the shown edit, unless something was staged or tried since."""
         told = self._chosen
         known = next((one for one in station.judged if told and one.edit.id == told.edit.id), None)
         if known is None or len(known.edit.changes) != 1 or station.writing.trial or station.edits.staged:
@@ -186,14 +186,14 @@ class Edits(QWidget):
             return None
         return Tried(change.name, change.old, change.new)
 
-    def _grow(self, known: list[Told]) -> None:
+    def _grow(self, known: list[EditEvidence]) -> None:
         """More is known of some: hundreds of others are not laid out again each second."""
         for row, (told, shown) in enumerate(zip(known, self._shown, strict=True)):
             if told != shown:
                 self.list.item(row).setText(self._line(told))
         self._shown = known
 
-    def _list(self, known: list[Told]) -> None:
+    def _list(self, known: list[EditEvidence]) -> None:
         chosen = self._chosen
         self._shown = known
         self.list.blockSignals(True)
@@ -207,7 +207,7 @@ class Edits(QWidget):
         self.list.blockSignals(False)
 
     @property
-    def _chosen(self) -> Told | None:
+    def _chosen(self) -> EditEvidence | None:
         row = self.list.currentRow()
         return self._shown[row] if 0 <= row < len(self._shown) else None
 
@@ -228,7 +228,7 @@ class Edits(QWidget):
         self.response.setVisible(tried is not None and self.response.show_response(tried))
         self._draw(told)
 
-    def _draw(self, told: Told | None) -> None:
+    def _draw(self, told: EditEvidence | None) -> None:
         found = {} if told is None else {one.channel: one for one in told.curves}
         for channel in self.curves.keys() - found.keys():
             gone = self.curves.pop(channel)
@@ -260,19 +260,19 @@ class Edits(QWidget):
         for one in self.curves.values():
             one.show_hover(at)
 
-    def _what(self, told: Told) -> str:
-        """Return what was changed, in its unit."""
+    def _what(self, told: EditEvidence) -> str:
+        """Return the changed parameters, in their units."""
         if told.experiment is None:
             return changes(told.edit, self._units.get(told.edit.id, {}))
         return f"{what(told)} {told.experiment.unit}".rstrip()
 
-    def _line(self, told: Told) -> str:
+    def _line(self, told: EditEvidence) -> str:
         ended = told.edit.became if told.experiment is None else told.experiment.kind
         values = self._what(told).replace(" → ", ARROW)  # no line ends within them, nor before a unit
         values = re.sub(r"(?<=\d) (?=[^\W\d]|[°%])", "\N{NO-BREAK SPACE}", values)
         return f"{_when(told.edit.utc_ns)}  {values}\n{ended} · {word(told)}"
 
-    def _verdict(self, told: Told) -> str:
+    def _verdict(self, told: EditEvidence) -> str:
         evidence, tried = told.evidence, told.experiment
         if tried is not None:
             said = f"{counted(len(tried.periods), 'period')}" if tried.responses else str(evidence.word)
@@ -307,7 +307,7 @@ def _when(utc_ns: int) -> str:
     return f"{at:%H:%M:%S}" if is_today else f"{at:%Y-%m-%d %H:%M}"
 
 
-def _said(told: Told) -> list[str]:
+def _said(told: EditEvidence) -> list[str]:
     evidence, tried = told.evidence, told.experiment
     done = [] if tried is None else list(record(tried))
     strong = _strong(told)
@@ -337,13 +337,17 @@ def _by_our_clock(note: str) -> str:
     """Name an edit in a note by its time, by which the list has it, instead of by the command's id."""
 
     def time_of(found: re.Match[str]) -> str:
-        return _when(int(datetime.datetime.fromisoformat(f"{found[1]}+00:00").timestamp()) * 10**9)
+        try:
+            at = datetime.datetime.fromisoformat(f"{found[1]}+00:00")
+        except ValueError:  # as of a month 13: no time at all, which stays as it was written
+            return found[0]
+        return _when(int(at.timestamp()) * 10**9)
 
     return EDIT.sub(time_of, note)
 
 
-def _strong(told: Told) -> list[Measured]:
-    """Return what differs, the strongest first."""
+def _strong(told: EditEvidence) -> list[Measured]:
+    """Return the differing metrics, the strongest first."""
     found = (one for one in told.evidence.metrics if one.word in (Word.BETTER, Word.WORSE, Word.CHANGED))
     return sorted(found, key=lambda one: -abs(one.size or 0.0))
 

@@ -7,7 +7,7 @@ from gateway.amounts import counted
 from gateway.units import Units
 from server_gui.core.desk.station import Station
 from server_gui.core.evidence.comparison import FEWEST, Evidence, Word
-from server_gui.core.evidence.file import Told
+from server_gui.core.evidence.file import EditEvidence
 from server_gui.core.evidence.wording import share
 from server_gui.core.tuning.edits import unit_of
 from server_gui.core.tuning.writing import Trial
@@ -23,7 +23,7 @@ def changes(station: Station, trial: Trial, units: Units) -> list[str]:
 
 
 def wordings(station: Station, trial: Trial, units: Units) -> tuple[str, ...]:
-    """Return what to say where there is less and less room: each value whole, and how many more there are."""
+    """Return the wordings for less and less room: each value whole, with the number of further ones."""
     first, *others = _changes(station, trial, units)
     said = changes(station, trial, units)
     full = ", ".join(said)
@@ -39,8 +39,8 @@ def why_no_ab(trial: Trial) -> str:
     return "" if count == 1 else AB_OF_ONE.format(count)
 
 
-def so_far(edit: Told | None) -> tuple[str, ...]:
-    """Return what it did until now in one clause: `so far worse: left knee tracking error RMS +45.0 %`.
+def so_far(edit: EditEvidence | None) -> tuple[str, ...]:
+    """Return its effect so far in one clause: `so far worse: left knee tracking error RMS +45.0 %`.
 
     Then the same for where there is less and less room.
     """

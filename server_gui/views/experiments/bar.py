@@ -5,7 +5,7 @@ from PySide6.QtWidgets import QFrame, QHBoxLayout, QProgressBar, QPushButton, QV
 
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
-from server_gui.core.experiments.machine import State
+from server_gui.core.experiments.machine import ExperimentState
 from server_gui.core.experiments.result import result
 from server_gui.core.experiments.run import Run
 from server_gui.core.experiments.wording import progress
@@ -55,7 +55,7 @@ class ExperimentBar(QFrame):
             return
         whose = "" if found is self._desk.selected else f"{found.title}: "
         set_text(self.words, whose + progress(run))
-        set_tone(self.words, "bad" if run.state is State.NOT_CONFIRMED else "")
+        set_tone(self.words, "bad" if run.state is ExperimentState.NOT_CONFIRMED else "")
         self._bar.setRange(0, len(run.plan.steps))
         self._bar.setValue(run.place)
         self._bar.setVisible(not run.is_over)
@@ -70,7 +70,7 @@ class ExperimentBar(QFrame):
             self._tell(station, run)
 
     def _tell(self, station: Station, run: Run) -> None:
-        failed = run.state is State.NOT_CONFIRMED
+        failed = run.state is ExperimentState.NOT_CONFIRMED
         station.tell(NewsKind.WARNING if failed or run.why else NewsKind.PARAMETER, progress(run))
         info = station.known.get(run.plan.name)
         told = result(run, station.who or "this desk", "" if info is None else info.unit)

@@ -29,8 +29,8 @@ from server_gui.core.experiments.plan import (
     BadPlan,
     Bounds,
     Dwell,
-    Kind,
-    Plan,
+    ExperimentKind,
+    ExperimentPlan,
     ab,
     sweep,
 )
@@ -43,7 +43,7 @@ from server_gui.views.widgets.no_wheel_spin import NoWheelSpin
 from server_gui.views.widgets.plain import PlainLabel
 
 WIDTH: Final = 460  # at text of 100 %
-FIELDS: Final = {Kind.AB: ("A", "B"), Kind.SWEEP: ("From", "To", "Step")}
+FIELDS: Final = {ExperimentKind.AB: ("A", "B"), ExperimentKind.SWEEP: ("From", "To", "Step")}
 LOOK_MS: Final = 500
 USUAL: Final = "twice what is usual"
 
@@ -65,7 +65,7 @@ class ExperimentForm(QDialog):
         desk: Desk,
         station: Station,
         theme: Theme,
-        kind: Kind,
+        kind: ExperimentKind,
         tried: Tried | None = None,
     ) -> None:
         super().__init__(parent)
@@ -120,7 +120,7 @@ class ExperimentForm(QDialog):
         self._clock.start()
 
     @property
-    def plan(self) -> Plan:
+    def plan(self) -> ExperimentPlan:
         """What is typed, as a plan; raises `BadPlan`."""
         info, held, unit = self._held()
         refused = self._station.refused(PARAMETER_WRITE)
@@ -136,7 +136,7 @@ class ExperimentForm(QDialog):
             _bound(self.error, "tracking error", self._error_unit),
             _bound(self.current, "current", self._current_unit),
         )
-        if self._kind is Kind.AB:
+        if self._kind is ExperimentKind.AB:
             first, second = values
             pairs, seed = self.pairs.value(), self._seed
             return ab(info, held, (first, second), unit, pairs=pairs, dwell=dwell, bounds=bounds, seed=seed)
@@ -146,7 +146,7 @@ class ExperimentForm(QDialog):
     def _grid(self) -> QGridLayout:
         grid = QGridLayout()
         grid.setColumnStretch(1, 1)
-        pairs = {"Pairs": self.pairs} if self._kind is Kind.AB else {}
+        pairs = {"Pairs": self.pairs} if self._kind is ExperimentKind.AB else {}
         rows: dict[str, QWidget] = {
             "Parameter": self.parameter,
             "Unit": self.unit,
@@ -175,7 +175,7 @@ class ExperimentForm(QDialog):
     def _chosen(self) -> None:
         """Another parameter: begin with what was on trial; else with what is held, and was typed for it."""
         tried = self._tried
-        is_ab = self._kind is Kind.AB  # a sweep begins with what is held
+        is_ab = self._kind is ExperimentKind.AB  # a sweep begins with what is held
         if tried is not None and is_ab and tried.parameter == self.parameter.currentText():
             info = self._station.known[tried.parameter]
             unit = unit_of(info.name, info.unit, self._desk.shown.units)

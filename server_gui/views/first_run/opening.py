@@ -2,15 +2,15 @@
 
 from typing import TYPE_CHECKING, Final
 
-from server_gui.core.desk.first_steps import FirstSteps, Step
+from server_gui.core.desk.first_steps import FirstStep, FirstSteps
 from server_gui.processes.demo_robot import DemoRobot
-from server_gui.processes.simulated import Part
+from server_gui.processes.simulated import RobotPart
 from server_gui.views.first_run.splash import Splash
 
 if TYPE_CHECKING:  # it takes long to import, and the splash does not wait for it
     from server_gui.core.desk.station import Station
 
-STEPS: Final = {Part.SIMULATOR: Step.SIMULATOR, Part.GATEWAY: Step.GATEWAY}
+STEPS: Final = {RobotPart.SIMULATOR: FirstStep.SIMULATOR, RobotPart.GATEWAY: FirstStep.GATEWAY}
 LONGEST_S: Final = 60.0  # that a splash stands there
 
 
@@ -29,13 +29,13 @@ class Opening:
             return
         for part in self.own.ready:
             self._steps.reach(STEPS[part])
-        if window and Step.WINDOW not in self._steps.took_s:
-            self._steps.reach(Step.WINDOW)
+        if window and FirstStep.WINDOW not in self._steps.took_s:
+            self._steps.reach(FirstStep.WINDOW)
             self._splash.raise_()  # the window has come to lie above it
         if station is not None and station.robot.parts and station.is_live:
-            self._steps.reach(Step.DATA)
+            self._steps.reach(FirstStep.DATA)
             if station.processing.derived().gait.walking:
-                self._steps.reach(Step.WALK)
+                self._steps.reach(FirstStep.WALK)
         self._splash.refresh()
         too_long = self._steps.elapsed_s > LONGEST_S
         if too_long or self.own.problem or self._steps.now is None:

@@ -20,7 +20,7 @@ def application() -> QApplication:
 
 
 def kept_settings() -> QSettings:
-    """Return what the window keeps from one time to the next."""
+    """Return the window's persistent settings."""
     return QSettings("gwrms", "gui")
 
 

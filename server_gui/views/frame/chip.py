@@ -28,11 +28,15 @@ class Words:
 
 
 class Chip(QFrame):
-    """A mark, what it means, and a line of detail; of what has no room whole parts are left out."""
+    """A mark, what it means, and a line of detail; of what has no room whole parts are left out.
 
-    def __init__(self, theme: Theme, name: str, button: QPushButton | None = None) -> None:
+    One whose first line is a name needs no more than `most` (at text of 100 %), if given.
+    """
+
+    def __init__(self, theme: Theme, name: str, button: QPushButton | None = None, most: int = 0) -> None:
         super().__init__()
         self._theme = theme
+        self._most = most
         self._words = Words(Mark("ring", "old"), "")
         self.setObjectName("card")
         self.setAccessibleName(name)
@@ -63,14 +67,16 @@ class Chip(QFrame):
         """How wide it is with all of its first line, and what is short of the second."""
         bold, plain = QFontMetrics(self._theme.text_font(bold=True)), QFontMetrics(self._theme.text_font())
         short = next((part for part in self._words.parts[:1] if len(part) <= SHORT), "")
-        words = max(bold.horizontalAdvance(self._words.main), plain.horizontalAdvance(short))
-        return max(words + self._around, self._theme.px(LEAST))
+        words = max(bold.horizontalAdvance(self._words.main), plain.horizontalAdvance(short)) + self._around
+        return max(min(words, self._theme.px(self._most) or words), self._theme.px(LEAST))
 
     @property
     def wants(self) -> int:
         """How wide it is with everything."""
         plain = QFontMetrics(self._theme.text_font())
-        return max(self.needs, plain.horizontalAdvance(" · ".join(self._words.parts)) + self._around)
+        main = QFontMetrics(self._theme.text_font(bold=True)).horizontalAdvance(self._words.main)
+        detail = plain.horizontalAdvance(" · ".join(self._words.parts))
+        return max(self.needs, max(main, detail) + self._around)
 
     def say(self, words: Words) -> None:
         """Show this."""

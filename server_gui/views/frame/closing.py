@@ -52,7 +52,7 @@ class Closing(QDialog):
         self.setFixedWidth(theme.px(WIDTH))
 
     def say(self) -> None:
-        """Show what is waited for, where that takes a moment."""
+        """Show the reason for waiting, if closing takes a moment."""
         took_s = time.monotonic() - self._began_s
         if took_s >= SAID_S:
             set_text(self.said, f"{self._ending.waits_for or 'the last threads end'} … ({took_s:.0f} s)")

@@ -12,10 +12,10 @@ from server_gui.core.alarms.robot_alarms import remedy
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.tuning.stop import StopState
-from server_gui.views.frame.chip import Chip, Words
+from server_gui.views.frame.chip import LEAST, Chip, Words
 from server_gui.views.frame.recording_chip import NAME, RecordingChip
 from server_gui.views.marks import Mark, age_text, drives_mark, enabled_text
-from server_gui.views.predictions import OLD, status
+from server_gui.views.predictions import OLD, by_steps, status
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.plain import PlainLabel, set_tip
 from server_gui.views.widgets.stop_button import StopButton
@@ -28,7 +28,8 @@ STOP_MARKS: Final = {
 STOP_SHARE: Final = 0.4  # of the width, which STOP may take at most
 RESETTING: Final = "Ends a held stop. Every drive stays switched off: nothing is enabled."
 # Left out in this order where there is less room; alarms stand below the header.
-SPARE: Final = ("status", "robot", "recording", "link", "drives")
+SPARE: Final = ("status", "recording", "link", "drives", "robot")
+A_NAME: Final = 130  # wide, at text of 100 %: a longer name of a robot is elided in its middle
 
 
 class Header(QWidget):
@@ -41,7 +42,6 @@ class Header(QWidget):
         super().__init__()
         self._desk = desk
         self._theme = theme
-        self._is_short = False
         self.setObjectName("header")
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self._brand = PlainLabel("GWRMS")
@@ -50,7 +50,7 @@ class Header(QWidget):
         self._row.setContentsMargins(12, 5, 12, 5)
         self._row.setSpacing(8)
         self._row.addWidget(self._brand)
-        self._chips = {name: Chip(theme, name) for name in _WORDS}
+        self._chips = {name: Chip(theme, name, most=A_NAME if name == "robot" else 0) for name in _WORDS}
         self._chips[NAME] = self.recording = RecordingChip(desk, theme)
         self._outcome = Chip(theme, "what became of the STOP")
         for chip in (*self._chips.values(), self._outcome):
@@ -81,8 +81,7 @@ class Header(QWidget):
         )
 
     def be_short(self, is_short: bool) -> None:
-        """Leave out what stands elsewhere too, where there is little room: STOP names the robot."""
-        self._is_short = is_short
+        """Leave out what says nothing of the robot, where there is little room."""
         self._brand.setVisible(not is_short)
         self._fit()
 
@@ -117,14 +116,20 @@ class Header(QWidget):
         self.stop.allow(max(round(self.width() * STOP_SHARE), self._theme.px(150)))
         self._empty.setVisible(station is None)
         has_outcome = self._has_outcome
-        shown = [] if station is None else [name for name in self._chips if self._is_wanted(name)]
+        shown = [] if station is None else list(self._chips)
         room = self._room(has_outcome=has_outcome)
+        needs = {name: chip.needs for name, chip in self._chips.items()}
+        wide = dict(needs)
         for name in SPARE:
-            if sum(self._chips[one].needs + self._row.spacing() for one in shown) > room and name in shown:
+            if name == "drives":  # before them the name of the robot gives way
+                needs["robot"] = min(needs["robot"], self._theme.px(LEAST))
+            if sum(needs[one] + self._row.spacing() for one in shown) > room and name in shown:
                 shown.remove(name)
+        if sum(wide[one] + self._row.spacing() for one in shown) <= room:
+            needs = wide
         for name, chip in self._chips.items():
             chip.setVisible(name in shown)
-            chip.setMinimumWidth(chip.needs if name in shown else 0)
+            chip.setMinimumWidth(needs[name] if name in shown else 0)
             self._row.setStretchFactor(chip, chip.wants if name in shown else 0)
         self._outcome.setVisible(has_outcome)
         self._outcome.setMinimumWidth(self._outcome.needs if has_outcome else 0)
@@ -136,9 +141,6 @@ class Header(QWidget):
         station = self._desk.selected
         stopping = None if station is None else station.stopping
         return stopping is not None and (stopping.state is not StopState.IDLE or stopping.held)
-
-    def _is_wanted(self, name: str) -> bool:
-        return not (self._is_short and name == "robot")
 
     def _room(self, *, has_outcome: bool) -> int:
         """How much is left for the chips."""
@@ -196,15 +198,17 @@ def _status(station: Station) -> Words:
     if line is not None and line.mark.word != OLD:
         parts = ("predicted", line.short) if line.detail.startswith("predicted") else (line.detail,)
         return Words(line.mark, line.text, tuple(filter(None, parts)), f"{line.text}\n{line.detail}")
-    gait, problem = station.processing.derived().gait, station.predictions.problem
+    gait, problem, seen = (
+        station.processing.derived().gait,
+        station.predictions.problem,
+        by_steps(station),
+    )
     why_not = f"not predicted: {problem}" if problem else "not predicted"
-    parts = ("by steps", why_not if line is None else f"no prediction now, {line.detail}")
-    if gait.walking is None:
-        return Words(Mark("ring", "old"), "Activity not known", parts)
+    parts = (seen.short or seen.detail, why_not if line is None else f"no prediction now, {line.detail}")
     if not gait.walking:
-        return Words(Mark("ring", "dim"), "Not walking", parts)
+        return Words(seen.mark, seen.text, parts)
     cadence = "–" if gait.cadence_spm is None else f"{gait.cadence_spm:.0f}"
-    return Words(Mark("diamond", "accent"), "Walking", (f"{cadence} steps/min", *parts))
+    return Words(seen.mark, seen.text, (f"{cadence} steps/min", *parts))
 
 
 def _link(station: Station) -> Words:

@@ -28,7 +28,7 @@ class Help(QWidget):
         self._show_again()
 
     def show_section(self, title: str) -> None:
-        """Show what the manual says of this; the first section where it says nothing."""
+        """Show the manual's section of this title, or its first section."""
         self.choice.setCurrentIndex(max(0, self.choice.findText(title)))
 
     def _show_again(self) -> None:

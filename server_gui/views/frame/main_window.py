@@ -272,7 +272,7 @@ class MainWindow(QMainWindow):
         self._fit()
 
     def show_help(self) -> None:
-        """Show what the manual says of the panel that has the keyboard, or of the tab."""
+        """Show the manual's section on the panel with the keyboard, or on the tab."""
         tab = self.tabs.tabText(self.tabs.currentIndex()).replace("&", "")
         self.help.show_section("Parameters" if has_focus_in(self.parameters) else tab)
         self.bring(self._manual)
@@ -331,6 +331,7 @@ class MainWindow(QMainWindow):
             for part in (self.header, self.parameters):
                 part.be_short(is_narrow)
             self.panels_button.setVisible(is_narrow)
+            self.page_bar.arrange()  # now: else what is below moves a frame later
         self._panels.fit(scaled=scaled)
 
     def _hold_header(self) -> None:

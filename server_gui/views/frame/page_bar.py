@@ -35,12 +35,12 @@ class PageBar(QWidget):
 
     def event(self, event: QEvent) -> bool:
         if event.type() == QEvent.Type.LayoutRequest:  # text has another size, or the corner another button
-            self._arrange()
+            self.arrange()
         return super().event(event)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        self._arrange()
+        self.arrange()
 
     def _mark(self, place: int) -> None:
         self._group.button(place).setChecked(True)
@@ -57,7 +57,7 @@ class PageBar(QWidget):
                 button.setProperty("tight", is_tight)
                 button.style().polish(button)
 
-    def _arrange(self) -> None:
+    def arrange(self) -> None:
         """From left to right; what has no room beside the corner begins another row."""
         corner = self._corner.sizeHint()
         self._tighten(self.width() - corner.width())

@@ -7,11 +7,12 @@ from typing import Final
 from PySide6.QtCore import QEvent, Qt
 from PySide6.QtWidgets import QApplication, QStatusBar
 
+from server_gui.core.alarms.severity import bus_level
 from server_gui.core.desk.busiest import busiest
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.recording import Tone
 from server_gui.core.desk.station import Station
-from server_gui.core.processing.bus_health import UNKNOWN, Level, worst
+from server_gui.core.processing.bus_health import ORDER, UNKNOWN, BusHealthLevel, seen, worst
 from server_gui.views.frame.recording_chip import TONES
 from server_gui.views.resources.bus_health import LEVELS
 from server_gui.views.theme import Theme
@@ -65,7 +66,7 @@ class StatusBar(QStatusBar):
         """Show how it is now."""
         station = self._desk.selected
         self.computer.say(*(("no robot", "") if station is None else _computer(station)))
-        level, words = (Level.UNKNOWN, ("",)) if station is None else _bus(station)
+        level, words = (BusHealthLevel.UNKNOWN, ("",)) if station is None else _bus(station)
         self._bus_icon.show_mark(LEVELS[level])
         self._bus_icon.setVisible(station is not None)
         self.bus.say(*words)
@@ -92,11 +93,13 @@ class StatusBar(QStatusBar):
         return (len(self._frames) - 1) / max(self._frames[-1] - self._frames[0], 1e-6)
 
 
-def _bus(station: Station) -> tuple[Level, tuple[str, ...]]:
+def _bus(station: Station) -> tuple[BusHealthLevel, tuple[str, ...]]:
     """Return the worst bus; where nothing new comes from the robot, none is known to be good."""
     level, words = worst(station.robot)
-    is_known = level is not Level.GOOD or station.is_live
-    return (level, words) if is_known else (Level.UNKNOWN, (UNKNOWN, "CAN –"))
+    for bus in seen(station.robot) or ():
+        level = max(level, bus_level(level, bus.name, station.alarms), key=ORDER.index)
+    is_known = level is not BusHealthLevel.GOOD or station.is_live
+    return (level, words) if is_known else (BusHealthLevel.UNKNOWN, (UNKNOWN, "CAN –"))
 
 
 def _computer(station: Station) -> tuple[str, ...]:

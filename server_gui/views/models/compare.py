@@ -17,7 +17,16 @@ from PySide6.QtWidgets import (
 from gateway.amounts import NONE
 from gateway.plain_text import plain
 from server_gui.core.models.catalogue import Catalogue, Entry
-from server_gui.core.models.comparison import Row, last_week, notes, percent, rows, signed, usual_other
+from server_gui.core.models.comparison import (
+    OTHERS,
+    Row,
+    last_week,
+    notes,
+    percent,
+    rows,
+    signed,
+    usual_other,
+)
 from server_gui.views.models.calibration import CalibrationPlot, Curve
 from server_gui.views.theme import Theme
 from server_gui.views.widgets import columns
@@ -30,6 +39,7 @@ MARKS: Final = {
     "better": ("▲ better", "good"),
     "worse": ("▼ worse", "bad"),
     "alike": ("= alike", "dim"),
+    OTHERS: ("other sessions", "dim"),
     "": ("", "dim"),
 }
 NARROW: Final = 940  # at text of 100 %: no room for the plot beside the figures
@@ -45,6 +55,7 @@ class Compare(Card):
         super().__init__("Compare")
         self._theme = theme
         self._shown: object = None
+        self._judged = ""
         self._entry: Entry | None = None
         self._found = Catalogue()
         self.said = _words()
@@ -63,13 +74,17 @@ class Compare(Card):
         theme.changed.connect(self._fill)
         self.show_entry(None, Catalogue())
 
-    def show_entry(self, entry: Entry | None, found: Catalogue) -> None:
-        """Show this model; beside what serves in its place, until somebody chooses another."""
-        if (entry, found) == self._shown:
+    def show_entry(self, entry: Entry | None, found: Catalogue, judged: str = "") -> None:
+        """Show this model, as training has `judged` it; beside what serves in its place.
+
+        Until somebody chooses another.
+        """
+        if (entry, found, judged) == self._shown:
             return
+        self._judged = judged
         same = self._entry is not None and entry is not None and self._entry.card.id == entry.card.id
         chosen = str(self.other.currentData() or "") if same else ""
-        self._shown, self._entry, self._found = (entry, found), entry, found
+        self._shown, self._entry, self._found = (entry, found, judged), entry, found
         self._offer(entry, found, chosen)
         self._fill()
 
@@ -144,7 +159,7 @@ class Compare(Card):
             part.setVisible(other is not None)
         set_text(self.said, f"{entry.name}; serves {entry.whom}{_signed(entry)}")
         set_text(self.week, f"Last week: {last_week(entry)}{self._its_week(other)}")
-        told = " ".join(notes(entry, other))
+        told = "\n".join(filter(None, (self._judged, " ".join(notes(entry, other)))))
         set_text(self.notes, told)
         self.notes.setVisible(bool(told))
         self._fill_rows(rows(entry.card, None if other is None else other.card))

@@ -2,7 +2,7 @@
 
 from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QPushButton
 
-from server_gui.core.models.changes import Change
+from server_gui.core.models.changes import ModelChange
 from server_gui.core.models.models import Models
 from server_gui.views.widgets.card import Card, set_text
 from server_gui.views.widgets.plain import PlainLabel
@@ -14,7 +14,7 @@ class Confirm(Card):
     def __init__(self, models: Models) -> None:
         super().__init__("")
         self._models = models
-        self._shown: Change | None = None
+        self._shown: ModelChange | None = None
         self.words = PlainLabel()
         self.words.setWordWrap(True)
         self.why = QLineEdit()

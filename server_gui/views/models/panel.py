@@ -28,6 +28,9 @@ EMPTY: Final = (
 )
 
 
+AWAY: Final = "▲ The store is not reached, it is tried again; what was promoted there is not shown: {why}"
+
+
 class ModelsPage(QWidget):
     """Nothing here waits: the store is read in a thread, and a training is a process of its own."""
 
@@ -86,7 +89,9 @@ class ModelsPage(QWidget):
         self._show_state()
         self._show_learned()
         entry = self.chosen
-        self.compare.show_entry(entry, models.found)
+        trained = None if entry is None else models.trained.get(entry.card.id)
+        judged = "" if trained is None else f"Training has judged it: {trained.said}"
+        self.compare.show_entry(entry, models.found, judged)
         self.confirm.refresh()
         self.form.refresh()
         self._show_actions(entry)
@@ -157,11 +162,13 @@ class ModelsPage(QWidget):
 
     def _show_state(self) -> None:
         found = self._models.found
-        lines = [f"▲ {found.problem}"] if found.problem else []
+        away = self._models.reach.problem
+        lines = [] if away is None else [AWAY.format(why=away)]
+        lines += [f"▲ {found.problem}"] if found.problem and found.problem != away else []
         lines += [f"▲ {each}" for each in found.damaged]
         if self._models.looked_s is None:
             lines.append(LOOKING)
-        elif not found.entries and not found.problem:
+        elif not found.entries and not found.problem and away is None:
             lines.append(EMPTY)
         set_text(self.state, "\n".join(lines))
         self.state.setVisible(bool(lines))

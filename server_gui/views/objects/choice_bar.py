@@ -15,7 +15,7 @@ from PySide6.QtWidgets import (
 )
 
 from server_gui.core.objects.devices import Device
-from server_gui.core.objects.rows import BY_EDS, Kind
+from server_gui.core.objects.rows import BY_EDS, RowKind
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.plain import set_tip
 
@@ -23,10 +23,10 @@ BUTTON: Final = 104  # px at text of 100 % that one needs
 EVENLY: Final = (6, 3, 2)  # buttons in a row: no row has only one
 READ_ALL, READ_NO_MORE = "Read all", "Stop reading"
 TIPS: Final = {
-    Kind.ALL: "Every object of the device's EDS",
-    Kind.PARAMETERS: "Those that may be written: parameters",
-    Kind.DIFFERENT: "Those that were read, and hold something else than what they are compared with",
-    Kind.PINNED: "Those that are pinned (Ctrl+P pins the chosen one)",
+    RowKind.ALL: "Every object of the device's EDS",
+    RowKind.PARAMETERS: "Those that may be written: parameters",
+    RowKind.DIFFERENT: "Those that were read, and hold something else than what they are compared with",
+    RowKind.PINNED: "Those that are pinned (Ctrl+P pins the chosen one)",
 }
 
 
@@ -46,7 +46,7 @@ class ChoiceBar(QWidget):
         self.words.setPlaceholderText("Search: 0x6041, 0x60*, 0x6060-0x607F, words …")
         self.words.setClearButtonEnabled(True)
         self.words.setAccessibleName("Search of the objects")
-        self.kinds = {kind: QPushButton(kind.value) for kind in Kind}
+        self.kinds = {kind: QPushButton(kind.value) for kind in RowKind}
         self.all, self.export = QPushButton(READ_ALL), QPushButton("CSV …")
         set_tip(self.all, "Every object once, some hundred a second at most; goes on while this is shown")
         set_tip(self.export, "All that was read of this device, with every digit")
@@ -55,11 +55,11 @@ class ChoiceBar(QWidget):
             button.setCheckable(True)
             set_tip(button, TIPS[kind])
             self._group.addButton(button)
-        self.kinds[Kind.ALL].setChecked(True)
+        self.kinds[RowKind.ALL].setChecked(True)
         self._build()
 
     @property
-    def kind(self) -> Kind:
+    def kind(self) -> RowKind:
         """What is to be shown."""
         return next(kind for kind, button in self.kinds.items() if button.isChecked())
 
@@ -77,8 +77,8 @@ class ChoiceBar(QWidget):
         others = [(one.title, one.component) for one in devices if one is not device]
         _fill(self.other, [(BY_EDS, None), *others])
 
-    def count(self, kinds: Mapping[Kind, Sequence[object]], *, is_reading: bool) -> None:
-        """Say how many there are of each kind, and whether all are being read."""
+    def count(self, kinds: Mapping[RowKind, Sequence[object]], *, is_reading: bool) -> None:
+        """Show the number of objects of each kind, and whether all are being read."""
         for kind, button in self.kinds.items():
             _set_text(button, f"{kind.value} {len(kinds[kind])}")
         _set_text(self.all, READ_NO_MORE if is_reading else READ_ALL)

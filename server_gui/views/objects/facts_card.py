@@ -72,14 +72,15 @@ class FactsCard(Card):
     def show_object(
         self, info: ObjectInfo | None, component: str, facts: Sequence[tuple[str, str]], refused: str
     ) -> None:
-        """Show what is known of it; `refused` says why it may not be changed here, empty where it may."""
+        """Show the facts of an object; `refused` is the reason why it may not be changed here, or empty."""
+        is_another = (info, component) != (self._info, self._component)
         self._info, self._component = info, component
         title = NOTHING if info is None else f"{info.object}  {plain(info.name)}"
         self.set_title(title)
         self.setAccessibleName(title)
         said = "\n".join(f"{title}: {plain(text, chr(10))}" for title, text in facts)
-        if self.text.toPlainText() != said and not self.text.textCursor().hasSelection():
-            at = self.text.verticalScrollBar().value()
+        if self.text.toPlainText() != said and (is_another or not self.text.textCursor().hasSelection()):
+            at = 0 if is_another else self.text.verticalScrollBar().value()
             self.text.setPlainText(said)
             self.text.verticalScrollBar().setValue(at)
         self.edit.setEnabled(info is not None and not refused)

@@ -10,7 +10,8 @@ from PySide6.QtCore import QAbstractTableModel, QModelIndex, QPersistentModelInd
 from gateway.plain_text import plain
 from gateway.wire.dictionary import ObjectInfo
 from server_gui.core.follow.frame_time import now_ns
-from server_gui.core.objects.reading import Held
+from server_gui.core.objects.forms import for_reading
+from server_gui.core.objects.reading import ReadValue
 from server_gui.core.objects.rows import Compared, limits, pin_of
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.plain import tip
@@ -36,7 +37,7 @@ LONGEST: Final = 200  # letters of a cell: the chosen one's facts have them all
 
 
 @dataclass(frozen=True, slots=True)
-class Shown:
+class ShownObjects:
     """One device's objects beside another's, and what of them is pinned or staged."""
 
     compared: Compared = field(default_factory=lambda: Compared("", {}))
@@ -44,10 +45,10 @@ class Shown:
     pinned: Collection[str] = ()
     staged: Collection[str] = ()  # names of parameters
 
-    def held(self, info: ObjectInfo) -> Held | None:
+    def held(self, info: ObjectInfo) -> ReadValue | None:
         return self.compared.held.get((self.compared.component, info.object))
 
-    def is_now(self, held: Held) -> bool:
+    def is_now(self, held: ReadValue) -> bool:
         """Whether it may be called how it is."""
         return self.is_linked and not held.is_old(now_ns())
 
@@ -59,9 +60,9 @@ class ObjectsModel(QAbstractTableModel):
         super().__init__()
         self._theme = theme
         self.rows: Sequence[ObjectInfo] = ()
-        self.shown = Shown()
+        self.shown = ShownObjects()
 
-    def take(self, rows: Sequence[ObjectInfo], shown: Shown) -> bool:
+    def take(self, rows: Sequence[ObjectInfo], shown: ShownObjects) -> bool:
         """Show these from now on; whether there are others than before."""
         before, self.shown = self.shown, shown
         if before.compared.title != shown.compared.title:
@@ -106,7 +107,7 @@ class ObjectsModel(QAbstractTableModel):
         return None
 
     def text(self, info: ObjectInfo, column: int) -> str:
-        """Return what a cell says."""
+        """Return the text of a cell."""
         text = plain(_TEXTS[column](self.shown, info))
         return text if len(text) <= LONGEST else f"{text[:LONGEST]}…"
 
@@ -131,28 +132,28 @@ def age_text(seconds: float) -> str:
     return f"{seconds:.0f} s"
 
 
-def _name(shown: Shown, info: ObjectInfo) -> str:
+def _name(shown: ShownObjects, info: ObjectInfo) -> str:
     return f"★ {info.name}" if pin_of(shown.compared.component, info.object) in shown.pinned else info.name
 
 
-def _holds(shown: Shown, info: ObjectInfo) -> str:
+def _holds(shown: ShownObjects, info: ObjectInfo) -> str:
     held = shown.held(info)
     if held is None or held.told.problem is None:
-        return "–" if held is None else held.told.words
+        return "–" if held is None else for_reading(info, held.told.words)
     return WHOSE.sub("", held.told.problem)
 
 
-def _age(shown: Shown, info: ObjectInfo) -> str:
+def _age(shown: ShownObjects, info: ObjectInfo) -> str:
     held = shown.held(info)
     return "" if held is None else age_text(held.age_s(now_ns()))
 
 
-def _other(shown: Shown, info: ObjectInfo) -> str:
+def _other(shown: ShownObjects, info: ObjectInfo) -> str:
     other = shown.compared.other(info)
     if other is None:
         return "–"
     mark = "≠ " if shown.compared.differs(info) else ""
-    return f"{mark}{_as_beside(_holds(shown, info), other)}"
+    return f"{mark}{for_reading(info, _as_beside(_holds(shown, info), other))}"
 
 
 def _as_beside(words: str, other: float | str) -> str:
@@ -161,13 +162,13 @@ def _as_beside(words: str, other: float | str) -> str:
     return f"0x{other:X}" if is_hex else str(other)
 
 
-def _parameter(shown: Shown, info: ObjectInfo) -> str:
+def _parameter(shown: ShownObjects, info: ObjectInfo) -> str:
     if info.read_only is not None or info.parameter is None:
         return info.read_only or ""
     return f"● {info.parameter}" if info.parameter in shown.staged else info.parameter
 
 
-_TEXTS: Final[tuple[Callable[[Shown, ObjectInfo], str], ...]] = (
+_TEXTS: Final[tuple[Callable[[ShownObjects, ObjectInfo], str], ...]] = (
     lambda _shown, info: info.object,
     _name,
     _holds,

@@ -22,7 +22,7 @@ from server_gui.views.objects.objects_model import (
     UNIT,
     WIDEST,
     ObjectsModel,
-    Shown,
+    ShownObjects,
 )
 from server_gui.views.theme import Theme
 
@@ -115,7 +115,7 @@ class ObjectsTable(QTableView):
         first, last = self._first_and_last
         return list(self._model.rows[first : last + 1])
 
-    def take(self, rows: list[ObjectInfo], shown: Shown, device: object) -> None:
+    def take(self, rows: list[ObjectInfo], shown: ShownObjects, device: object) -> None:
         """Show these; columns are measured anew for another `device`."""
         is_other = device != self._measured
         address = self._address

@@ -28,7 +28,7 @@ from server_gui.core.objects.rows import CSV_TITLES, Compared, Finder, cells, pi
 from server_gui.core.tuning.edits import unit_of
 from server_gui.views.objects.choice_bar import ChoiceBar
 from server_gui.views.objects.facts_card import FactsCard
-from server_gui.views.objects.objects_model import Shown
+from server_gui.views.objects.objects_model import ShownObjects
 from server_gui.views.objects.objects_table import ObjectsTable
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
@@ -162,6 +162,7 @@ class ObjectsPage(QWidget):
         station = self._desk.selected
         if station is not None:
             self._show_facts(station, self._compared(station, self._device(station)))
+            self._frame = 0  # and is asked for with the next frame
 
     def _pin(self) -> None:
         station, current = self._desk.selected, self.table.current
@@ -209,7 +210,7 @@ class ObjectsPage(QWidget):
         reading = station.objects.reading
         kinds = self._finder.find(dictionary, self.bar.words.text(), compared, pinned, reading.revision)
         self.bar.count(kinds, is_reading=bool(reading.left))
-        shown = Shown(compared, station.is_linked, pinned, station.edits.staged.keys())
+        shown = ShownObjects(compared, station.is_linked, pinned, station.edits.staged.keys())
         component = None if device is None else device.component
         measured = (station, component, dictionary.revision, compared.with_component)
         self.table.take(kinds[self.bar.kind], shown, measured)
@@ -252,7 +253,7 @@ class ObjectsPage(QWidget):
     def _wanted(
         self, station: Station, dictionary: Dictionary, compared: Compared
     ) -> tuple[list[Object], list[Object]]:
-        """Return what is chosen or in sight, here and on the device beside it.
+        """Return the chosen and visible objects, here and on the device beside it.
 
         And what of it never changes.
         """
@@ -271,7 +272,7 @@ class ObjectsPage(QWidget):
 
 
 def _trouble(station: Station, device: Device | None, dictionary: Dictionary) -> str:
-    """Return what is wrong as a whole; of single objects their rows tell."""
+    """Return the problem of the whole panel; problems of single objects are in their rows."""
     if not station.is_linked:
         return LOST
     if station.robot.description is None:

@@ -1,6 +1,7 @@
 """The joint table: what each drive tells, in the units of choice, with bars where there is a limit."""
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -18,7 +19,7 @@ from server_gui.core.alarms.marks import GLYPHS
 from server_gui.core.alarms.texts import error_text
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
-from server_gui.core.follow.robot import Part
+from server_gui.core.follow.robot import FollowedComponent
 from server_gui.core.tuning.stop import StopState
 from server_gui.views.marks import STILL_ENABLED, state_mark
 from server_gui.views.theme import Theme
@@ -57,7 +58,16 @@ CODE: Final = re.compile(r"0x[0-9A-Fa-f]{4}(?P<words> [^(;:]+)?")
 ENABLED: Final = "operation enabled"  # only then it is to be where its target is
 NONE: Final = "–"
 MOST_ERROR: Final = 280  # wide, in words
-LEAST_ERROR: Final = "0x0000 …"
+# A drive's states where there is little room; in alarms and on cards they stand in full.
+FEW_WORDS: Final = {
+    "not ready to switch on": "not ready",
+    "ready to switch on": "ready",
+    "switch on disabled": "off",
+    "operation enabled": "enabled",
+    "quick stop active": "quick stop",
+    "fault reaction active": "fault",
+}
+LEAST_ERROR: Final = "0x0000"  # its words stand below the table then
 BAR = Qt.ItemDataRole.UserRole + 1
 
 
@@ -106,11 +116,16 @@ class JointModel(QAbstractTableModel):
             if known != rows[row]:
                 self.dataChanged.emit(self.index(row, 0), self.index(row, len(COLUMNS) - 1))
 
-    def widest(self, column: int, metrics: QFontMetrics) -> int:
-        """Return how wide a column is at least, so that nothing in it is cut."""
-        texts = [row[column].text for row in self._cells]
+    def widest(self, column: int, metrics: QFontMetrics, said: Callable[[str], str] = str) -> int:
+        """Return how wide a column is at least, so that nothing in it is cut, as it is `said`."""
+        texts = [said(row[column].text) for row in self._cells]
         texts.append(str(self.headerData(column, Qt.Orientation.Horizontal, Qt.ItemDataRole.DisplayRole)))
         return max(metrics.horizontalAdvance(text) for text in texts)
+
+    @property
+    def errors(self) -> list[tuple[str, str]]:
+        """Each joint with which something is wrong, and what."""
+        return [(row[JOINT].text, row[ERROR].text) for row in self._cells if row[ERROR].tip]
 
     def empty(self) -> set[int]:
         """Return the columns that say nothing yet: no stop was sent."""
@@ -149,11 +164,23 @@ class JointModel(QAbstractTableModel):
 
 
 class BarDelegate(SentenceDelegate):
-    """Draws a cell's bar below its text: from the middle, as far as its share; errors to a whole word."""
+    """Draws a cell's bar below its text: from the middle, as far as its share.
+
+    Of an error its code where `is_short`, else all of it; where `is_tight`, states in fewer words.
+    """
 
     def __init__(self, theme: Theme) -> None:
         super().__init__(ERROR)
         self._theme = theme
+        self.is_short = self.is_tight = False
+
+    def initStyleOption(self, option: QStyleOptionViewItem, index: Index) -> None:
+        super().initStyleOption(option, index)
+        text = str(index.data())
+        if self.is_short and index.column() == ERROR and text.startswith("0x"):
+            option.text = text.partition(" ")[0]
+        elif self.is_tight and index.column() == STATE:
+            option.text = in_few_words(text)
 
     def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: Index) -> None:
         super().paint(painter, option, index)
@@ -177,8 +204,9 @@ class JointTable(QTableView):
         super().__init__()
         self._theme = theme
         self._model = model
+        self._bars = BarDelegate(theme)
         self.setModel(model)
-        self.setItemDelegate(BarDelegate(theme))
+        self.setItemDelegate(self._bars)
         self.setAccessibleName("Joints")
         self.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
@@ -204,6 +232,11 @@ class JointTable(QTableView):
         rows = max(self._model.rowCount(), 1) * self.verticalHeader().defaultSectionSize()
         return QSize(self._theme.px(600), rows + self.horizontalHeader().sizeHint().height() + 2)
 
+    @property
+    def unsaid(self) -> list[tuple[str, str]]:
+        """Each joint with which something is wrong, and what, where that has no room in its column."""
+        return self._model.errors if self._bars.is_short else []
+
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self._fit()
@@ -215,17 +248,10 @@ class JointTable(QTableView):
 
     def _fit(self) -> None:
         """Every column as wide as what is in it; what has no room is left out whole."""
-        widths = [self._width(column) for column in range(len(COLUMNS))]
-        shown = set(range(len(COLUMNS))) - self._model.empty()
-        for column in (column for column in SPARE if column not in self._model.at_fault):
-            if sum(widths[known] for known in shown) > self.viewport().width():
-                shown.discard(column)
-        if self._model.at_fault:
-            code = self._text_width(LEAST_ERROR)
-            for column in (TORQUE, ANGLE):  # the last to go, for what is wrong alone
-                least = sum(min(widths[known], code) if known == ERROR else widths[known] for known in shown)
-                if least > self.viewport().width():
-                    shown.discard(column)
+        before = self._bars.is_short, self._bars.is_tight
+        widths, shown = self._fitting()
+        if before != (self._bars.is_short, self._bars.is_tight):
+            self.viewport().update()
         spare = max(self.viewport().width() - sum(widths[known] for known in shown), 0) // max(len(shown), 1)
         for column, width in enumerate(widths):
             self.setColumnHidden(column, column not in shown)
@@ -233,14 +259,52 @@ class JointTable(QTableView):
             if column in shown and column != ERROR and abs(self.columnWidth(column) - wanted) > 1:
                 self.setColumnWidth(column, wanted)
 
+    def _fitting(self) -> tuple[list[int], set[int]]:
+        """Return how wide each column is, and those that are shown, at the fullest that has room."""
+        room = self.viewport().width()
+        for is_tight in (False, True):
+            self._bars.is_tight = is_tight
+            widths = [self._width(column) for column in range(len(COLUMNS))]
+            shown = self._with_room(widths)
+            of_error = room - sum(widths[known] for known in shown if known != ERROR)
+            self._bars.is_short = any(self._text_width(text) > of_error for _, text in self._model.errors)
+            if self._bars.is_short:
+                widths[ERROR] = max(self._text_width(LEAST_ERROR), self._text_width(COLUMNS[ERROR][0]))
+                shown = self._with_room(widths)
+            if sum(widths[known] for known in shown) <= room:
+                break
+        for column in (TORQUE, ANGLE, ERROR):  # errors stand below the table, too
+            if sum(widths[known] for known in shown) > room:
+                shown.discard(column)
+        return widths, shown
+
+    def _with_room(self, widths: list[int]) -> set[int]:
+        """Return the columns that are shown, without the spare ones that have no room."""
+        shown = set(range(len(COLUMNS))) - self._model.empty()
+        for column in (column for column in SPARE if column not in self._model.at_fault):
+            if sum(widths[known] for known in shown) > self.viewport().width():
+                shown.discard(column)
+        return shown
+
     def _text_width(self, text: str) -> int:
-        return QFontMetrics(self._theme.text_font()).horizontalAdvance(text) + self._theme.px(16)
+        return QFontMetrics(self._theme.text_font()).horizontalAdvance(text) + self._around
+
+    @property
+    def _around(self) -> int:
+        """What is beside the text of a cell."""
+        return self._theme.px(9 if self._bars.is_tight else 16)
 
     def _width(self, column: int) -> int:
         numbers = ANGLE <= column <= TEMPERATURE
         metrics = QFontMetrics(self._theme.number_font() if numbers else self._theme.text_font())
-        widest = self._model.widest(column, metrics) + self._theme.px(16)
+        few = self._bars.is_tight and column == STATE
+        widest = self._model.widest(column, metrics, in_few_words if few else str) + self._around
         return min(widest, self._theme.px(MOST_ERROR)) if column == ERROR else widest
+
+
+def in_few_words(state: str) -> str:
+    """Return a state as it is said where there is little room."""
+    return next((state.replace(full, few) for full, few in FEW_WORDS.items() if full in state), state)
 
 
 def _unit(desk: Desk, quantity: str) -> Unit:
@@ -323,7 +387,7 @@ def _torque(station: Station, joint: str, desk: Desk, *, stale: bool) -> Cell:
     return Cell(text, plain.colour, Bar(share, colour), f"{100 * abs(share):.0f} % of its limit")
 
 
-def _error(station: Station, part: Part, *, stale: bool) -> Cell:
+def _error(station: Station, part: FollowedComponent, *, stale: bool) -> Cell:
     """Return the drive's error code in words, or what is wrong with the component.
 
     Nothing known is no dash.

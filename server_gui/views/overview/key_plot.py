@@ -28,7 +28,7 @@ Part = tuple[str, str, str]  # of the legend: colour, what is drawn, what it say
 
 
 @dataclass(frozen=True, slots=True)
-class Kind:
+class PlotKind:
     """What is plotted: channels with the colours and words of their curves; `least` range is SI.
 
     Curves whose channel's component has a parameter of the CiA 402 object `most` may come no further from 0
@@ -46,7 +46,7 @@ class Kind:
 class KeyPlot(Card):
     """Its time is that of all plots beside it."""
 
-    def __init__(self, desk: Desk, theme: Theme, kind: Kind) -> None:
+    def __init__(self, desk: Desk, theme: Theme, kind: PlotKind) -> None:
         super().__init__(kind.title)
         self._desk = desk
         self._theme = theme

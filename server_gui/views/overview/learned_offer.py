@@ -6,7 +6,7 @@ from PySide6.QtWidgets import QHBoxLayout, QPushButton, QSizePolicy, QVBoxLayout
 
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
-from server_gui.core.prediction.adaptation import Adapting, Happening, State
+from server_gui.core.prediction.adaptation import AdaptationState, Adapting, Happening
 from server_gui.views.marks import Mark
 from server_gui.views.predictions import LEARNED
 from server_gui.views.theme import Theme
@@ -78,14 +78,22 @@ def wordings(adapting: Adapting) -> tuple[str, ...]:
     """Return what there is to say, the fullest first. Each says how it stands: figures alone look better."""
     tried = "" if adapting.tried is None else adapting.tried.text
     of = {
-        State.OFFERED: (f"Learned from {adapting.wearer}", "Learned", ""),
-        State.SERVING: (f"Served by what was learned from {adapting.wearer}", "Learned, serves", "Serves"),
-        State.NO_BETTER: ("No better than the general model", "No better"),
-        State.DECLINED: ("Declined: the general model serves", "Declined"),
-        State.TAKEN_BACK: ("Taken back: the general model serves", "Taken back"),
-        State.FAILED: (f"Not learned from {adapting.wearer}", "Not learned"),
+        AdaptationState.OFFERED: (f"Learned from {adapting.wearer}", "Learned", ""),
+        AdaptationState.SERVING: (
+            f"Served by what was learned from {adapting.wearer}",
+            "Learned, serves",
+            "Serves",
+        ),
+        AdaptationState.NO_BETTER: ("No better than the general model", "No better"),
+        AdaptationState.DECLINED: ("Declined: the general model serves", "Declined"),
+        AdaptationState.TAKEN_BACK: ("Taken back: the general model serves", "Taken back"),
+        AdaptationState.FAILED: (f"Not learned from {adapting.wearer}", "Not learned"),
     }.get(adapting.state, ())
-    told = tried if adapting.state in (State.OFFERED, State.SERVING, State.NO_BETTER) else ""
+    told = (
+        tried
+        if adapting.state in (AdaptationState.OFFERED, AdaptationState.SERVING, AdaptationState.NO_BETTER)
+        else ""
+    )
     short = [": ".join(filter(None, (words, told))) for words in of]
     text = adapting.text[:1].upper() + adapting.text[1:]
     return tuple(dict.fromkeys(filter(None, (text, *short, of[-1] if of else ""))))

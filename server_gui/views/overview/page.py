@@ -1,4 +1,7 @@
-"""The overview: what is so now, gait phase, posture, pressure of both feet, three plots, and the joints."""
+"""The overview: what is so now, gait phase, posture, pressure of both feet, three plots, and the joints.
+
+Where not all of it is seen at once, the joints come before the pictures: their numbers are never scrolled to.
+"""
 
 from collections.abc import Collection
 from typing import Final
@@ -17,7 +20,8 @@ from server_gui.core.follow.frame_time import now_ns
 from server_gui.core.processing.gait_events import Leg
 from server_gui.views.marks import age_text, old_text
 from server_gui.views.overview.joint_table import JointModel, JointTable
-from server_gui.views.overview.key_plot import SECONDS, KeyPlot, Kind
+from server_gui.views.overview.joint_words import JointWords
+from server_gui.views.overview.key_plot import SECONDS, KeyPlot, PlotKind
 from server_gui.views.overview.learned_offer import LearnedOffer
 from server_gui.views.overview.now_line import NowLine
 from server_gui.views.predictions import STOPPED, activity, lines, model_phases
@@ -34,20 +38,23 @@ from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 
 SHARES: Final = (10, 9, 11)  # of the width, where three cards stand beside each other
 A_COLUMN: Final = 190  # wide at least, at text of 100 %
+LEEWAY: Final = 40  # high, likewise: so much must be spare before the joints go down again
 STATUS_LINES: Final = 3
 WIDEST_N: Final = 888.0  # of what a foot carries
 SHARE: Final = 0.05  # of both feet: a figure that is further off than its picture is read at once
 SIDES: Final = ("left", "right")
 PLOTS: Final = (
-    Kind(
+    PlotKind(
         "Knee angle",
         "rad",
         0.2,
         tuple((f"{side}_knee.position", side, side) for side in SIDES),
         ends="0x607d",
     ),
-    Kind("Knee torque", "N·m", 5.0, tuple((f"{side}_knee.torque", side, side) for side in SIDES), "0x6072"),
-    Kind(
+    PlotKind(
+        "Knee torque", "N·m", 5.0, tuple((f"{side}_knee.torque", side, side) for side in SIDES), "0x6072"
+    ),
+    PlotKind(
         "Trunk tilt",
         "rad",
         0.08,
@@ -66,6 +73,7 @@ class Overview(QWidget):
         self._desk = desk
         self._theme = theme
         self._read_ns: int | None = None  # when what is read was last shown
+        self.is_numbers_first = True  # where not all is seen at once
         self.is_paced = True  # by itself; else only as it is told: with what stands beside it
         self._station: Station | None = None
         self._soles = dict.fromkeys(SIDES, Sole())
@@ -87,18 +95,34 @@ class Overview(QWidget):
         self._pressure = self._pressure_card()
         self._plots = [self._plot(kind) for kind in PLOTS]
         self._joints, self._model = Card("Joints"), JointModel(desk, theme)
-        self._joints.body.addWidget(JointTable(self._model, theme))
+        self._table = JointTable(self._model, theme)
+        self._joints.body.addWidget(self._table)
+        self._wrong = JointWords(theme)
+        self._joints.body.addWidget(self._wrong)
         self._grid = QGridLayout(self)
         self._grid.setContentsMargins(6, 6, 6, 6)
         self._grid.setSpacing(6)
-        self._columns, self._is_plots = 0, False
+        self._columns, self._is_plots, self._is_low = 0, False, False
         self._arrange(len(SHARES))
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        columns = self._fitting
-        if columns != self._columns:
+        self._fit()
+
+    def _fit(self) -> None:
+        """Arrange it anew where another number of cards fits, or all of it is seen at once or no more."""
+        columns, is_low = self._fitting, self._is_too_low()
+        if columns != self._columns or is_low is not self._is_low:
+            self._is_low = is_low
             self._arrange(columns)
+
+    def _is_too_low(self) -> bool:
+        """Whether something has to be scrolled to."""
+        seen = self.parentWidget()
+        if seen is None or not self.is_numbers_first:
+            return False
+        spare = seen.height() - self._grid.totalMinimumSize().height()
+        return spare < (self._theme.px(LEEWAY) if self._is_low else 0)
 
     @property
     def _fitting(self) -> int:
@@ -119,19 +143,21 @@ class Overview(QWidget):
         return QSize(self._theme.px(A_COLUMN), super().minimumSizeHint().height())
 
     def _arrange(self, columns: int) -> None:
-        """Arrange as many cards as fit in a row, and the joints below."""
+        """Lay as many cards as fit in a row, and the joints below, or above where there is little room."""
         self._columns, grid = columns, self._grid
         grid.addWidget(self.now, 0, 0, 1, columns)
         cards = [] if self._is_plots else [self._status, self._posture, self._pressure]
+        first = 2 if self._is_low else 1
         for place, card in enumerate((*cards, *self._plots)):
-            grid.addWidget(card, 1 + place // columns, place % columns)
-        rows = 1 + -(-(len(cards) + len(self._plots)) // columns)
-        grid.addWidget(self._joints, rows, 0, 1, columns)
+            grid.addWidget(card, first + place // columns, place % columns)
+        last = first + -(-(len(cards) + len(self._plots)) // columns)
+        joints = 1 if self._is_low else last
+        grid.addWidget(self._joints, joints, 0, 1, columns)
         for column, share in enumerate(SHARES):
             grid.setColumnStretch(column, share if column < columns else 0)
-        for row in range(8):
-            is_plots = (row - 1) * columns >= len(cards)
-            grid.setRowStretch(row, 0 if row in (0, rows) or row > rows else 6 if is_plots else 10)
+        for row in range(9):
+            is_plots = (row - first) * columns >= len(cards)
+            grid.setRowStretch(row, 0 if row in (0, joints) or row >= last else 6 if is_plots else 10)
 
     def read_now(self) -> None:
         """Let the next frame show also what is read: what stands beside it is shown anew then."""
@@ -150,6 +176,7 @@ class Overview(QWidget):
         if slow:
             self._read_ns = now_ns()
             self.now.refresh()
+            self._fit()  # also where less of it is seen, which changes nothing of its size
         self._refresh_status(station, slow=slow)
         self._refresh_posture(station, slow=slow)
         self._refresh_pressure(station, slow=slow)
@@ -158,11 +185,12 @@ class Overview(QWidget):
             plot.refresh(station, flags, slow=slow)
         if slow:
             self._model.refresh()
+            self._wrong.say(self._table.unsaid)
             self._joints.set_note(*_age(station))
 
     # --- one time for all plots
 
-    def _plot(self, kind: Kind) -> KeyPlot:
+    def _plot(self, kind: PlotKind) -> KeyPlot:
         made = KeyPlot(self._desk, self._theme, kind)
         made.plot.zoomed.connect(self._show_time)
         made.plot.fitted.connect(self._fit_time)

@@ -176,7 +176,7 @@ class Detail(Card):
 
 
 def reach(info: ParameterInfo, current: Number | None) -> tuple[float, float] | None:
-    """Return what one write can reach, in SI; None where there are no limits."""
+    """Return the range of one write, in SI; None without limits."""
     if info.min is None or info.max is None or info.max <= info.min:
         return None
     if info.max_step is None or current is None:

@@ -26,7 +26,7 @@ class Filter(QSortFilterProxyModel):
         self.setRecursiveFilteringEnabled(True)
 
     def show(self, words: str, names: Iterable[str] | None) -> bool:
-        """Show what has all words, and is one of `names`; whether that is something else than before."""
+        """Show rows that match all words and are one of `names`; return whether the filter has changed."""
         wanted = words.lower().split(), None if names is None else frozenset(names)
         if wanted == (self._words, self._names):
             return False
@@ -77,7 +77,7 @@ class FilterBar(QWidget):
         self._arrange()
 
     def refresh(self) -> Iterable[str] | None:
-        """Show how many there are of each kind; the names of the chosen one, None for all."""
+        """Show the numbers of each kind; return the names of the chosen one, None for all."""
         station = self._desk.selected
         chosen: Iterable[str] | None = None
         for kind, names_of in KINDS.items():

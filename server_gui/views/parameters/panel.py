@@ -21,7 +21,7 @@ from gateway.wire.parameter import PARAMETER_STORE, PARAMETER_WRITE
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.tuning.comparison import open_file, save_file, staged_as
-from server_gui.core.tuning.edits import Change, refusal, unit_of
+from server_gui.core.tuning.edits import ReviewedEdit, refusal, unit_of
 from server_gui.core.tuning.several_joints import Offer
 from server_gui.core.tuning.writing import WriteState
 from server_gui.views.parameters.control_bar import ControlBar
@@ -239,7 +239,7 @@ class ParametersPanel(QWidget):
         return grid
 
     def _more_button(self) -> QPushButton:
-        """Return what its menu has is done by the buttons that it stands for."""
+        """Return the button whose menu replaces the rarely used buttons."""
         self._seldom = (self._compare, self._save, self.store_button)
         self.more = QPushButton("More")
         menu = QMenu(self.more)
@@ -328,8 +328,8 @@ class ParametersPanel(QWidget):
         self._with(Station.stage_undo)
         self.begin_review()
 
-    def _write(self, changes: tuple[Change, ...], trial_s: float | None) -> None:
-        """Write what was shown, unless the robot holds something else by now: then that is shown first."""
+    def _write(self, changes: tuple[ReviewedEdit, ...], trial_s: float | None) -> None:
+        """Write the reviewed changes; if the robot's values have changed since, show the review again."""
         station = self._desk.selected
         if station is None:
             return
@@ -352,7 +352,7 @@ class ParametersPanel(QWidget):
             self.pages.setCurrentIndex(EDIT)
 
     def _refused(self, station: Station | None) -> str:
-        """Return what of the staged the robot would refuse, as it stands now."""
+        """Return the staged values that the robot would refuse now."""
         changes = () if station is None else station.difference(self._desk.shown.units)
         said = [f"{change.name}: {change.problem}" for change in changes if change.problem]
         return "\n".join(said)
@@ -377,7 +377,7 @@ def _close_file(station: Station) -> None:
 
 
 def _banner(station: Station | None, staged: int, problem: str) -> tuple[str, str]:
-    """Return what matters most now, and how it is meant."""
+    """Return the most important message, and its style."""
     if station is None:
         return "No robot chosen: there is nothing to change.", "plain"
     if problem:

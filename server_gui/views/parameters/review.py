@@ -15,7 +15,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from server_gui.core.tuning.edits import Change
+from server_gui.core.tuning.edits import ReviewedEdit
 from server_gui.views.parameters.tree import range_text
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.columns import title_widths
@@ -44,7 +44,7 @@ class Review(QWidget):
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self._theme = theme
-        self.changes: tuple[Change, ...] = ()
+        self.changes: tuple[ReviewedEdit, ...] = ()
         self._allowed = False
         self._settled = QTimer(self, singleShot=True)
         self._settled.timeout.connect(lambda: self._enable(self._allowed))
@@ -100,8 +100,8 @@ class Review(QWidget):
         everything.addWidget(self.leave_out)
         everything.addLayout(row)
 
-    def show_changes(self, changes: tuple[Change, ...]) -> None:
-        """Show what would be written from now on."""
+    def show_changes(self, changes: tuple[ReviewedEdit, ...]) -> None:
+        """Show the changes to be written."""
         self.changes = changes
         self.table.setRowCount(len(changes))
         for row, change in enumerate(changes):
@@ -148,7 +148,7 @@ class Review(QWidget):
         self.try_it.setEnabled(on)
         self.write_it.setEnabled(on)
 
-    def _fill(self, row: int, change: Change) -> None:
+    def _fill(self, row: int, change: ReviewedEdit) -> None:
         old = "–" if change.old is None else change.unit.editable(change.old)
         mark = "✕ refused" if change.problem else ("⚠ changed elsewhere" if change.elsewhere else "")
         new, allowed = change.unit.editable(change.new), range_text(*change.allowed, change.unit)

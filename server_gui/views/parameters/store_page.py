@@ -122,7 +122,7 @@ class StorePage(QWidget):
             self.store.emit(tuple(one.components[0] for one in self._chosen))
 
     def _state(self, station: Station | None, chosen: list[Storable]) -> tuple[str, str]:
-        """Return what is to be known before, and whether it can be done."""
+        """Return the notes before storing, and whether it is possible."""
         if station is None or not chosen:
             return "No device of this robot says that it can store (1010h).", "bad"
         trial = station.writing.trial

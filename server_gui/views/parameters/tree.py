@@ -16,7 +16,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from gateway.parameter_files.comparison import Verdict
+from gateway.parameter_files.comparison import ComparisonVerdict
 from gateway.units import Unit, with_minus
 from gateway.wire.method import Number
 from gateway.wire.parameter import ParameterInfo
@@ -156,7 +156,7 @@ class ParameterTree(QTreeView):
             self._show_columns()
 
     def show_only(self, words: str, names: Iterable[str] | None) -> None:
-        """Show what has all words and is one of `names`, its groups open; who chose one finds it chosen."""
+        """Show rows that match all words and are one of `names`, with open groups; the selection stays."""
         self._filtering = True
         if self.filter.show(words, names):
             self._open_groups(everything=bool(words) or names is not None)
@@ -296,7 +296,7 @@ class ParameterTree(QTreeView):
         value = None if row is None else row.file
         unit = unit_of(name, info.unit, self._desk.shown.units)
         _set(items[FILE], "" if value is None else brief(unit, value))
-        same = row is None or row.verdict is Verdict.SAME
+        same = row is None or row.verdict is ComparisonVerdict.SAME
         items[FILE].setForeground(self._theme.colour("dim" if same else "warn"))
 
     def _exact(self, name: str) -> str:

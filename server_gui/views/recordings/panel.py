@@ -24,6 +24,7 @@ class Recordings(QStackedWidget):
         self.setObjectName("page")
         self.list = SessionsPage(archive, recording, theme)
         self.list.played.connect(self._play)
+        self.list.beside.connect(self._play_beside)
         self.list.compared.connect(lambda: self.setCurrentIndex(CHANGED))
         self._player = LazyView(self._make_player)
         self._changed = LazyView(self._make_changed)
@@ -61,3 +62,9 @@ class Recordings(QStackedWidget):
             self.setCurrentIndex(PLAYER)
             self.player.show_tape()
             self._archive.playback.play(on=True)  # as the button says; at its very beginning there is little
+
+    def _play_beside(self) -> None:
+        marked = self.list.marked
+        self._play()
+        if self.currentIndex() == PLAYER and len(marked) == 2:
+            self.player.show_beside(marked[1])

@@ -18,14 +18,19 @@ from PySide6.QtWidgets import (
 )
 
 from gateway.plain_text import plain
+from ml.store.sessions import Session
 from server_gui.core.archive.archive import Archive
-from server_gui.core.archive.playback import SPEEDS
+from server_gui.core.archive.playback import SPEEDS, PlayedRobot
 from server_gui.core.archive.recorded_notes import RecordedNotes
+from server_gui.core.archive.side_by_side import SideBySide
 from server_gui.core.cloud.actions import FORMATS, export
 from server_gui.core.cloud.selection import Choice
 from server_gui.core.cloud.tape import Tape, as_time
+from server_gui.core.workspace.alignment import Align
+from server_gui.views.alarms.strip import AlarmStrip
 from server_gui.views.overview.page import Overview
 from server_gui.views.predictions import status
+from server_gui.views.recordings.beside_bar import BesideBar
 from server_gui.views.recordings.label_bar import LabelBar
 from server_gui.views.recordings.timeline import SECOND_NS, Timeline, clock_text, day_text
 from server_gui.views.theme import Theme
@@ -33,11 +38,13 @@ from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.files import ask_save
 from server_gui.views.widgets.plain import PlainLabel, set_tip
 from server_gui.views.widgets.scroll_area import ScrollArea
-from server_gui.views.workspace.page import Signals
+from server_gui.views.workspace.page import AROUND_S, Signals
 
 ROOMY: Final = 440  # high, at text of 100 %: what is lower shows plots alone beside labels
 ALL: Final = 960  # high, likewise: what is lower begins with all of the robot rather than with what labels it
 SLOW: Final = 5  # frames between two looks at what people read
+SIGNALS: Final = 1  # of the two views
+AROUND_NS: Final = round(AROUND_S * SECOND_NS)
 
 
 class Player(QWidget):
@@ -53,12 +60,27 @@ class Player(QWidget):
         self._frame = 0
         self._told: object = None  # which recording and journal have been told of
         self.overview = Overview(self._playback.desk, theme)
+        self.overview.is_numbers_first = False  # a walk is replayed for how it looked
         notes = RecordedNotes(self._playback, archive.labels)
-        self.signals = Signals(self._playback.desk, theme, notes)
+        deliver, reading = archive.deliver, archive.library.reading
+        self.beside = SideBySide(self._playback, archive.settings, reading.do, deliver)
+        self.signals = Signals(
+            self._playback.desk,
+            theme,
+            notes,
+            others=lambda: self.beside.second.desk.stations,
+            step=self.beside.step,
+        )
+        self.beside_bar = BesideBar(self.beside)
         self._views = (self.overview, self.signals)
+        self._around: tuple[str, int] | None = None  # a channel and an instant, to be shown once it is read
         self._stack = QStackedWidget()
         for view in self._views:
             self._stack.addWidget(ScrollArea(view))
+        self.alarms = AlarmStrip(self._playback.desk, theme, self)
+        self.alarms.setAccessibleName("Alarms of the recording")
+        self.alarms.shown.connect(lambda _station, channel, at_ns: self.show_around(channel, at_ns))
+        self.alarms.hide()
         self.banner = PlainLabel()
         self.banner.setObjectName("banner")
         self.banner.setWordWrap(True)
@@ -73,6 +95,8 @@ class Player(QWidget):
         everything.setContentsMargins(8, 8, 8, 8)
         everything.setSpacing(6)
         everything.addLayout(self._head())
+        everything.addWidget(self.beside_bar)
+        everything.addWidget(self.alarms)
         everything.addWidget(self._stack, 1)
         everything.addWidget(self.timeline)
         everything.addLayout(self._transport())
@@ -105,6 +129,26 @@ class Player(QWidget):
             self.timeline.show_tape(self._playback.tape)
             self.timeline.setFocus()
             self._speed.setCurrentIndex(SPEEDS.index(self._playback.speed))
+            self._around = None
+            self.beside.close()
+            self.beside_bar.refresh()
+            self.alarms.list.hide()
+            self.alarms.hide()
+
+    def show_beside(self, session: Session) -> None:
+        """Show another recording in the same plots: what is played goes on with it from its beginning."""
+        self.beside.open(session)
+        self.beside_bar.refresh()
+        self._choice.button(SIGNALS).click()
+
+    def show_around(self, channel: str, at_ns: int) -> None:
+        """Show a channel before and after an instant of its signals: what comes after it is read first."""
+        robot = self._playback.desk.stations[0].robot
+        if isinstance(robot, PlayedRobot) and robot.row_ns is not None and robot.stamp_ns is not None:
+            self._playback.play(on=False)
+            self._playback.seek(at_ns + robot.row_ns - robot.stamp_ns + AROUND_NS)
+            self._around = (channel, at_ns)
+            self._choice.button(SIGNALS).click()
 
     def refresh(self) -> None:
         """Go on playing, and draw a frame."""
@@ -112,12 +156,24 @@ class Player(QWidget):
         playback.step()
         if playback.tape is None:
             return
+        if self._around is not None and not playback.is_loading:
+            (channel, at_ns), self._around = self._around, None
+            self.signals.refresh()
+            self.signals.show_around((channel,), at_ns)
+        self._refresh_beside()
         self._views[self._stack.currentIndex()].refresh()
         self.timeline.show_position(playback.position_ns)
         self.timeline.show_outline(playback.outline)
         self._frame += 1
         if self._frame % SLOW == 1:
             self._refresh_words()
+
+    def _refresh_beside(self) -> None:
+        """Bring the second recording into the plots once it is there."""
+        station, scene = self.beside.station, self.signals.scene
+        if station is not None and (scene.beside is None or scene.beside.station is not station):
+            scene.put_beside(station)
+            scene.align = Align.NOW
 
     # --- how it is put together
 
@@ -155,6 +211,7 @@ class Player(QWidget):
         self.export.setMenu(menu)
         self.export.setToolTip("The chosen span, or all of it, as a file; made in the background")
         self.events = QPushButton("Events")
+        self.events.setAccessibleName("Events of the recording")
         self.events.setToolTip("What happened in it; choose one to see its instant")
         happened = QMenu(self.events)
         happened.aboutToShow.connect(lambda: self._list_events(happened))
@@ -192,7 +249,15 @@ class Player(QWidget):
         set_text(self.place, f"{clock_text(since, 1)} of {clock_text(length, 1)}{looking}")
         self.events.setEnabled(bool(len(happened.flags)))
         self._refresh_flags(tape)
+        self._refresh_alarms()
+        self.beside_bar.refresh()
         self.labels.refresh(tape)
+
+    def _refresh_alarms(self) -> None:
+        """What was wrong then; where something was, there is room for it from then on: nothing moves again."""
+        self.alarms.refresh()
+        if self.alarms.told and self.alarms.isHidden():
+            self.alarms.show()
 
     def _refresh_flags(self, tape: Tape) -> None:
         journals, happened = self._archive.journals, self._playback.happened
@@ -246,6 +311,7 @@ class Player(QWidget):
         self._playback.speed = SPEEDS[place]
 
     def _back(self) -> None:
+        self.beside.close()
         self._playback.close()
         self.left.emit()
 

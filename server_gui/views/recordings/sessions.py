@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from datetime import datetime
 from typing import Any, Final
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import QRect, Qt, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -13,6 +13,7 @@ from PySide6.QtWidgets import (
     QPlainTextEdit,
     QPushButton,
     QSplitter,
+    QStyle,
     QVBoxLayout,
     QWidget,
 )
@@ -28,6 +29,7 @@ from server_gui.views.recordings.timeline import SECOND_NS, clock_text
 from server_gui.views.theme import Theme
 from server_gui.views.widgets import columns
 from server_gui.views.widgets.card import Card, set_text
+from server_gui.views.widgets.elided import WrappingDelegate
 from server_gui.views.widgets.plain import PlainLabel, set_tip, tip
 from server_gui.views.widgets.rows import SORT_ROLE, Filtered, Index, RowsModel, RowsTable
 
@@ -40,8 +42,12 @@ EMPTY: Final = (
     "Nothing is recorded yet. What a robot sends while this window is open is recorded by itself: "
     "add a robot at the left, and its session appears here within seconds."
 )
+ROW: Final = 21  # high, at text of 100 %
+LINES: Final = 6  # of notes, at most
+WRAPPED: Final = Qt.TextFlag.TextWordWrap.value
 EVENTS_TOLD: Final = 200
 MARK_TWO: Final = "Mark two recordings: a click on one, a click with Ctrl on the other"
+TOGETHER: Final = "Both in the same plots, played together: aligned by their beginnings or a heel strike"
 COMPARING: Final = "What was otherwise in the later one, and what of the walk moved with it"
 
 
@@ -69,13 +75,15 @@ class SessionModel(RowsModel[Session]):
 
 
 class SessionsTable(RowsTable):
-    """What has no room is told of the chosen one beside it."""
+    """Notes stand in lines. What has no room is told of the chosen one beside it."""
 
     def __init__(self, model: Filtered, theme: Theme) -> None:
         super().__init__(model, "Recordings", BEGAN)
         self._theme = theme
+        self._lines = WrappingDelegate(NOTES)
+        self.setItemDelegate(self._lines)
         columns.prepare(self)
-        for changed in (model.dataChanged, model.rowsInserted, model.rowsRemoved):
+        for changed in (model.dataChanged, model.rowsInserted, model.rowsRemoved, model.layoutChanged):
             changed.connect(self.fit)
         theme.changed.connect(self.fit)
 
@@ -86,12 +94,29 @@ class SessionsTable(RowsTable):
     def fit(self) -> None:
         """Share what room there is."""
         columns.fit(self, {column: self._theme.px(least) for column, least in NAMES.items()}, SPARE)
+        for row in range(self.model().rowCount()):
+            if self.rowHeight(row) != (high := self._high(row)):
+                self.setRowHeight(row, high)
+
+    def _high(self, row: int) -> int:
+        """How high a row is with its notes, which are whole where they are not too long."""
+        notes, one = str(self.model().index(row, NOTES).data() or ""), self._theme.px(ROW)
+        if not notes or self.isColumnHidden(NOTES):
+            return one
+        margin = self.style().pixelMetric(QStyle.PixelMetric.PM_FocusFrameHMargin) + 1
+        box = QRect(0, 0, max(self.columnWidth(NOTES) - 2 * margin, 1), 100_000)
+        needed = self.fontMetrics().boundingRect(box, WRAPPED, notes).height()
+        return max(one, min(needed, LINES * self.fontMetrics().lineSpacing()) + self._theme.px(4))
 
 
 class SessionsPage(QWidget):
-    """`played` when the chosen session is to be played, `compared` when two that are marked are compared."""
+    """`played` when the chosen session is to be played; of two that are marked, `beside` each other.
+
+    `compared` when these are compared.
+    """
 
     played = Signal()
+    beside = Signal()
     compared = Signal()
 
     def __init__(self, archive: Archive, recording: Recording, theme: Theme) -> None:
@@ -116,6 +141,8 @@ class SessionsPage(QWidget):
         self.play.clicked.connect(self.played)
         self.compare = QPushButton("What changed?")
         self.compare.clicked.connect(self._compare)
+        self.together = QPushButton("Side by side")
+        self.together.clicked.connect(self.beside)
         self.details = QPlainTextEdit(readOnly=True)
         self.details.setAccessibleName("What is known of the chosen recording")
         self._card = Card("Recording")
@@ -125,7 +152,10 @@ class SessionsPage(QWidget):
         self._list.body.addWidget(self.words)
         self._list.body.addWidget(self.said)
         self._list.body.addWidget(self.table, 1)
-        self._list.body.addWidget(self.compare)
+        of_two = QHBoxLayout()
+        of_two.addWidget(self.compare)
+        of_two.addWidget(self.together)
+        self._list.body.addLayout(of_two)
         split = QSplitter()
         split.addWidget(self._list)
         split.addWidget(self._card)
@@ -171,6 +201,8 @@ class SessionsPage(QWidget):
         marked = self.marked
         self.compare.setEnabled(len(marked) == 2)
         set_tip(self.compare, COMPARING if len(marked) == 2 else MARK_TWO)
+        self.together.setEnabled(len(marked) == 2 and self._archive.tape is not None)
+        set_tip(self.together, TOGETHER if len(marked) == 2 else MARK_TWO)
 
     def _compare(self) -> None:
         marked = self.marked
@@ -180,8 +212,8 @@ class SessionsPage(QWidget):
 
     def _state(self) -> str:
         library = self._archive.library
-        if library.found.problem is not None:
-            return f"The store is not reached, it is tried again: {library.found.problem}"
+        if library.reach.problem is not None:
+            return f"The store is not reached, it is tried again: {library.reach.problem}"
         return EMPTY if library.revision and not library.found.sessions else ""
 
     def _refresh_details(self) -> None:
@@ -196,7 +228,7 @@ class SessionsPage(QWidget):
 
     # --- how it is put together
 
-    def _table(self) -> RowsTable:
+    def _table(self) -> SessionsTable:
         self._filter = Filtered(self.sessions)
         table = SessionsTable(self._filter, self._theme)
         table.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
@@ -223,7 +255,8 @@ class SessionsPage(QWidget):
             self.mark.clear()
 
     def _restyle(self) -> None:
-        self.table.verticalHeader().setDefaultSectionSize(self._theme.px(21))
+        self.table.verticalHeader().setDefaultSectionSize(self._theme.px(ROW))
+        self.table.fit()
         self.details.setMinimumWidth(self._theme.px(120))
 
 
@@ -258,9 +291,9 @@ def _when(time: datetime | None) -> str:
 
 
 def _told(session: Session | None, tape: Tape | None, problem: str, held: Sequence[str]) -> str:
-    """Return what is known of it, as text."""
+    """Return the facts of a session as text."""
     if session is None:
-        return "Choose a recording to see what is in it; with Ctrl a second one, to ask what changed."
+        return "Choose a recording to see what is in it; with Ctrl a second one, to compare the two."
     known = {
         "Session": session.session,
         "Robot": session.robot,

@@ -263,7 +263,7 @@ class Timeline(QWidget):
     # --- where an instant is
 
     def _flag_at(self, place: QPointF) -> Flag | None:
-        """Return what happened there; it is pointed at above the bar."""
+        """Return the flag at this place, which is pointed at above the bar."""
         if place.y() > self._bar().top():
             return None
         near = self._theme.px(7)

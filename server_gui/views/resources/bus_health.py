@@ -1,6 +1,6 @@
 """Bus health: each CAN bus with its load, state and errors, who talks on it, and how its nodes answer."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 from PySide6.QtCore import QRectF, QSize, Qt
@@ -17,12 +17,14 @@ from PySide6.QtWidgets import (
 )
 
 from gateway.wire.bus import BusInfo, NodeInfo
+from server_gui.core.alarms.alarm import Alarms
+from server_gui.core.alarms.severity import bus_level
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.processing.bus_health import (
     BUSY_PERCENT,
     FULL_PERCENT,
-    Level,
+    BusHealthLevel,
     Talking,
     findings,
     level,
@@ -43,10 +45,10 @@ from server_gui.views.widgets.wrapping_legend import WrappingLegend
 
 READ: Final = 6  # frames between two looks
 LEVELS: Final = {
-    Level.GOOD: Mark("disc", "good", "ok"),
-    Level.UNKNOWN: Mark("ring", "old", "not known"),
-    Level.WARNING: Mark("triangle", "warn", "warning"),
-    Level.ALARM: Mark("square", "bad", "ALARM"),
+    BusHealthLevel.GOOD: Mark("disc", "good", "ok"),
+    BusHealthLevel.UNKNOWN: Mark("ring", "old", "not known"),
+    BusHealthLevel.WARNING: Mark("triangle", "warn", "warning"),
+    BusHealthLevel.ALARM: Mark("square", "bad", "ALARM"),
 }
 TITLES: Final = (
     "Node",
@@ -143,12 +145,13 @@ class BusCard(Card):
         """Rows and letters are of the size before."""
         self.table.setRowCount(0)
 
-    def show_bus(self, bus: BusInfo) -> None:
-        """Show how it is now."""
-        bad, mark = level(bus), LEVELS[level(bus)]
+    def show_bus(self, bus: BusInfo, alarms: Alarms) -> None:
+        """Show how it is now, as bad as what is told of it and of its nodes."""
+        bad = bus_level(level(bus), bus.name, alarms)
+        mark = LEVELS[bad]
         self._icon.show_mark(mark)
         rate = "" if bus.bitrate is None else f" of {bus.bitrate / 1e6:g} Mbit/s"
-        word = "FULL: " if bad is Level.ALARM and (bus.load_percent or 0.0) >= FULL_PERCENT else ""
+        word = "FULL: " if bad is BusHealthLevel.ALARM and (bus.load_percent or 0.0) >= FULL_PERCENT else ""
         self.load.say(f"{word}{load_text(bus)}{rate}", f"{word}{load_text(bus)}")
         self._bar.show_load(bus.load_percent, "accent" if mark.colour == "good" else mark.colour)
         self.set_title(f"Bus {bus.name}")
@@ -166,9 +169,9 @@ class BusCard(Card):
             )
         self._counters.say([*counters, (text, "", f"opened {bus.opened} ×")])
         self._kinds.say([(css(self._theme, "dim"), "", f"{kind} {rate:.0f}/s") for kind, rate in _kinds(bus)])
-        self._show_nodes(bus)
+        self._show_nodes(bus, {alarm.subject: alarm.mark.colour for alarm in alarms.each})
 
-    def _show_nodes(self, bus: BusInfo) -> None:
+    def _show_nodes(self, bus: BusInfo, told: Mapping[str, str]) -> None:
         talks = {one.node_id: one for one in talking(bus)}
         nodes = {node.node_id: node for node in bus.nodes}
         rows = sorted(talks.keys() | nodes.keys(), key=lambda known: _order(known, talks.get(known)))
@@ -181,9 +184,11 @@ class BusCard(Card):
             )
         for row, node_id in enumerate(rows):
             node, talk = nodes.get(-1 if node_id is None else node_id), talks.get(node_id)
-            good = node is None or node_level(node) is Level.GOOD
+            colours = [told.get(name) for name in (() if node is None else node.components)]
+            good = node is None or (node_level(node) is BusHealthLevel.GOOD and "warn" not in colours)
+            colour = "bad" if "bad" in colours else "text" if good else "warn"
             for column, said in enumerate(_texts(node_id, node, talk)):
-                self._set(row, column, said, "text" if good else "warn")
+                self._set(row, column, said, colour)
         self._fit()
 
     def _fit(self) -> None:
@@ -250,10 +255,15 @@ class BusHealthView(QWidget):
         for place, card in enumerate(self.cards):
             card.setVisible(place < len(shown))
             if place < len(shown):
-                card.show_bus(shown[place])
+                card.show_bus(shown[place], station.alarms)
 
     def _say(self, station: Station, buses: Sequence[BusInfo] | None) -> None:
-        found = [(level(bus), bus.name, *one) for bus in buses or () for one in findings(bus)]
+        alarms = station.alarms
+        found = [
+            (bus_level(level(bus), bus.name, alarms), bus.name, *one)
+            for bus in buses or ()
+            for one in findings(bus)
+        ]
         if buses is None:
             is_old = (
                 station.is_linked and station.robot.buses_at_ns is not None and station.robot.buses is None
@@ -267,7 +277,7 @@ class BusHealthView(QWidget):
         checks = dict.fromkeys(check for *_, check in found if check)
         set_text(self.checks, "\n".join(f"→ {check}" for check in checks))
         self._check.setVisible(bool(checks))
-        tone = "bad" if any(bad is Level.ALARM for bad, *_ in found) else ""
+        tone = "bad" if any(bad is BusHealthLevel.ALARM for bad, *_ in found) else ""
         if self.said.property("tone") != tone:
             self.said.setProperty("tone", tone)
             self.said.style().polish(self.said)

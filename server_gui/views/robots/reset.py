@@ -39,7 +39,7 @@ def ask_clear(parent: QWidget, station: Station) -> Question:
 
 
 def _ask_again(parent: QWidget, station: Station, why: str) -> None:
-    """Say that it has not helped, which is no success though no stop is held."""
+    """Report that the fault is still there: no success, even though no stop is held."""
 
     def again() -> None:
         ask_clear(parent, station)

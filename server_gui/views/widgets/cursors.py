@@ -37,7 +37,7 @@ FIRST: Final = (
 
 
 @dataclass(frozen=True, slots=True)
-class Shown:
+class CursorLayout:
     """Where things are, as shares of the field's width from the left, and of its height from the top."""
 
     at: tuple[float, ...] = ()  # the cursors
@@ -56,7 +56,7 @@ class Shown:
 
 
 def told(flags: Iterable[tuple[float, FlagKind]], apart: float) -> list[tuple[float, FlagKind]]:
-    """Return which flags have room for their mark, `apart` from each other: a fault before the stop by it."""
+    """Return the flags with room for their mark, `apart` from each other: a fault before its stop."""
     found: list[tuple[float, FlagKind]] = []
     for share, kind in sorted(flags, key=lambda flag: FIRST.index(flag[1])):
         if all(abs(share - other) >= apart for other, _ in found):
@@ -70,11 +70,11 @@ class Cursors(QWidget):
     def __init__(self, theme: Theme, parent: QWidget) -> None:
         super().__init__(parent)
         self._theme = theme
-        self._shown = Shown()
+        self._shown = CursorLayout()
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         self.hide()
 
-    def show_marks(self, shown: Shown) -> None:
+    def show_marks(self, shown: CursorLayout) -> None:
         """Show these from now on."""
         if shown != self._shown:
             self._shown = shown

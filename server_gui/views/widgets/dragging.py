@@ -14,7 +14,7 @@ CURVES: Final = "application/x-gwrms-curves"
 
 
 def dragged(texts: Sequence[str]) -> QMimeData:
-    """Return what a drag of these curves carries."""
+    """Return the data of a drag of these curves."""
     data = QMimeData()
     data.setData(CURVES, json.dumps(list(texts)).encode())
     data.setText("\n".join(texts))

@@ -56,6 +56,27 @@ class SentenceDelegate(QStyledItemDelegate):
         option.text = whole_words(option.text, option.fontMetrics, room)
 
 
+class WrappingDelegate(QStyledItemDelegate):
+    """Draws what is in a column in lines; its view gives the row the height for them."""
+
+    def __init__(self, column: int) -> None:
+        super().__init__()
+        self._column = column
+        self._paints = False  # else Qt asks how wide it is in one line
+
+    def initStyleOption(self, option: QStyleOptionViewItem, index: Index) -> None:
+        super().initStyleOption(option, index)
+        if self._paints and index.column() == self._column:
+            option.features |= QStyleOptionViewItem.ViewItemFeature.WrapText
+
+    def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: Index) -> None:
+        self._paints = True
+        try:
+            super().paint(painter, option, index)
+        finally:
+            self._paints = False
+
+
 def whole_words(text: str, metrics: QFontMetrics, room: int) -> str:
     """Return all of it, or as many of its words as have room (pixels) with … behind, the first at least."""
     if metrics.horizontalAdvance(text) <= room:

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from PySide6.QtCore import QPointF, QRectF, QSize, Qt
+from PySide6.QtCore import QPointF, QRectF, QSize, QSizeF, Qt
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPainterPath, QPaintEvent, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
@@ -98,10 +98,7 @@ class StickFigure(QWidget):
         if last in chains:
             self._draw_leg(painter, last, chains[last], hip, unit)
         self._name_sides(painter, {side: hip + points[-1] * unit for side, points in chains.items()})
-        for side, points in chains.items():
-            for joint, point in zip(JOINTS, (QPointF(), *points), strict=False):
-                if f"{side}_{joint}" in self._wrong:
-                    self._name_joint(painter, f"{side} {joint}", hip + point * unit, unit)
+        self._name_joints(painter, chains, hip, unit)
         self._draw_angles(painter)
         painter.end()
 
@@ -128,17 +125,30 @@ class StickFigure(QWidget):
             painter.strokePath(letter, QPen(self._theme.colour("card"), 3))  # it may stand on the other leg
             painter.fillPath(letter, self._theme.colour(side if self._live else "old"))
 
-    def _name_joint(self, painter: QPainter, name: str, point: QPointF, unit: float) -> None:
+    def _name_joints(
+        self, painter: QPainter, chains: Mapping[str, tuple[QPointF, ...]], hip: QPointF, unit: float
+    ) -> None:
+        """Name each joint in trouble behind the wearer, where no leg swings to."""
+        at = {
+            (side, joint): hip + point * unit
+            for side, points in chains.items()
+            for joint, point in zip(JOINTS, (QPointF(), *points), strict=False)
+            if f"{side}_{joint}" in self._wrong
+        }
         painter.setFont(self._theme.text_font(bold=True))
-        metrics = painter.fontMetrics()
-        width, height = metrics.horizontalAdvance(name) + 8, metrics.height() + 2
-        left = point.x() - unit * 0.06 - width  # behind the wearer, where no leg swings to
-        box = QRectF(max(0.0, left), point.y() - height / 2, width, height)
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(self._theme.colour("card"))
-        painter.drawRoundedRect(box, 3, 3)
-        painter.setPen(self._theme.colour("bad" if self._live else "old"))
-        painter.drawText(box, Qt.AlignmentFlag.AlignCenter, name)
+        metrics = QFontMetricsF(painter.font())
+        names = placed_names(at, metrics, unit * 0.06, QSizeF(self.size()))
+        for _, box, joints in names:
+            painter.setPen(QPen(self._theme.colour("bad" if self._live else "old"), 1))
+            middle = QPointF(box.right(), box.center().y())
+            for joint in joints if len(at) > 1 else ():  # of several it is shown which is meant
+                painter.drawLine(middle, joint)
+        for text, box, _ in names:
+            painter.setPen(Qt.PenStyle.NoPen)
+            painter.setBrush(self._theme.colour("card"))
+            painter.drawRoundedRect(box, 3, 3)
+            painter.setPen(self._theme.colour("bad" if self._live else "old"))
+            painter.drawText(box, Qt.AlignmentFlag.AlignCenter, text)
 
     def _draw_angles(self, painter: QPainter) -> None:
         """Hip, knee and ankle of each side in words."""
@@ -207,6 +217,37 @@ class StickFigure(QWidget):
         if dashed:
             pen.setStyle(Qt.PenStyle.DotLine)
         return pen
+
+
+Named = tuple[str, QRectF, Sequence[QPointF]]  # a name, where it stands, and the joints that it names
+
+
+def placed_names(
+    at: Mapping[tuple[str, str], QPointF], metrics: QFontMetricsF, beside: float, room: QSizeF
+) -> list[Named]:
+    """Return where the names of these joints stand, none over another: both sides of one have one name."""
+    named: list[tuple[str, Sequence[QPointF]]] = []
+    for joint in JOINTS:
+        sides = [side for side in SIDES if (side, joint) in at]
+        name = f"both {joint}s" if len(sides) == len(SIDES) else f"{' '.join(sides)} {joint}"
+        if sides:
+            named.append((name, [at[side, joint] for side in sides]))
+    named.sort(key=lambda one: max(point.y() for point in one[1]))
+    high = metrics.height() + 2
+    tops: list[float] = []
+    for _, points in named:
+        wanted = sum(point.y() for point in points) / len(points) - high / 2
+        tops.append(max(wanted, tops[-1] + high + 1) if tops else wanted)
+    below = room.height()
+    for place in reversed(range(len(tops))):  # what would stand below the picture, and what it meets then
+        tops[place] = min(tops[place], below - high)
+        below = tops[place] - 1
+    found: list[Named] = []
+    for (name, points), top in zip(named, tops, strict=True):
+        wide = metrics.horizontalAdvance(name) + 8
+        left = min(point.x() for point in points) - beside - wide
+        found.append((name, QRectF(max(0.0, left), top, wide, high), points))
+    return found
 
 
 def chain(pose: Pose, lean: float) -> tuple[QPointF, QPointF, QPointF, QPointF]:

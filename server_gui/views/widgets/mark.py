@@ -26,6 +26,11 @@ class MarkIcon(QWidget):
             self.setAccessibleName(mark.word)
             self.update()
 
+    @property
+    def mark(self) -> Mark:
+        """What is shown."""
+        return self._mark
+
     def sizeHint(self) -> QSize:
         side = self._theme.px(self._pixels)
         return QSize(side, side)

@@ -15,7 +15,7 @@ from PySide6.QtWidgets import QApplication, QGraphicsItem, QWidget
 from server_gui.core.desk.flags import FlagKind
 from server_gui.views.theme import Theme
 from server_gui.views.widgets import raster
-from server_gui.views.widgets.cursors import Cursors, Shown
+from server_gui.views.widgets.cursors import CursorLayout, Cursors
 from server_gui.views.widgets.plain import set_tip
 from server_gui.views.widgets.time_axis import LAST, NOW, PAUSED, TimeAxis
 from server_gui.views.widgets.value_axis import ValueAxis
@@ -364,7 +364,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
         def share(at: float) -> float:
             return (at - left) / (right - left)
 
-        shown = Shown(
+        shown = CursorLayout(
             at=tuple(share(at) for at in self._at),
             active=self._active,
             hover=None if self._hover is None else share(self._hover),

@@ -212,7 +212,7 @@ def _cosmetic(colour: QColor, width: float) -> QPen:
 
 
 def size_of(cells: Sequence[Cell]) -> float:
-    """Return how much larger than the outline a foot with these cells is; 1 where they are within it."""
+    """Return the size of a foot with these cells in outlines; 1 if they are within it."""
     return max([1.0, *(x / FARTHEST_M for x, _ in cells), *(abs(y) / WIDEST_M for _, y in cells)])
 
 

@@ -40,7 +40,7 @@ class StopButton(QPushButton):
         self.pressed.connect(self.stopped)
 
     def name(self, robot: str | None) -> None:
-        """Say whom it stops, in smaller letters or in two lines where that has no room in one."""
+        """Set the name of the robot, in smaller letters or two lines if there is no room for it in one."""
         self._robot = None if robot is None else plain(robot)
         self.setAccessibleName("STOP" if robot is None else f"STOP {plain(robot)}")
         text = "STOP" if robot is None else f"STOP  {plain(robot)}"

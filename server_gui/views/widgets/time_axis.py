@@ -48,7 +48,7 @@ class TimeAxis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph has no types
         return [(next((step for step in STEPS_S if step >= least), STEPS_S[-1]), 0.0)]
 
     def tickStrings(self, values: Sequence[float], scale: float, spacing: float) -> list[str]:
-        """Return what stands at these places."""
+        """Return the labels of these places."""
         said = [time_text(value) for value in values]
         return [self._end if text == NOW else text for text in said]
 

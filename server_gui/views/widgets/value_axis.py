@@ -45,6 +45,6 @@ class ValueAxis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph has no types
         return [(step, [value for value in values if value >= least]) for step, values in found]
 
     def tickStrings(self, values: Sequence[float], scale: float, spacing: float) -> list[str]:
-        """Return what stands at these places."""
+        """Return the labels of these places."""
         near = [0.0 if abs(value) < spacing / 1000 else value * scale for value in values]
         return [with_minus(f"{value:.6g}") for value in near]

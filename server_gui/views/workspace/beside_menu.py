@@ -86,6 +86,6 @@ def _named(station: Station) -> str:
 
 
 def others_of(desk: Desk, archive: Archive | None) -> list[Station]:
-    """Return who can be beside the robot that is looked at: others, and the recording that is played."""
+    """Return possible companions of the shown robot: other robots, and the recording being played."""
     played = [] if archive is None else archive.playback.desk.stations
     return [*(one for one in desk.stations if one is not desk.selected), *played]

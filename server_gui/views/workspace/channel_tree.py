@@ -128,7 +128,7 @@ class ChannelTree(QTreeWidget):
 
 
 def _title(info: ChannelInfo, units: Units) -> str:
-    """Return what a channel is called below its component, in the unit that its plot has."""
+    """Return the name of a channel below its component, in the unit of its plot."""
     symbol = units.unit(info.quantity, info.unit).symbol
     return f"{info.quantity.replace('_', ' ')}  {symbol}".rstrip()
 

@@ -9,7 +9,7 @@ from server_gui.core.desk.station import Station
 from server_gui.core.workspace.curve_binding import BESIDE
 from server_gui.core.workspace.scene import Scene
 from server_gui.core.workspace.series import Floats
-from server_gui.core.workspace.trigger import WINDOWS, On, State
+from server_gui.core.workspace.trigger import WINDOWS, On, TriggerState
 from server_gui.views.widgets.plot import PlacedFlag
 from server_gui.views.widgets.time_axis import NOW, PAUSED, SHOWN, time_text
 from server_gui.views.workspace.unit_plot import EmptyPlot, UnitPlot
@@ -77,7 +77,7 @@ def flag(scene: Scene, cards: Sequence[AnyPlot], found: Sequence[Flag], newest_n
 def _levels(scene: Scene, card: UnitPlot) -> list[float]:
     trigger = scene.trigger
     condition = trigger.condition
-    if trigger.state is State.OFF or condition.on is On.EMCY or condition.of not in card.drawn:
+    if trigger.state is TriggerState.OFF or condition.on is On.EMCY or condition.of not in card.drawn:
         return []
     levels = (condition.level, condition.high) if condition.on in WINDOWS else (condition.level,)
     return [level * card.unit.scale for level in levels]

@@ -71,7 +71,7 @@ class LayoutMenu(QPushButton):
         self._try(lambda: self._shows(self._layouts.load(name)), f"layout {name}")
 
     def save(self, name: str) -> None:
-        """Keep what is shown under this name."""
+        """Save the arrangement under this name."""
         layout = self._present()
         layout.name = name
         self._try(lambda: self._kept(layout), f"layout saved as {' '.join(name.split())}")

@@ -179,7 +179,7 @@ class Signals(QWidget):
             raise OSError(f"the picture could not be written: is there room in {path.parent}, and may you?")
 
     def layout_now(self) -> Layout:
-        """Return what is shown as a layout."""
+        """Return the present arrangement as a layout."""
         return layout_of(self.scene, self.layouts.current, self._seconds)
 
     def show_layout(self, layout: Layout) -> None:

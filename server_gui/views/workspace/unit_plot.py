@@ -121,7 +121,7 @@ class EmptyPlot(TakesCurves):
 
 
 def _title(place: int, unit: Unit, curves: Sequence[Drawn]) -> str:
-    """Return what is measured, and in which unit: a unit alone says too little."""
+    """Return the measured quantities with their unit: a unit alone says too little."""
     quantities = dict.fromkeys(_quantity(curve) for curve in curves if not curve.problem)
     said = ", ".join(quantities).capitalize()
     return f"{place + 1} · {said} ({unit.symbol})" if unit.symbol else f"{place + 1} · {said}"

@@ -3,13 +3,12 @@
 import shutil
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from functools import partial
 from typing import Final
 
 from tests.gui.walks.hand import Hand
-from tests.gui.walks.robot import AGAIN_S
+from tests.gui.walks.robot import AGAIN_S, play_newest
 from tests.gui.walks.walk import Bench
 from tests.support.waiting import until
 from tests.unit.training.walkers import day, put
@@ -133,12 +132,7 @@ def recording(bench: Bench) -> None:
 def replay(bench: Bench) -> None:
     """A recording is played in the views of a robot, says so, and is labelled; STOP is the live robot's."""
     hand = bench.hand
-    hand.click("Recordings")
-    today = time.strftime("%Y-%m-%d")
-    hand.sees(today, within_s=AGAIN_S)
-    hand.insist(today, lambda: hand.can_see("Play"), place=-1)
-    hand.insist("Play", lambda: hand.reads("PLAYBACK, not live"), exactly=True)
-    hand.misses("reading …", within_s=AGAIN_S)
+    play_newest(hand)
     hand.sees("steps/min", within_s=AGAIN_S)
     hand.keep("replay")
     hand.reveal("The span is the whole recording", "Labels")
@@ -173,7 +167,7 @@ def learning(bench: Bench) -> None:
     hand.sees(JUDGE)
     hand.keep("train")
     hand.click("Start training")
-    hand.sees("Better: F1", within_s=AGAIN_S)
+    hand.sees("Not compared: F1", within_s=AGAIN_S)
     hand.sees("Train a model")  # the form is gone, and its result in sight
     hand.keep("trained")
     hand.insist("Promote…", lambda: hand.reads("Serves now"))

@@ -57,6 +57,10 @@ class Hand:
     def can_see(self, name: str) -> bool:
         return bool(self.ask(where=name))
 
+    def names(self) -> list[str]:
+        """Return what everything is called that a hand could go to: what a menu offers first."""
+        return [str(name) for name, *_ in self.ask(places=1)]
+
     def click(self, name: str, *, place: int = 0, times: int = 1, exactly: bool = False) -> None:
         """Click it where it stands."""
         x, y = self.where(name, place, exactly=exactly)

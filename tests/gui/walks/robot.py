@@ -1,5 +1,7 @@
 """Moments at a robot: it walks, is stopped, loses its link, breaks; and a second one beside it."""
 
+import re
+import time
 from typing import Final
 
 from tests.gui.walks.hand import Hand
@@ -7,6 +9,7 @@ from tests.gui.walks.walk import Bench
 from tests.support.waiting import until
 
 AGAIN_S: Final = 100.0  # until a simulated robot walks again, on a machine that does much else
+FAULT_EVENT: Final = re.compile(r"\d+:\d\d\.\d  fault: .*right hip")
 ENABLED: Final = ("6 of 6 enabled", "6/6 enabled")
 STOPPED: Final = ("0 of 6 enabled", "0/6 enabled")
 
@@ -113,6 +116,38 @@ def drive_fault(bench: Bench) -> None:
     clear_fault(hand, "fault: right hip")
     none_enabled(hand)
     walks_again(bench)
+
+
+def fault_replayed(bench: Bench) -> None:
+    """The recording of it: its event leads to the instant, the alarm of then is there, and its signal."""
+    hand = bench.hand
+    play_newest(hand)
+    hand.misses("looking for events", within_s=AGAIN_S)
+    hand.click("Events of the recording")
+    event = until(lambda: next(filter(FAULT_EVENT.match, hand.names()), None), "listed the fault's event")
+    hand.keep("replay-events")
+    hand.click(event)
+    hand.sees("fault: right hip", "0x2310", within_s=AGAIN_S)
+    if hand.can_see("Pause"):
+        hand.click("Pause", exactly=True)
+    hand.misses("Clear fault…") if not hand.can_see("Clear fault…") else None
+    hand.keep("replay-fault")
+    if not hand.can_see("Show the signal ± 5 s"):
+        hand.click("fault: right hip", place=-1)
+    hand.insist("Show the signal ± 5 s", lambda: hand.reads("right_hip."), place=-1)
+    hand.keep("replay-fault-signal")
+    hand.click("← All")
+    hand.click("Overview")
+
+
+def play_newest(hand: Hand) -> None:
+    """The recording that goes on, from its beginning."""
+    hand.click("Recordings")
+    today = time.strftime("%Y-%m-%d")
+    hand.sees(today, within_s=AGAIN_S)
+    hand.insist(today, lambda: hand.can_see("Play"), place=-1)
+    hand.insist("Play", lambda: hand.reads("PLAYBACK, not live"), exactly=True)
+    hand.misses("reading …", within_s=AGAIN_S)
 
 
 def clear_fault(hand: Hand, alarm: str) -> None:

@@ -67,6 +67,7 @@ WALKS: Final = {
             desk.trial_runs_out,
             desk.edits,
             robot.drive_fault,
+            robot.fault_replayed,
             robot.insole_lost,
             robot.bus_in_trouble,
         )

@@ -11,7 +11,7 @@ from drivers.bus.bus import CanBus
 from drivers.bus.channels import objection
 from drivers.bus.device import CanDevice
 from drivers.bus.settings import ChannelSettings, DeviceSettings
-from drivers.samples import Sample, State
+from drivers.samples import ComponentState, Sample
 from eds import Description
 from tests.support.waiting import until
 from tests.unit.bus.conftest import IDENTITY, SMALL_EDS
@@ -117,7 +117,7 @@ def test_a_pdo_that_stays_away_and_an_object_that_is_refused_are_told(
         gait.start()
         until(lambda: "no phase: TPDO1 (0x185), which brings it on SYNC, does not come" in problem(gait))
         until(lambda: "load: " in problem(gait) and "0x2101:00" in problem(gait))
-        until(lambda: gait.quality(time.monotonic_ns()).state is State.OK)  # the node itself answers
+        until(lambda: gait.quality(time.monotonic_ns()).state is ComponentState.OK)  # the node itself answers
         gait.stop()
 
 

@@ -9,7 +9,7 @@ from drivers.bus.bus import CanBus
 from drivers.bus.device import CanDevice
 from drivers.bus.life import NodeLife
 from drivers.bus.settings import DeviceSettings
-from drivers.samples import State
+from drivers.samples import ComponentState
 from eds import Description
 from tests.support.waiting import until
 from tests.unit.bus.conftest import IDENTITY
@@ -76,14 +76,14 @@ def test_a_device_without_a_heartbeat_that_dies_is_lost(
             until(lambda: device.node.ready, "came up")
             heard_ns = device.node.life.heard_ns or 0
             until(lambda: (device.node.life.heard_ns or 0) > heard_ns, "asked, though nobody wanted to know")
-            assert device.quality(device.node.life.heard_ns or 0).state is State.OK
+            assert device.quality(device.node.life.heard_ns or 0).state is ComponentState.OK
             node.silent = True
             asked = len(node.requests)
             until(lambda: len(node.requests) > asked, "asked again")
             quality = device.quality((device.node.life.heard_ns or 0) + round((SILENT_S + 0.1) * 1e9))
         finally:
             device.stop()
-    assert quality.state is State.LOST
+    assert quality.state is ComponentState.LOST
     assert quality.problem is not None
     assert "it has answered nothing for 3.1 s: check the node's power and cable" in quality.problem
     assert {request[0] for request in node.requests} <= {0x40, 0x80}  # it was only read

@@ -13,7 +13,7 @@ from drivers.bus.node import shared_node
 from drivers.bus.sdo.channel import SdoChannel
 from drivers.bus.settings import CanSettings, DeviceSettings
 from drivers.errors import DeviceAbort, DeviceTimeout, DriverError, SettingsError, Unavailable
-from drivers.samples import State
+from drivers.samples import ComponentState
 from eds import Description
 from tests.support.waiting import WAIT_S, until
 from tests.unit.bus.conftest import IDENTITY
@@ -32,7 +32,7 @@ def problem(found: CanDevice) -> str:
     return found.quality(time.monotonic_ns()).problem or ""
 
 
-def state(found: CanDevice) -> State:
+def state(found: CanDevice) -> ComponentState:
     return found.quality(time.monotonic_ns()).state
 
 
@@ -43,7 +43,7 @@ def test_a_node_that_answers_is_ready_and_sends_nothing_but_answers(
         gait = device(bus, describe)
         gait.start()
         until(lambda: gait.node.ready)
-        assert state(gait) is State.OK
+        assert state(gait) is ComponentState.OK
         gait.stop()
         assert {can_id for can_id, _ in fake.seen} == {0x605}
         assert fake.writes == []
@@ -149,7 +149,7 @@ def test_a_node_that_boots_late_is_picked_up(bus: CanBus, channel: str, describe
     gait = device(bus, describe)
     gait.start()
     until(lambda: "no frame at all on bus main" in problem(gait))
-    assert state(gait) is State.LOST
+    assert state(gait) is ComponentState.LOST
     with FakeNode(channel, 5, dict(IDENTITY)) as fake:
         fake.boot_up()
         until(lambda: gait.node.ready)
@@ -246,13 +246,13 @@ def test_a_heartbeat_that_stays_away_is_told_while_sdo_works(
         until(lambda: gait.node.ready)
         fake.heartbeat()
         until(lambda: gait.node.life.heartbeats)
-        until(lambda: state(gait) is State.LOST)
+        until(lambda: state(gait) is ComponentState.LOST)
         until(lambda: "its heartbeat is missing for" in problem(gait))
         assert gait.node.upload(0x1000, 0).result(WAIT_S)
 
         def is_back() -> bool:
             fake.heartbeat()
-            return state(gait) is State.OK
+            return state(gait) is ComponentState.OK
 
         until(is_back)
         gait.stop()
@@ -280,10 +280,10 @@ def test_an_emcy_storm_is_bounded_counted_and_told_in_words(
             fake.emcy(0x8110, 0x11)
         until(lambda: gait.node.life.emcys == 500)
         assert len(gait.node.life.emcy_history) == EMCY_HISTORY
-        assert state(gait) is State.FAULT
+        assert state(gait) is ComponentState.FAULT
         assert "0x8110 CAN overrun: messages were lost (register: generic, communication)" in problem(gait)
         fake.emcy(0)
-        until(lambda: state(gait) is State.OK)
+        until(lambda: state(gait) is ComponentState.OK)
         gait.stop()
 
 

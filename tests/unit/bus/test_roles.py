@@ -11,7 +11,7 @@ import pytest
 from drivers.bus.bus import CanBus
 from drivers.bus.device import CanDevice
 from drivers.bus.settings import CanSettings, DeviceSettings, Role
-from drivers.samples import State
+from drivers.samples import ComponentState
 from eds import Description
 from tests.support.waiting import until
 from tests.unit.bus.conftest import IDENTITY
@@ -102,7 +102,7 @@ def test_a_master_guards_a_node_that_has_no_heartbeat(
         def is_as_it_should() -> bool:
             quality = gait.quality(time.monotonic_ns())
             if answers:
-                return quality.state is State.OK and gait.node.life.heartbeats >= 8
-            return quality.state is State.LOST and "heartbeat is missing" in str(quality.problem)
+                return quality.state is ComponentState.OK and gait.node.life.heartbeats >= 8
+            return quality.state is ComponentState.LOST and "heartbeat is missing" in str(quality.problem)
 
         until(lambda: asked >= 10 and is_as_it_should(), step=guard)

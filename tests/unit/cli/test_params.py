@@ -12,7 +12,7 @@ from drivers.errors import DeviceTimeout
 from eds import dcf
 from gateway.main import main
 from gateway.modules.control.parameters import Lock
-from gateway.parameter_files.comparison import Verdict, compare
+from gateway.parameter_files.comparison import ComparisonVerdict, compare
 from gateway.parameter_files.contents import COMMANDS
 from gateway.wire.limits import LINE_LIMIT
 from gateway.wire.parameter import ParameterInfo, ParameterValue
@@ -153,13 +153,13 @@ def test_what_the_robot_would_refuse_is_said_before_anything_is_sent(
 @pytest.mark.parametrize(
     ("value", "verdict"),
     [
-        (0.6, Verdict.DIFFERENT),  # 0.60000002 in the device, whose maximum that is then
-        (-0.7, Verdict.DIFFERENT),  # -0.69999999
-        (0.6000001, Verdict.OUT_OF_LIMITS),
-        (-0.7000001, Verdict.OUT_OF_LIMITS),
+        (0.6, ComparisonVerdict.DIFFERENT),  # 0.60000002 in the device, whose maximum that is then
+        (-0.7, ComparisonVerdict.DIFFERENT),  # -0.69999999
+        (0.6000001, ComparisonVerdict.OUT_OF_LIMITS),
+        (-0.7000001, ComparisonVerdict.OUT_OF_LIMITS),
     ],
 )
-def test_a_real_at_its_very_limit_is_within_it(value: float, verdict: Verdict) -> None:
+def test_a_real_at_its_very_limit_is_within_it(value: float, verdict: ComparisonVerdict) -> None:
     info = ParameterInfo(
         name="knee.gain", unit="", min=-0.7, max=0.6, max_step=None, live=True, states=None, component="knee",
         object="0x2000:0", access="rw", store=False, type="REAL32",

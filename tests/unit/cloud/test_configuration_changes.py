@@ -10,7 +10,14 @@ from msgspec.structs import replace
 
 from gateway.main import main
 from ml.store.sessions import Session
-from server_gui.core.cloud.configuration_changes import NOT_RECORDED, NOT_THERE, Changes, Kind, Told, changes
+from server_gui.core.cloud.configuration_changes import (
+    NOT_RECORDED,
+    NOT_THERE,
+    ChangeKind,
+    Changes,
+    SessionConfiguration,
+    changes,
+)
 from server_gui.core.cloud.metric_changes import DAYS, Walk, moved
 from server_gui.core.evidence.comparison import Word
 from server_gui.core.evidence.cycles import Cycle
@@ -38,8 +45,10 @@ OLD = Session(
 
 
 def compared(after: Session, before: Session = OLD, wearers: str = "P01", models: str = "m1") -> Changes:
-    told = Told(before, frozenset({"P01"}), {"activity": "m1"})
-    return changes(told, Told(after, frozenset({wearers} - {""}), {"activity": models} if models else {}))
+    told = SessionConfiguration(before, frozenset({"P01"}), {"activity": "m1"})
+    return changes(
+        told, SessionConfiguration(after, frozenset({wearers} - {""}), {"activity": models} if models else {})
+    )
 
 
 def test_alike_sessions_have_no_difference() -> None:
@@ -62,14 +71,14 @@ def test_what_differs_is_told_in_order_the_wearer_first() -> None:
     )
     found = compared(after, wearers="P02", models="m2")
     assert [(one.kind, one.what, one.before, one.after) for one in found.differences] == [
-        (Kind.WEARER, "wearer", "P01", "P02"),
-        (Kind.PARAMETER, "left_knee.gain", "2", "3"),
-        (Kind.PARAMETER, "gait.step_length", "0.4", "0.41"),
-        (Kind.CALIBRATION, "left_knee zero offset (rad)", "0.01", "0.02"),
-        (Kind.CALIBRATION, "trunk calibration", "no file", "t.toml 5e"),
-        (Kind.FIRMWARE, "left_knee firmware", "1.2", "1.3"),
-        (Kind.MODEL, "model of activity", "m1", "m2"),
-        (Kind.SOFTWARE, "gateway", "0.1.0", "0.2.0"),
+        (ChangeKind.WEARER, "wearer", "P01", "P02"),
+        (ChangeKind.PARAMETER, "left_knee.gain", "2", "3"),
+        (ChangeKind.PARAMETER, "gait.step_length", "0.4", "0.41"),
+        (ChangeKind.CALIBRATION, "left_knee zero offset (rad)", "0.01", "0.02"),
+        (ChangeKind.CALIBRATION, "trunk calibration", "no file", "t.toml 5e"),
+        (ChangeKind.FIRMWARE, "left_knee firmware", "1.2", "1.3"),
+        (ChangeKind.MODEL, "model of activity", "m1", "m2"),
+        (ChangeKind.SOFTWARE, "gateway", "0.1.0", "0.2.0"),
     ]
 
 
@@ -77,29 +86,37 @@ def test_an_older_session_that_tells_nothing_is_not_recorded_and_never_unchanged
     found = compared(OLD, replace(OLD, setup={}, parameters={}, versions={}))
     assert found.differences == ()
     unknown = {one.kind: (one.before, one.after) for one in found.unrecorded}
-    for kind in (Kind.FIRMWARE, Kind.EDS, Kind.LIMITS, Kind.FILE, Kind.SOFTWARE):
+    for kind in (
+        ChangeKind.FIRMWARE,
+        ChangeKind.EDS,
+        ChangeKind.LIMITS,
+        ChangeKind.FILE,
+        ChangeKind.SOFTWARE,
+    ):
         assert unknown[kind][0] == NOT_RECORDED, kind
-    assert unknown[Kind.PARAMETER] == (NOT_RECORDED, "recorded of 2")
+    assert unknown[ChangeKind.PARAMETER] == (NOT_RECORDED, "recorded of 2")
 
 
 def test_what_neither_tells_is_not_recorded_of_both() -> None:
     bare = Session("exo-01", "b")
-    found = changes(Told(bare, frozenset(), {}), Told(bare, frozenset(), {}))
+    found = changes(SessionConfiguration(bare, frozenset(), {}), SessionConfiguration(bare, frozenset(), {}))
     assert {(one.before, one.after) for one in found.unrecorded} == {(NOT_RECORDED, NOT_RECORDED)}
-    assert {Kind.WEARER, Kind.PARAMETER, Kind.FIRMWARE, Kind.MODEL} <= {one.kind for one in found.unrecorded}
+    assert {ChangeKind.WEARER, ChangeKind.PARAMETER, ChangeKind.FIRMWARE, ChangeKind.MODEL} <= {
+        one.kind for one in found.unrecorded
+    }
     assert found.same == 1, "the robot's name"
 
 
 def test_a_joint_that_is_new_is_no_gap_in_the_record() -> None:
     found = compared(replace(OLD, setup={**SETUP, "component/right_knee": "joint"}))
     assert [(one.kind, one.before, one.after) for one in found.differences] == [
-        (Kind.COMPONENT, NOT_THERE, "joint")
+        (ChangeKind.COMPONENT, NOT_THERE, "joint")
     ]
 
 
 def test_a_device_that_did_not_answer_is_not_recorded() -> None:
     found = compared(OLD, replace(OLD, setup={k: v for k, v in SETUP.items() if "firmware" not in k}))
-    unknown = [(one.before, one.after) for one in found.unrecorded if one.kind is Kind.FIRMWARE]
+    unknown = [(one.before, one.after) for one in found.unrecorded if one.kind is ChangeKind.FIRMWARE]
     assert (NOT_RECORDED, "1.2") in unknown
     assert found.differences == ()
 

@@ -24,7 +24,7 @@ from server_gui.core.cloud import ros
 from server_gui.core.cloud.mcap import write_mcap
 from server_gui.core.cloud.recordings import Recorded as Opened
 from server_gui.core.cloud.recordings import Recordings
-from server_gui.core.cloud.selection import Choice, Recording, choose
+from server_gui.core.cloud.selection import Choice, SelectedRecording, choose
 from server_gui.core.cloud.tabular import write_csv, write_parquet
 from tests.unit.cloud.recordings import BATCHES, ROWS, UNITS, Recorded, record
 from tests.unit.recording.robots import value
@@ -33,7 +33,7 @@ WRITERS = {"csv": write_csv, "parquet": write_parquet, "mcap": write_mcap}
 BEGAN = datetime(2026, 11, 21, 15, 30, tzinfo=UTC)
 
 
-def chosen(url: str, spool: Path, choice: Choice | None = None) -> Recording:
+def chosen(url: str, spool: Path, choice: Choice | None = None) -> SelectedRecording:
     recorded = record(url, spool)
     return choose(*opened(recorded), choice or Choice())
 
@@ -105,13 +105,13 @@ SENSORS = {
 }
 
 
-def sensed(*rows: dict[str, float]) -> Recording:
+def sensed(*rows: dict[str, float]) -> SelectedRecording:
     """Of every kind of sensor, a row a second; what is not given is null."""
     columns = {name: [row.get(name) for row in rows] for name in SENSORS}
     utc = [BEGAN + timedelta(seconds=number) for number in range(len(rows))]
     table = pa.table({"utc": utc, "stamp_ns": list(range(len(rows)))} | columns)
     channels = [Channel(name, unit, len(rows)) for name, unit in SENSORS.items()]
-    return Recording(Session("exo-01", "s-1"), channels, [table], [], [])
+    return SelectedRecording(Session("exo-01", "s-1"), channels, [table], [], [])
 
 
 def test_each_sensor_has_its_message(tmp_path: Path) -> None:
@@ -174,7 +174,7 @@ def test_an_export_that_breaks_off_leaves_what_was_there(tmp_path: Path, kind: s
         yield from recording.tables
         raise KeyboardInterrupt
 
-    cut = Recording(recording.session, recording.channels, broken(), [], [])
+    cut = SelectedRecording(recording.session, recording.channels, broken(), [], [])
     with pytest.raises(KeyboardInterrupt):
         WRITERS[kind](file, cut)
     assert [each.name for each in tmp_path.iterdir()] == [file.name]

@@ -164,7 +164,7 @@ def test_a_copy_of_the_store_is_named_until_it_has_forgotten_too(server: Server,
     said = server.run(*FORGET, status=1)
     assert f"{copied.as_uri()} is a copy that has rows of theirs" in said
     (found,) = exports.found([("exo", HERS)], server.url)
-    assert found.state is exports.State.HAS_ROWS
+    assert found.state is exports.ExportState.HAS_ROWS
     server.config.write_text(f'[recorder]\nspool = "{tmp_path / "none"}"\n')
     server.run("forget", "--url", copied.as_uri(), "--wearer", "P01", "--yes")
     assert exports.found([("exo", HERS)], server.url) == []

@@ -8,8 +8,8 @@ from drivers.bus.interfaces.controller_state import BusState
 from drivers.errors import DeviceTimeout
 from drivers.joint.settings import JointSettings
 from drivers.scan.asking import Axis as ToldAxis
-from drivers.scan.asking import Told
-from drivers.scan.scan import Found
+from drivers.scan.asking import NodeAnswers
+from drivers.scan.scan import ScanResult
 from drivers.scan.traffic import Traffic
 from eds import Description
 from gateway.commission.dialogue import Ask
@@ -46,11 +46,11 @@ class FakeBench:
     def __init__(self, **drives: FakeDrive) -> None:
         self.drives = {int(name.removeprefix("node_")): drive for name, drive in drives.items()}
 
-    def nodes(self) -> Found:
-        told: dict[int, Told | str] = {
+    def nodes(self) -> ScanResult:
+        told: dict[int, NodeAnswers | str] = {
             node: _told(drive) for node, drive in self.drives.items() if drive.there
         }
-        return Found(1.0, Traffic(), 0.0, None, 0, BusState.ACTIVE, None, told, frozenset())
+        return ScanResult(1.0, Traffic(), 0.0, None, 0, BusState.ACTIVE, None, told, frozenset())
 
     def read(self, node: int, index: int, subindex: int = 0) -> bytes | None:
         drive = self.drives[node]
@@ -72,10 +72,12 @@ class FakeBench:
         raise AssertionError(f"nobody agreed to power for node {joint.node_id}, {description.product}")
 
 
-def _told(drive: FakeDrive) -> Told:
+def _told(drive: FakeDrive) -> NodeAnswers:
     vendor, product = SHIPPED_DRIVE
     axis = ToldAxis(0, None, None)
-    return Told(0x20192, 0, "drive", None, None, vendor, product, None, drive.serial_number, 100, (axis,), ())
+    return NodeAnswers(
+        0x20192, 0, "drive", None, None, vendor, product, None, drive.serial_number, 100, (axis,), ()
+    )
 
 
 class Hands:

@@ -14,7 +14,7 @@ from drivers.errors import SettingsError
 from drivers.joint.settings import JointSettings
 from gateway.cli import calibrate
 from gateway.commission.dialogue import run
-from gateway.commission.draft import Found
+from gateway.commission.draft import DraftValue
 from gateway.commission.edit import NotEdited, comment_of, with_value
 from gateway.commission.zero import NotRepeated, posture, repeated
 from gateway.config.reading import load
@@ -114,16 +114,16 @@ def test_a_larger_change_is_taken_when_told() -> None:
 
 
 def test_one_value_is_another_and_all_else_stays() -> None:
-    made = with_value(FILE, "joint.left_knee", "zero_offset", Found(0.75, "rad; 30° by hand"))
+    made = with_value(FILE, "joint.left_knee", "zero_offset", DraftValue(0.75, "rad; 30° by hand"))
     assert "zero_offset = 0.75" in made
     assert "of 30° and 75°" not in made
     assert comment_of(made, "joint.left_knee", "zero_offset") == "rad; 30° by hand"
     assert [one for one in made.splitlines() if "zero" not in one and "rad;" not in one] == [
         one for one in FILE.splitlines() if "zero" not in one and "rad;" not in one
     ]
-    again = with_value(made, "joint.right_knee", "zero_offset", Found(-0.1, "rad; " + "so " * 60))
+    again = with_value(made, "joint.right_knee", "zero_offset", DraftValue(-0.1, "rad; " + "so " * 60))
     assert tomllib.loads(again)["joint"]["right_knee"]["zero_offset"] == -0.1
-    assert with_value(again, "joint.right_knee", "zero_offset", Found(0.2, "x")).count("so so") == 0
+    assert with_value(again, "joint.right_knee", "zero_offset", DraftValue(0.2, "x")).count("so so") == 0
 
 
 @pytest.mark.parametrize(
@@ -136,11 +136,11 @@ def test_one_value_is_another_and_all_else_stays() -> None:
 )
 def test_a_file_that_is_written_otherwise_is_not_guessed_at(text: str) -> None:
     with pytest.raises(NotEdited, match="write zero_offset = 1"):
-        with_value(text, "joint.left_knee", "zero_offset", Found(1))
+        with_value(text, "joint.left_knee", "zero_offset", DraftValue(1))
 
 
 def test_a_value_that_was_not_there_is_added() -> None:
-    made = with_value("[joint.left_knee]\nnode_id = 5\n", "joint.left_knee", "zero_offset", Found(1.5))
+    made = with_value("[joint.left_knee]\nnode_id = 5\n", "joint.left_knee", "zero_offset", DraftValue(1.5))
     assert tomllib.loads(made) == {"joint": {"left_knee": {"node_id": 5, "zero_offset": 1.5}}}
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from drivers.errors import SettingsError
-from drivers.scan.asking import Told
+from drivers.scan.asking import NodeAnswers
 from drivers.scan.products import Library
 from gateway.cli.commission import main
 from gateway.commission.controller import controller
@@ -16,7 +16,7 @@ from gateway.commission.writing import text
 from gateway.config.reading import examine
 from tests.unit.commission.fake_bench import Hands
 
-GAIT = Told(0, 0, "gait", None, None, 0x0, 0x4A44_0002, None, 1, 100, (), ())
+GAIT = NodeAnswers(0, 0, "gait", None, None, 0x0, 0x4A44_0002, None, 1, 100, (), ())
 LIBRARY = Library([])
 
 

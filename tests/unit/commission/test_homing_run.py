@@ -11,12 +11,12 @@ import eds
 from drivers.bus.settings import CanSettings
 from drivers.errors import Unavailable
 from drivers.joint import power as drive_power
-from drivers.joint.homing import METHODS, Progress, Setup, offered, progress
+from drivers.joint.homing import METHODS, HomingProgress, Setup, offered, progress
 from drivers.joint.settings import JointSettings
 from gateway.commission import homing_run, power, powered_run
 from gateway.commission.bench import CanBench
-from gateway.commission.homing_run import HomingRun, Plan
-from gateway.commission.powered_run import Outcome
+from gateway.commission.homing_run import HomingLimits, HomingRun
+from gateway.commission.powered_run import PoweredRunResult
 from tests.support.waiting import WAIT_S, until
 from tests.unit.commission.homing_drive import ATTAINED, COMPLETE, FAILED, NOT_STARTED, UNDER_WAY, HomingDrive
 from tests.unit.joint.standard import S
@@ -32,7 +32,7 @@ SETTINGS = JointSettings(
     sdo_timeout_s=2.0,
 )
 IMPATIENT = replace(SETTINGS, stop_timeout_s=0.3, sdo_timeout_s=0.5)  # of drives that never do what is asked
-WAY = Plan(Setup(17, 5000, 1000, 20_000), -1000, 100_000, fastest=1e9, lag=5000, time_s=20.0)
+WAY = HomingLimits(Setup(17, 5000, 1000, 20_000), -1000, 100_000, fastest=1e9, lag=5000, time_s=20.0)
 ENABLING = {0x000F, 0x001F}
 
 
@@ -51,7 +51,7 @@ def channel(request: pytest.FixtureRequest) -> str:
 
 
 @contextmanager
-def begun(channel: str, plan: Plan = WAY, settings: JointSettings = SETTINGS) -> Iterator[HomingRun]:
+def begun(channel: str, plan: HomingLimits = WAY, settings: JointSettings = SETTINGS) -> Iterator[HomingRun]:
     """A run under power; whoever is in the block keeps it."""
     bench = CanBench("main", CanSettings(interface="virtual", channel=channel))
     with bench.power(settings, eds.load(eds.locate("joint_drive.eds", None), NODE)) as found:
@@ -63,7 +63,7 @@ def begun(channel: str, plan: Plan = WAY, settings: JointSettings = SETTINGS) ->
             run.end()
 
 
-def finished(run: HomingRun) -> Outcome:
+def finished(run: HomingRun) -> PoweredRunResult:
     def over() -> bool:
         run.keep()
         return run.done
@@ -83,7 +83,7 @@ def until_it_homes(run: HomingRun, drive: HomingDrive) -> None:
 
 def test_what_moves_nothing_is_enabled_homed_and_disabled_again(channel: str) -> None:
     with HomingDrive(channel, NODE) as drive:
-        with begun(channel, Plan(Setup(37), -100, 100, 1e9, 5000, 20.0)) as run:
+        with begun(channel, HomingLimits(Setup(37), -100, 100, 1e9, 5000, 20.0)) as run:
             outcome = finished(run)
         assert (outcome.problem, outcome.off, outcome.before, outcome.after) == (None, True, 0, 0)
         assert drive.states[:4] == [
@@ -157,7 +157,7 @@ def test_whatever_goes_wrong_stops_and_disables_it(
 
 
 def test_units_that_were_misread_show_in_the_speed(channel: str) -> None:
-    plan = Plan(WAY.setup, -1000, 2**30, fastest=10.0, lag=5000, time_s=20.0)
+    plan = HomingLimits(WAY.setup, -1000, 2**30, fastest=10.0, lag=5000, time_s=20.0)
     with HomingDrive(channel, NODE, home=None, step=1000), begun(channel, plan) as run:
         outcome = finished(run)
     assert "counts/s, not 10 at most" in str(outcome.problem)
@@ -172,7 +172,7 @@ def test_a_joint_that_goes_on_whatever_the_drive_says_is_stopped(channel: str, s
             position = int.from_bytes(drive.objects[0x6064, 0], "little", signed=True)
             drive.objects[0x6064, 0] = (position + 9000).to_bytes(4, "little", signed=True)
 
-    plan = Plan(WAY.setup, -1000, 30_000, fastest=1000.0, lag=5000, time_s=20.0)
+    plan = HomingLimits(WAY.setup, -1000, 30_000, fastest=1000.0, lag=5000, time_s=20.0)
     with HomingDrive(channel, NODE, home=None, step=0, on_look=runs_away), begun(channel, plan) as run:
         outcome = finished(run)
     assert any(words in str(outcome.problem) for words in ("counts/s, not 1000", "left the way"))
@@ -203,13 +203,16 @@ def test_the_mode_that_was_asked_for_is_given_back_whatever_6061h_shows_without_
             off = self.state is S.SWITCH_ON_DISABLED and index == 0x6061
             return answer[:4] + bytes(4) if off else answer
 
-    with Shy(channel, NODE) as drive, begun(channel, Plan(Setup(37), -100, 100, 1e9, 5000, 20.0)) as run:
+    with (
+        Shy(channel, NODE) as drive,
+        begun(channel, HomingLimits(Setup(37), -100, 100, 1e9, 5000, 20.0)) as run,
+    ):
         assert finished(run).problem is None
         assert drive.mode == 8
 
 
 def test_home_that_is_not_found_in_time_ends_it(channel: str) -> None:
-    plan = Plan(WAY.setup, -1000, 2**30, fastest=1e9, lag=5000, time_s=0.1)
+    plan = HomingLimits(WAY.setup, -1000, 2**30, fastest=1e9, lag=5000, time_s=0.1)
     with HomingDrive(channel, NODE, home=None, step=0), begun(channel, plan) as run:
         assert "not found within" in str(finished(run).problem)
 
@@ -332,4 +335,4 @@ def offered_all() -> list[int]:
 
 def test_the_statusword_says_how_far_a_homing_is() -> None:
     said = {bits: progress(0x0227 | bits) for bits in (0, 0x400, 0x1000, 0x1400, 0x2000, 0x2400, 0x3000)}
-    assert list(said.values()) == list(Progress)
+    assert list(said.values()) == list(HomingProgress)

@@ -10,8 +10,8 @@ import pytest
 
 from drivers.errors import DeviceTimeout
 from gateway.cli.commission_lines import JsonFace, Lines
-from gateway.cli.motion_ends import ENDS, Ended, ending
-from gateway.commission.dialogue import Ask, Reading, number, run
+from gateway.cli.motion_ends import ENDS, MotionEnded, ending
+from gateway.commission.dialogue import Ask, DeviceReading, number, run
 from tests.support.waiting import WAIT_S, until
 
 
@@ -78,13 +78,13 @@ def test_what_drives_tell_comes_until_the_answer_and_one_that_is_silent_is_told(
 ) -> None:
     looks: list[int] = []
 
-    def live() -> list[Reading]:
+    def live() -> list[DeviceReading]:
         looks.append(1)
         if len(looks) == 2:
             raise DeviceTimeout("node 7 does not answer")
         if len(looks) == 3:
             pipe.write("moved")
-        return [Reading("node 7", None, "counts")]
+        return [DeviceReading("node 7", None, "counts")]
 
     with Lines(pipe.source) as lines:
         assert JsonFace(lines).ask(Ask("Bend it", live=live)) == "moved"
@@ -98,17 +98,42 @@ def stopped_in(pipe: Pipe, lines: Lines, busy: Callable[[Lines], object]) -> Non
     busy(lines)
 
 
-@pytest.mark.parametrize("busy", [lambda lines: lines.get(1, None), lambda _: threading.Event().wait(WAIT_S)])
+@pytest.mark.parametrize(
+    "busy", [lambda lines: JsonFace(lines).ask(Ask("?")), lambda _: threading.Event().wait(WAIT_S)]
+)
 def test_a_stop_ends_whatever_is_done_and_once(pipe: Pipe, busy: Callable[[Lines], object]) -> None:
     with ending(), Lines(pipe.source) as lines:
-        with pytest.raises(Ended):
+        with pytest.raises(MotionEnded):
             stopped_in(pipe, lines, busy)
         assert lines.stop_asked
 
 
+def test_a_stop_that_comes_just_before_a_question_waits_is_heard(
+    pipe: Pipe, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The signal interrupted nothing, as the wait had not begun: the stop was lost until an answer came."""
+    with ending(), Lines(pipe.source) as lines:
+        wait = lines._read.get
+
+        def uninterrupted(timeout: float | None = None) -> object:
+            signal.pthread_sigmask(signal.SIG_BLOCK, ENDS)
+            try:
+                return wait(timeout)
+            finally:
+                signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDS)
+
+        monkeypatch.setattr(lines._read, "get", uninterrupted)
+        late = threading.Timer(WAIT_S / 2, pipe.write, ("an answer",))
+        late.start()
+        pipe.write('{"stop": true}')
+        with pytest.raises(MotionEnded):
+            JsonFace(lines).ask(Ask("?"))
+        late.cancel()
+
+
 def test_a_second_signal_does_not_end_what_the_first_one_ends() -> None:
     with ending():
-        with pytest.raises(Ended):
+        with pytest.raises(MotionEnded):
             signal.raise_signal(signal.SIGINT)
         for number in ENDS:
             signal.raise_signal(number)

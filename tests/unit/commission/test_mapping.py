@@ -7,7 +7,7 @@ import pytest
 
 from drivers.bus.settings import CanSettings
 from drivers.scan.asking import Axis as ToldAxis
-from drivers.scan.asking import Told
+from drivers.scan.asking import NodeAnswers
 from gateway.commission import nodes
 from gateway.commission.axes import Axis
 from gateway.commission.bench import CanBench
@@ -17,7 +17,9 @@ from tests.unit.commission.fake_bench import Hands
 from tests.unit.commission.homing_drive import HomingDrive
 
 NODE = 5
-TOLD = Told(0x20192, 0, "drive", None, None, 0, 0x4A44_0001, None, 1, 100, (ToldAxis(0, None, None),), ())
+TOLD = NodeAnswers(
+    0x20192, 0, "drive", None, None, 0, 0x4A44_0001, None, 1, 100, (ToldAxis(0, None, None),), ()
+)
 JOINT = "joint.left_knee"
 
 

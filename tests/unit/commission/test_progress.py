@@ -10,7 +10,7 @@ from gateway.commission.axes import Axis
 from gateway.commission.dialogue import Ask, At, run
 from gateway.commission.draft import Draft
 from gateway.commission.live import watched
-from gateway.commission.progress import END, Progress, State, Step
+from gateway.commission.progress import END, CommissionStep, Progress, StepState
 from gateway.commission.serial_bench import SerialPorts
 from gateway.commission.steps import commission
 from tests.unit.commission.fake_bench import ON, FakeBench, FakeDrive
@@ -44,26 +44,26 @@ def gone_through(draft: Draft, robot: FakeBench, person: Forgetful) -> tuple[Pro
     return progress, seen
 
 
-def states(progress: Progress, part: str) -> dict[str, State]:
+def states(progress: Progress, part: str) -> dict[str, StepState]:
     return {step.title: step.state for step in progress.steps() if step.part == part}
 
 
 def test_every_step_that_is_gone_through_is_in_the_list(tmp_path: Path) -> None:
     progress, seen = gone_through(Draft(tmp_path / "exo.toml"), robot := bench(), Forgetful(robot))
     assert len(progress.steps()) == len(seen) == len(set(seen))
-    assert set(states(progress, "left_knee").values()) == {State.DONE}
-    assert states(progress, END) == {"feet and trunk": State.PASSED, "the file": State.DONE}
+    assert set(states(progress, "left_knee").values()) == {StepState.DONE}
+    assert states(progress, END) == {"feet and trunk": StepState.PASSED, "the file": StepState.DONE}
 
 
 def test_somebody_who_was_called_away_sees_where_it_is(tmp_path: Path) -> None:
     robot = bench()
     progress, _ = gone_through(Draft(tmp_path / "exo.toml"), robot, CalledAway(robot))
     knee = states(progress, "left_knee")
-    now = [title for title, state in knee.items() if state is State.NOW]
+    now = [title for title, state in knee.items() if state is StepState.NOW]
     assert now == ["what counts mean"]
-    assert (knee["which drive"], knee["limits"]) == (State.DONE, State.NEXT)
-    assert set(states(progress, "left_hip").values()) == {State.NEXT}
-    assert set(states(progress, "robot").values()) == {State.DONE}
+    assert (knee["which drive"], knee["limits"]) == (StepState.DONE, StepState.NEXT)
+    assert set(states(progress, "left_hip").values()) == {StepState.NEXT}
+    assert set(states(progress, "robot").values()) == {StepState.DONE}
 
 
 def test_what_was_found_before_is_done_and_a_joint_that_is_left_out_is_passed(tmp_path: Path) -> None:
@@ -72,9 +72,9 @@ def test_what_was_found_before_is_done_and_a_joint_that_is_left_out_is_passed(tm
     draft.put("joint.left_hip", "node_id", 11)
     progress = Progress(draft)
     progress.at(At("left_hip", "scale"))
-    assert set(states(progress, "left_knee").values()) == {State.PASSED}
-    assert states(progress, "left_hip")["which drive"] is State.DONE
-    assert Step("left_hip", "what counts mean", State.NOW) in progress.steps()
+    assert set(states(progress, "left_knee").values()) == {StepState.PASSED}
+    assert states(progress, "left_hip")["which drive"] is StepState.DONE
+    assert CommissionStep("left_hip", "what counts mean", StepState.NOW) in progress.steps()
 
 
 @pytest.mark.parametrize(

@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 
 from gateway.commission import scale
 from gateway.commission.axes_of_imu import NAMES, NoAxes, axes
-from gateway.commission.scale import Held, Nominal
+from gateway.commission.scale import HeldPose, Nominal
 
-LOW, HIGH = Held(0.1, 1_000), Held(1.1, 41_000)
+LOW, HIGH = HeldPose(0.1, 1_000), HeldPose(1.1, 41_000)
 
 
 @given(
@@ -24,7 +24,7 @@ def test_the_scale_gives_back_the_angles_it_was_made_of(
     counts: float, gear: float, direction: int, zero: float, angles: tuple[float, float]
 ) -> None:
     true = scale.Scale(counts, gear, direction, zero)
-    held = [Held(angle, round((angle - zero) * direction * counts * gear / math.tau)) for angle in angles]
+    held = [HeldPose(angle, round((angle - zero) * direction * counts * gear / math.tau)) for angle in angles]
     found = scale.scale(held[0], held[1], counts, gear)
     assert found.direction == direction
     assert found.zero_offset == pytest.approx(zero, abs=math.tau / counts / gear)
@@ -54,9 +54,9 @@ def test_a_gear_that_is_nearly_whole_is_whole(measured: float, gear: float) -> N
 
 
 @pytest.mark.parametrize(
-    ("second", "words"), [(Held(0.15, 41_000), "10°"), (Held(1.1, 1_005), "another joint was moved")]
+    ("second", "words"), [(HeldPose(0.15, 41_000), "10°"), (HeldPose(1.1, 1_005), "another joint was moved")]
 )
-def test_two_positions_that_say_nothing_are_refused(second: Held, words: str) -> None:
+def test_two_positions_that_say_nothing_are_refused(second: HeldPose, words: str) -> None:
     assert words in str(scale.problem(LOW, second))
     assert scale.problem(LOW, HIGH) is None
 

@@ -92,6 +92,13 @@ def test_what_is_wrong_twice_is_said_as_such_and_so_is_what_to_check(bench: Benc
     alarm = bench.station.alarms.active[0].alarm
     assert alarm.what == "its heartbeat is missing; its position jumped"
     assert alarm.check == "check its power; it goes on; check its encoder"
+    more = (
+        "its heartbeat is missing: check its power; it reports 0x8130 life guard error; 3 % of it is missing"
+    )
+    bench.station.take([looked(state="lost", problem=more)])
+    alarm = bench.station.alarms.active[0].alarm
+    assert alarm.what == "its heartbeat is missing; it reports 0x8130 life guard error; 3 % of it is missing"
+    assert alarm.check == "check its power", "a second problem is no advice"
     bench.station.take([looked(state="stale", problem="this computer stood still: see what keeps it busy")])
     alarm = bench.station.alarms.active[0].alarm
     assert (alarm.what, alarm.check) == ("this computer stood still", "see what keeps it busy")
@@ -233,7 +240,7 @@ def test_a_confirmed_stop_is_proved_drive_by_drive_and_says_how_to_go_on(bench: 
     assert all(proof.state == "quick stop active" for proof in stopping.proofs.values())
     (one,) = bench.station.alarms.active
     assert one.alarm.kind is Kind.STOPPED
-    assert "all 6 quick stop active within" in one.alarm.did
+    assert "all 6 drives confirmed in quick stop active within" in one.alarm.did
     assert "Reset stop…" in one.alarm.check
 
 

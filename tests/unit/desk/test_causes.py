@@ -142,3 +142,14 @@ def test_a_robot_whose_computer_stood_still_says_so_and_its_worst_stays_the_wors
     (one,) = station.alarms.active
     assert one.is_acknowledged
     assert station.alarms.worst is not None, "that it is read does not make it better"
+
+
+def test_stalls_that_follow_each_other_are_one_event_until_one_is_far_longer() -> None:
+    stalls, told, at_s = Stalls(), list[float](), 0.0
+    stalls.take(1, stamps(0.0, 0.05), 0, 1000.0)
+    for lasted_s in (0.3, 0.6, 0.7, 0.5, 1.0, 2.0, 0.6):
+        began_s, at_s = at_s, at_s + lasted_s
+        found = stalls.take(1, stamps(began_s + 0.06, at_s + 0.05), round(at_s * SECOND_NS), 1000.0 + at_s)
+        assert found is not None
+        told += [lasted_s] if stalls.is_news(found) else []
+    assert told == [0.6, 2.0]

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from gateway.parameter_files.comparison import Verdict
+from gateway.parameter_files.comparison import ComparisonVerdict
 from gateway.parameter_files.contents import FileProblem
 from server_gui.core.tuning.comparison import Comparison, open_file, save_file, staged_as
 from tests.support.desk import HELD, Bench, described, looked
@@ -39,9 +39,9 @@ def test_every_value_of_a_file_is_the_same_or_different_or_cannot_be_changed(
 ) -> None:
     compared = opened(file, bench)
     assert {name: row.verdict for name, row in compared.rows.items()} == {
-        STEP: Verdict.DIFFERENT,
-        ANGLE: Verdict.SAME,
-        TORQUE: Verdict.OUT_OF_LIMITS,
+        STEP: ComparisonVerdict.DIFFERENT,
+        ANGLE: ComparisonVerdict.SAME,
+        TORQUE: ComparisonVerdict.OUT_OF_LIMITS,
     }
     assert compared.unchangeable == ("left_hip.no_such",)
     assert staged_as(compared.different) == {STEP: 0.43, TORQUE: 95.0}

@@ -8,7 +8,7 @@ from gateway.client import CallTimeout, RemoteError
 from gateway.units import Units
 from gateway.wire.parameter import Confirmed, Reverted, Written
 from server_gui.core.desk.station import Station
-from server_gui.core.tuning.edits import Change
+from server_gui.core.tuning.edits import ReviewedEdit
 from server_gui.core.tuning.writing import WriteState
 from tests.support.desk import HELD, Bench, described, looked
 
@@ -19,7 +19,7 @@ def stage(station: Station, name: str, value: float) -> None:
     station.edits.stage(name, value, station.robot.parameters.get(name))
 
 
-def changes(bench: Bench) -> tuple[Change, ...]:
+def changes(bench: Bench) -> tuple[ReviewedEdit, ...]:
     return bench.station.difference(Units())
 
 

@@ -161,4 +161,4 @@ def test_a_store_that_is_away_is_told_and_what_was_read_stays(
 
 
 def test_where_there_is_no_store_yet_there_is_nothing(settings: ServerSettings) -> None:
-    assert look(settings) == module.Found()
+    assert look(settings) == module.JournalsFound()

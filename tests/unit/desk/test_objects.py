@@ -13,10 +13,10 @@ from server_gui.core.desk.desk import Desk
 from server_gui.core.follow.events import Described
 from server_gui.core.objects.devices import device_of, devices
 from server_gui.core.objects.facts import facts
-from server_gui.core.objects.forms import forms
+from server_gui.core.objects.forms import for_reading, forms
 from server_gui.core.objects.objects import Objects
-from server_gui.core.objects.reading import MOST, OLD_S, Held, Reading
-from server_gui.core.objects.rows import Compared, Finder, Kind, cells, channel_lines, pin_of
+from server_gui.core.objects.reading import MOST, OLD_S, Reading, ReadValue
+from server_gui.core.objects.rows import Compared, Finder, RowKind, cells, channel_lines, limits, pin_of
 from tests.support.desk import Bench, FakeCommands, described
 from tests.support.dictionaries import HOLDS, OBJECTS, answer_lists, answer_reads, one
 
@@ -204,7 +204,7 @@ def test_a_robot_that_has_started_anew_holds_nothing_of_before() -> None:
 # --- finding, comparing, saving
 
 
-def _find(objects: Objects, compared: Compared, words: str = "", kind: Kind = Kind.ALL) -> list[str]:
+def _find(objects: Objects, compared: Compared, words: str = "", kind: RowKind = RowKind.ALL) -> list[str]:
     pinned = {pin_of(KNEE, "0x6041:0")}
     found = Finder().find(objects.of(KNEE), words, compared, pinned, objects.reading.revision)
     return [info.object for info in found[kind]]
@@ -238,15 +238,15 @@ def test_objects_are_found_by_address_range_and_all_that_is_said_of_them(
 
 
 def test_of_a_kind(objects: Objects, whole: Compared) -> None:
-    assert _find(objects, whole, kind=Kind.PARAMETERS) == ["0x6072:0"]
-    assert _find(objects, whole, kind=Kind.PINNED) == ["0x6041:0"]
-    assert _find(objects, whole, kind=Kind.DIFFERENT) == ["0x6040:0", "0x6065:0", "0x6072:0"]
+    assert _find(objects, whole, kind=RowKind.PARAMETERS) == ["0x6072:0"]
+    assert _find(objects, whole, kind=RowKind.PINNED) == ["0x6041:0"]
+    assert _find(objects, whole, kind=RowKind.DIFFERENT) == ["0x6040:0", "0x6065:0", "0x6072:0"]
 
 
 def test_what_was_not_read_differs_from_nothing(objects: Objects, commands: FakeCommands) -> None:
     objects.of(KNEE)
     answer_lists(commands)
-    assert _find(objects, Compared(KNEE, {}), kind=Kind.DIFFERENT) == []
+    assert _find(objects, Compared(KNEE, {}), kind=RowKind.DIFFERENT) == []
 
 
 def test_two_devices_are_compared(objects: Objects, commands: FakeCommands, whole: Compared) -> None:
@@ -256,7 +256,7 @@ def test_two_devices_are_compared(objects: Objects, commands: FakeCommands, whol
     objects.reading.look([(other, address) for address in ("0x6041:0", "0x6065:0", "0x1018:4")])
     answer_reads(commands, {**HOLDS, "0x6065:0": ObjectValue(7, "7", 1)})
     beside = Compared(KNEE, whole.held, other)
-    assert _find(objects, beside, kind=Kind.DIFFERENT) == ["0x6065:0"]
+    assert _find(objects, beside, kind=RowKind.DIFFERENT) == ["0x6065:0"]
     assert beside.title == "right knee"
 
 
@@ -306,7 +306,7 @@ def test_what_is_locked_says_so_with_the_lines_that_release_it(whole: Compared) 
 
 def test_what_is_old_is_not_told_as_it_is_now(whole: Compared) -> None:
     info = BY_ADDRESS["0x6041:0"]
-    held = Held(HOLDS["0x6041:0"], time.monotonic_ns() - 60_000_000_000, 0.0)
+    held = ReadValue(HOLDS["0x6041:0"], time.monotonic_ns() - 60_000_000_000, 0.0)
     old = Compared(KNEE, {(KNEE, "0x6041:0"): held})
     assert "OLD: read 60 s ago" in dict(facts(info, old, None, None, "", is_linked=True))["Holds"]
     assert "OLD" in dict(facts(info, whole, None, None, "", is_linked=False))["Holds"]
@@ -337,3 +337,14 @@ def test_what_has_no_eds_is_among_them_with_why() -> None:
     broken = ComponentInfo("ankle", "device", "absent", "ankle.eds is not there")
     description = replace(described().description, components=[broken])
     assert [one.problem for one in devices(description)] == ["ankle.eds is not there"]
+
+
+def test_numbers_are_read_with_the_sign_for_minus_and_texts_as_they_are() -> None:
+    number, text = one("0x6065:0", "Window", "INTEGER32"), one("0x1008:0", "Name", "VISIBLE_STRING")
+    assert for_reading(number, "-6700") == "−6700"
+    assert for_reading(text, "-A -6700") == "-A -6700"
+    assert limits(replace(number, min=-6700, max=6700)) == "−6700 … 6700"
+    held = {("left_knee", number.object): ReadValue(ObjectValue(-6700, "-6700", 1), time.monotonic_ns(), 0.0)}
+    said = dict(facts(number, Compared("left_knee", held), None, None, "", is_linked=True))
+    assert said["Holds"] == "−6700"
+    assert said["Decimal, Hex, Binary"].startswith("−6700 · 0xFFFFE5D4")

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gateway.parameter_files.comparison import Verdict, compare
+from gateway.parameter_files.comparison import ComparisonVerdict, compare
 from gateway.units import Unit
 from gateway.wire.parameter import ParameterInfo, ParameterValue
 from server_gui.core.tuning.edits import refusal
@@ -60,11 +60,11 @@ def test_window_and_file_agree(value: float, held: float, max_step: float | None
     parameter = info(max_step=max_step)
     now = ParameterValue(held, "m", -0.7, 0.6, 0)
     (row,) = compare({"knee.gain": value}, {"knee.gain": parameter}, {"knee.gain": now})
-    refused = row.verdict in (Verdict.OUT_OF_LIMITS, Verdict.TOO_FAR)
+    refused = row.verdict in (ComparisonVerdict.OUT_OF_LIMITS, ComparisonVerdict.TOO_FAR)
     assert refused == (refusal(value, held, parameter, METRE) is not None)
 
 
 def test_a_file_can_say_nothing_of_a_parameter_without_a_type() -> None:
     now = ParameterValue(0.1, "m", -0.7, 0.6, 0)
     (row,) = compare({"knee.gain": 0.2}, {"knee.gain": info(kind="")}, {"knee.gain": now})
-    assert (row.verdict, row.why) == (Verdict.UNREADABLE, "its type is not known")
+    assert (row.verdict, row.why) == (ComparisonVerdict.UNREADABLE, "its type is not known")

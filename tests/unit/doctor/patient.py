@@ -11,7 +11,7 @@ import eds
 from drivers.bus.interfaces.controller_state import BusState
 from drivers.imu import rotation
 from drivers.joint.scaling import scalings
-from drivers.scan.asking import Told
+from drivers.scan.asking import NodeAnswers
 from drivers.scan.products import Library, files
 from gateway.config.reading import examined
 from gateway.config.robot import RobotConfig
@@ -20,7 +20,7 @@ from gateway.doctor.gathering.objects import wanted
 from gateway.doctor.observations import (
     BusFacts,
     Computer,
-    Heard,
+    IdentifierFrames,
     NodeTable,
     Object,
     Observations,
@@ -142,7 +142,10 @@ class Patient:
         self._errors += 1
 
     def _bus(self, seconds: float, load: float) -> BusFacts:
-        heard = {id_: Heard(count, count / seconds, self._asks[id_]) for id_, count in self._counts.items()}
+        heard = {
+            id_: IdentifierFrames(count, count / seconds, self._asks[id_])
+            for id_, count in self._counts.items()
+        }
         state = BusState.PASSIVE if self._errors and not heard else BusState.ACTIVE
         frames = sum(self._counts.values()) / seconds
         return BusFacts(seconds, heard, frames, load, self._errors / seconds, state)
@@ -225,5 +228,5 @@ def proposals(seen: Observations, objects: Mapping[str, Mapping[Object, Value]])
     return found
 
 
-def _told(vendor: int, product: int) -> Told:
-    return Told(0x20192, None, None, None, None, vendor, product, None, None, None, (), ())
+def _told(vendor: int, product: int) -> NodeAnswers:
+    return NodeAnswers(0x20192, None, None, None, None, vendor, product, None, None, None, (), ())

@@ -9,7 +9,7 @@ from msgspec import structs
 
 import eds
 from drivers.bus.interfaces.controller_state import BusState
-from gateway.doctor.observations import BusFacts, Computer, Heard, Observations, Samples
+from gateway.doctor.observations import BusFacts, Computer, IdentifierFrames, Observations, Samples
 from gateway.doctor.report import status, well
 from gateway.doctor.table import RULES, judged
 from gateway.doctor.verdicts import Edit, Finding, Unknown, Write
@@ -193,7 +193,10 @@ def test_what_is_to_be_written_is_told_in_its_parameters_unit(drives: Patient) -
 
 def test_a_node_that_no_table_has_is_told_and_no_mistake(walker: Patient) -> None:
     seen = walker.seen()
-    heard = dict(seen.buses["main"].heard or {}) | {0x709: Heard(3, 1.0), 0x77F: Heard(1, 0.0)}
+    heard = dict(seen.buses["main"].heard or {}) | {
+        0x709: IdentifierFrames(3, 1.0),
+        0x77F: IdentifierFrames(1, 0.0),
+    }
     verdicts = list(judged(replace(seen, buses={"main": replace(seen.buses["main"], heard=heard)})))
     (told,) = verdicts
     assert isinstance(told, Unknown)

@@ -10,9 +10,9 @@ from server_gui.core.evidence.edits import (
     BACK_NS,
     BEFORE_NS,
     SETTLE_NS,
-    Change,
+    EditState,
     JournalEdits,
-    State,
+    ParameterChange,
     due_ns,
     spell,
 )
@@ -39,8 +39,8 @@ def _entries(*told: tuple[int, str, int]) -> list[dict[str, Any]]:
 
 def test_an_edit_has_who_what_and_when() -> None:
     (edit,) = journal((200, "write", 7), (201, "write done", 7)).all
-    assert edit.changes == (Change(NAME, 80.0, 60.0),)
-    assert (edit.who, edit.state, edit.robot, edit.write) == ("anna", State.KEPT, "exo-01", 7)
+    assert edit.changes == (ParameterChange(NAME, 80.0, 60.0),)
+    assert (edit.who, edit.state, edit.robot, edit.write) == ("anna", EditState.KEPT, "exo-01", 7)
     assert (edit.began_ns, edit.in_force_ns, edit.ended_ns) == (200 * SECOND, 201 * SECOND, None)
     assert edit.utc == "1970-01-01T00:03:20Z"
     assert edit.id == _entries((200, "write", 7))[0]["hash"][:10]
@@ -48,27 +48,27 @@ def test_an_edit_has_who_what_and_when() -> None:
 
 def test_a_trial_is_kept_or_goes_back() -> None:
     on = journal((200, "write", 1), (201, "trial begun", 1))
-    assert on.all[0].state is State.ON_TRIAL
+    assert on.all[0].state is EditState.ON_TRIAL
     assert due_ns(on.all[0]) is None
     kept = journal((200, "write", 1), (201, "trial begun", 1), (220, "trial confirmed", 1)).all[0]
-    assert kept.state is State.KEPT
+    assert kept.state is EditState.KEPT
     assert kept.in_force_ns == 201 * SECOND
     assert due_ns(kept) == 201 * SECOND + AFTER_NS
     back = journal((200, "write", 1), (201, "trial begun", 1), (220, "taken back", 1)).all[0]
-    assert (back.state, back.ended_ns) == (State.REVERTED, 220 * SECOND)
+    assert (back.state, back.ended_ns) == (EditState.REVERTED, 220 * SECOND)
     assert due_ns(back) == 220 * SECOND + BACK_NS
 
 
 def test_what_was_refused_or_failed_is_no_edit_in_force() -> None:
     assert journal((200, "write refused", 1)).all == []
     failed = journal((200, "write", 1), (201, "write taken back", 1)).all[0]
-    assert failed.state is State.FAILED
+    assert failed.state is EditState.FAILED
     assert spell(failed, [failed])[0].after == ()
 
 
 def test_a_trial_that_could_not_be_taken_back_yet_goes_on() -> None:
     told = ((200, "write", 1), (201, "trial begun", 1), (220, "NOT TAKEN BACK yet", 1))
-    assert journal(*told).all[0].state is State.ON_TRIAL
+    assert journal(*told).all[0].state is EditState.ON_TRIAL
 
 
 def test_what_follows_the_write_at_once_is_on_neither_side() -> None:
@@ -117,7 +117,7 @@ def test_a_trial_that_takes_over_another_is_judged_against_what_it_found() -> No
     ).all
     first, _ = spell(edits[0], edits)
     second, _ = spell(edits[1], edits)
-    assert (edits[0].state, edits[1].state) == (State.TAKEN_OVER, State.REVERTED)
+    assert (edits[0].state, edits[1].state) == (EditState.TAKEN_OVER, EditState.REVERTED)
     assert first.after == [(202 * SECOND, 221 * SECOND)]
     assert second.before == [(202 * SECOND, 220 * SECOND)]
     assert second.after == [(222 * SECOND, 250 * SECOND)]
@@ -165,8 +165,8 @@ def test_the_robots_own_journal_is_understood(tmp_path: Path) -> None:
     edits.take(journal.told().journal.entries)
     journal.close()
     assert [(edit.write, edit.state, edit.trial_s) for edit in edits.all] == [
-        (kept, State.KEPT, None),
-        (trial, State.REVERTED, 20.0),
+        (kept, EditState.KEPT, None),
+        (trial, EditState.REVERTED, 20.0),
     ]
     assert [edit.boot_id for edit in edits.all] == ["boot-1", "boot-1"]
     assert edits.all[1].ended_ns is not None
@@ -191,7 +191,7 @@ def test_an_entry_that_is_nonsense_costs_no_other(nonsense: dict[str, Any]) -> N
     edits = JournalEdits("exo-01")
     good = _entries((200, "write", 1), (201, "write done", 1))
     edits.take([entry(9, 1, "write", 9, {NAME: 1.0}) | nonsense, *good])
-    assert [(edit.write, edit.state) for edit in edits.all] == [(1, State.KEPT)]
+    assert [(edit.write, edit.state) for edit in edits.all] == [(1, EditState.KEPT)]
 
 
 def test_a_value_that_is_no_number_and_a_time_of_no_calendar_can_be_shown() -> None:

@@ -13,15 +13,15 @@ from msgspec.structs import replace
 
 from server_gui.core.evidence import file as evidence_file
 from server_gui.core.evidence.comparison import compare
-from server_gui.core.evidence.edits import State
-from server_gui.core.evidence.file import EvidenceFile, Told, folder_beside, forget, read_all
+from server_gui.core.evidence.edits import EditState
+from server_gui.core.evidence.file import EditEvidence, EvidenceFile, folder_beside, forget, read_all
 from tests.unit.evidence.synthetic import cycles, spell
 from tests.unit.evidence.test_edits import journal
 
 
-def told(write: int = 1, *, is_final: bool = True) -> Told:
+def told(write: int = 1, *, is_final: bool = True) -> EditEvidence:
     (edit,) = journal((200 + write, "write", write), (201 + write, "write done", write)).all
-    return Told(edit, compare(cycles(), spell(), ["left_knee"]), is_final, "20261121T1530")
+    return EditEvidence(edit, compare(cycles(), spell(), ["left_knee"]), is_final, "20261121T1530")
 
 
 def test_what_was_kept_is_read_again(tmp_path: Path) -> None:
@@ -64,7 +64,7 @@ def test_another_format_is_left_alone(tmp_path: Path, caplog: pytest.LogCaptureF
     file.add(told())
     with file.path.open("ab") as lines:
         lines.write(msgspec.json.encode({"format": 2, "edit": "otherwise"}) + b"\n")
-    assert [one.edit.state for one in file.read().values()] == [State.KEPT]
+    assert [one.edit.state for one in file.read().values()] == [EditState.KEPT]
     assert "newer gwrms" in caplog.text
 
 

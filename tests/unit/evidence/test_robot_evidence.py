@@ -8,8 +8,8 @@ from msgspec.structs import replace
 
 from gateway.wire.control import JournalEntries
 from server_gui.core.evidence.comparison import Word
-from server_gui.core.evidence.edits import State
-from server_gui.core.evidence.file import Told
+from server_gui.core.evidence.edits import EditState
+from server_gui.core.evidence.file import EditEvidence
 from server_gui.core.evidence.robot_evidence import MISSED, OUTSIDE, Recorded, RobotEvidence
 from server_gui.core.follow.events import Described, Event, Journalled, Telemetry, replaced
 from tests.support.desk import described
@@ -27,7 +27,9 @@ def events() -> list[Event]:
     return list(walk(36.0, seed=7, person=2, edits=[WORSE]))
 
 
-def followed(events: Iterable[Event | Recorded], robot: RobotEvidence | None = None) -> dict[int, Told]:
+def followed(
+    events: Iterable[Event | Recorded], robot: RobotEvidence | None = None
+) -> dict[int, EditEvidence]:
     """Return what is known in the end, by write."""
     robot = robot or RobotEvidence("exo-01")
     told = [one for event in events for one in robot.take(event)]
@@ -35,12 +37,12 @@ def followed(events: Iterable[Event | Recorded], robot: RobotEvidence | None = N
 
 
 @pytest.fixture(scope="module")
-def worse(events: list[Event]) -> Told:
+def worse(events: list[Event]) -> EditEvidence:
     """What is known of the edit where nothing is amiss."""
     return followed(events)[WORSE.write]
 
 
-def words(told: Told) -> dict[str, Word]:
+def words(told: EditEvidence) -> dict[str, Word]:
     return {one.series: one.word for one in told.evidence.metrics}
 
 
@@ -50,11 +52,11 @@ def changed(events: Sequence[Event], change: Callable[[Telemetry], Event | None]
     return [event for event in made if event is not None]
 
 
-def test_a_worse_gain_is_seen_at_its_joint_and_at_no_other(worse: Told) -> None:
+def test_a_worse_gain_is_seen_at_its_joint_and_at_no_other(worse: EditEvidence) -> None:
     assert words(worse)["left_knee.error_rms"] is Word.WORSE
     assert [one for one, word in words(worse).items() if word in DIFFER and "left_knee" not in one] == []
     assert worse.evidence.strongest.startswith("left_knee.")
-    assert worse.edit.state is State.KEPT
+    assert worse.edit.state is EditState.KEPT
     assert worse.evidence.notes == ()
 
 
@@ -73,7 +75,7 @@ def test_evidence_grows_while_a_trial_counts_down(events: list[Event]) -> None:
 
 
 def test_a_link_that_is_lost_in_the_middle_costs_the_cycles_it_has_cut(
-    events: list[Event], worse: Told
+    events: list[Event], worse: EditEvidence
 ) -> None:
     whole = worse.evidence
     lost = changed(events, lambda one: one if not 25e9 < one.batch.stamps_ns[0] < 27e9 else None)
@@ -132,14 +134,14 @@ def test_a_trial_that_nobody_follows_any_more_is_not_on_trial_for_ever(events: l
         return Journalled(JournalEntries(made))
 
     told = followed(map(on_trial, events))[WORSE.write]
-    assert (told.edit.state, told.is_final) == (State.ASKED, True)
+    assert (told.edit.state, told.is_final) == (EditState.ASKED, True)
     assert told.evidence.word is Word.WORSE
 
 
 def test_what_a_missed_part_of_the_journal_told_is_compared_with_nothing(events: list[Event]) -> None:
     """The trial was taken back, or another edit was made, in entries that nobody here has seen."""
     robot = RobotEvidence("exo-01")
-    seen: list[Told] = []
+    seen: list[EditEvidence] = []
     for event in events:
         if isinstance(event, Journalled):
             made = [one | {"what": "trial begun"} for one in event.journal.entries if one["n"] == 2]
@@ -151,10 +153,10 @@ def test_what_a_missed_part_of_the_journal_told_is_compared_with_nothing(events:
             robot.take(Journalled(JournalEntries([late])))
             seen = robot.look()
     (told,) = robot.end()
-    assert told.edit.state is State.ASKED, "no trial is on for ever"
+    assert told.edit.state is EditState.ASKED, "no trial is on for ever"
     assert MISSED in told.evidence.notes
     assert told.evidence.cycles_after <= 4, "from the last look at the journal on nobody knows what was held"
-    assert [one.edit.state for one in seen] == [State.ASKED]
+    assert [one.edit.state for one in seen] == [EditState.ASKED]
 
 
 def test_edits_of_before_it_was_followed_are_not_judged(events: list[Event]) -> None:
@@ -201,7 +203,9 @@ def test_values_that_no_joint_can_have_are_no_values(events: list[Event]) -> Non
     assert found["left_knee.error_rms"] is Word.WORSE
 
 
-def test_an_edit_that_nobody_heard_the_end_of_cuts_the_walk_short(events: list[Event], worse: Told) -> None:
+def test_an_edit_that_nobody_heard_the_end_of_cuts_the_walk_short(
+    events: list[Event], worse: EditEvidence
+) -> None:
     """Whether its values are in force is not known: the strides after it say nothing of the one before."""
     (told,) = (one for one in events if isinstance(one, Journalled))
     asked = entry(3, 26 * SECOND, "write", 26, {"left_knee.max_torque": 40.0})
@@ -258,7 +262,7 @@ def split(events: Sequence[Event], at_s: float, *names: str) -> list[Event | Rec
 
 @pytest.mark.parametrize("at_s", [10.0, 26.0])
 def test_nobody_is_compared_with_who_wears_the_robot_next(
-    events: list[Event], worse: Told, at_s: float
+    events: list[Event], worse: EditEvidence, at_s: float
 ) -> None:
     robot = RobotEvidence("exo-01")
     told = followed(split(events, at_s, "anna", "bert"), robot)[WORSE.write]

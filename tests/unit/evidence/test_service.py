@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
-from server_gui.core.evidence.file import EvidenceFile, Told, read_all
+from server_gui.core.evidence.file import EditEvidence, EvidenceFile, read_all
 from server_gui.core.evidence.service import EvidenceService
 from server_gui.core.follow.events import Event
 from tests.support.waiting import until
@@ -20,7 +20,7 @@ def events() -> list[Event]:
 
 
 def test_what_an_edit_did_is_kept_when_the_desk_ends(tmp_path: Path, events: list[Event]) -> None:
-    heard: list[Told] = []
+    heard: list[EditEvidence] = []
     with EvidenceService(
         tmp_path, lambda _robot: "session-1", lambda _robot, told: heard.append(told)
     ) as service:
@@ -32,7 +32,7 @@ def test_what_an_edit_did_is_kept_when_the_desk_ends(tmp_path: Path, events: lis
 
 
 def test_nothing_is_kept_of_a_robot_that_is_not_recorded(tmp_path: Path, events: list[Event]) -> None:
-    heard: list[Told] = []
+    heard: list[EditEvidence] = []
     with EvidenceService(tmp_path, lambda _robot: "", lambda _robot, told: heard.append(told)) as service:
         for event in events:
             service.take("exo-01", event)
@@ -45,7 +45,7 @@ def test_a_robot_that_sends_nonsense_disturbs_no_other(tmp_path: Path, events: l
         yield events[0]
         yield object()  # type: ignore[misc]  # nothing that a feed tells
 
-    heard: list[Told] = []
+    heard: list[EditEvidence] = []
     with EvidenceService(
         tmp_path, lambda _robot: "session-1", lambda _robot, told: heard.append(told)
     ) as service:
@@ -62,7 +62,7 @@ def test_a_folder_that_cannot_be_written_is_said(
 ) -> None:
     blocked = tmp_path / "edits"
     blocked.write_text("a file")
-    heard: list[Told] = []
+    heard: list[EditEvidence] = []
     with EvidenceService(
         blocked, lambda _robot: "session-1", lambda _robot, told: heard.append(told)
     ) as service:
@@ -74,7 +74,7 @@ def test_a_folder_that_cannot_be_written_is_said(
 
 def test_it_belongs_to_the_recording_in_which_the_edit_was_made(tmp_path: Path, events: list[Event]) -> None:
     """What is kept of a wearer goes with that wearer, and not with who came next."""
-    heard: list[Told] = []
+    heard: list[EditEvidence] = []
     session = ["anna"]
     with EvidenceService(
         tmp_path, lambda _robot: session[0], lambda _robot, told: heard.append(told)
@@ -92,7 +92,7 @@ def test_what_a_command_keeps_meanwhile_is_told(
 ) -> None:
     """The window that records shows an A/B trial of a terminal."""
     monkeypatch.setattr("server_gui.core.evidence.service.LOOK_S", 0.0)
-    heard: list[Told] = []
+    heard: list[EditEvidence] = []
     with EvidenceService(tmp_path, lambda _robot: "", lambda _robot, told: heard.append(told)) as service:
         for event in events:
             service.take("exo-01", event)

@@ -6,7 +6,7 @@ import pytest
 
 from gateway.units import Unit
 from gateway.wire.parameter import ParameterInfo
-from server_gui.core.experiments.plan import BadPlan, Dwell, Plan, ab, signs, sweep
+from server_gui.core.experiments.plan import BadPlan, Dwell, ExperimentPlan, ab, signs, sweep
 
 METRE = Unit("m", "m")
 STEP_LENGTH = ParameterInfo(
@@ -26,7 +26,7 @@ STEP_LENGTH = ParameterInfo(
 )
 
 
-def values(plan: Plan) -> list[float]:
+def values(plan: ExperimentPlan) -> list[float]:
     """In the order in which they are held."""
     return [step.value for step in plan.steps]
 

@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 
 from gateway.wire.control import JournalEntries
 from server_gui.core.alarms.alarm import Alarm
-from server_gui.core.alarms.texts import Kind as AlarmKind
-from server_gui.core.experiments.machine import ENDS, TABLE, Action, State
+from server_gui.core.alarms.texts import Kind
+from server_gui.core.experiments.machine import ENDS, TABLE, Action, ExperimentState
 from server_gui.core.experiments.machine import Event as Step
 from server_gui.core.experiments.plan import Bounds
-from server_gui.core.experiments.watch import Watch
+from server_gui.core.experiments.watch import ExperimentWatch
 from server_gui.core.follow.events import Journalled
 from tests.support.desk import telemetry
 from tests.unit.experiments.world import NAME, ORIGINAL, World
@@ -38,10 +38,10 @@ HAPPENINGS: Final[Mapping[str, Callable[[World], Any]]] = {
 
 def check(world: World) -> None:
     """What must hold always."""
-    if world.run.state is State.OVER:
+    if world.run.state is ExperimentState.OVER:
         assert world.trial is None
         assert world.value == ORIGINAL
-    if world.run.state is State.NOTHING_DONE:
+    if world.run.state is ExperimentState.NOTHING_DONE:
         assert not world.wrote
 
 
@@ -59,22 +59,33 @@ def test_in_any_order_the_original_is_back_or_it_is_an_error(orders: list[str], 
     world.settle()
     assert world.trial is None
     if world.value == ORIGINAL:
-        assert world.run.state in (State.OVER, State.NOTHING_DONE, State.NOT_CONFIRMED)
-    elif world.wrote and world.run.state is State.OVER:
+        assert world.run.state in (
+            ExperimentState.OVER,
+            ExperimentState.NOTHING_DONE,
+            ExperimentState.NOT_CONFIRMED,
+        )
+    elif world.wrote and world.run.state is ExperimentState.OVER:
         raise AssertionError("another value is held, and nobody has said so")
 
 
 @pytest.mark.parametrize(
-    "state", [State.LOOKING, State.WRITING, State.HOLDING, State.TAKING_BACK, State.READING]
+    "state",
+    [
+        ExperimentState.LOOKING,
+        ExperimentState.WRITING,
+        ExperimentState.HOLDING,
+        ExperimentState.TAKING_BACK,
+        ExperimentState.READING,
+    ],
 )
 @pytest.mark.parametrize("what", sorted(HAPPENINGS))
-def test_each_happening_in_each_state_ends_well(state: State, what: str) -> None:
+def test_each_happening_in_each_state_ends_well(state: ExperimentState, what: str) -> None:
     world = World()
-    if state is not State.LOOKING:
-        world.until(State.WRITING if state is State.WRITING else State.HOLDING)
-    if state in (State.TAKING_BACK, State.READING):
+    if state is not ExperimentState.LOOKING:
+        world.until(ExperimentState.WRITING if state is ExperimentState.WRITING else ExperimentState.HOLDING)
+    if state in (ExperimentState.TAKING_BACK, ExperimentState.READING):
         world.run.halt("asked for")
-    if state is State.READING:
+    if state is ExperimentState.READING:
         world.carry_out()
     assert world.run.state is state
     HAPPENINGS[what](world)
@@ -82,7 +93,7 @@ def test_each_happening_in_each_state_ends_well(state: State, what: str) -> None
     world.settle()
     check(world)
     assert world.run.is_over
-    assert world.run.state is not State.NOT_CONFIRMED or what in ("a long while", "no telemetry")
+    assert world.run.state is not ExperimentState.NOT_CONFIRMED or what in ("a long while", "no telemetry")
 
 
 def test_all_goes_well() -> None:
@@ -109,36 +120,34 @@ def test_all_goes_well() -> None:
 )
 def test_each_rule_ends_it_at_once_with_its_reason(what: str, why: str) -> None:
     world = World()
-    world.until(State.HOLDING)
+    world.until(ExperimentState.HOLDING)
     HAPPENINGS[what](world)
     wrote = len(world.wrote)
     world.sleep(7.0)
     world.settle()
     assert why in world.run.why
     assert len(world.wrote) <= wrote + (what in ("another desk has the lease", "nobody watches"))
-    assert world.run.state is State.OVER
+    assert world.run.state is ExperimentState.OVER
 
 
 @pytest.mark.parametrize(
     ("kind", "lasts_s", "ends"),
     [
-        (AlarmKind.STALE, 4.0, False),
-        (AlarmKind.BUS, 4.0, False),
-        (AlarmKind.UPLOAD, 4.0, False),
-        (AlarmKind.PART_STALE, 1.0, False),
-        (AlarmKind.PART_STALE, 3.0, True),
-        (AlarmKind.FAULT, 0.5, True),
-        (AlarmKind.LOST, 0.5, True),
-        (AlarmKind.BUS_FAILS, 0.5, True),
-        (AlarmKind.BLIND, 0.5, True),
-        (AlarmKind.REPORTS, 0.5, True),
+        (Kind.STALE, 4.0, False),
+        (Kind.BUS, 4.0, False),
+        (Kind.UPLOAD, 4.0, False),
+        (Kind.PART_STALE, 1.0, False),
+        (Kind.PART_STALE, 3.0, True),
+        (Kind.FAULT, 0.5, True),
+        (Kind.LOST, 0.5, True),
+        (Kind.BUS_FAILS, 0.5, True),
+        (Kind.BLIND, 0.5, True),
+        (Kind.REPORTS, 0.5, True),
     ],
 )
-def test_what_a_busy_computer_has_for_a_moment_ends_nothing(
-    kind: AlarmKind, lasts_s: float, ends: bool
-) -> None:
+def test_what_a_busy_computer_has_for_a_moment_ends_nothing(kind: Kind, lasts_s: float, ends: bool) -> None:
     world = World()
-    world.until(State.HOLDING)
+    world.until(ExperimentState.HOLDING)
     world.alarms = [Alarm(kind, "gait", "said of it")]
     world.sleep(lasts_s)
     world.alarms = []
@@ -149,35 +158,35 @@ def test_what_a_busy_computer_has_for_a_moment_ends_nothing(
 
 def test_what_another_master_has_written_is_never_called_back() -> None:
     world = World()
-    world.until(State.HOLDING)
+    world.until(ExperimentState.HOLDING)
     world.sleep(0.5)
     world.steal()
     world.settle()
-    assert world.run.state is State.NOT_CONFIRMED
+    assert world.run.state is ExperimentState.NOT_CONFIRMED
     assert "somebody else has written it" in world.run.why
     assert f"{NAME} = 550 mm" in world.run.back
 
 
 def test_a_robot_that_never_answers_again_is_not_confirmed() -> None:
     world = World()
-    world.until(State.HOLDING)
+    world.until(ExperimentState.HOLDING)
     world.drop()
     world.run.halt("asked for")
     world.sleep(120.0)
-    assert world.run.state is State.NOT_CONFIRMED
+    assert world.run.state is ExperimentState.NOT_CONFIRMED
 
 
 def test_a_value_that_has_changed_meanwhile_begins_nothing() -> None:
     world = World()
     world.value = 0.43
     world.settle()
-    assert world.run.state is State.NOTHING_DONE
+    assert world.run.state is ExperimentState.NOTHING_DONE
     assert "begin anew" in world.run.why
     assert not world.wrote
 
 
 def test_from_every_state_there_is_a_way_out_and_nothing_is_written_on_it() -> None:
-    for state in State:
+    for state in ExperimentState:
         told = {step: after for (before, step), after in TABLE.items() if before is state}
         if state in ENDS:
             assert set(told) <= {Step.WRITTEN}
@@ -207,14 +216,14 @@ def test_from_every_state_there_is_a_way_out_and_nothing_is_written_on_it() -> N
 )
 def test_the_journal_ends_it_by_what_others_do_now(entry: dict[str, Any], why: str) -> None:
     world = World()
-    world.until(State.HOLDING)
+    world.until(ExperimentState.HOLDING)
     world.run.take(Journalled(JournalEntries([entry])))
     assert why in (world.run.watch.why or "")
     assert bool(world.run.watch.why) is bool(why)
 
 
 def test_a_journal_that_was_begun_anew_tells_of_a_stop_all_the_same() -> None:
-    watch = Watch(NAME, ("left_knee",), Bounds())
+    watch = ExperimentWatch(NAME, ("left_knee",), Bounds())
     watch.take(Journalled(JournalEntries([{"n": 500, "who": "anna", "what": "note", "monotonic_ns": 1}])))
     watch.begin((), 2)
     watch.take(Journalled(JournalEntries([{"n": 1, "who": "anna", "what": "stop", "monotonic_ns": 3}])))
@@ -224,7 +233,7 @@ def test_a_journal_that_was_begun_anew_tells_of_a_stop_all_the_same() -> None:
 @pytest.mark.parametrize(("bounds", "is_usual"), [(Bounds(), True), (Bounds(error=0.015), False)])
 def test_a_bound_that_nobody_chose_says_what_to_do(bounds: Bounds, is_usual: bool) -> None:
     """The larger the effect of a value, the sooner twice the usual ends its trial."""
-    watch = Watch(NAME, ("left_knee",), bounds)
+    watch = ExperimentWatch(NAME, ("left_knee",), bounds)
     watch.take(telemetry([1], {"left_knee.following_error": [-0.01]}))
     watch.begin((), 2)
     watch.take(telemetry([3], {"left_knee.following_error": [0.03]}))

@@ -10,10 +10,10 @@ from gateway.client import LinkLost, NotConnected, RemoteError
 from gateway.wire.control import JournalEntries
 from gateway.wire.parameter import ParameterInfo, Reverted, Written
 from server_gui.core.alarms.alarm import Alarm
-from server_gui.core.alarms.texts import Kind as AlarmKind
+from server_gui.core.alarms.texts import Kind
 from server_gui.core.evidence.cycles import Cycle
-from server_gui.core.experiments.machine import State
-from server_gui.core.experiments.plan import Dwell, Plan, sweep
+from server_gui.core.experiments.machine import ExperimentState
+from server_gui.core.experiments.plan import Dwell, ExperimentPlan, sweep
 from server_gui.core.experiments.run import Run
 from server_gui.core.follow.events import Event, Journalled, Telemetry
 from server_gui.core.processing.gait_events import Leg
@@ -41,7 +41,7 @@ class Walk:
 class World(FakeCommands):
     """The gateway's half: it holds the value, and takes back what is on trial with the lease or the link."""
 
-    def __init__(self, plan: Plan | None = None) -> None:
+    def __init__(self, plan: ExperimentPlan | None = None) -> None:
         super().__init__()
         self.now_ns = 100 * SECOND
         self.value, self.ends_ns = ORIGINAL, 0
@@ -167,7 +167,7 @@ class World(FakeCommands):
 
     def alarm(self) -> None:
         """The guard warns."""
-        self.alarms = [Alarm(AlarmKind.GUARD, "guard.tilt", "too far")]
+        self.alarms = [Alarm(Kind.GUARD, "guard.tilt", "too far")]
 
     def stop(self, reason: str = "") -> "Future[Any]":
         entry = {"n": 1000, "who": "anna", "what": "stop"}
@@ -192,19 +192,19 @@ class World(FakeCommands):
             self.sleep(0.5)
         raise AssertionError(f"it never ends: {self.run.state} {self.run.why}")
 
-    def until(self, state: State) -> None:
+    def until(self, state: ExperimentState) -> None:
         """Let all go well until it stands there."""
         for _ in range(400):
             if self.run.state is state:
                 return
-            if state is not State.WRITING or self.run.state is not State.WRITING:
+            if state is not ExperimentState.WRITING or self.run.state is not ExperimentState.WRITING:
                 self.carry_out()
             if self.run.state is not state:
                 self.sleep(0.5)
         raise AssertionError(f"{self.run.state}, not {state}: {self.run.why}")
 
 
-def sweep_of() -> Plan:
+def sweep_of() -> ExperimentPlan:
     """Three values."""
     from gateway.units import Units
     from server_gui.core.tuning.edits import unit_of

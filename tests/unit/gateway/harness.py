@@ -18,7 +18,7 @@ import pytest
 
 import eds
 from drivers.bus.life import NodeLife
-from drivers.component import Component, Kind
+from drivers.component import Component, ComponentKind
 from drivers.errors import DeviceAbort, NotPermitted
 from drivers.joint.cia402 import DriveState, drive_state
 from drivers.joint.commands import WAY_UP
@@ -26,7 +26,7 @@ from drivers.joint.quick_stop import StopOutcome
 from drivers.joint.reading import DriveReading
 from drivers.joint.transitions import Led
 from drivers.latest import Latest
-from drivers.samples import Channel, Quality, State
+from drivers.samples import Channel, ComponentState, Quality
 from gateway.config import RobotConfig, load
 from gateway.connections.listeners import listen
 from gateway.daemon import Daemon
@@ -244,7 +244,7 @@ class FakeComponent:
     def __init__(
         self,
         name: str,
-        kind: Kind,
+        kind: ComponentKind,
         quantities: Sequence[str],
         stale_after_s: float = 1000.0,
         lost: str | None = None,
@@ -270,7 +270,7 @@ class FakeComponent:
         self.latest.update(stamp_ns, tuple(range(len(values))), values)
 
     def quality(self, now_ns: int) -> Quality:
-        state = State.OK if self.lost is None else State.LOST
+        state = ComponentState.OK if self.lost is None else ComponentState.LOST
         age_ns = self.latest.age_ns(now_ns)
         return Quality(state, None if age_ns is None else age_ns / 1e6, self.lost, {"frames": 7})
 
@@ -286,7 +286,7 @@ class FakeDrive(FakeComponent):
     """A CiA 402 drive that stops when it is asked, unless told otherwise."""
 
     def __init__(self, name: str, statusword: int = ENABLED) -> None:
-        super().__init__(name, Kind.JOINT, ["position", "statusword"])
+        super().__init__(name, ComponentKind.JOINT, ["position", "statusword"])
         self.reading: DriveReading | None = None
         self.position = 0.5  # rad; stays where it is when the drive changes its state
         self.stops = 0
@@ -427,8 +427,8 @@ class Bench:
     def __init__(self) -> None:
         self.left = FakeDrive("left_knee")
         self.right = FakeDrive("right_knee")
-        self.gait = FakeComponent("gait", Kind.DEVICE, [])
-        self.insole = FakeComponent("left_insole", Kind.INSOLE, ["force", "cop_x"])
+        self.gait = FakeComponent("gait", ComponentKind.DEVICE, [])
+        self.insole = FakeComponent("left_insole", ComponentKind.INSOLE, ["force", "cop_x"])
         self.gait.node.objects |= {
             (0x2001, 0): (400).to_bytes(2, "little"),
             (0x2002, 0): (1200).to_bytes(2, "little"),
@@ -436,7 +436,7 @@ class Bench:
         }
         self.left.node.objects[0x6072, 0] = (1000).to_bytes(2, "little")
         self.insole.give(300.0, None)
-        self.absent: dict[str, tuple[Kind, str]] = {}
+        self.absent: dict[str, tuple[ComponentKind, str]] = {}
         self.files = {
             "left_knee": "joint_drive.eds",
             "right_knee": "joint_drive.eds",

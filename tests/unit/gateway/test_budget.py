@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from drivers.component import Kind
+from drivers.component import ComponentKind
 from gateway.config import ConfigError
 from gateway.main import main
 from gateway.modules.component.module import ComponentSource
@@ -90,7 +90,7 @@ def test_it_looks_only_while_there_are_streams(loop: Loop) -> None:
 
 
 def knee() -> FakeComponent:
-    return FakeComponent("knee", Kind.JOINT, ["position", "torque"])
+    return FakeComponent("knee", ComponentKind.JOINT, ["position", "torque"])
 
 
 def test_ticks_come_at_a_part_of_their_rate_and_never_below_one_a_second(loop: Loop) -> None:

@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
-from drivers.component import Kind
-from drivers.samples import Finding, Quality, State
+from drivers.component import ComponentKind
+from drivers.samples import ComponentState, Finding, Quality
 from gateway.modules.component.assembly import assemble
 from tests.support.waiting import until
 from tests.unit.gateway.harness import ROBOT, Bench, Client, config, serving
@@ -83,7 +83,7 @@ def test_a_cold_start_does_not_wait_for_ever(client: Client, bench: Bench) -> No
 
 
 def test_what_cannot_be_built_is_named_and_the_rest_is_served(client: Client, bench: Bench) -> None:
-    bench.absent["left_knee"] = (Kind.JOINT, "knee.eds: line 3: no such object")
+    bench.absent["left_knee"] = (ComponentKind.JOINT, "knee.eds: line 3: no such object")
     described = client.call("robot.describe")
     states = {one["name"]: (one["state"], one["problem"]) for one in described["components"]}
     assert states["left_knee"] == ("lost", "knee.eds: line 3: no such object")
@@ -99,7 +99,7 @@ def test_what_cannot_be_built_is_named_and_the_rest_is_served(client: Client, be
 
 
 def test_a_component_that_is_not_there_stands_where_the_file_has_it(client: Client, bench: Bench) -> None:
-    bench.absent["left_knee"] = (Kind.JOINT, "knee.eds: line 3: no such object")
+    bench.absent["left_knee"] = (ComponentKind.JOINT, "knee.eds: line 3: no such object")
     in_the_file = ["left_knee", "right_knee", "gait", "left_insole"]
     assert [one["name"] for one in client.call("robot.describe")["components"]] == in_the_file
     assert list(client.call("component.snapshot")["quality"]) == in_the_file
@@ -153,7 +153,7 @@ def test_what_was_found_is_told_with_its_beginning(
     client: Client, bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     finding = Finding(7, "it hangs", "check its power")
-    found = Quality(State.FAULT, 1.0, "it hangs (for 2 s): check its power", findings=(finding,))
+    found = Quality(ComponentState.FAULT, 1.0, "it hangs (for 2 s): check its power", findings=(finding,))
     monkeypatch.setattr(bench.insole, "quality", lambda _now_ns: found)
     parts = {one["name"]: one for one in client.call("robot.describe")["components"]}
     assert parts["left_insole"]["findings"] == [

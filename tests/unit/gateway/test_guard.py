@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 from drivers.bus.life import NodeLife
-from drivers.component import Kind
+from drivers.component import ComponentKind
 from gateway.cli.describe import main as describe
 from gateway.connections.listeners import listen
 from gateway.daemon import Daemon
@@ -368,7 +368,7 @@ class TestOpen:
         assert words[1][:5] == ["foot", "insole_stale", "silent for 0.2 s", "alarm", "tripped"]
 
     def test_a_component_that_could_not_be_built_cannot_be_seen(self, serve: Serve, bench: Bench) -> None:
-        bench.absent["left_knee"] = (Kind.JOINT, "its EDS is broken")
+        bench.absent["left_knee"] = (ComponentKind.JOINT, "its EDS is broken")
         rule = guard(serve(LIMIT))["rules"][0]
         assert (rule["quantities"], rule["low"], rule["high"]) == (["position"], -0.1, 2.0)
         assert rule["state"] == "blind"

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from drivers.component import Kind
+from drivers.component import ComponentKind
 from drivers.errors import DeviceTimeout
 from drivers.joint.cia402 import DriveState
 from drivers.joint.quick_stop import StopOutcome
@@ -122,7 +122,7 @@ class TestControllers:
             assert client.call("robot.reset")["held"] is False
 
     def test_one_that_is_not_there_keeps_the_hold_and_is_named(self, bench: Bench, tmp_path: Path) -> None:
-        bench.absent["gait"] = (Kind.DEVICE, "its EDS is broken")
+        bench.absent["gait"] = (ComponentKind.DEVICE, "its EDS is broken")
         with stopped(tmp_path, CONTROLLER) as client:
             answer = client.call("robot.reset")
         assert answer["held"] is True

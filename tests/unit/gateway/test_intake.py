@@ -15,7 +15,13 @@ import pytest
 
 from gateway.access.identity import ANYBODY
 from gateway.connections import incoming_bytes, intake, pace, stop_lines
-from gateway.connections.incoming_bytes import ON_THE_WAY, RECEIVE_BYTES, UNKNOWN_BYTES, Heard, IncomingBytes
+from gateway.connections.incoming_bytes import (
+    ON_THE_WAY,
+    RECEIVE_BYTES,
+    UNKNOWN_BYTES,
+    IncomingBytes,
+    ReceivedBytes,
+)
 from gateway.connections.listeners import listen
 from gateway.connections.pace import Pace
 from gateway.connections.session import Session
@@ -42,7 +48,7 @@ class Turned:
         self.client, self.accepted = client, accepted
         self.front, self.loop = Loop(), Loop()
         self.asked: list[str] = []  # reasons of the stops that have acted
-        self.heard: list[Heard] = []
+        self.heard: list[ReceivedBytes] = []
         self.spent: list[int] = []  # what the thread will have worked, the last first
         answer: Future[Any] = Future()
         intake._prepare(accepted)
@@ -182,7 +188,7 @@ def test_stops_beyond_what_may_wait_act_and_are_not_answered(
     turned: Turned, caplog: pytest.LogCaptureFixture
 ) -> None:
     session = Session(turned.loop, turned.inlet, lambda _session, _request: None, 30.0, Sharing(turned.loop))
-    heard = Heard()
+    heard = ReceivedBytes()
     heard.stops = [framing.StopRequest("x", number) for number in range(MOST_STOPS + 5)]
     heard.stop, heard.stopped = heard.stops[-1], Future()
     session.hear(heard)
@@ -303,7 +309,7 @@ def test_a_rest_is_the_last_one_that_was_said(turned: Turned) -> None:
     turned.front.call_later(0.0, lambda: None)
     turned.front._turn()
     assert turned.inlet._rests
-    turned.inlet._end("gone", Heard())
+    turned.inlet._end("gone", ReceivedBytes())
     assert turned.inlet._pace.resting == 0
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from drivers.component import Kind
+from drivers.component import ComponentKind
 from gateway.modules.stop.authority import Address
 from gateway.records import durable
 from gateway.records.journal import Journal, Share
@@ -108,7 +108,7 @@ def test_what_the_robots_file_does_not_say_is_not_written(
 
 def test_what_an_absent_device_holds_is_not_given_up(calm: Bench, tmp_path: Path) -> None:
     path = write_undo(tmp_path, entry(7, change(STEP, STEP_LENGTH, 400, 420)))
-    calm.absent["gait"] = (Kind.DEVICE, "gait.eds is broken")
+    calm.absent["gait"] = (ComponentKind.DEVICE, "gait.eds is broken")
     with tuned(tmp_path) as robot:
         until(lambda: robot.trials()[0].problem == f"{STEP_LENGTH}: unknown: gait.eds is broken", "said")
     assert path.exists()

@@ -19,14 +19,14 @@ from gateway import coding
 from gateway.config.robot import ParameterSettings
 from gateway.modules.control import catalogue, eds_parameters, parameters, rules
 from gateway.modules.control.parameters import Lock, Parameter
-from gateway.wire.framing import Kind, RpcError
+from gateway.wire.framing import ErrorKind, RpcError
 from tests.mutation.operators import mutants
 from tests.mutation.operators import names as names_in
 
 UNSIGNED8, INTEGER8, UNSIGNED64, BOOLEAN, REAL32, REAL64 = 0x05, 0x02, 0x1B, 0x01, 0x08, 0x11
 
 
-def refused(do: Callable[[], object]) -> Kind | None:
+def refused(do: Callable[[], object]) -> ErrorKind | None:
     """The kind of refusal; `None` where it was done."""
     try:
         do()
@@ -41,41 +41,41 @@ ACCESS = {
     "rw": (None, None),
     "rwr": (None, None),
     "rww": (None, None),
-    "ro": (None, Kind.READ_ONLY),
-    "const": (None, Kind.READ_ONLY),
-    "wo": (Kind.NOT_ALLOWED, Kind.NOT_ALLOWED),
-    "": (Kind.NOT_ALLOWED, Kind.NOT_ALLOWED),
+    "ro": (None, ErrorKind.READ_ONLY),
+    "const": (None, ErrorKind.READ_ONLY),
+    "wo": (ErrorKind.NOT_ALLOWED, ErrorKind.NOT_ALLOWED),
+    "": (ErrorKind.NOT_ALLOWED, ErrorKind.NOT_ALLOWED),
 }  # access in the EDS → reading, writing
 LIMITS = [
     (None, None, -128, None),
     (None, None, 127, None),
-    (None, None, -129, Kind.OUT_OF_LIMIT),
-    (None, None, 128, Kind.OUT_OF_LIMIT),
-    (10, 20, 9, Kind.OUT_OF_LIMIT),
+    (None, None, -129, ErrorKind.OUT_OF_LIMIT),
+    (None, None, 128, ErrorKind.OUT_OF_LIMIT),
+    (10, 20, 9, ErrorKind.OUT_OF_LIMIT),
     (10, 20, 10, None),
     (10, 20, 15, None),
     (10, 20, 20, None),
-    (10, 20, 21, Kind.OUT_OF_LIMIT),
-    (10, None, 9, Kind.OUT_OF_LIMIT),
+    (10, 20, 21, ErrorKind.OUT_OF_LIMIT),
+    (10, None, 9, ErrorKind.OUT_OF_LIMIT),
     (10, None, 10, None),
     (10, None, 21, None),
     (None, 20, 9, None),
     (None, 20, 20, None),
-    (None, 20, 21, Kind.OUT_OF_LIMIT),
+    (None, 20, 21, ErrorKind.OUT_OF_LIMIT),
     (0, 0, 0, None),
-    (0, 0, 1, Kind.OUT_OF_LIMIT),
-    (0, 0, -1, Kind.OUT_OF_LIMIT),
+    (0, 0, 1, ErrorKind.OUT_OF_LIMIT),
+    (0, 0, -1, ErrorKind.OUT_OF_LIMIT),
     (9.6, 20, 9.6, None),  # the device would hold 10
-    (9.2, 20, 9.2, Kind.OUT_OF_LIMIT),  # the device would hold 9
-    (10, 19.8, 19.8, Kind.OUT_OF_LIMIT),  # the device would hold 20
+    (9.2, 20, 9.2, ErrorKind.OUT_OF_LIMIT),  # the device would hold 9
+    (10, 19.8, 19.8, ErrorKind.OUT_OF_LIMIT),  # the device would hold 20
 ]  # min, max, value, what comes of it
 ACCEPTED = [
     (b"\x05", None),
     (b"\xfb", None),
-    (b"\x06", Kind.OUT_OF_LIMIT),
-    (b"\xfa", Kind.OUT_OF_LIMIT),
-    (b"", Kind.MISMATCH),
-    (b"\x05\x00", Kind.MISMATCH),
+    (b"\x06", ErrorKind.OUT_OF_LIMIT),
+    (b"\xfa", ErrorKind.OUT_OF_LIMIT),
+    (b"", ErrorKind.MISMATCH),
+    (b"\x05\x00", ErrorKind.MISMATCH),
 ]  # bytes within −5 and 5, what comes of them
 CONTRADICTIONS: list[tuple[float | None, float | None, bool]] = [
     (None, None, False),
@@ -89,18 +89,18 @@ CONTRADICTIONS: list[tuple[float | None, float | None, bool]] = [
 REAL_LIMITS = [
     (REAL32, 1.0, None, 0.6, 0.6, None),  # the device holds 0.60000002
     (REAL32, 1.0, None, 0.6, 0.60000003, None),  # and so it does of this
-    (REAL32, 1.0, None, 0.6, 0.6000001, Kind.OUT_OF_LIMIT),
+    (REAL32, 1.0, None, 0.6, 0.6000001, ErrorKind.OUT_OF_LIMIT),
     (REAL32, 1.0, 0.7, None, 0.7, None),  # 0.69999999
-    (REAL32, 1.0, 0.7, None, 0.6999999, Kind.OUT_OF_LIMIT),
+    (REAL32, 1.0, 0.7, None, 0.6999999, ErrorKind.OUT_OF_LIMIT),
     (REAL32, 0.001, -0.6, 0.6, 0.6, None),
     (REAL32, 0.001, -0.6, 0.6, -0.6, None),
     (REAL32, -0.001, -0.6, 0.6, 0.6, None),
     (REAL32, 1.0, -1e300, 1e300, 5.0, None),  # no REAL32 reaches them
     (REAL64, 0.001, None, 0.6, 0.6, None),  # 0.6000000000000001
-    (REAL64, 1.0, None, 0.6, 0.6000000000000001, Kind.OUT_OF_LIMIT),
-    (INTEGER8, 0.25, None, 0.7, 0.7, Kind.OUT_OF_LIMIT),  # the device would hold 0.75
+    (REAL64, 1.0, None, 0.6, 0.6000000000000001, ErrorKind.OUT_OF_LIMIT),
+    (INTEGER8, 0.25, None, 0.7, 0.7, ErrorKind.OUT_OF_LIMIT),  # the device would hold 0.75
     (INTEGER8, 0.1, None, 0.6, 0.6, None),
-    (INTEGER8, 0.1, None, 0.6, 0.64, Kind.OUT_OF_LIMIT),
+    (INTEGER8, 0.1, None, 0.6, 0.64, ErrorKind.OUT_OF_LIMIT),
 ]  # type, scale, min, max, value, what comes of it
 
 
@@ -129,15 +129,15 @@ def check_parameter(module: ModuleType) -> None:
     for lock in module.Lock:
         locked = one(lock=lock, table="[joint.knee]")
         assert (refused(locked.check_readable), locked.read_only) == (None, lock.value)
-        assert refused(lambda locked=locked: locked.encode(1)) == Kind.READ_ONLY  # type: ignore[misc]
+        assert refused(lambda locked=locked: locked.encode(1)) == ErrorKind.READ_ONLY  # type: ignore[misc]
     broken = one(problem="no such object")
-    assert {refused(broken.check_readable), refused(lambda: broken.encode(1))} == {Kind.UNAVAILABLE}
+    assert {refused(broken.check_readable), refused(lambda: broken.encode(1))} == {ErrorKind.UNAVAILABLE}
     assert one().encode(5) == b"\x05"
     for data, kind in ACCEPTED:
         limited = one(min=-5, max=5)
         assert refused(lambda limited=limited, data=data: limited.accepts(data)) == kind  # type: ignore[misc]
     assert one().accepts(b"\xff") == -1
-    assert refused(lambda: one(access="ro").accepts(b"\x01")) == Kind.READ_ONLY
+    assert refused(lambda: one(access="ro").accepts(b"\x01")) == ErrorKind.READ_ONLY
 
 
 # Numbers and bytes
@@ -286,7 +286,7 @@ def check_described(module: ModuleType) -> None:
         settings = ParameterSettings(object="0x6072:0", min=least, max=most, scale=scale)
         found = module.described("knee.x", settings, {"knee": drive()}, {})
         assert (found.problem is None) is within
-        assert refused(found.check_writable) == (None if within else Kind.UNAVAILABLE)
+        assert refused(found.check_writable) == (None if within else ErrorKind.UNAVAILABLE)
     for object_, absent in (("0x7000:0", {}), ("0x1008:0", {}), ("0x6072:0", {"knee": "no power"})):
         found = module.described("knee.x", ParameterSettings(object=object_), {"knee": drive()}, absent)
         assert found.problem is not None
@@ -360,10 +360,10 @@ def check_states(module: ModuleType) -> None:
         for state in (*DriveState, None):
             allowed = named is None or state in (DriveState.FAULT, DriveState.OPERATION_ENABLED)
             at_rest = state not in moving and state is not None
-            expected = None if allowed and (live or at_rest) else Kind.WRONG_STATE
+            expected = None if allowed and (live or at_rest) else ErrorKind.WRONG_STATE
             expected = None if live and named is None else expected
             assert refused(lambda one=one, state=state: _check(module, one, 5, 5, state)) == expected  # type: ignore[misc]
-    for most, after, kind in ((None, 200, None), (10.0, 60, None), (10.0, 61, Kind.OUT_OF_LIMIT)):
+    for most, after, kind in ((None, 200, None), (10.0, 60, None), (10.0, 61, ErrorKind.OUT_OF_LIMIT)):
         one = _stepping(most)
         assert refused(lambda one=one, after=after: _check(module, one, after, 50, None)) == kind  # type: ignore[misc]
 

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import eds
-from drivers.component import Kind
+from drivers.component import ComponentKind
 from drivers.errors import DeviceAbort, DeviceTimeout, Unavailable
 from gateway.config.robot import ParameterSettings
 from gateway.modules.control import unanswered
@@ -246,7 +246,7 @@ def test_an_unknown_drive_state_means_do_not(writer: Client, bench: Bench) -> No
 
 
 def test_an_absent_drive_means_do_not(client: Client, bench: Bench) -> None:
-    bench.absent["right_knee"] = (Kind.JOINT, "its EDS is broken")
+    bench.absent["right_knee"] = (ComponentKind.JOINT, "its EDS is broken")
     bench.left.set_state(DISABLED)
     client.call("control.acquire", ttl_s=60)
     assert "its EDS is broken" in str(client.refused("parameter.write", changes={"gait.toe_height": 0.09}))
@@ -414,7 +414,7 @@ def test_a_stop_interrupts_a_write_which_is_taken_back(standing: Client, bench: 
 
 
 def test_a_parameter_of_an_absent_device_is_unavailable(client: Client, bench: Bench) -> None:
-    bench.absent["gait"] = (Kind.DEVICE, "gait.eds is broken")
+    bench.absent["gait"] = (ComponentKind.DEVICE, "gait.eds is broken")
     client.call("control.acquire", ttl_s=60)
     error = client.refused("parameter.write", changes={"gait.step_length": 0.42})
     assert error.kind == "unavailable"

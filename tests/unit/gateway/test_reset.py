@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from drivers.component import Kind
+from drivers.component import ComponentKind
 from drivers.joint.cia402 import DriveState
 from drivers.joint.transitions import Led
 from gateway.records.folder import RecordsFolder
@@ -75,7 +75,7 @@ def test_one_drive_of_which_it_is_not_known_that_it_has_no_current_keeps_it_held
 
 
 def test_a_joint_that_could_not_be_built_keeps_it_held(bench: Bench, tmp_path: Path) -> None:
-    bench.absent["left_knee"] = (Kind.JOINT, "its EDS is broken")
+    bench.absent["left_knee"] = (ComponentKind.JOINT, "its EDS is broken")
     with serving(config(tmp_path)) as address, Client(address) as client:
         client.call("control.acquire", ttl_s=60)
         client.call("robot.stop")

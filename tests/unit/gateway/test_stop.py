@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from drivers.component import Kind
+from drivers.component import ComponentKind
 from drivers.joint.quick_stop import StopOutcome
 from drivers.joint.reading import DriveReading
 from gateway.config import ConfigError
@@ -43,7 +43,7 @@ def test_only_what_is_confirmed_counts_as_stopped(client: Client, bench: Bench) 
 
 
 def test_a_drive_that_could_not_be_built_is_unreachable(client: Client, bench: Bench) -> None:
-    bench.absent["left_knee"] = (Kind.JOINT, "its EDS is broken")
+    bench.absent["left_knee"] = (ComponentKind.JOINT, "its EDS is broken")
     assert client.call("robot.stop")["drives"] == {"right_knee": "confirmed", "left_knee": "unreachable"}
 
 
@@ -261,7 +261,7 @@ class TestController:
         assert len(bench.gait.node.written()) > 1
 
     def test_one_that_is_not_there_is_unreachable(self, bench: Bench, tmp_path: Path) -> None:
-        bench.absent["gait"] = (Kind.DEVICE, "its EDS is broken")
+        bench.absent["gait"] = (ComponentKind.DEVICE, "its EDS is broken")
         with stopping(tmp_path, CONTROLLER) as client:
             assert client.call("robot.stop")["controllers"] == {"gait": "unreachable"}
             assert "not there" in client.call("robot.describe")["stop"]["controllers"]["gait"]

@@ -13,11 +13,11 @@ from gateway.modules.stop.machine import (
     TRANSITIONS,
     Action,
     Event,
-    Finding,
     Input,
     Phase,
-    State,
-    Step,
+    ResetFinding,
+    StopMachineState,
+    Transition,
     step,
     table,
     unproved,
@@ -25,14 +25,14 @@ from gateway.modules.stop.machine import (
 
 TARGETS = frozenset({"left_knee", "gait"})
 STOPS = (Input.STOP, Input.TRIP)
-RESTS = {name: Finding(at_rest=True, asked_ns=100) for name in TARGETS}
+RESTS = {name: ResetFinding(at_rest=True, asked_ns=100) for name in TARGETS}
 
 
-def at(phase: Phase, **changes: object) -> State:
-    return replace(State(TARGETS, phase, number=7, stops=2, stopped_ns=50), **changes)  # type: ignore[arg-type]
+def at(phase: Phase, **changes: object) -> StopMachineState:
+    return replace(StopMachineState(TARGETS, phase, number=7, stops=2, stopped_ns=50), **changes)  # type: ignore[arg-type]
 
 
-def proof(**findings: Finding) -> Event:
+def proof(**findings: ResetFinding) -> Event:
     return Event(Input.PROVED, number=7, findings={**RESTS, **findings})
 
 
@@ -79,11 +79,11 @@ def test_nothing_is_reset_or_enabled_while_a_rule_that_stops_is_tripped(phase: P
 @pytest.mark.parametrize("asked_ns", [99, 100])
 def test_what_came_in_before_the_newest_stop_is_not_done(phase: Phase, what: Input, asked_ns: int) -> None:
     stopped = at(phase, asked_ns=100)
-    assert step(stopped, Event(what, asked_ns)) == Step(stopped, (), OVERTAKEN)
+    assert step(stopped, Event(what, asked_ns)) == Transition(stopped, (), OVERTAKEN)
 
 
 def test_a_record_that_is_found_overtakes_nothing() -> None:
-    found = step(State(TARGETS), Event(Input.FOUND, 100)).state
+    found = step(StopMachineState(TARGETS), Event(Input.FOUND, 100)).state
     assert (found.phase, found.stopped_ns, found.asked_ns) == (Phase.HELD, 100, 0)
     assert step(found, Event(Input.RESET, 50)).state.phase is Phase.RESETTING
 
@@ -92,7 +92,7 @@ def test_a_record_that_is_found_overtakes_nothing() -> None:
 @pytest.mark.parametrize("phase", Phase)
 @pytest.mark.parametrize("number", [6, 8])
 def test_an_end_counts_only_of_the_newest_undertaking(phase: Phase, what: Input, number: int) -> None:
-    assert step(at(phase), Event(what, number=number, findings=RESTS)) == Step(at(phase))
+    assert step(at(phase), Event(what, number=number, findings=RESTS)) == Transition(at(phase))
 
 
 class TestProof:
@@ -102,11 +102,15 @@ class TestProof:
 
     @pytest.mark.parametrize(
         "finding",
-        [Finding(at_rest=False, asked_ns=100), Finding(at_rest=True, asked_ns=50), Finding(True, 0)],
+        [
+            ResetFinding(at_rest=False, asked_ns=100),
+            ResetFinding(at_rest=True, asked_ns=50),
+            ResetFinding(True, 0),
+        ],
         ids=["not at rest", "asked for when it was stopped", "never asked for"],
     )
     @pytest.mark.parametrize("target", sorted(TARGETS))
-    def test_one_that_is_not_known_to_rest_keeps_the_hold(self, target: str, finding: Finding) -> None:
+    def test_one_that_is_not_known_to_rest_keeps_the_hold(self, target: str, finding: ResetFinding) -> None:
         assert step(at(Phase.RESETTING), proof(**{target: finding})).state.phase is Phase.HELD
 
     @pytest.mark.parametrize("target", sorted(TARGETS))
@@ -145,12 +149,12 @@ class TestProof:
         assert step(at(Phase.RELEASING), Event(Input.KEPT, number=7)).state.phase is Phase.HELD
 
 
-def orders(state: State, depth: int) -> Iterator[tuple[State, Event, Step]]:
+def orders(state: StopMachineState, depth: int) -> Iterator[tuple[StopMachineState, Event, Transition]]:
     """Every event in every state that can be reached; a state is met once."""
     met: set[tuple[Phase, bool, tuple[str, ...]]] = set()
     edge = [state]
     for time_ns in range(1, depth):
-        following: list[State] = []
+        following: list[StopMachineState] = []
         for one in edge:
             for event in _events(one, 1000 * time_ns):
                 after = step(one, event)
@@ -162,8 +166,8 @@ def orders(state: State, depth: int) -> Iterator[tuple[State, Event, Step]]:
         edge = following
 
 
-def _events(state: State, now_ns: int) -> Iterator[Event]:
-    fresh = {name: Finding(at_rest=True, asked_ns=now_ns) for name in TARGETS}
+def _events(state: StopMachineState, now_ns: int) -> Iterator[Event]:
+    fresh = {name: ResetFinding(at_rest=True, asked_ns=now_ns) for name in TARGETS}
     for what in Input:
         for number in (state.number, state.number - 1):
             for standing in ((), ("rule",)):
@@ -173,7 +177,7 @@ def _events(state: State, now_ns: int) -> Iterator[Event]:
 
 def test_no_order_of_events_lets_go_of_a_hold_without_proof() -> None:
     tried = 0
-    for before, event, after in orders(State(TARGETS), depth=12):
+    for before, event, after in orders(StopMachineState(TARGETS), depth=12):
         tried += 1
         if before.held and not after.state.held:
             assert (before.phase, event.input) == (Phase.RELEASING, Input.REMOVED)

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.component import Kind
+from drivers.component import ComponentKind
 from gateway.connections.session import Session
 from gateway.modules.component.module import ComponentSource
 from gateway.process.loop import Loop
@@ -53,7 +53,7 @@ def taken(one: Outlet) -> list[dict[str, Any]]:
 
 
 def knee(stale_after_s: float = 1000.0) -> FakeComponent:
-    return FakeComponent("knee", Kind.JOINT, ["position", "torque"], stale_after_s)
+    return FakeComponent("knee", ComponentKind.JOINT, ["position", "torque"], stale_after_s)
 
 
 def rows(data: list[dict[str, Any]]) -> list[tuple[int, dict[str, float | None]]]:
@@ -144,7 +144,7 @@ def test_ticks_that_the_loop_missed_for_too_long_are_counted_as_dropped() -> Non
 
 
 def test_own_samples_come_complete_one_component_a_notification() -> None:
-    component, other = knee(), FakeComponent("trunk", Kind.IMU, ["tilt_forward"])
+    component, other = knee(), FakeComponent("trunk", ComponentKind.IMU, ["tilt_forward"])
     loop = Loop()
     feed = SampleFeed(loop, [whole(ComponentSource(component)), whole(ComponentSource(other))])
     one = outlet()

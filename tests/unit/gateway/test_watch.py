@@ -11,11 +11,11 @@ from drivers.errors import DeviceTimeout
 from drivers.joint.quick_stop import StopOutcome
 from gateway.modules.stop.authority import Authority
 from gateway.modules.stop.controllers import Controller, Controllers
-from gateway.modules.stop.machine import Finding, Input, Phase
+from gateway.modules.stop.machine import Input, Phase, ResetFinding
 from gateway.modules.stop.reset import Lowering
 from gateway.modules.stop.stopper import Stopper
 from gateway.modules.stop.target import Report
-from gateway.modules.stop.watch import AT_LEAST_S, LOOK_S, Watch
+from gateway.modules.stop.watch import AT_LEAST_S, LOOK_S, StopWatch
 from gateway.process.futures import done, failed
 from gateway.process.loop import Loop
 
@@ -40,7 +40,7 @@ def look(**axes: Unseen) -> None:
     authority.feed(Input.STOP, lambda _step: None)
     stoppers = cast("dict[str, Stopper]", axes)
     nothing: Any = lambda *_what: None  # noqa: E731 - it takes whatever is told
-    Watch(authority, stoppers, {}, nothing, nothing).look()
+    StopWatch(authority, stoppers, {}, nothing, nothing).look()
 
 
 @pytest.mark.parametrize(("idle_s", "asked"), [(0.0, 0), (LOOK_S / 2, 0), (LOOK_S, 1), (AT_LEAST_S, 1)])
@@ -71,7 +71,7 @@ def test_a_controller_that_is_only_asked_to_stop_keeps_no_reset_from_its_end(
     """It enables drives and cannot be reached: each of its stops goes ahead of the reading."""
     monkeypatch.setattr("gateway.modules.stop.reset.LOOK_S", 0.05)
     loop = Loop()
-    never: Future[Finding] = Future()
+    never: Future[ResetFinding] = Future()
     gait = SimpleNamespace(stop=lambda **_how: done(Report(StopOutcome.UNREACHABLE)), wake=lambda: None)
     gait.look = lambda: never
     controllers = cast("Controllers", SimpleNamespace(targets={"gait": gait}, absent={}))
@@ -84,8 +84,8 @@ def test_a_controller_that_is_only_asked_to_stop_keeps_no_reset_from_its_end(
     loop.close()
 
 
-def at_rest(*names: str) -> dict[str, Finding]:
-    return {name: Finding(at_rest=True, asked_ns=time.monotonic_ns()) for name in names}
+def at_rest(*names: str) -> dict[str, ResetFinding]:
+    return {name: ResetFinding(at_rest=True, asked_ns=time.monotonic_ns()) for name in names}
 
 
 @pytest.mark.parametrize("is_being_proved", [False, True])
@@ -98,7 +98,7 @@ def test_nobody_who_is_led_down_is_stopped_by_a_look(is_being_proved: bool) -> N
     if is_being_proved:
         authority.feed(Input.PROVED, _nothing, number=reset.number, findings=at_rest("knee"))
     assert authority.state.phase is (Phase.RELEASING if is_being_proved else Phase.RESETTING)
-    Watch(authority, cast("dict[str, Stopper]", {"knee": knee}), {}, _nothing, _nothing).look()
+    StopWatch(authority, cast("dict[str, Stopper]", {"knee": knee}), {}, _nothing, _nothing).look()
     assert knee.asked == 0
 
 
@@ -107,11 +107,11 @@ def test_a_controller_that_does_not_tell_whether_it_is_stopped_is_asked_to_stop(
     error: Exception | None,
 ) -> None:
     asked: list[str] = []
-    told = done(Finding(at_rest=True, asked_ns=1)) if error is None else failed(error)
+    told = done(ResetFinding(at_rest=True, asked_ns=1)) if error is None else failed(error)
     gait = SimpleNamespace(running=False, look=lambda: told, stop=lambda: asked.append("stop"))
     authority = Authority({"gait"}, ())
     authority.feed(Input.STOP, _nothing)
-    Watch(authority, {}, cast("dict[str, Controller]", {"gait": gait}), _nothing, _nothing).look()
+    StopWatch(authority, {}, cast("dict[str, Controller]", {"gait": gait}), _nothing, _nothing).look()
     assert asked == ([] if error is None else ["stop"])
 
 

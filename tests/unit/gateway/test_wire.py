@@ -107,7 +107,7 @@ def test_no_line_raises_anything_but_bad_line(line: bytes) -> None:
 def test_wrong_parameters_name_the_field_and_what_is_allowed(method: str, params: bytes, says: str) -> None:
     with pytest.raises(framing.RpcError) as caught:
         framing.decode_params(msgspec.Raw(params), METHODS[method].params)
-    assert (caught.value.code, caught.value.kind) == (framing.INVALID_PARAMS, framing.Kind.BAD_PARAMS)
+    assert (caught.value.code, caught.value.kind) == (framing.INVALID_PARAMS, framing.ErrorKind.BAD_PARAMS)
     assert says in str(caught.value)
 
 
@@ -129,7 +129,7 @@ def test_messages_are_one_line_and_numbers_that_are_none_are_null(id_: framing.I
 
 def test_an_error_carries_kind_code_and_only_what_applies() -> None:
     error = framing.refuse(
-        framing.Kind.OUT_OF_LIMIT, "too far", component="gait", object="0x2001:0", limit=0.6
+        framing.ErrorKind.OUT_OF_LIMIT, "too far", component="gait", object="0x2001:0", limit=0.6
     )
     found = json.loads(framing.encode_error(3, error))
     assert found == {
@@ -144,5 +144,5 @@ def test_an_error_carries_kind_code_and_only_what_applies() -> None:
 
 
 def test_every_kind_has_a_code_of_its_own() -> None:
-    assert set(framing.CODES) == set(framing.Kind)
+    assert set(framing.CODES) == set(framing.ErrorKind)
     assert len(set(framing.CODES.values())) == len(framing.CODES)

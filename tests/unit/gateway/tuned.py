@@ -15,7 +15,7 @@ from gateway.config import RobotConfig
 from gateway.modules.component.module import ComponentModule
 from gateway.modules.control.tuning import Tuning
 from gateway.modules.stop.authority import Address, Authority
-from gateway.modules.stop.machine import Finding, Input
+from gateway.modules.stop.machine import Input, ResetFinding
 from gateway.process.futures import outcome
 from gateway.process.loop import Loop
 from gateway.records.journal import read_verified
@@ -142,7 +142,7 @@ class Tuned:
     def reset(self) -> None:
         """There is nothing that would have to rest."""
         for what in (Input.RESET, Input.PROVED, Input.REMOVED):
-            findings: dict[str, Finding] = {}
+            findings: dict[str, ResetFinding] = {}
             number = self.authority.state.number
             self.authority.feed(what, lambda _step: None, number=number, findings=findings)
         assert not self.authority.held

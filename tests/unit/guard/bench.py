@@ -11,13 +11,13 @@ import msgspec
 from drivers.bus.bus import CanBus
 from drivers.bus.life import NodeLife
 from drivers.bus.settings import CanSettings
-from drivers.component import Component, Kind
+from drivers.component import Component, ComponentKind
 from drivers.latest import Latest
-from drivers.samples import Channel, Quality, State
+from drivers.samples import Channel, ComponentState, Quality
 from gateway.config.guard import WATCHES
-from gateway.config.guard_rules import Rule
-from gateway.guard.watcher import Change, Watcher
-from gateway.guard.watcher import State as Found
+from gateway.config.guard_rules import GuardRule
+from gateway.guard.watcher import RuleState as Found
+from gateway.guard.watcher import RuleTransition, Watcher
 from gateway.guard.wiring import Wiring
 from gateway.modules.component.assembly import Robot
 
@@ -56,7 +56,7 @@ class Part:
     """A component with channels, and the life of a node where it is one."""
 
     name: str
-    kind: Kind
+    kind: ComponentKind
     quantities: tuple[str, ...] = ()
     settings: Any = field(default_factory=lambda: SimpleNamespace(lost_after_s=2.0, stale_after_s=0.5))
 
@@ -76,7 +76,7 @@ class Part:
     def stop(self) -> None: ...
 
     def quality(self, now_ns: int) -> Quality:
-        return Quality(State.OK, 0.0)
+        return Quality(ComponentState.OK, 0.0)
 
     def give(self, quantity: str, value: float | None, stamp_ns: int | None = None) -> None:
         stamp_ns = time.monotonic_ns() if stamp_ns is None else stamp_ns
@@ -87,12 +87,15 @@ class Bench:
     """A robot of such parts, and what became of the watchers."""
 
     def __init__(self) -> None:
-        self.knee, self.hip = (Part(name, Kind.JOINT, JOINT) for name in ("left_knee", "left_hip"))
-        self.gait, self.foot = Part("gait", Kind.DEVICE), Part("left_insole", Kind.INSOLE, ("force",))
-        self.other_foot = Part("right_insole", Kind.INSOLE, ("force",))
-        self.trunk = Part("trunk", Kind.IMU, IMU)
-        self.changes: list[Change] = []
-        self.absent: dict[str, tuple[Kind, str]] = {}
+        self.knee, self.hip = (Part(name, ComponentKind.JOINT, JOINT) for name in ("left_knee", "left_hip"))
+        self.gait, self.foot = (
+            Part("gait", ComponentKind.DEVICE),
+            Part("left_insole", ComponentKind.INSOLE, ("force",)),
+        )
+        self.other_foot = Part("right_insole", ComponentKind.INSOLE, ("force",))
+        self.trunk = Part("trunk", ComponentKind.IMU, IMU)
+        self.changes: list[RuleTransition] = []
+        self.absent: dict[str, tuple[ComponentKind, str]] = {}
         self.held = False
         settings = CanSettings(interface="virtual", channel="guard wiring")
         self.buses = {name: CanBus(name, settings) for name in ("main", "other")}
@@ -100,11 +103,11 @@ class Bench:
     def wire(self, watch: str, **keys: Any) -> Wiring:
         parts: list[Component] = [self.knee, self.hip, self.gait, self.foot, self.other_foot, self.trunk]
         present = {part.name: part for part in parts if part.name not in self.absent}
-        rule: Rule = msgspec.convert({"watch": watch, **keys}, WATCHES[watch].rule)
+        rule: GuardRule = msgspec.convert({"watch": watch, **keys}, WATCHES[watch].rule)
         robot = Robot(dict(self.buses), present, {}, self.absent)
         return Wiring(rule, robot, 0, self.changed, held=lambda: self.held)
 
-    def changed(self, _watcher: Watcher, change: Change) -> None:
+    def changed(self, _watcher: Watcher, change: RuleTransition) -> None:
         self.changes.append(change)
 
     def states(self) -> list[Found]:

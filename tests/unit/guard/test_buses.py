@@ -13,7 +13,7 @@ from drivers.errors import DeviceAbort, DeviceTimeout, Unavailable
 from gateway.guard.buses import BusWatcher, SyncWatcher
 from gateway.guard.inputs import AGAIN_NS
 from gateway.guard.watcher import GRACE_NS
-from gateway.guard.watcher import State as Found
+from gateway.guard.watcher import RuleState as Found
 from gateway.guard.watchers import ASK_S, UNASKED_NS
 from tests.unit.guard.bench import Bench, S
 

@@ -9,9 +9,9 @@ from typing import Any
 import msgspec
 import pytest
 
-from drivers.component import Kind
+from drivers.component import ComponentKind
 from gateway.config.guard import GuardSettings
-from gateway.config.guard_rules import DriftRule, RangeRule, Rule
+from gateway.config.guard_rules import DriftRule, GuardRule, RangeRule
 from gateway.guard.module import GuardModule
 from gateway.modules.component.assembly import Robot
 from tests.unit.guard.bench import Bench
@@ -27,7 +27,7 @@ class Loop:
         """Nobody waits for it."""
 
 
-def limit(*actions: str, **more: Any) -> Rule:
+def limit(*actions: str, **more: Any) -> GuardRule:
     table = {
         "watch": "joint_limit",
         "max": 2.0,
@@ -40,7 +40,7 @@ def limit(*actions: str, **more: Any) -> Rule:
 
 
 @contextmanager
-def guarding(robot: Robot, rules: Mapping[str, Rule], held: bool = False) -> Iterator[GuardModule]:
+def guarding(robot: Robot, rules: Mapping[str, GuardRule], held: bool = False) -> Iterator[GuardModule]:
     journal = SimpleNamespace(append=lambda *_args, **_more: None)
     control = SimpleNamespace(
         drives={}, journal=journal, authority=SimpleNamespace(held=held), trip=lambda _who, _why: None
@@ -85,7 +85,7 @@ def test_where_it_cannot_see_a_rule_stops_and_holds_only_if_it_acts_then() -> No
         "acts": limit("quick_stop", "hold_parameters", blind="act"),
         "tells": limit("quick_stop", "hold_parameters"),
     }
-    robot = Robot({}, {}, {}, {"left_knee": (Kind.JOINT, "its EDS is broken")})
+    robot = Robot({}, {}, {}, {"left_knee": (ComponentKind.JOINT, "its EDS is broken")})
     with guarding(robot, rules) as guard:
         why = "left_knee: is not there: its EDS is broken"
         assert guard.standing == {"acts": why}

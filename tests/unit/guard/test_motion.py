@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from drivers.component import Kind
+from drivers.component import ComponentKind
 from gateway.guard.watcher import GRACE_NS
-from gateway.guard.watcher import State as Found
+from gateway.guard.watcher import RuleState as Found
 from gateway.guard.wiring import Wiring
 from tests.unit.guard.bench import Bench, Part, S
 
@@ -79,7 +79,7 @@ def test_an_old_velocity_counts_as_long_as_it_is_not_stale(bench: Bench) -> None
 def test_a_drive_without_a_velocity_has_no_stopping_distance(
     bench: Bench, on: list[str] | None, problems: list[str]
 ) -> None:
-    bench.hip = Part("left_hip", Kind.JOINT, ("position",))
+    bench.hip = Part("left_hip", ComponentKind.JOINT, ("position",))
     for watcher in bench.wire("stopping_distance", **BRAKE, **({} if on is None else {"on": on})).watchers:
         watcher.look(1)
     assert [one.reason for one in bench.changes] == problems
@@ -188,14 +188,14 @@ def test_one_side_alone_is_blind(bench: Bench) -> None:
 
 
 def test_a_side_that_is_not_there_or_cannot_tell_is_said(bench: Bench) -> None:
-    bench.absent["left_hip"] = (Kind.JOINT, "its EDS is broken")
+    bench.absent["left_hip"] = (ComponentKind.JOINT, "its EDS is broken")
     for watcher in bench.wire("asymmetry", **SIDES).watchers:
         watcher.look(1)
-    bench.absent = {"left_knee": (Kind.JOINT, "its EDS is worse")}
+    bench.absent = {"left_knee": (ComponentKind.JOINT, "its EDS is worse")}
     for watcher in bench.wire("asymmetry", **SIDES).watchers:
         watcher.look(1)
     bench.absent = {}
-    bench.hip = Part("left_hip", Kind.JOINT, ("velocity",))
+    bench.hip = Part("left_hip", ComponentKind.JOINT, ("velocity",))
     for watcher in bench.wire("asymmetry", **SIDES).watchers:
         watcher.look(1)
     assert [one.reason for one in bench.changes] == [

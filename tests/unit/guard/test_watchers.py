@@ -18,25 +18,25 @@ from gateway.guard.inputs import (
     UnseenWatcher,
 )
 from gateway.guard.judging import Beside, judging
-from gateway.guard.watcher import GRACE_NS, Change, State, Watcher
+from gateway.guard.watcher import GRACE_NS, RuleState, RuleTransition, Watcher
 
-WATCHING, CLEARED, BLIND, TRIPPED = State.WATCHING, State.CLEARED, State.BLIND, State.TRIPPED
+WATCHING, CLEARED, BLIND, TRIPPED = RuleState.WATCHING, RuleState.CLEARED, RuleState.BLIND, RuleState.TRIPPED
 MS, S = 1_000_000, 1_000_000_000
 STALE_NS = 500 * MS
 BEGAN_NS = 300 * MS
 
 
 @pytest.fixture
-def changes() -> list[Change]:
+def changes() -> list[RuleTransition]:
     return []
 
 
 @pytest.fixture
-def changed(changes: list[Change]) -> Callable[[Watcher, Change], None]:
+def changed(changes: list[RuleTransition]) -> Callable[[Watcher, RuleTransition], None]:
     return lambda _watcher, change: changes.append(change)
 
 
-def level(changed: Callable[[Watcher, Change], None], began_ns: int = 0, **more: Any) -> LevelWatcher:
+def level(changed: Callable[[Watcher, RuleTransition], None], began_ns: int = 0, **more: Any) -> LevelWatcher:
     """Above 10 A, over below 9 A."""
     rule = LevelRule(watch="current", above=10.0, hysteresis=1.0, clear_s=0.2, **more)
     how = judging(rule, Beside(STALE_NS / 1e9))
@@ -45,7 +45,7 @@ def level(changed: Callable[[Watcher, Change], None], began_ns: int = 0, **more:
 
 class TestLevel:
     def test_the_first_frame_above_trips_once_and_says_what_it_saw(
-        self, changed: Callable[[Watcher, Change], None], changes: list[Change]
+        self, changed: Callable[[Watcher, RuleTransition], None], changes: list[RuleTransition]
     ) -> None:
         watcher = level(changed)
         for at, value in enumerate((9.99, 10.0, -10.001, 10.5, 12.0)):
@@ -56,7 +56,7 @@ class TestLevel:
 
     @pytest.mark.parametrize(("last_ms", "trips"), [(99, 0), (100, 1)])
     def test_it_must_last_as_long_as_it_says(
-        self, changed: Callable[[Watcher, Change], None], last_ms: int, trips: int
+        self, changed: Callable[[Watcher, RuleTransition], None], last_ms: int, trips: int
     ) -> None:
         watcher = level(changed, for_s=0.1)
         for at_ms in (0, 50, last_ms):
@@ -64,7 +64,7 @@ class TestLevel:
         assert watcher.trips == trips
 
     def test_a_value_that_is_well_in_between_begins_anew(
-        self, changed: Callable[[Watcher, Change], None]
+        self, changed: Callable[[Watcher, RuleTransition], None]
     ) -> None:
         now_ns = time.monotonic_ns()
         watcher = level(changed, now_ns, for_s=0.1)
@@ -78,7 +78,7 @@ class TestLevel:
         (9.0, 199, TRIPPED), (9.0, 200, CLEARED), (9.01, 200, TRIPPED),
     ])  # fmt: skip
     def test_it_is_over_after_a_while_below_its_hysteresis(
-        self, changed: Callable[[Watcher, Change], None], value: float, last_ms: int, state: State
+        self, changed: Callable[[Watcher, RuleTransition], None], value: float, last_ms: int, state: RuleState
     ) -> None:
         now_ns = time.monotonic_ns()
         watcher = level(changed, now_ns)
@@ -88,7 +88,7 @@ class TestLevel:
         assert watcher.state is state
 
     def test_it_trips_anew_after_it_was_over(
-        self, changed: Callable[[Watcher, Change], None], changes: list[Change]
+        self, changed: Callable[[Watcher, RuleTransition], None], changes: list[RuleTransition]
     ) -> None:
         now_ns = time.monotonic_ns()
         watcher = level(changed, now_ns)
@@ -98,7 +98,7 @@ class TestLevel:
         assert watcher.trips == 2
 
     def test_silence_makes_it_blind_and_a_live_value_ends_that(
-        self, changed: Callable[[Watcher, Change], None], changes: list[Change]
+        self, changed: Callable[[Watcher, RuleTransition], None], changes: list[RuleTransition]
     ) -> None:
         now_ns = time.monotonic_ns()
         watcher = level(changed, now_ns)
@@ -114,7 +114,7 @@ class TestLevel:
 
     @pytest.mark.parametrize("value", [None, float("nan"), float("inf")])
     def test_what_is_no_number_is_not_seen(
-        self, changed: Callable[[Watcher, Change], None], value: float | None
+        self, changed: Callable[[Watcher, RuleTransition], None], value: float | None
     ) -> None:
         watcher = level(changed)
         watcher.see(0, 1.0)
@@ -125,10 +125,10 @@ class TestLevel:
     @pytest.mark.parametrize(("age_ns", "state"), [(STALE_NS, WATCHING), (STALE_NS + 1, BLIND)])
     def test_a_value_is_late_when_it_is_older_than_it_may_be(
         self,
-        changed: Callable[[Watcher, Change], None],
+        changed: Callable[[Watcher, RuleTransition], None],
         monkeypatch: pytest.MonkeyPatch,
         age_ns: int,
-        state: State,
+        state: RuleState,
     ) -> None:
         monkeypatch.setattr("gateway.guard.inputs.time", SimpleNamespace(monotonic_ns=lambda: 100 * S))
         watcher = level(changed)
@@ -137,7 +137,7 @@ class TestLevel:
         assert watcher.state is state
 
     def test_a_value_that_comes_late_does_not_count_as_seen_but_one_that_is_too_much_does(
-        self, changed: Callable[[Watcher, Change], None]
+        self, changed: Callable[[Watcher, RuleTransition], None]
     ) -> None:
         watcher = level(changed)
         watcher.look(time.monotonic_ns())
@@ -152,7 +152,7 @@ class TestLevel:
         assert watcher.state is TRIPPED, "late values end nothing"
 
     def test_nothing_yet_is_blind_only_after_the_time_to_come_up(
-        self, changed: Callable[[Watcher, Change], None], changes: list[Change]
+        self, changed: Callable[[Watcher, RuleTransition], None], changes: list[RuleTransition]
     ) -> None:
         watcher = level(changed, began_ns=S)
         assert watcher.look(S + GRACE_NS) == S + GRACE_NS + 1
@@ -161,13 +161,13 @@ class TestLevel:
         assert [(one.state, one.reason) for one in changes] == [(BLIND, "knee.current: has had no value yet")]
 
     def test_a_rule_may_act_where_it_cannot_see(
-        self, changed: Callable[[Watcher, Change], None], changes: list[Change]
+        self, changed: Callable[[Watcher, RuleTransition], None], changes: list[RuleTransition]
     ) -> None:
         watcher = level(changed, blind=Blind.ACT)
         watcher.look(GRACE_NS + 1)
         assert [(one.state, one.acts) for one in changes] == [(TRIPPED, True)]
 
-    def test_blindness_does_not_end_a_trip(self, changed: Callable[[Watcher, Change], None]) -> None:
+    def test_blindness_does_not_end_a_trip(self, changed: Callable[[Watcher, RuleTransition], None]) -> None:
         now_ns = time.monotonic_ns()
         watcher = level(changed, now_ns)
         watcher.see(now_ns, 11.0)
@@ -180,7 +180,7 @@ class TestLevel:
         assert watcher.state is CLEARED
 
     def test_blind_after_a_trip_is_cleared_when_it_sees_again(
-        self, changed: Callable[[Watcher, Change], None], changes: list[Change]
+        self, changed: Callable[[Watcher, RuleTransition], None], changes: list[RuleTransition]
     ) -> None:
         now_ns = time.monotonic_ns()
         watcher = level(changed, now_ns)
@@ -206,12 +206,12 @@ class TestSilence:
         return Life()
 
     @pytest.fixture
-    def watcher(self, life: Life, changed: Callable[[Watcher, Change], None]) -> SilenceWatcher:
+    def watcher(self, life: Life, changed: Callable[[Watcher, RuleTransition], None]) -> SilenceWatcher:
         rule = SilenceRule(watch="node_lost", clear_s=0.2)
         return SilenceWatcher(rule, "knee", BEGAN_NS, changed, life.pulse)
 
     def test_it_trips_when_the_time_is_over_and_not_before(
-        self, watcher: SilenceWatcher, life: Life, changes: list[Change]
+        self, watcher: SilenceWatcher, life: Life, changes: list[RuleTransition]
     ) -> None:
         life.last_ns = S
         assert watcher.look(S + 100 * MS) == S + 250 * MS + 1
@@ -240,7 +240,7 @@ class TestSilence:
         assert watcher.state is TRIPPED
 
     def test_one_that_was_never_heard_is_blind_and_not_lost(
-        self, watcher: SilenceWatcher, life: Life, changes: list[Change]
+        self, watcher: SilenceWatcher, life: Life, changes: list[RuleTransition]
     ) -> None:
         due_ns = BEGAN_NS + GRACE_NS
         assert watcher.look(due_ns) == due_ns + AGAIN_NS
@@ -252,7 +252,7 @@ class TestSilence:
         assert watcher.state is WATCHING
 
     def test_a_reboot_in_between_is_a_loss(
-        self, watcher: SilenceWatcher, life: Life, changes: list[Change]
+        self, watcher: SilenceWatcher, life: Life, changes: list[RuleTransition]
     ) -> None:
         watcher.on_boot_up(S)  # it is switched on
         assert not changes
@@ -268,7 +268,9 @@ class TestEmcy:
         return Life()
 
     @pytest.fixture
-    def make(self, life: Life, changed: Callable[[Watcher, Change], None]) -> Callable[..., EmcyWatcher]:
+    def make(
+        self, life: Life, changed: Callable[[Watcher, RuleTransition], None]
+    ) -> Callable[..., EmcyWatcher]:
         def make(*codes: str) -> EmcyWatcher:
             rule = EmcyRule(watch="emcy", codes=codes or None, clear_s=0.2)
             return EmcyWatcher(rule, "knee", BEGAN_NS, changed, life.pulse, None)
@@ -301,7 +303,9 @@ class TestEmcy:
         watcher.on_emcy(self.emcy(code))
         assert watcher.trips == trips
 
-    def test_a_storm_is_one_trip(self, make: Callable[..., EmcyWatcher], changes: list[Change]) -> None:
+    def test_a_storm_is_one_trip(
+        self, make: Callable[..., EmcyWatcher], changes: list[RuleTransition]
+    ) -> None:
         watcher = make()
         for at in range(1000):
             watcher.on_emcy(self.emcy(0x2310, S + at))
@@ -348,7 +352,7 @@ class TestEmcy:
 
 
 def test_what_cannot_be_watched_is_blind_at_once_and_says_why(
-    changed: Callable[[Watcher, Change], None], changes: list[Change]
+    changed: Callable[[Watcher, RuleTransition], None], changes: list[RuleTransition]
 ) -> None:
     rule = LevelRule(watch="temperature", above=80.0)
     watcher = UnseenWatcher(rule, "knee", 0, changed, "has no temperature")

@@ -5,9 +5,9 @@ from typing import Any
 
 import pytest
 
-from drivers.component import Kind
+from drivers.component import ComponentKind
 from gateway.config.guard import WATCHES
-from gateway.guard.watcher import State as Found
+from gateway.guard.watcher import RuleState as Found
 from tests.unit.guard.bench import JOINT, Bench, Part
 
 HEAT = {"rated": 1.0, "time_constant_s": 1.0}
@@ -186,7 +186,7 @@ def test_an_insole_is_silent_after_the_time_that_its_rule_or_table_says(
 def test_a_drive_without_the_channel_is_said_where_somebody_has_named_it(
     bench: Bench, on: list[str] | None, problems: list[str]
 ) -> None:
-    bench.hip = Part("left_hip", Kind.JOINT, JOINT[:-1])  # no temperature
+    bench.hip = Part("left_hip", ComponentKind.JOINT, JOINT[:-1])  # no temperature
     wiring = bench.wire("temperature", above=80.0, **({} if on is None else {"on": on}))
     for watcher in wiring.watchers:
         watcher.look(1)
@@ -194,14 +194,14 @@ def test_a_drive_without_the_channel_is_said_where_somebody_has_named_it(
 
 
 def test_a_rule_that_nobody_can_feed_and_a_component_that_is_not_there_are_said(bench: Bench) -> None:
-    bench.knee = Part("left_knee", Kind.JOINT, ("position",))
-    bench.absent["left_hip"] = (Kind.JOINT, "its EDS is broken")
+    bench.knee = Part("left_knee", ComponentKind.JOINT, ("position",))
+    bench.absent["left_hip"] = (ComponentKind.JOINT, "its EDS is broken")
     for watcher in bench.wire("temperature", above=80.0).watchers:
         watcher.look(1)
     assert [one.reason for one in bench.changes] == ["left_hip: is not there: its EDS is broken"]
     bench.changes.clear()
     bench.absent.clear()
-    bench.hip = Part("left_hip", Kind.JOINT, ("position",))
+    bench.hip = Part("left_hip", ComponentKind.JOINT, ("position",))
     for watcher in bench.wire("temperature", above=80.0).watchers:
         watcher.look(1)
     assert [one.reason for one in bench.changes] == ["the robot: has no temperature"]

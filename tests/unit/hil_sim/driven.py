@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from drivers.component import Component
-from drivers.samples import Sample, State
+from drivers.samples import ComponentState, Sample
 from gateway import config
 from gateway.modules.component.assembly import assemble
 from hil_sim import robot_file
@@ -100,7 +100,7 @@ class Watched:
 
     @property
     def live(self) -> bool:
-        return self.component.quality(time.monotonic_ns()).state in (State.OK, State.FAULT)
+        return self.component.quality(time.monotonic_ns()).state in (ComponentState.OK, ComponentState.FAULT)
 
     @property
     def problem(self) -> str:

@@ -8,7 +8,7 @@ import pytest
 
 from gateway.main import COMMANDS
 from hil_sim.exoskeleton import Exoskeleton, Scenario
-from hil_sim.faults.fault import FaultRefused, Target
+from hil_sim.faults.fault import FaultRefused, FaultTarget
 from hil_sim.faults.injector import Faults
 from hil_sim.faults.registry import FAULTS
 from hil_sim.scenario.script import load
@@ -74,7 +74,7 @@ def test_there_are_at_least_thirty() -> None:
     assert len(FAULTS) >= 30
 
 
-@pytest.mark.parametrize("name", [name for name, fault in FAULTS.items() if fault.on is not Target.HOST])
+@pytest.mark.parametrize("name", [name for name, fault in FAULTS.items() if fault.on is not FaultTarget.HOST])
 def test_every_fault_begins_and_ends_on_each_of_its_devices(name: str, faults: Faults) -> None:
     for device in FAULTS[name].on.value:
         begun = faults.begin(name, device)

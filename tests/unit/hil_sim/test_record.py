@@ -10,7 +10,7 @@ import pytest
 
 from gateway.main import main
 from hil_sim.channels import UNITS
-from hil_sim.cli.record import COLUMNS, DANGER_COLUMNS, Recording
+from hil_sim.cli.record import COLUMNS, DANGER_COLUMNS, SessionRecorder
 from hil_sim.controller import objects
 from hil_sim.exoskeleton import Exoskeleton, Scenario
 from hil_sim.gait.activity import Activity
@@ -21,7 +21,7 @@ def recorded(
     scenario: str, seconds: float, seed: int = 1, person: int = 2, assists: str | None = None
 ) -> list[str]:
     file = io.BytesIO()
-    Recording(file, scenario, seed, person, assists=assists).run(seconds)
+    SessionRecorder(file, scenario, seed, person, assists=assists).run(seconds)
     return file.getvalue().decode().splitlines()
 
 

@@ -11,9 +11,9 @@ import pytest
 from gateway.main import main
 from hil_sim.cli import run as command
 from hil_sim.scenario import records, report
-from hil_sim.scenario.expectation import Result, Verdict
+from hil_sim.scenario.expectation import ScenarioResult, Verdict
 from hil_sim.scenario.records import Ran
-from hil_sim.scenario.runner import Outcome
+from hil_sim.scenario.runner import ScenarioOutcome
 from hil_sim.scenario.script import Script
 
 MET = Verdict(True, "a is 1", "a was 1", 1.0)
@@ -23,7 +23,7 @@ BEGAN_S = 1_795_255_200.0
 
 
 def ran(*verdicts: Verdict, problem: str = "", name: str = "tests/two.toml", skipped_s: float = 0.0) -> Ran:
-    outcome = Outcome(verdicts, skipped_s, seconds=3.0, problem=problem)
+    outcome = ScenarioOutcome(verdicts, skipped_s, seconds=3.0, problem=problem)
     return Ran(Path(name), Script(title="Two things"), outcome, BEGAN_S)
 
 
@@ -34,18 +34,20 @@ def told(one: Ran) -> list[str]:
 @pytest.mark.parametrize(
     ("verdicts", "result"),
     [
-        ((), Result.PASSED),
-        ((MET,), Result.PASSED),
-        ((MET, FAILED, SLOW), Result.FAILED),
-        ((MET, SLOW), Result.INCONCLUSIVE),
+        ((), ScenarioResult.PASSED),
+        ((MET,), ScenarioResult.PASSED),
+        ((MET, FAILED, SLOW), ScenarioResult.FAILED),
+        ((MET, SLOW), ScenarioResult.INCONCLUSIVE),
     ],
 )
-def test_a_scenario_is_as_good_as_its_worst_expectation(verdicts: Sequence[Verdict], result: Result) -> None:
+def test_a_scenario_is_as_good_as_its_worst_expectation(
+    verdicts: Sequence[Verdict], result: ScenarioResult
+) -> None:
     assert ran(*verdicts).outcome.result is result
 
 
 def test_one_that_could_not_be_run_is_no_success() -> None:
-    assert ran(problem="no gateway").outcome.result is Result.NOT_RUN
+    assert ran(problem="no gateway").outcome.result is ScenarioResult.NOT_RUN
 
 
 def test_a_person_reads_the_file_what_was_expected_what_was_seen_and_a_total() -> None:
@@ -63,9 +65,15 @@ def test_a_person_reads_the_file_what_was_expected_what_was_seen_and_a_total() -
     assert told(ran(MET))[-1] == "1 expectation met"
     assert told(ran(problem="x"))[-1] == "not run"
     assert told(ran(MET, skipped_s=0.31))[-1].startswith("This computer was too slow: 0.3 s were left out")
-    results = [Result.PASSED, Result.FAILED, Result.PASSED, Result.INCONCLUSIVE, Result.PASSED]
+    results = [
+        ScenarioResult.PASSED,
+        ScenarioResult.FAILED,
+        ScenarioResult.PASSED,
+        ScenarioResult.INCONCLUSIVE,
+        ScenarioResult.PASSED,
+    ]
     assert report.total(results) == "5 scenarios: 3 passed, 1 failed, 1 inconclusive\n"
-    assert report.total([Result.NOT_RUN]) == "1 scenario: 1 not run\n"
+    assert report.total([ScenarioResult.NOT_RUN]) == "1 scenario: 1 not run\n"
 
 
 def test_a_program_reads_the_same_as_json() -> None:
@@ -79,7 +87,7 @@ def test_a_program_reads_the_same_as_json() -> None:
         "doubt": None,
     }
     assert one["expectations"][1]["doubt"] == "this computer was too slow"
-    total = records.total_as_json([Result.PASSED, Result.NOT_RUN])
+    total = records.total_as_json([ScenarioResult.PASSED, ScenarioResult.NOT_RUN])
     assert total == {"scenarios": 2, "passed": 1, "failed": 0, "inconclusive": 0, "not_run": 1}
 
 
@@ -133,9 +141,9 @@ def test_words_that_xml_cannot_hold_are_replaced() -> None:
 
 
 @pytest.fixture
-def outcomes(monkeypatch: pytest.MonkeyPatch) -> list[Outcome]:
+def outcomes(monkeypatch: pytest.MonkeyPatch) -> list[ScenarioOutcome]:
     """What comes of the scenarios that are run, one after the other."""
-    coming: list[Outcome] = []
+    coming: list[ScenarioOutcome] = []
     monkeypatch.setattr(command, "run", lambda *_: coming.pop(0))
     return coming
 
@@ -147,14 +155,14 @@ def outcomes(monkeypatch: pytest.MonkeyPatch) -> list[Outcome]:
 def test_the_exit_status_says_what_came_of_all(
     verdicts: list[Verdict],
     status: int,
-    outcomes: list[Outcome],
+    outcomes: list[ScenarioOutcome],
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     files = [tmp_path / f"{number}.toml" for number in range(len(verdicts))]
     for file in files:
         file.write_text("", encoding="utf-8")
-    outcomes.extend(Outcome((verdict,)) for verdict in verdicts)
+    outcomes.extend(ScenarioOutcome((verdict,)) for verdict in verdicts)
     junit = tmp_path / "junit.xml"
     assert main(["sim", "run", "--junit", str(junit), *map(str, files)]) == status
     said = capsys.readouterr().out
@@ -164,9 +172,9 @@ def test_the_exit_status_says_what_came_of_all(
 
 
 def test_results_that_could_not_be_written_are_told_before_anything_is_run(
-    outcomes: list[Outcome], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    outcomes: list[ScenarioOutcome], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    file, outcome = tmp_path / "two.toml", Outcome((MET,))
+    file, outcome = tmp_path / "two.toml", ScenarioOutcome((MET,))
     file.write_text("", encoding="utf-8")
     outcomes.append(outcome)
     nowhere = tmp_path / "none" / "junit.xml"
@@ -183,7 +191,7 @@ def test_results_of_before_stay_until_there_are_new_ones(
     file.write_text("", encoding="utf-8")
     junit.write_text("of before", encoding="utf-8")
 
-    def killed(*_: object) -> Outcome:
+    def killed(*_: object) -> ScenarioOutcome:
         assert junit.read_text(encoding="utf-8") == "of before"
         assert not new.exists()
         raise KeyboardInterrupt
@@ -200,9 +208,9 @@ def test_which_one_is_run_is_said_before_it_is_run(
     file.write_text('title = "Two things"\n', encoding="utf-8")
     before: list[str] = []
 
-    def run(*_: object) -> Outcome:
+    def run(*_: object) -> ScenarioOutcome:
         before.append(capsys.readouterr().out)
-        return Outcome((MET,))
+        return ScenarioOutcome((MET,))
 
     monkeypatch.setattr(command, "run", run)
     assert main(["sim", "run", str(file)]) == 0
@@ -211,12 +219,12 @@ def test_which_one_is_run_is_said_before_it_is_run(
 
 
 def test_one_that_cannot_be_run_does_not_keep_the_others_from_it(
-    outcomes: list[Outcome], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    outcomes: list[ScenarioOutcome], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     files = [tmp_path / f"{number}.toml" for number in range(2)]
     for file in files:
         file.write_text("", encoding="utf-8")
-    outcomes.extend([Outcome(problem="the gateway did not start"), Outcome((MET,))])
+    outcomes.extend([ScenarioOutcome(problem="the gateway did not start"), ScenarioOutcome((MET,))])
     assert main(["sim", "run", "--json", *map(str, files)]) == 1
     said = capsys.readouterr()
     first, second, total = map(json.loads, said.out.splitlines())
@@ -232,9 +240,9 @@ def test_results_that_cannot_be_written_any_more_are_an_error(
     folder = tmp_path / "going"
     folder.mkdir()
 
-    def run(*_: object) -> Outcome:
+    def run(*_: object) -> ScenarioOutcome:
         folder.rmdir()
-        return Outcome((MET,))
+        return ScenarioOutcome((MET,))
 
     monkeypatch.setattr(command, "run", run)
     assert main(["sim", "run", "--junit", str(folder / "x.xml"), str(tmp_path / "x.toml")]) == 1

@@ -9,10 +9,10 @@ import pytest
 
 from drivers.bus.bus import CanBus
 from drivers.bus.settings import CanSettings
-from drivers.component import Component, Kind
+from drivers.component import Component, ComponentKind
 from drivers.imu.can_device import CanImu
 from drivers.imu.settings import CanImuSettings
-from drivers.samples import State
+from drivers.samples import ComponentState
 from tests.support.waiting import until
 
 LEANING_10_DEGREES = bytes.fromhex("55 53 00 00 1C 07 00 00")  # pitch 1820 / 32768 · 180°
@@ -46,7 +46,7 @@ def tilt_forward(trunk: CanImu) -> float | None:
 def test_its_frames_become_tilt_and_stop_leaves_none(channel: str, device: can.BusABC, can_id: int) -> None:
     trunk = imu(channel, can_id)
     component: Component = trunk
-    assert component.kind is Kind.IMU
+    assert component.kind is ComponentKind.IMU
     trunk.start()
     trunk.start()
     until(lambda: trunk._bus.opened)
@@ -54,11 +54,11 @@ def test_its_frames_become_tilt_and_stop_leaves_none(channel: str, device: can.B
     until(lambda: tilt_forward(trunk) is not None)
     assert tilt_forward(trunk) == pytest.approx(math.radians(10.0), abs=1e-4)
     quality = trunk.quality(time.monotonic_ns())
-    assert (quality.state, quality.problem, quality.counters["frames"]) == (State.OK, None, 1)
+    assert (quality.state, quality.problem, quality.counters["frames"]) == (ComponentState.OK, None, 1)
     trunk.stop()
     trunk.stop()
     assert tilt_forward(trunk) is None
-    assert trunk.quality(time.monotonic_ns()).state is State.LOST
+    assert trunk.quality(time.monotonic_ns()).state is ComponentState.LOST
 
 
 def test_silence_names_the_identifier_and_what_to_check(channel: str, device: can.BusABC) -> None:

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from drivers.component import Component, Kind
+from drivers.component import Component, ComponentKind
 from drivers.imu.device import Imu
 from drivers.imu.settings import ImuSettings
-from drivers.samples import State
+from drivers.samples import ComponentState
 from tests.support.waiting import until
 from tests.unit.imu.encode import witmotion
 from tests.unit.port.terminals import Terminal, send_until
@@ -45,7 +45,7 @@ def go_live(imu: Imu, terminal: Terminal) -> int:
 
 def test_it_is_a_component_with_named_units(imu: Imu) -> None:
     component: Component = imu
-    assert component.kind is Kind.IMU
+    assert component.kind is ComponentKind.IMU
     units = {channel.name: channel.unit for channel in component.channels}
     assert units["trunk.tilt_forward"] == "rad"
     assert units["trunk.acceleration_z"] == "m/s²"
@@ -55,13 +55,13 @@ def test_value_is_live_then_null_as_it_goes_stale_and_lost(imu: Imu, terminal: T
     stamp_ns = go_live(imu, terminal)
     value, _ = imu.latest.read(0, stamp_ns)
     assert value == pytest.approx(0.174533, abs=1e-4)
-    assert imu.quality(stamp_ns).state is State.OK
+    assert imu.quality(stamp_ns).state is ComponentState.OK
     assert imu.quality(stamp_ns).problem is None
     last_ns = imu.latest.updated_ns or stamp_ns
     stale = imu.quality(last_ns + SECOND_NS)
-    assert (stale.state, imu.latest.read(0, last_ns + SECOND_NS)[0]) == (State.STALE, None)
+    assert (stale.state, imu.latest.read(0, last_ns + SECOND_NS)[0]) == (ComponentState.STALE, None)
     lost = imu.quality(last_ns + 3 * SECOND_NS)
-    assert lost.state is State.LOST
+    assert lost.state is ComponentState.LOST
     assert lost.problem is not None
     assert "no byte" in lost.problem
     assert "power" in lost.problem
@@ -76,7 +76,7 @@ def test_bytes_without_a_frame_are_called_wrong_baud_rate_or_format(imu: Imu, te
         "words",
     )
     quality = imu.quality(time.monotonic_ns())
-    assert quality.state is State.LOST
+    assert quality.state is ComponentState.LOST
     assert quality.age_ms is None
     assert quality.counters["bytes_dropped"] > 0
 
@@ -86,14 +86,14 @@ def test_unplugged_sensor_is_lost_at_once_and_comes_back_without_a_restart(
 ) -> None:
     go_live(imu, terminal)
     terminal.unplug()
-    until(lambda: imu.quality(time.monotonic_ns()).state is State.LOST, "the loss")
+    until(lambda: imu.quality(time.monotonic_ns()).state is ComponentState.LOST, "the loss")
     assert imu.latest.read(0, time.monotonic_ns()) == (None, None)
     until(lambda: "does not exist" in str(imu.quality(time.monotonic_ns()).problem), "the reason")
     terminal.plug_in()
     until(lambda: imu.line.problem(time.monotonic_ns()) is None, "the port to open")
     go_live(imu, terminal)
     quality = imu.quality(time.monotonic_ns())
-    assert quality.state is State.OK
+    assert quality.state is ComponentState.OK
     assert quality.counters["reconnects"] == 1
 
 
@@ -101,4 +101,4 @@ def test_stopped_component_keeps_no_value_and_no_port(imu: Imu, terminal: Termin
     go_live(imu, terminal)
     imu.stop()
     assert imu.latest.read(0, time.monotonic_ns()) == (None, None)
-    assert imu.quality(time.monotonic_ns()).state is State.LOST
+    assert imu.quality(time.monotonic_ns()).state is ComponentState.LOST

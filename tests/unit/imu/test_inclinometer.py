@@ -11,11 +11,11 @@ import pytest
 import eds
 from drivers.bus.bus import CanBus
 from drivers.bus.settings import CanSettings, Role
-from drivers.component import Component, Kind
+from drivers.component import Component, ComponentKind
 from drivers.errors import SettingsError
 from drivers.imu.canopen.cia410 import InclinometerSettings
 from drivers.imu.inclinometer import Inclinometer
-from drivers.samples import State
+from drivers.samples import ComponentState
 from tests.support.waiting import until
 from tests.unit.bus.fake_node import FakeNode, Object
 
@@ -73,7 +73,7 @@ def test_it_is_a_component_whose_slopes_are_tilt(channel: str) -> None:
     with FakeNode(channel, NODE, device() | tpdo(1, 0x180 + NODE, *SLOPES_16)) as fake:
         trunk = inclinometer(channel)
         component: Component = trunk
-        assert component.kind is Kind.IMU
+        assert component.kind is ComponentKind.IMU
         assert [one.name for one in component.channels] == ["trunk.tilt_forward", "trunk.tilt_side"]
         trunk.start()
         trunk.start()
@@ -81,7 +81,7 @@ def test_it_is_a_component_whose_slopes_are_tilt(channel: str) -> None:
         fake.send(0x180 + NODE, EXAMPLE)
         until(lambda: tilt(trunk)[0] is not None)
         assert tilt(trunk) == pytest.approx((math.radians(10.0), math.radians(-10.0)))
-        assert (trunk.quality(time.monotonic_ns()).state, problem(trunk)) == (State.OK, "")
+        assert (trunk.quality(time.monotonic_ns()).state, problem(trunk)) == (ComponentState.OK, "")
         trunk.stop()
         assert tilt(trunk) == (None, None)
 
@@ -142,7 +142,7 @@ def test_slopes_that_no_tpdo_keeps_fresh_are_polled_and_that_is_said(
         until(lambda: tilt(trunk)[0] == pytest.approx(math.radians(20.0)))
         assert why in problem(trunk)
         assert "asked by SDO at 100 Hz" in problem(trunk)
-        assert trunk.quality(time.monotonic_ns()).state is State.OK
+        assert trunk.quality(time.monotonic_ns()).state is ComponentState.OK
         trunk.stop()
 
 
@@ -201,7 +201,7 @@ def test_a_node_that_reboots_or_falls_silent_leaves_no_old_tilt(channel: str) ->
         fake.send(0x194, EXAMPLE[:3])
         until(lambda: trunk.quality(time.monotonic_ns()).counters["short_frames"])
         assert "TPDO1 (0x194), which brings them, stays silent" in problem(trunk)
-        assert trunk.quality(time.monotonic_ns()).state is State.LOST
+        assert trunk.quality(time.monotonic_ns()).state is ComponentState.LOST
         trunk.stop()
 
 
@@ -210,7 +210,7 @@ def test_a_device_that_is_no_inclinometer_says_so(channel: str) -> None:
         trunk = inclinometer(channel)
         trunk.start()
         until(lambda: "0x6000" in problem(trunk))
-        assert trunk.quality(time.monotonic_ns()).state is State.LOST
+        assert trunk.quality(time.monotonic_ns()).state is ComponentState.LOST
         trunk.stop()
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from drivers.component import Kind
+from drivers.component import ComponentKind
 from drivers.identify import recognise
 from drivers.imu import formats
 from drivers.imu.can_device import CanImu
@@ -155,4 +155,4 @@ def test_a_robot_imports_only_the_formats_that_it_has(tmp_path: Path) -> None:
 
 
 def test_every_kind_of_component_has_a_builder() -> None:
-    assert set(BUILDERS) == set(Kind)
+    assert set(BUILDERS) == set(ComponentKind)

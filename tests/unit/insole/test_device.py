@@ -6,14 +6,14 @@ from pathlib import Path
 
 import pytest
 
-from drivers.component import Component, Kind
+from drivers.component import Component, ComponentKind
 from drivers.errors import SettingsError
 from drivers.insole import layout as layouts
 from drivers.insole.build import insoles
 from drivers.insole.device import Insole
 from drivers.insole.settings import InsoleSettings
 from drivers.latest import Latest
-from drivers.samples import Channel, Quality, State
+from drivers.samples import Channel, ComponentState, Quality
 from tests.support.waiting import until
 from tests.unit.insole.encode import CALIBRATED, MISSING, RIGHT, Sender, cobs_frame
 from tests.unit.port.terminals import Terminal, send_until
@@ -63,7 +63,7 @@ def send(terminal: Terminal, insole: Insole, frame: Callable[[], bytes]) -> None
 
 def test_channels_are_force_cop_and_cells_in_si(insole: Insole) -> None:
     component: Component = insole
-    assert component.kind is Kind.INSOLE
+    assert component.kind is ComponentKind.INSOLE
     assert [(channel.name, channel.unit) for channel in component.channels[:4]] == [
         ("left_insole.force", "N"),
         ("left_insole.cop_x", "m"),
@@ -82,7 +82,7 @@ def test_even_pressure_gives_the_whole_soles_force_at_its_centre(
     assert got["cell_7"] == pytest.approx(20_000.0)
     assert got["force"] == pytest.approx(20_000.0 * area)
     assert got["cop_x"] == pytest.approx(sum(layout.moments_x) / area)
-    assert quality(insole).state is State.OK
+    assert quality(insole).state is ComponentState.OK
 
 
 def test_foot_in_the_air_has_no_centre_of_pressure(
@@ -99,7 +99,7 @@ def test_missing_cells_are_a_fault_and_null(insole: Insole, terminal: Terminal, 
     got = values(insole)
     assert (got["cell_15"], got["force"]) == (None, None)
     assert got["cell_0"] == pytest.approx(20_000.0)
-    assert quality(insole).state is State.FAULT
+    assert quality(insole).state is ComponentState.FAULT
     assert "missing cells" in str(quality(insole).problem)
 
 
@@ -108,7 +108,7 @@ def test_counts_without_a_calibration_are_no_pressure(
 ) -> None:
     send(terminal, insole, lambda: sender.frame(LOADED, 0))
     assert set(values(insole).values()) == {None}
-    assert quality(insole).state is State.FAULT
+    assert quality(insole).state is ComponentState.FAULT
     assert "no calibration" in str(quality(insole).problem)
 
 
@@ -125,7 +125,7 @@ def test_swapped_ports_are_named(insole: Insole, terminal: Terminal, sender: Sen
         lambda: "swapped" in str(quality(insole).problem),
         "the words",
     )
-    assert quality(insole).state is State.LOST
+    assert quality(insole).state is ComponentState.LOST
     assert set(values(insole).values()) == {None}
 
 
@@ -191,7 +191,7 @@ def test_calibration_file_turns_counts_into_pressure(
         assert got["cell_0"] == pytest.approx(10_000.0)
         assert got["cell_15"] == pytest.approx(40_950.0)
         assert got["contact"] == 1
-        assert quality(insole).state is State.OK
+        assert quality(insole).state is ComponentState.OK
         assert quality(insole).counters["saturated"] > 0
     finally:
         insole.stop()

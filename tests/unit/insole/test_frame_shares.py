@@ -5,7 +5,7 @@ import pytest
 from drivers.frame_shares import WINDOW_S, FrameShare
 from drivers.insole.device import Insole
 from drivers.insole.settings import InsoleSettings
-from drivers.samples import State
+from drivers.samples import ComponentState
 from tests.unit.insole.encode import Sender
 
 SECOND_NS = 1_000_000_000
@@ -38,7 +38,7 @@ def test_missing_frames_are_told_and_what_came_is_believed(every: int, words: st
         if number % every:
             insole.received(insole.line.parser.feed(frame), now_ns)
     quality = insole.quality(now_ns)
-    assert quality.state is State.OK
+    assert quality.state is ComponentState.OK
     if words is None:
         assert (quality.problem, quality.findings) == (None, ())
     else:

@@ -17,7 +17,7 @@ from drivers.insole.build import pair
 from drivers.insole.device import Insole
 from drivers.insole.settings import InsoleSettings
 from drivers.parsing import Parser
-from drivers.samples import State
+from drivers.samples import ComponentState
 from hil_sim.gait.activity import Activity
 from hil_sim.gait.generator import Generator
 from hil_sim.gait.walk import Shape
@@ -50,7 +50,7 @@ class Seeded:
 
 def fresh(component: Insole | Imu, now_ns: int) -> bool:
     """Whether the component's samples come, whatever they say."""
-    return component._freshness.state(now_ns)[0] is State.OK
+    return component._freshness.state(now_ns)[0] is ComponentState.OK
 
 
 class Robot:

@@ -8,7 +8,7 @@ import pytest
 
 from drivers.joint.drive import JointDrive
 from drivers.joint.leg_pairs import join_joints
-from drivers.samples import Quality, State
+from drivers.samples import ComponentState, Quality
 from tests.support.waiting import until
 from tests.unit.bus.fake_node import FakeNode
 from tests.unit.joint.conftest import drive_objects, surroundings, tpdo
@@ -34,13 +34,13 @@ def test_a_frozen_encoder_is_a_fault_until_it_counts_again(joint: Make, channel:
         knee = joint(MAPPED, slow_poll_hz=0)
         knee.start()
         until(lambda: knee.node.ready)
-        until(lambda: quality(knee).state is State.OK, step=lambda: send(fake, 250, 100))
+        until(lambda: quality(knee).state is ComponentState.OK, step=lambda: send(fake, 250, 100))
         until(lambda: quality(knee).findings, step=lambda: send(fake, 250, 100))
         found = quality(knee)
-        assert found.state is State.FAULT
+        assert found.state is ComponentState.FAULT
         assert "its position stays the same to the count while it turns at" in str(found.problem)
         assert "check its encoder" in found.findings[0].check
-        until(lambda: quality(knee).state is State.OK, step=lambda: send(fake, 251, 100))
+        until(lambda: quality(knee).state is ComponentState.OK, step=lambda: send(fake, 251, 100))
         assert quality(knee).findings == ()
         knee.stop()
 
@@ -71,7 +71,7 @@ def test_a_drive_that_an_input_holds_off_stands_and_is_no_fault(joint: Make, cha
             ),
             step=lambda: send(fake, 250, statusword=OFF),
         )
-        assert quality(knee).state is State.OK
+        assert quality(knee).state is ComponentState.OK
         knee.stop()
 
 
@@ -82,15 +82,18 @@ def test_a_drive_that_reports_an_error_and_goes_on_is_told_in_words(joint: Make,
         until(lambda: knee.node.ready)
         fake.emcy(0x2351, 0x02)
         until(lambda: knee.node.life.active_emcy)
-        until(lambda: quality(knee).state is State.OK, step=lambda: send(fake, 250))
+        until(lambda: quality(knee).state is ComponentState.OK, step=lambda: send(fake, 250))
         assert "it reports 0x2351 load level warning (I²t, thermal state) (register: current) (" in str(
             quality(knee).problem
         )
-        until(lambda: quality(knee).state is State.FAULT, step=lambda: send(fake, 250, statusword=IN_FAULT))
+        until(
+            lambda: quality(knee).state is ComponentState.FAULT,
+            step=lambda: send(fake, 250, statusword=IN_FAULT),
+        )
         assert str(quality(knee).problem).count("0x2351") == 1, "once, as what the fault is"
         fake.emcy(0)
         until(lambda: knee.node.life.active_emcy is None)
-        until(lambda: quality(knee).state is State.OK, step=lambda: send(fake, 250))
+        until(lambda: quality(knee).state is ComponentState.OK, step=lambda: send(fake, 250))
         assert quality(knee).problem is None
         knee.stop()
 
@@ -102,7 +105,7 @@ def test_a_drive_that_stops_answering_is_told_beside_its_values(joint: Make, cha
         until(lambda: knee.node.ready)
         fake.silent = True
         until(lambda: "answers no SDO" in str(quality(knee).problem), step=lambda: send(fake, 250))
-        assert quality(knee).state is State.OK, "its position comes"
+        assert quality(knee).state is ComponentState.OK, "its position comes"
         fake.silent = False
         until(lambda: quality(knee).problem is None, step=lambda: send(fake, 250))
         knee.stop()

@@ -13,7 +13,7 @@ from drivers.errors import Unavailable
 from drivers.joint.cia402 import DriveState
 from drivers.joint.drive import JointDrive
 from drivers.joint.quick_stop import StopOutcome
-from drivers.samples import Sample, State
+from drivers.samples import ComponentState, Sample
 from tests.support.waiting import WAIT_S, until
 from tests.unit.bus.fake_node import FakeNode
 from tests.unit.joint.conftest import drive_objects, surroundings, tpdo
@@ -28,7 +28,7 @@ def read(joint: JointDrive, quantity: str) -> float | None:
     return joint.latest.read(index, time.monotonic_ns())[0]
 
 
-def quality(joint: JointDrive) -> tuple[State, str]:
+def quality(joint: JointDrive) -> tuple[ComponentState, str]:
     found = joint.quality(time.monotonic_ns())
     return found.state, found.problem or ""
 
@@ -44,7 +44,7 @@ def test_a_mapped_drive_shows_its_angle_state_and_words_for_them(joint: Make, ch
         assert read(knee, "position") == pytest.approx(0.5 - math.pi / 2)
         assert read(knee, "statusword") == 0x1637
         assert read(knee, "state") == DriveState.OPERATION_ENABLED
-        assert quality(knee) == (State.OK, "")
+        assert quality(knee) == (ComponentState.OK, "")
         units = {channel.name: channel.unit for channel in knee.channels}
         assert units["left_knee.position"] == "rad"
         assert knee.channels[-1].enum == {int(state): state.words for state in DriveState}
@@ -104,7 +104,7 @@ def test_a_drive_without_position_in_its_tpdos_is_polled_and_says_so(joint: Make
         assert read(knee, "position") == pytest.approx(math.pi / 2)
         until(lambda: read(knee, "error_code") is not None)
         state, words = quality(knee)
-        assert state is State.OK
+        assert state is ComponentState.OK
         assert words == "position: asked by SDO at 100 Hz, because none of its 1 enabled TPDOs carries it"
         assert fake.writes == []
         knee.stop()
@@ -290,12 +290,12 @@ def test_silence_becomes_stale_then_lost_and_names_the_tpdo(joint: Make, channel
         knee = joint(objects, stale_after_s=0.1, lost_after_s=0.5)
         knee.start()
         until(lambda: knee.node.ready)
-        assert quality(knee)[0] is State.LOST
+        assert quality(knee)[0] is ComponentState.LOST
         fake.send(0x182, struct.pack("<Hi", 0x0027, 250))
         until(lambda: read(knee, "position") is not None)
-        until(lambda: quality(knee)[0] is State.STALE)
+        until(lambda: quality(knee)[0] is ComponentState.STALE)
         assert read(knee, "position") is None
-        until(lambda: quality(knee)[0] is State.LOST)
+        until(lambda: quality(knee)[0] is ComponentState.LOST)
         assert "TPDO1 (0x182), which brings it on SYNC, does not come" in quality(knee)[1]
         knee.stop()
 
@@ -307,7 +307,7 @@ def test_a_drive_in_fault_is_told_with_its_emcy(joint: Make, channel: str) -> No
         knee.start()
         until(lambda: knee.node.ready)
         fake.send(0x182, struct.pack("<Hi", 0x0218, 250))
-        until(lambda: quality(knee)[0] is State.FAULT)
+        until(lambda: quality(knee)[0] is ComponentState.FAULT)
         assert "does not say why" in quality(knee)[1]
         fake.emcy(0x8611, 0x01)
         until(lambda: knee.node.life.active_emcy)
@@ -316,7 +316,7 @@ def test_a_drive_in_fault_is_told_with_its_emcy(joint: Make, channel: str) -> No
             lambda: (
                 quality(knee)
                 == (
-                    State.FAULT,
+                    ComponentState.FAULT,
                     "the drive is in fault: 0x8611 following error too large (register: generic)",
                 )
             )
@@ -331,7 +331,7 @@ def test_a_fault_before_we_came_is_told_by_the_drives_error_code(joint: Make, ch
         knee.start()
         until(lambda: knee.node.ready)
         fake.send(0x182, struct.pack("<HiH", 0x0218, 250, 0x3220))
-        until(lambda: quality(knee)[0] is State.FAULT)
+        until(lambda: quality(knee)[0] is ComponentState.FAULT)
         assert quality(knee)[1] == "the drive is in fault: 0x3220 DC link undervoltage"
         knee.stop()
 
@@ -363,7 +363,7 @@ def test_a_mapping_that_is_not_answered_names_the_object(joint: Make, channel: s
         knee = joint(objects, sdo_timeout_s=0.05)
         knee.start()
         until(lambda: "reading 0x1A00:01: no answer within 0.05 s" in quality(knee)[1])
-        assert quality(knee)[0] is State.LOST
+        assert quality(knee)[0] is ComponentState.LOST
         knee.stop()
 
 
@@ -374,7 +374,7 @@ def test_a_contradiction_of_scaling_is_told_beside_good_values(joint: Make, chan
         knee.start()
         until(lambda: knee.node.ready)
         fake.send(0x182, struct.pack("<Hi", 0x0027, 250))
-        until(lambda: quality(knee)[0] is State.OK)
+        until(lambda: quality(knee)[0] is ComponentState.OK)
         assert "rated_torque is 50 N·m, but the drive's 6076h times gear_ratio makes 0.4" in quality(knee)[1]
         knee.stop()
 
@@ -425,5 +425,5 @@ def test_starting_and_stopping_again_and_again_leaves_nothing(joint: Make, chann
             until(lambda: knee.node.ready)
             knee.stop()
             knee.stop()
-        assert quality(knee)[0] is State.LOST
+        assert quality(knee)[0] is ComponentState.LOST
         assert fake.writes == []

@@ -7,22 +7,22 @@ import pytest
 
 from gateway.cli.joint_test import _parser, _wish
 from gateway.joint_test.limits import LAG, MOST_SPEED
-from gateway.joint_test.motion import Kind, Wish
+from gateway.joint_test.motion import JointTestKind, Wish
 from gateway.main import main
-from server_gui.core.joint_tests.comparing import ANALYSES, Shown, told
+from server_gui.core.joint_tests.comparing import ANALYSES, AnalysedTest, told
 from tests.unit.hil_sim.bench import Bench
 from tests.unit.joint_tests.truth import RATED_NM, recorded
 
 TORQUE = ("--torque", "12")
 
 
-def usual(kind: Kind) -> Wish:
+def usual(kind: JointTestKind) -> Wish:
     typed = ["robot.toml:left_knee", *(TORQUE if kind.by_torque else ())]
     return _wish(kind, _parser(str(kind)).parse_args(typed))
 
 
-@pytest.mark.parametrize("kind", Kind)
-def test_what_it_does_by_default_has_twice_the_room(kind: Kind) -> None:
+@pytest.mark.parametrize("kind", JointTestKind)
+def test_what_it_does_by_default_has_twice_the_room(kind: JointTestKind) -> None:
     wish = usual(kind)
     test = recorded(Bench(0.14), wish)
     room = wish.amplitude if kind.by_torque else LAG
@@ -30,7 +30,7 @@ def test_what_it_does_by_default_has_twice_the_room(kind: Kind) -> None:
     assert np.max(np.abs(test["torque"])) < RATED_NM / 1.8
     assert np.max(np.abs(test["velocity"])) < MOST_SPEED / 2
     assert np.max(np.abs(away)) < room / 2
-    shown = told(Shown(test, ANALYSES[str(kind)](test)), None)
+    shown = told(AnalysedTest(test, ANALYSES[str(kind)](test)), None)
     values = [one["value"] for one in shown["measures"] if one["value"] is not None]
     assert len(values) >= 3
     assert all(type(one) is float and math.isfinite(one) for one in values)

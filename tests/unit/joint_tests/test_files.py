@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from gateway.joint_test.recording import COLUMNS, Recording, Row
+from gateway.joint_test.recording import COLUMNS, JointTestRecording, Row
 from gateway.main import main
 from server_gui.core.joint_tests.comparing import analysed, differences, last_before
 from server_gui.core.joint_tests.file import NotReadable, read
@@ -50,7 +50,7 @@ def rows(count: int = 400) -> list[Row]:
 
 
 def kept(path: Path, *, ended: bool = True, **more: Any) -> Path:
-    with Recording(path, head(**more), by_torque=False) as recording:
+    with JointTestRecording(path, head(**more), by_torque=False) as recording:
         recording.add(rows())
         if ended:
             recording.end(problem=None, off=True, state="switch on disabled", late_s=0.0)

@@ -6,23 +6,27 @@ from typing import Any
 
 import pytest
 
-from gateway.config.guard_rules import LevelRule, RangeRule, Rule
-from gateway.joint_test.limits import MOST_SPEED, Asked, Drive, Limits, NotAllowed, limits
-from gateway.joint_test.motion import Kind, Motion, Wish, motion, planned
+from gateway.config.guard_rules import GuardRule, LevelRule, RangeRule
+from gateway.joint_test.limits import MOST_SPEED, AskedLimits, Drive, JointTestLimits, NotAllowed, limits
+from gateway.joint_test.motion import JointTestKind, Motion, Wish, motion, planned
 
 DEGREE = math.radians(1.0)
 DRIVE = Drive(low=-1.0, high=2.0, torque=80.0, rated_torque=40.0, rated_current=5.0)
-USUAL = Asked()
-STEP = Wish(Kind.STEP, 1.0 * DEGREE, 10.0 * DEGREE)
-CHIRP = Wish(Kind.CHIRP, DEGREE, 15 * DEGREE, low_hz=0.2, high_hz=15.0, seconds=10.0)
-RELAY = Wish(Kind.RELAY, 5 * DEGREE, 0.0, torque=10.0)
-FRICTION = Wish(Kind.FRICTION, 10 * DEGREE, 20 * DEGREE)
+USUAL = AskedLimits()
+STEP = Wish(JointTestKind.STEP, 1.0 * DEGREE, 10.0 * DEGREE)
+CHIRP = Wish(JointTestKind.CHIRP, DEGREE, 15 * DEGREE, low_hz=0.2, high_hz=15.0, seconds=10.0)
+RELAY = Wish(JointTestKind.RELAY, 5 * DEGREE, 0.0, torque=10.0)
+FRICTION = Wish(JointTestKind.FRICTION, 10 * DEGREE, 20 * DEGREE)
 EVERY = (STEP, CHIRP, FRICTION)
 
 
 def allowed(
-    wish: Wish = STEP, drive: Drive = DRIVE, asked: Asked = USUAL, angle: float = 0.5, **rules: Rule
-) -> Limits:
+    wish: Wish = STEP,
+    drive: Drive = DRIVE,
+    asked: AskedLimits = USUAL,
+    angle: float = 0.5,
+    **rules: GuardRule,
+) -> JointTestLimits:
     return limits(wish, asked, drive, rules, "left_knee", angle, 0.01)
 
 
@@ -39,9 +43,13 @@ def test_the_narrowest_of_file_and_drive_counts() -> None:
 
 
 def test_who_asks_for_more_torque_gets_the_current_for_it() -> None:
-    assert [allowed(asked=Asked(torque=most)).current for most in (20.0, 40.0, 80.0)] == [5.0, 5.0, 10.0]
+    assert [allowed(asked=AskedLimits(torque=most)).current for most in (20.0, 40.0, 80.0)] == [
+        5.0,
+        5.0,
+        10.0,
+    ]
     current = LevelRule(watch="current", above=6.0)
-    assert allowed(asked=Asked(torque=80.0), current=current).current == 6.0
+    assert allowed(asked=AskedLimits(torque=80.0), current=current).current == 6.0
 
 
 @pytest.mark.parametrize(
@@ -55,9 +63,9 @@ def test_who_asks_for_more_torque_gets_the_current_for_it() -> None:
         ({"angle": -3.0}, "not within its limits"),
         ({"wish": replace(STEP, amplitude=5 * DEGREE, speed=400 * DEGREE)}, "its target would move at"),
         ({"wish": replace(CHIRP, high_hz=40.0)}, "beyond a quarter"),
-        ({"wish": RELAY, "asked": Asked(torque=15.0)}, "must be twice that"),
-        ({"asked": Asked(torque=100.0)}, "may be 80 at most"),
-        ({"asked": Asked(speed=2 * MOST_SPEED)}, "at most"),
+        ({"wish": RELAY, "asked": AskedLimits(torque=15.0)}, "must be twice that"),
+        ({"asked": AskedLimits(torque=100.0)}, "may be 80 at most"),
+        ({"asked": AskedLimits(speed=2 * MOST_SPEED)}, "at most"),
     ],
 )
 def test_what_is_not_allowed_or_not_known_is_refused(wrong: dict[str, Any], words: str) -> None:

@@ -7,10 +7,10 @@ import pytest
 from numpy.typing import NDArray
 from scipy import signal
 
-from gateway.joint_test.motion import Kind, Wish
+from gateway.joint_test.motion import JointTestKind, Wish
 from hil_sim.drive.mechanics import JointConstants
 from server_gui.core.joint_tests.friction import friction
-from server_gui.core.joint_tests.measures import Result
+from server_gui.core.joint_tests.measures import JointTestResult
 from server_gui.core.joint_tests.relay import relay
 from server_gui.core.joint_tests.response import frequency_response, measured
 from server_gui.core.joint_tests.step import step_response
@@ -20,11 +20,13 @@ from tests.unit.joint_tests.truth import made, recorded, sampled
 CONSTANTS = JointConstants()
 EFFICIENCY = CONSTANTS.gear_efficiency  # what the gear loses is seen as friction where torque is measured
 CURRENT_S = 0.0035  # until the current is there
-FRICTION = Wish(Kind.FRICTION, amplitude=math.radians(8.0), speed=math.radians(20.0))
-CHIRP = Wish(Kind.CHIRP, math.radians(1.0), math.radians(15.0), low_hz=0.2, high_hz=15.0, seconds=30.0)
+FRICTION = Wish(JointTestKind.FRICTION, amplitude=math.radians(8.0), speed=math.radians(20.0))
+CHIRP = Wish(
+    JointTestKind.CHIRP, math.radians(1.0), math.radians(15.0), low_hz=0.2, high_hz=15.0, seconds=30.0
+)
 
 
-def value(result: Result, name: str) -> float:
+def value(result: JointTestResult, name: str) -> float:
     found = result.value(name)
     assert found is not None, [one for one in result.measures if one.name == name]
     return found
@@ -97,7 +99,9 @@ def test_a_step_of_a_second_order_is_as_the_textbook_says(damping: float) -> Non
     times = np.arange(0.0, 4.0, 0.01)
     target = np.where(times >= 1.0, 0.02, 0.0)
     _, position, _ = signal.lsim(second_order(damping, 2.0), np.concatenate([target[1:], target[-1:]]), times)
-    result = step_response(made(sampled(times, target, position), Wish(Kind.STEP, 0.02, 10.0, repeat=1)))
+    result = step_response(
+        made(sampled(times, target, position), Wish(JointTestKind.STEP, 0.02, 10.0, repeat=1))
+    )
     overshoot = 100 * math.exp(-math.pi * damping / math.sqrt(1 - damping**2))
     assert value(result, "overshoot") == pytest.approx(overshoot, abs=1.0)
     rise = (2.16 * damping + 0.60) / (
@@ -114,7 +118,7 @@ def test_bandwidth_and_phase_margin_of_a_second_order(damping: float) -> None:
     times = np.arange(0.0, 60.0, 0.01)
     target = 0.02 * signal.chirp(times, 0.2, 60.0, 15.0, method="logarithmic")
     _, position, _ = signal.lsim(second_order(damping, 2.0), target, times)
-    wish = Wish(Kind.CHIRP, 0.02, 10.0, low_hz=0.2, high_hz=15.0, seconds=60.0)
+    wish = Wish(JointTestKind.CHIRP, 0.02, 10.0, low_hz=0.2, high_hz=15.0, seconds=60.0)
     result = frequency_response(made(sampled(times, target, position), wish))
     squared = 1 - 2 * damping**2
     bandwidth = 2.0 * math.sqrt(squared + math.sqrt(squared**2 + 1))
@@ -128,7 +132,9 @@ def test_the_highest_frequencies_are_seen_however_long_a_test_was(lost: int) -> 
     times = np.arange(0.0, 30.5 - 0.01 * lost, 0.01)
     target = 0.02 * signal.chirp(times, 0.2, 30.0, 15.0, method="logarithmic")
     position = target + np.random.default_rng(1).normal(0.0, 2e-4, len(times))
-    response = measured(made(sampled(times, target, position), Wish(Kind.CHIRP, 0.02, 10.0, seconds=30.0)))
+    response = measured(
+        made(sampled(times, target, position), Wish(JointTestKind.CHIRP, 0.02, 10.0, seconds=30.0))
+    )
     assert response is not None
     assert response.coherence[response.hz < 14.0].min() > 0.9
 
@@ -137,7 +143,7 @@ def test_what_is_not_coherent_is_unknown_and_judges_nothing() -> None:
     times = np.arange(0.0, 60.0, 0.01)
     target = 0.02 * signal.chirp(times, 0.2, 60.0, 15.0, method="logarithmic")
     noise = np.random.default_rng(1).normal(0.0, 0.02, len(times))
-    wish = Wish(Kind.CHIRP, 0.02, 10.0, low_hz=0.2, high_hz=15.0, seconds=60.0)
+    wish = Wish(JointTestKind.CHIRP, 0.02, 10.0, low_hz=0.2, high_hz=15.0, seconds=60.0)
     result = frequency_response(made(sampled(times, target, noise), wish))
     assert [result.value(name) for name in ("bandwidth", "phase_margin", "crossover")] == [None] * 3
     assert any("not known" in note for note in result.notes)
@@ -146,7 +152,7 @@ def test_what_is_not_coherent_is_unknown_and_judges_nothing() -> None:
 def test_a_joint_that_does_not_move_has_no_step_response() -> None:
     times = np.arange(0.0, 4.0, 0.01)
     target = np.where(times >= 1.0, 0.02, 0.0)
-    result = step_response(made(sampled(times, target, 0.0 * times), Wish(Kind.STEP, 0.02, 10.0)))
+    result = step_response(made(sampled(times, target, 0.0 * times), Wish(JointTestKind.STEP, 0.02, 10.0)))
     assert {one.value for one in result.measures} == {None}
     assert all(one.why for one in result.measures)
 
@@ -158,7 +164,7 @@ def test_a_relay_finds_the_ultimate_gain_and_period_of_the_joint(damping: float)
     bench.joint.constants = JointConstants(
         coulomb_friction=0.0, viscous_friction=damping, gear_efficiency=1.0
     )
-    wish = Wish(Kind.RELAY, math.radians(10.0), 1.0, repeat=12, torque=8.0)
+    wish = Wish(JointTestKind.RELAY, math.radians(10.0), 1.0, repeat=12, torque=8.0)
     result = relay(recorded(bench, wish))
     inertia = bench.joint.constants.inertia + bench.joint.rotor_inertia
     omega = np.linspace(1.0, 100.0, 20_000)

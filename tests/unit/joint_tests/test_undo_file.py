@@ -11,7 +11,7 @@ from drivers.errors import DeviceTimeout, Mismatch
 from gateway.commission.bench import Bench
 from gateway.commission.dialogue import Say
 from gateway.joint_test.limits import NotAllowed
-from gateway.joint_test.undo_file import Change, Unfinished, changes, keep, put_right, read
+from gateway.joint_test.undo_file import OriginalValue, Unfinished, changes, keep, put_right, read
 
 NODE = 2
 LEFT = Unfinished(
@@ -20,7 +20,7 @@ LEFT = Unfinished(
     NODE,
     "2026-11-23T10:00:00Z",
     "Ada",
-    (Change(0x6060, 1, 3, 8), Change(0x60B0, 4, -100, 0), Change(0x60B2, 2, 5, 0)),
+    (OriginalValue(0x6060, 1, 3, 8), OriginalValue(0x60B0, 4, -100, 0), OriginalValue(0x60B2, 2, 5, 0)),
 )
 KNEE = "left_knee"
 KNEE = "left_knee"
@@ -66,7 +66,7 @@ def test_what_it_changes_is_known_before(tmp_path: Path) -> None:
     before = {"0x6060:0": 3, "0x60B0:0": -100, "0x60B1:0": 0, "0x60B2:0": 5, "0x6065:0": 9}
     assert changes(before, 8, 0) == LEFT.changes
     assert changes({"0x6060:0": 10, "0x60B2:0": 0}, 10, 0) == ()
-    assert changes({"0x6860:0": 1}, 10, 0x800) == (Change(0x6860, 1, 1, 10),)
+    assert changes({"0x6860:0": 1}, 10, 0x800) == (OriginalValue(0x6860, 1, 1, 10),)
 
 
 def test_nothing_left_is_nothing_to_say(tmp_path: Path) -> None:

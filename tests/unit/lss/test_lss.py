@@ -15,7 +15,7 @@ from drivers.lss.master import UNCONFIGURED, Identity, LssMaster
 from drivers.lss.preconditions import BusSurvey
 from drivers.scan.traffic import Traffic
 from hil_sim.bus.can_bus import Frame
-from hil_sim.node.lss import State
+from hil_sim.node.lss import LssState
 from tests.unit.lss.lines import PRODUCT, REVISION, VENDOR, Line
 
 ANSWER = 0x7E4
@@ -38,7 +38,7 @@ def master_of(line: Line) -> LssMaster:
 
 
 def nobody_is_left_selected(line: Line) -> bool:
-    return all(node.lss.state is State.WAITING for node in line.nodes.values())
+    return all(node.lss.state is LssState.WAITING for node in line.nodes.values())
 
 
 # Finding

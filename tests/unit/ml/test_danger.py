@@ -7,26 +7,33 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ml.danger.budget import BUDGETS, extrapolated, rate_interval, rule_of_three, share_interval, thresholds
-from ml.danger.combine import Calibration, load
+from ml.danger.baseline import FEWEST, WAITS, Baseline
+from ml.danger.calibration import Calibration, load
 from ml.danger.detector import DETECTORS
-from ml.danger.levels import CALM_S, HOLD, URGENT, Level, Levels, held
-from ml.danger.now import CHANNELS
-from ml.danger.usual import FEWEST, WAITS, Usual
-from ml.danger.watch import Watch
+from ml.danger.false_alarm_budget import (
+    BUDGETS,
+    extrapolated,
+    rate_interval,
+    rule_of_three,
+    share_interval,
+    thresholds,
+)
+from ml.danger.levels import CALM_S, HOLD, URGENT, Level, Levels, sustained
+from ml.danger.monitor import DangerMonitor
+from ml.danger.observation import CHANNELS
 
 PERIOD_NS = 140_000_000  # as seldom as can be: it is learned from seconds, not from rows
 CALIBRATION = load()
 
 
-def rows(watch: Watch, count: int, start: int = 0, **values: float) -> None:
+def rows(watch: DangerMonitor, count: int, start: int = 0, **values: float) -> None:
     row = [values.get(name.replace(".", "_")) for name in CHANNELS]
     for at in range(start, start + count):
         watch.take(at * PERIOD_NS, row)
 
 
 def test_a_robot_without_any_channel_is_unknown_and_never_fine() -> None:
-    watch = Watch(CALIBRATION)
+    watch = DangerMonitor(CALIBRATION)
     rows(watch, 50)
     assert watch.verdict is not None
     assert watch.verdict.level is Level.UNKNOWN
@@ -35,7 +42,7 @@ def test_a_robot_without_any_channel_is_unknown_and_never_fine() -> None:
 
 
 def test_a_robot_of_whom_few_detectors_speak_is_not_called_fine() -> None:
-    watch = Watch(CALIBRATION)
+    watch = DangerMonitor(CALIBRATION)
     rows(watch, 300, left_knee_temperature=30.0)
     assert watch.verdict is not None
     assert watch.verdict.number is not None
@@ -44,7 +51,7 @@ def test_a_robot_of_whom_few_detectors_speak_is_not_called_fine() -> None:
 
 
 def test_a_motor_that_grows_hot_is_told_with_its_joint() -> None:
-    watch = Watch(CALIBRATION)
+    watch = DangerMonitor(CALIBRATION)
     rows(watch, 300, left_knee_temperature=30.0)
     calm = watch.verdict
     row: list[float | None] = [None] * len(CHANNELS)
@@ -60,7 +67,7 @@ def test_a_motor_that_grows_hot_is_told_with_its_joint() -> None:
 
 
 def test_a_value_that_has_gone_stale_silences_its_detector() -> None:
-    watch = Watch(CALIBRATION)
+    watch = DangerMonitor(CALIBRATION)
     rows(watch, 300, left_knee_temperature=30.0)
     rows(watch, 20, 300)
     assert watch.verdict is not None
@@ -108,7 +115,7 @@ def test_thresholds_rise_with_the_level_and_keep_the_budget_on_what_was_seen() -
 
 @given(st.lists(st.floats(-3.0, 9.0), min_size=HOLD, max_size=40))
 def test_a_level_begins_where_what_is_held_reaches_its_threshold(odds: list[float]) -> None:
-    reached = float(held(np.array(odds))[HOLD - 1 :].max())
+    reached = float(sustained(np.array(odds))[HOLD - 1 :].max())
     for threshold, begins in ((reached, True), (reached + 1e-6, False)):
         levels = Levels(dict.fromkeys(URGENT, threshold))
         found = [levels.take(0.04 * at, one) for at, one in enumerate(odds)]
@@ -130,7 +137,7 @@ def test_intervals_of_rates_and_shares_are_the_known_ones() -> None:
 
 
 def test_what_is_learned_waits_until_nothing_was_wrong() -> None:
-    usual = Usual(np.array([0.1]))
+    usual = Baseline(np.array([0.1]))
     for at in range(FEWEST + WAITS + 2):
         usual.take(float(at), np.array([1.0]), quiet=True)
     assert usual.known.all()
@@ -142,10 +149,10 @@ def test_what_is_learned_waits_until_nothing_was_wrong() -> None:
 
 
 def test_robots_learn_nothing_of_each_other() -> None:
-    one, other = Watch(CALIBRATION), Watch(CALIBRATION)
+    one, other = DangerMonitor(CALIBRATION), DangerMonitor(CALIBRATION)
     rows(one, 300, left_knee_temperature=90.0)
     rows(other, 300, left_knee_temperature=30.0)
-    alone = Watch(CALIBRATION)
+    alone = DangerMonitor(CALIBRATION)
     rows(alone, 300, left_knee_temperature=30.0)
     assert other.verdict == alone.verdict
 
@@ -160,7 +167,7 @@ def test_the_shipped_calibration_names_its_detectors_levels_and_source() -> None
 
 
 def test_a_clock_that_jumps_back_silences_nobody_for_long() -> None:
-    watch = Watch(CALIBRATION)
+    watch = DangerMonitor(CALIBRATION)
     rows(watch, 50, start=100_000, left_knee_temperature=30.0)
     rows(watch, 50, left_knee_temperature=30.0)
     assert watch.verdict is not None

@@ -17,7 +17,7 @@ from ml.benchmarks.outcome import Outcome
 from ml.benchmarks.reliability import drawn
 from ml.danger.detector import DETECTORS
 from ml.danger.levels import Level
-from ml.danger.now import CHANNELS
+from ml.danger.observation import CHANNELS
 from ml.errors import UnusableData
 
 CALM, COMES, LIES = 1000, 50, 25  # rows

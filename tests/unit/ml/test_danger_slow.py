@@ -9,14 +9,14 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from ml.danger.creep import Creep
-from ml.danger.memory import LOOKS, Memory, _alone
-from ml.danger.now import CHANNELS, Now
+from ml.danger.encoder_slip import EncoderSlip
+from ml.danger.nearest_neighbours import LOOKS, NearestNeighbours, _alone
+from ml.danger.observation import CHANNELS, Observation
 from ml.danger.support import Support
 
 Floats = npt.NDArray[np.float64]
 Change = Callable[[float, dict[str, float]], None]
-Kind = Callable[[], Memory | Creep]
+Detector = Callable[[], NearestNeighbours | EncoderSlip]
 
 STEP_S = 0.08
 LEARNED_S = 110.0
@@ -38,21 +38,21 @@ def walking(at_s: float) -> dict[str, float]:
     return row
 
 
-def moment(at_s: float, row: dict[str, float], now: Now) -> Now:
+def moment(at_s: float, row: dict[str, float], now: Observation) -> Observation:
     now.take(at_s, np.array([row.get(name, math.nan) for name in CHANNELS]))
     return now
 
 
 @cache
-def learned(kind: Kind) -> tuple[Memory | Creep, Now, Floats]:
+def learned(kind: Detector) -> tuple[NearestNeighbours | EncoderSlip, Observation, Floats]:
     """A detector that knows somebody who walks, and its numbers of the last seconds (n, keys)."""
-    detector, now = kind(), Now()
+    detector, now = kind(), Observation()
     times = np.arange(0.0, LEARNED_S, STEP_S).tolist()
     found = [detector.measure(moment(at_s, walking(at_s), now), learn=True) for at_s in times]
     return detector, now, np.array(found[-100:])
 
 
-def seen(kind: Kind, key: str, change: Change, seconds: float = 4.0) -> tuple[float, Floats]:
+def seen(kind: Detector, key: str, change: Change, seconds: float = 4.0) -> tuple[float, Floats]:
     """The largest number of a key before a change, and its numbers after it began, NaN where unknown."""
     detector, now, before = copy.deepcopy(learned(kind))
     at, after = list(detector.keys).index(key), []
@@ -92,19 +92,19 @@ def all_go_elsewhere(since_s: float, row: dict[str, float]) -> None:
 
 
 def told(change: Change, key: str, least: float = 2.0) -> None:
-    usual, after = seen(Memory, key, change)
+    usual, after = seen(NearestNeighbours, key, change)
     assert np.nanmax(after) > least * usual
 
 
 def test_a_set_point_that_runs_away_is_told_of_its_joint_alone() -> None:
     told(runs_away, "left_knee.target", 5.0)
-    _, own = seen(Memory, "left_knee.target", runs_away)
-    _, other = seen(Memory, "right_hip.target", runs_away)
+    _, own = seen(NearestNeighbours, "left_knee.target", runs_away)
+    _, other = seen(NearestNeighbours, "right_hip.target", runs_away)
     assert np.nanmax(other) < 0.3 * np.nanmax(own)
 
 
 def test_till_it_has_looked_for_long_enough_nothing_is_told() -> None:
-    memory, now = Memory(), Now()
+    memory, now = NearestNeighbours(), Observation()
     found = np.array(
         [memory.measure(moment(at_s, walking(at_s), now), learn=True) for at_s in 0.08 * np.arange(LOOKS + 1)]
     )
@@ -125,14 +125,14 @@ def test_torque_that_fades_is_told() -> None:
 
 
 def test_a_set_point_is_told_where_it_goes_its_own_way_and_not_where_all_do() -> None:
-    _, alone = seen(Memory, "left_knee.target", runs_away, 1.0)
-    _, together = seen(Memory, "left_knee.target", all_go_elsewhere, 3.0)
+    _, alone = seen(NearestNeighbours, "left_knee.target", runs_away, 1.0)
+    _, together = seen(NearestNeighbours, "left_knee.target", all_go_elsewhere, 3.0)
     assert np.nanmax(together, initial=0.0) < 0.2 * np.nanmax(alone)
 
 
 def test_of_a_new_activity_nobody_can_say() -> None:
     for key in ("left_knee.target", "lean", "right load"):
-        usual, after = seen(Memory, key, new_activity, 2.0)
+        usual, after = seen(NearestNeighbours, key, new_activity, 2.0)
         assert math.isfinite(usual)
         assert np.isnan(after).all()
 
@@ -141,13 +141,13 @@ def test_a_robot_that_loses_a_joint_is_compared_with_nothing() -> None:
     def lost(since_s: float, row: dict[str, float]) -> None:
         del row["left_hip.velocity"]
 
-    _, after = seen(Memory, "lean", lost, 1.0)
+    _, after = seen(NearestNeighbours, "lean", lost, 1.0)
     assert np.isnan(after).all()
 
 
 def walked(change: Change, seconds: float) -> Floats:
     """All numbers of a walk in which a row may lack something, from the first moment on (n, keys)."""
-    memory, now, found = Memory(), Now(), []
+    memory, now, found = NearestNeighbours(), Observation(), []
     for at_s in np.arange(0.0, seconds, STEP_S).tolist():
         row = walking(at_s)
         change(at_s, row)
@@ -162,7 +162,7 @@ def test_of_a_single_joint_nobody_can_say_where_it_should_be_led() -> None:
 
     found = walked(alone, LEARNED_S)[-100:]
     assert np.isnan(found[:, 0]).all()
-    assert np.isfinite(found[:, Memory.keys.index("left_hip.torque")]).any()
+    assert np.isfinite(found[:, NearestNeighbours.keys.index("left_hip.torque")]).any()
 
 
 def test_what_a_joint_is_looked_up_by_is_there() -> None:
@@ -176,11 +176,13 @@ def test_what_was_missing_at_first_is_compared_once_it_is_there() -> None:
             row["left_hip.torque"] = row["left_insole.force"] = math.nan
 
     found = walked(late, 90.0)[-100:]
-    assert np.isfinite(found[:, [Memory.keys.index("left_hip.torque"), Memory.keys.index("left load")]]).all()
+    assert np.isfinite(
+        found[:, [NearestNeighbours.keys.index("left_hip.torque"), NearestNeighbours.keys.index("left load")]]
+    ).all()
 
 
 def test_what_is_wrong_is_not_remembered() -> None:
-    memory, now = Memory(), Now()
+    memory, now = NearestNeighbours(), Observation()
     for count in range(300):
         at_s = count * STEP_S
         assert np.isnan(memory.measure(moment(at_s, walking(at_s), now), learn=False)).all()
@@ -190,10 +192,10 @@ def test_an_encoder_that_slips_again_and_again_creeps() -> None:
     def encoder(since_s: float, row: dict[str, float]) -> None:
         row["left_knee.position"] += 0.012 * int(since_s / 0.5)
 
-    usual, after = seen(Creep, "left_knee", encoder)
+    usual, after = seen(EncoderSlip, "left_knee", encoder)
     assert np.nanmax(after) > 0.05
     assert usual < 0.02
-    usual, after = seen(Creep, "right_knee", encoder)
+    usual, after = seen(EncoderSlip, "right_knee", encoder)
     assert np.nanmax(after) < 0.02
 
 
@@ -208,7 +210,7 @@ def feet(at_s: float, forward_m: float) -> dict[str, float]:
 
 
 def test_a_foot_put_down_as_it_stands_is_a_halt_and_elsewhere_is_told() -> None:
-    support, now = Support(), Now()
+    support, now = Support(), Observation()
     stands = {"left_insole.force": 400.0, "right_insole.force": 400.0}
     stands |= {f"{side}_insole.cop_{way}": 0.1 * (way == "x") for side in ("left", "right") for way in "xy"}
     for at_s in np.arange(0.0, 10.0, STEP_S).tolist():

@@ -13,10 +13,10 @@ from ml.benchmarks.danger_data import HEALTHY, LEARNED_S, Seen
 from ml.benchmarks.danger_trunk import OWN, PAUSE_S, Person, channels, figures, upright
 from ml.benchmarks.report import page
 from ml.benchmarks.sisfall_danger import FALL_S, LEAD_IN, Watched, fallen, outcome
-from ml.danger.combine import load
+from ml.danger.calibration import load
 from ml.danger.detector import DETECTORS
 from ml.danger.levels import Level
-from ml.danger.now import CHANNELS
+from ml.danger.observation import CHANNELS
 from tests.unit.ml.recordings import falls, gait, saved
 
 G = 9.81

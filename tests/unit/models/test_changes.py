@@ -179,7 +179,7 @@ def test_nothing_is_promoted_before_it_is_confirmed(desk: Desk, registry: Regist
 
 def test_what_was_judged_not_better_is_not_promoted(desk: Desk, registry: Registry) -> None:
     model = publish(registry).id
-    desk.models.trained[model] = Trained(model, False, ("macro_f1 on held-out people: 0.5",))
+    desk.models.trained[model] = Trained(model, "not better", ("macro_f1 on held-out people: 0.5",))
     desk.models.ask_promotion(model, "")
     assert desk.models.tone is Tone.BAD
     assert "is not better: F1, mean over classes, on held-out people: 0.5" in desk.models.said

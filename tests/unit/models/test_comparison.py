@@ -106,6 +106,15 @@ def test_judges_that_differ_or_are_known_already_are_pointed_out() -> None:
     assert list(notes(one, entry("activity-1", held_out=("mon",)))) == []
 
 
+def test_points_of_models_that_were_judged_by_other_sessions_are_no_verdict() -> None:
+    one, other = (
+        card(metrics=judged(f1, f1), held_out=(session,)) for f1, session in ((0.939, "mon"), (0.971, "tue"))
+    )
+    known = {row.name: row for row in rows(one, other)}
+    assert signed(known["F1, mean over classes"].difference) == "−3.2"
+    assert {row.verdict for row in known.values() if row.difference is not None} == {"other sessions"}
+
+
 @pytest.mark.parametrize(
     ("serving", "expected"),
     [("activity-b", "activity-b"), ("activity-a", "activity-c"), ("", "activity-c"), ("gone", None)],

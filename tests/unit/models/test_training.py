@@ -29,13 +29,15 @@ def test_lines_say_how_far_it_is_and_the_last_what_came_of_it() -> None:
     answer = {
         "model": "activity-1",
         "better": False,
-        "why": ["not better"],
+        "verdict": "not better",
+        "why": ["as good"],
         "over": "activity-0",
         "held_out": {},
     }
     trained = heard(json.dumps(answer), job)
-    assert trained == Trained("activity-1", False, ("not better",), "activity-0")
-    assert trained.verdict == "Not better: not better"
+    assert trained == Trained("activity-1", "not better", ("as good",), "activity-0")
+    assert trained.said == "Not better: as good"
+    assert not trained.may_serve
     wrong = {"kind": "UnusableData", "message": "it takes two to learn from and one to judge by"}
     with pytest.raises(TrainingFailed, match="it takes two to learn from and one to judge by"):
         heard(json.dumps({"error": wrong}), job)
@@ -57,7 +59,7 @@ def test_a_model_is_trained_in_a_process_and_serves_nobody(
     found: list[Trained] = []
     job = jobs.add("Train", training(folder_url, TrainingWish("activity", "", ("s3",)), found.append))
     until(lambda: job.is_over)
-    assert (job.state, job.said.split(":")[0]) == (JobState.DONE, "Better")
+    assert (job.state, job.said.split(":")[0]) == (JobState.DONE, "Not compared")
     registry = Registry(folder_url)
     assert registry.card(found[0].model).held_out == ("s3",)
     assert registry.history("activity") == []

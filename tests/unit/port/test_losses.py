@@ -7,7 +7,7 @@ from drivers.insole.settings import InsoleSettings
 from drivers.losses import Losses
 from drivers.parsing import Counters
 from drivers.reader_stalls import ReaderStalls
-from drivers.samples import State
+from drivers.samples import ComponentState
 from tests.unit.insole.encode import Sender
 
 MS = 1_000_000
@@ -46,7 +46,7 @@ def test_a_silence_is_told_as_the_standstill_that_it_was() -> None:
         data = sender.frame([200] * 16)
         line._received(data, ms * MS)
         insole.received(line.parser.feed(sender.frame([201] * 16)), ms * MS)
-    assert insole.quality(1000 * MS).state is State.OK
+    assert insole.quality(1000 * MS).state is ComponentState.OK
     problem = insole.quality(3000 * MS).problem or ""
     assert "this computer has stood still for 2.0 s" in problem
     assert "TX wire" not in problem

@@ -11,7 +11,7 @@ from server_gui.core.fleet.live_prediction import RecordedPrediction
 from server_gui.core.follow.events import Telemetry
 from server_gui.core.models.names import told_name
 from server_gui.core.prediction import adapting, inbox, robot_predictor
-from server_gui.core.prediction.adaptation import Adapting, Happening, State, Tried, Wearing
+from server_gui.core.prediction.adaptation import AdaptationState, Adapting, Happening, Tried, Wearing
 from server_gui.core.prediction.service import BARRED, PredictionService
 from server_gui.core.recording.batching import EventKind
 from server_gui.core.settings.prediction import Action, RuleSettings
@@ -52,13 +52,13 @@ class Lab:
         self.service.take(ROBOT, walkers.described())
         self.told.until(lambda: (ROBOT, "gait_phase") in self.service.models)
 
-    def until(self, state: State) -> Adapting:
+    def until(self, state: AdaptationState) -> Adapting:
         self.told.until(lambda: self.adapting().state is state, self.walk)
         return self.adapting()
 
     def adapting(self) -> Adapting:
         found = [one for one in self.told.news if isinstance(one, Adapting)]
-        return found[-1] if found else Adapting(ROBOT, 0, State.OFF)
+        return found[-1] if found else Adapting(ROBOT, 0, AdaptationState.OFF)
 
     def until_served_by(self, wearer: str) -> None:
         def is_so() -> bool:
@@ -77,7 +77,7 @@ def test_a_wearer_is_served_by_what_was_learned_until_anybody_else_is_named(fold
     lab = Lab(settings(folder_url, STOPS))
     with lab.service:
         lab.served()
-        offered = lab.until(State.OFFERED)
+        offered = lab.until(AdaptationState.OFFERED)
         assert {one.learned_from for one in lab.told.predicted()} == {""}
         lab.service.say(ROBOT, offered.number, Happening.ACCEPT)
         lab.until_served_by("P01")
@@ -88,7 +88,7 @@ def test_a_wearer_is_served_by_what_was_learned_until_anybody_else_is_named(fold
         lab.wearing = Wearing("session-2", "P02")
         lab.until_served_by("")
         assert lab.told.predicted()[-1].card.id == name
-        lab.until(State.COLLECTING)
+        lab.until(AdaptationState.COLLECTING)
     assert lab.adapting().wearer == "P02"
 
 
@@ -99,7 +99,7 @@ def test_where_a_rule_may_stop_the_robot_by_it_no_unproven_model_is_offered(fold
     with lab.service:
         lab.served()
         lab.told.until(lambda: lab.adapting().why == BARRED, lab.walk)
-        assert lab.adapting().state is State.OFF
+        assert lab.adapting().state is AdaptationState.OFF
 
 
 def test_a_model_that_is_promoted_meanwhile_serves_at_once(folder_url: str) -> None:
@@ -107,7 +107,7 @@ def test_a_model_that_is_promoted_meanwhile_serves_at_once(folder_url: str) -> N
     lab = Lab(settings(folder_url))
     with lab.service:
         lab.served()
-        lab.service.say(ROBOT, lab.until(State.OFFERED).number, Happening.ACCEPT)
+        lab.service.say(ROBOT, lab.until(AdaptationState.OFFERED).number, Happening.ACCEPT)
         lab.until_served_by("P01")
         model = walkers.model()
         other = publish(folder_url, model.learned, units=model.card.units, notes="another")
@@ -124,12 +124,12 @@ def test_an_adapted_model_that_breaks_gives_way_to_the_general_one(
     lab = Lab(settings(folder_url))
     with lab.service:
         lab.served()
-        offered = lab.until(State.OFFERED)
+        offered = lab.until(AdaptationState.OFFERED)
         adapted = lab.service._adapting._attempts[ROBOT].adapted  # type: ignore[union-attr]
         assert adapted is not None
         adapted.learned.parts.pop("network")
         lab.service.say(ROBOT, offered.number, Happening.ACCEPT)
-        assert lab.until(State.FAILED).why == "the adapted model cannot be used"
+        assert lab.until(AdaptationState.FAILED).why == "the adapted model cannot be used"
         count = len(lab.told.predicted())
         lab.told.until(lambda: len(lab.told.predicted()) > count, lab.walk)
     assert lab.told.predicted()[-1].card.id == name
@@ -146,9 +146,11 @@ def test_a_recording_keeps_which_model_served_and_until_when_without_a_name() ->
     one = object.__new__(RecordedPrediction)
     one._recorder, one._show, one._own_models = Recorder(), None, {}  # type: ignore[assignment]
     one._session = lambda _: "session-1"
-    serving = Adapting(ROBOT, 1, State.SERVING, "P01", tried=Tried(3.4, 2.1, 30), model="gait_phase-77.w1")
-    one._keep([Adapting(ROBOT, 1, State.OFFERED, "P01"), serving, serving])
-    one._keep([Adapting(ROBOT, 1, State.TAKEN_BACK, "P01")])
+    serving = Adapting(
+        ROBOT, 1, AdaptationState.SERVING, "P01", tried=Tried(3.4, 2.1, 30), model="gait_phase-77.w1"
+    )
+    one._keep([Adapting(ROBOT, 1, AdaptationState.OFFERED, "P01"), serving, serving])
+    one._keep([Adapting(ROBOT, 1, AdaptationState.TAKEN_BACK, "P01")])
     assert kept == [
         (
             "adapted",

@@ -14,9 +14,9 @@ from server_gui.core.prediction import adapting as module
 from server_gui.core.prediction.adaptation import (
     BY_PERSON,
     NEXT,
+    AdaptationState,
     Adapting,
     Happening,
-    State,
     Tried,
     Wearing,
 )
@@ -141,7 +141,7 @@ def sound(bench: Bench, accepted: object) -> object:
     """What serves is of this wearer, recording, link and model, and was accepted in this very context."""
     if bench.serves is None:
         return None
-    assert bench.now.state is State.SERVING
+    assert bench.now.state is AdaptationState.SERVING
     assert bench.wearing.wearer == bench.serves.learned_from != ""
     assert bench.general is not None
     assert bench.serves.learned is bench.general.learned
@@ -160,7 +160,7 @@ def test_in_no_order_of_what_may_happen_it_serves_anybody_else(bench: Bench, beg
         accepted = None
         steps = {"collecting": [], "offered": ["walk"], "serving": ["walk", "ACCEPT"]}[begin]
         for name in [*steps, *order, "walk", "ACCEPT"]:
-            offered, before = bench.now.state is State.OFFERED, bench.serves
+            offered, before = bench.now.state is AdaptationState.OFFERED, bench.serves
             OPERATIONS[name](bench)
             if name == "ACCEPT" and offered:
                 accepted = context(bench)
@@ -190,7 +190,7 @@ def test_whatever_changes_ends_it_at_once(bench: Bench, what: str) -> None:
 def test_it_goes_from_a_minute_of_steps_to_an_offer_and_back(bench: Bench) -> None:
     bench.walk()
     assert [one.state for one in bench.told[-4:]] == [
-        State.COLLECTING, State.LEARNING, State.TRYING, State.OFFERED,
+        AdaptationState.COLLECTING, AdaptationState.LEARNING, AdaptationState.TRYING, AdaptationState.OFFERED,
     ]  # fmt: skip
     assert bench.now.text == "learned from P01: 3.4 → 2.1 % of the stride, on 30 later strides"
     assert bench.serves is None, "it serves when somebody wants it"
@@ -198,10 +198,14 @@ def test_it_goes_from_a_minute_of_steps_to_an_offer_and_back(bench: Bench) -> No
     assert bench.serves is not None
     assert bench.now.model == bench.serves.card.id
     bench.say(Happening.TAKE_BACK)
-    assert (bench.serves, bench.now.state) == (None, State.TAKEN_BACK)
+    assert (bench.serves, bench.now.state) == (None, AdaptationState.TAKEN_BACK)
     assert bench.service._attempts[ROBOT].adapted is None, "what was taken back is forgotten"
     bench.say(Happening.AGAIN)
-    assert [one.state for one in bench.told[-3:]] == [State.COLLECTING, State.LEARNING, State.TRYING]
+    assert [one.state for one in bench.told[-3:]] == [
+        AdaptationState.COLLECTING,
+        AdaptationState.LEARNING,
+        AdaptationState.TRYING,
+    ]
 
 
 def test_nobody_named_is_said_and_never_learned_from(bench: Bench) -> None:
@@ -216,7 +220,7 @@ def test_nobody_named_is_said_and_never_learned_from(bench: Bench) -> None:
 
 def test_attempts_at_a_link_are_no_news(bench: Bench) -> None:
     bench.hear(LOST)
-    assert (bench.now.state, bench.now.text) == (State.OFF, "")
+    assert (bench.now.state, bench.now.text) == (AdaptationState.OFF, "")
     count = len(bench.told)
     for _ in range(3):
         bench.hear(LOST)
@@ -228,11 +232,11 @@ def test_what_was_said_to_an_offer_that_is_over_changes_nothing(bench: Bench) ->
     stale = bench.now.number
     bench.wearing = Wearing("session-2", "P02")
     bench.walk()
-    assert bench.now.state is State.OFFERED
+    assert bench.now.state is AdaptationState.OFFERED
     bench.service.say(ROBOT, stale, Happening.ACCEPT)
     bench.learn()
     bench.hear(ROWS)
-    assert (bench.serves, bench.now.state) == (None, State.OFFERED)
+    assert (bench.serves, bench.now.state) == (None, AdaptationState.OFFERED)
 
 
 def test_what_is_no_better_is_said_and_cannot_be_accepted(
@@ -268,7 +272,7 @@ def test_a_robot_that_falls_silent_is_forgotten_and_begins_anew(
     assert bench.service._attempts[ROBOT].adapted is None
     monkeypatch.undo()
     bench.hear(ROWS)
-    assert bench.now.state is State.COLLECTING
+    assert bench.now.state is AdaptationState.COLLECTING
 
 
 def test_more_than_can_be_learned_from_in_time_is_not_kept(bench: Bench) -> None:
@@ -280,10 +284,16 @@ def test_more_than_can_be_learned_from_in_time_is_not_kept(bench: Bench) -> None
 
 
 def test_nothing_but_an_offer_that_is_accepted_leads_to_serving() -> None:
-    leads = [(state, what) for state, row in NEXT.items() for what in row if row[what] is State.SERVING]
-    assert leads == [(State.OFFERED, Happening.ACCEPT)]
-    assert NEXT.keys() == set(State)
-    reached: Iterable[State] = {State.OFF, State.UNNAMED, State.COLLECTING}
-    for _ in State:
+    leads = [
+        (state, what) for state, row in NEXT.items() for what in row if row[what] is AdaptationState.SERVING
+    ]
+    assert leads == [(AdaptationState.OFFERED, Happening.ACCEPT)]
+    assert NEXT.keys() == set(AdaptationState)
+    reached: Iterable[AdaptationState] = {
+        AdaptationState.OFF,
+        AdaptationState.UNNAMED,
+        AdaptationState.COLLECTING,
+    }
+    for _ in AdaptationState:
         reached = {*reached, *(after for state in reached for after in NEXT[state].values())}
-    assert set(reached) == set(State)
+    assert set(reached) == set(AdaptationState)

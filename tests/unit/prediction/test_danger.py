@@ -9,9 +9,9 @@ import pytest
 from msgspec.structs import replace
 
 from gateway.client import Batch
-from ml.danger.combine import SHIPPED, Calibration, load
+from ml.danger.calibration import SHIPPED, Calibration, load
 from ml.danger.levels import Level
-from ml.danger.now import CHANNELS
+from ml.danger.observation import CHANNELS
 from ml.errors import UnusableModel
 from server_gui.core.follow.events import Telemetry
 from server_gui.core.prediction import service as module
@@ -19,7 +19,7 @@ from server_gui.core.prediction.current import STALE_S, StationPredictions
 from server_gui.core.prediction.danger import EVERY_NS, prediction
 from server_gui.core.prediction.news import Endangered
 from server_gui.core.prediction.robot_predictor import RobotPredictor
-from server_gui.core.prediction.rules import Rule
+from server_gui.core.prediction.rules import PredictionRule
 from server_gui.core.settings.prediction import PredictionSettings, RuleSettings
 from server_gui.core.settings.server_file import ServerSettings
 from tests.unit.ml.serving.small import MS, hips
@@ -142,7 +142,7 @@ def test_what_was_known_last_stays_while_nobody_knows_better() -> None:
 
 
 def test_no_rule_begins_to_hold_by_what_is_unknown() -> None:
-    rule = Rule(RuleSettings("danger", "alarm", 0.5), EVERY_NS)
+    rule = PredictionRule(RuleSettings("danger", "alarm", 0.5), EVERY_NS)
     assert rule.take(prediction(endangered(Level.UNKNOWN, 0.99).verdict)) is None
     assert rule.take(prediction(endangered(Level.ALARM, 0.99).verdict)) is True
 

@@ -11,7 +11,7 @@ from ml.registry.registry import Registry
 from ml.robot.task import ABNORMAL, TASKS, UNKNOWN
 from ml.serving.predictor import Prediction
 from server_gui.core.prediction import robot_predictor
-from server_gui.core.prediction.rules import Rule
+from server_gui.core.prediction.rules import PredictionRule
 from server_gui.core.settings.prediction import EVERY_MS, Action, RuleSettings
 from tests.unit.ml.serving.small import MS, hips
 from tests.unit.prediction.robots import (
@@ -36,7 +36,7 @@ def said(at_ms: int, probability: float, label: str = "near_fall") -> Prediction
 
 def told(rule: RuleSettings, found: Iterable[Prediction]) -> list[tuple[int, bool]]:
     """When it began (True) and ended."""
-    one = Rule(rule, EVERY_MS_HERE * MS)
+    one = PredictionRule(rule, EVERY_MS_HERE * MS)
     changes = [(prediction.stamp_ns // MS, one.take(prediction)) for prediction in found]
     return [(at, change) for at, change in changes if change is not None]
 

@@ -10,7 +10,15 @@ from gateway.wire.bus import CLOSED, BusInfo, NodeInfo, TalkInfo
 from gateway.wire.finding import FindingInfo
 from server_gui.core.follow.events import BusesSeen, LinkChanged
 from server_gui.core.follow.robot import Robot
-from server_gui.core.processing.bus_health import Level, findings, level, seen, talking, trouble, worst
+from server_gui.core.processing.bus_health import (
+    BusHealthLevel,
+    findings,
+    level,
+    seen,
+    talking,
+    trouble,
+    worst,
+)
 
 NODE = NodeInfo(2, ["left_knee"], 0.44, 12.0, 88, 0, 0, 0.0)
 TALKS = [TalkInfo("TPDO", 2, 900.0), TalkInfo("SYNC", None, 100.0), TalkInfo("heartbeat", 2, 10.0)]
@@ -30,19 +38,19 @@ def robot(*buses: BusInfo, at_ns: int | None = None) -> Robot:
 @pytest.mark.parametrize(
     ("bus", "bad"),
     [
-        (BUS, Level.GOOD),
-        (replace(BUS, load_percent=None), Level.UNKNOWN),
-        (replace(BUS, load_percent=100.0), Level.ALARM),
-        (replace(BUS, load_percent=104.7), Level.ALARM),
-        (replace(BUS, load_percent=85.0, findings=[BUSY]), Level.WARNING),
-        (replace(BUS, state="error passive"), Level.WARNING),
-        (replace(BUS, state="bus off"), Level.ALARM),
-        (replace(BUS, state=CLOSED, load_percent=None), Level.ALARM),
-        (replace(BUS, nodes=[replace(NODE, findings=[LOST])]), Level.WARNING),
-        (replace(BUS, nodes=[replace(NODE, pdos_missing_percent=20.0)]), Level.WARNING),
+        (BUS, BusHealthLevel.GOOD),
+        (replace(BUS, load_percent=None), BusHealthLevel.UNKNOWN),
+        (replace(BUS, load_percent=100.0), BusHealthLevel.ALARM),
+        (replace(BUS, load_percent=104.7), BusHealthLevel.ALARM),
+        (replace(BUS, load_percent=85.0, findings=[BUSY]), BusHealthLevel.WARNING),
+        (replace(BUS, state="error passive"), BusHealthLevel.WARNING),
+        (replace(BUS, state="bus off"), BusHealthLevel.ALARM),
+        (replace(BUS, state=CLOSED, load_percent=None), BusHealthLevel.ALARM),
+        (replace(BUS, nodes=[replace(NODE, findings=[LOST])]), BusHealthLevel.WARNING),
+        (replace(BUS, nodes=[replace(NODE, pdos_missing_percent=20.0)]), BusHealthLevel.WARNING),
     ],
 )
-def test_a_bus_is_as_bad_as_what_is_worst_of_it(bus: BusInfo, bad: Level) -> None:
+def test_a_bus_is_as_bad_as_what_is_worst_of_it(bus: BusInfo, bad: BusHealthLevel) -> None:
     assert level(bus) is bad
 
 
@@ -67,14 +75,14 @@ def test_what_is_old_or_never_came_or_is_of_a_link_that_is_gone_is_not_known() -
     too_old.apply(BusesSeen(None, time.monotonic_ns()))
     for each in (Robot(), old, gone, too_old):
         assert seen(each) is None
-        assert worst(each)[0] is Level.UNKNOWN
+        assert worst(each)[0] is BusHealthLevel.UNKNOWN
         assert "%" not in worst(each)[1][0]
 
 
 def test_the_worst_bus_is_said_with_its_load_its_errors_and_who_talks_most() -> None:
     full = replace(BUS, name="legs", load_percent=97.0, error_frames=3, bus_offs=2)
     bad, wordings = worst(robot(BUS, full))
-    assert bad is Level.ALARM
+    assert bad is BusHealthLevel.ALARM
     why = "it is full"
     assert wordings[0] == f"CAN legs 97 %, 3 errors, 2 × bus off: {why} · most: left knee 90 %"
     assert wordings[-1] == "CAN 97 %: full"

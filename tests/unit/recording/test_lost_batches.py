@@ -14,7 +14,7 @@ from ml.store.tables import TELEMETRY
 from server_gui.core.recording.recorder import Recorder
 from server_gui.core.recording.rows import Record
 from server_gui.core.recording.spool import Spool
-from server_gui.core.recording.spool_files import Files, Kept
+from server_gui.core.recording.spool_files import Files, SegmentState
 from server_gui.core.recording.uploader import Uploader
 from tests.support.waiting import WAIT_S
 from tests.unit.recording.robots import batch
@@ -183,7 +183,7 @@ def test_a_batch_that_is_closed_while_somebody_looks_is_not_gone(
 
         own = Files.own
 
-        def meanwhile(files: Files) -> list[tuple[int, Kept]]:
+        def meanwhile(files: Files) -> list[tuple[int, SegmentState]]:
             found = own(files)
             monkeypatch.setattr(Files, "own", own)
             another()

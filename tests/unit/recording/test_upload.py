@@ -17,7 +17,7 @@ import pytest
 from gateway.wire.resource import ResourceSnapshot
 from ml.store import Store, StoreError, StoreUnreachable, durable
 from ml.store.labels import Label
-from ml.store.tables import TELEMETRY, Known
+from ml.store.tables import TELEMETRY, ColumnFacts
 from server_gui.core.recording.columns import Columns
 from server_gui.core.recording.errors import Damaged
 from server_gui.core.recording.recorder import Recorder
@@ -131,7 +131,7 @@ def test_values_in_different_units_never_share_a_column(spool: Spool, folder_url
 
 def test_a_column_that_was_written_without_a_unit_takes_none_later() -> None:
     layouts = [Layout(("knee",), (unit,)) for unit in ("rad", "°", None)]
-    assert Columns(layouts, {"knee": Known()}).schema.names[-3:] == ["knee@rad", "knee@°", "knee"]
+    assert Columns(layouts, {"knee": ColumnFacts()}).schema.names[-3:] == ["knee@rad", "knee@°", "knee"]
     assert Columns([Layout(("knee",), (unit,)) for unit in (None, "rad")], {}).schema.names[-1] == "knee"
 
 

@@ -360,7 +360,7 @@ def test_a_piece_that_is_closed_while_it_is_read_is_not_given_twice(
     fill(path)
     listed = journal_files.closed_pieces
 
-    def rotating(journal: Path) -> list[journal_files.Piece]:
+    def rotating(journal: Path) -> list[journal_files.ClosedJournalFile]:
         if journal.exists():
             journal.replace(journal_files.closed_piece(journal, 40).path)
         return listed(journal)

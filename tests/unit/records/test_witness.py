@@ -13,7 +13,7 @@ from gateway.certificates import der_of, fingerprint
 from gateway.main import main
 from gateway.records.journal import Journal, Sizes, head_file
 from gateway.records.signing import EMPTY, KEYLESS, HeadSigner
-from gateway.records.witness import Verdict, judge
+from gateway.records.witness import WitnessVerdict, judge
 from gateway.wire.control import JournalProof, SignedHead
 from tests.support.waiting import WAIT_S
 from tests.unit.gateway import keyed as keys
@@ -203,6 +203,6 @@ def test_what_was_seen_of_entries_that_are_removed_is_said(path: Path, seen: Sig
     journal.close()
     found = judge(path, [seen])
     assert (found.verdict, found.text) == (
-        Verdict.UNPROVEN,
+        WitnessVerdict.UNPROVEN,
         "what others have seen of it ends with entry 3, which is removed",
     )

@@ -12,10 +12,10 @@ import pytest
 from drivers.bus.settings import CanSettings
 from drivers.cli.scan import main
 from drivers.errors import Unavailable
-from drivers.scan.asking import Told
+from drivers.scan.asking import NodeAnswers
 from drivers.scan.products import Library, files
 from drivers.scan.report import as_text
-from drivers.scan.scan import Found, scan
+from drivers.scan.scan import ScanResult, scan
 from drivers.scan.traffic import Traffic
 from eds.shipped import SHIPPED
 from tests.unit.bus.fake_node import FakeNode
@@ -50,11 +50,11 @@ def channel(request: pytest.FixtureRequest) -> str:
 
 
 @pytest.fixture
-def found(channel: str) -> Iterator[Callable[..., Found]]:
+def found(channel: str) -> Iterator[Callable[..., ScanResult]]:
     """Scan while these nodes live, each told what to send as soon as the scan listens."""
     with ExitStack() as stack:
 
-        def run(*nodes: FakeNode, send: Callable[[], None] = lambda: None, active: bool = True) -> Found:
+        def run(*nodes: FakeNode, send: Callable[[], None] = lambda: None, active: bool = True) -> ScanResult:
             for node in nodes:
                 stack.enter_context(node)
             waited = threading.Event()
@@ -73,7 +73,7 @@ def found(channel: str) -> Iterator[Callable[..., Found]]:
 LISTEN_S = 0.4
 
 
-def test_nothing_is_sent_by_who_only_listens(channel: str, found: Callable[..., Found]) -> None:
+def test_nothing_is_sent_by_who_only_listens(channel: str, found: Callable[..., ScanResult]) -> None:
     node = FakeNode(channel, 5, DRIVE)
     seen = found(node, send=node.heartbeat, active=False)
     assert seen.nodes == (5,)
@@ -81,11 +81,11 @@ def test_nothing_is_sent_by_who_only_listens(channel: str, found: Callable[..., 
 
 
 def test_who_is_asked_says_what_it_is_and_nothing_is_written(
-    channel: str, found: Callable[..., Found]
+    channel: str, found: Callable[..., ScanResult]
 ) -> None:
     node = FakeNode(channel, 5, DRIVE)
     told = found(node).told[5]
-    assert isinstance(told, Told)
+    assert isinstance(told, NodeAnswers)
     assert (told.device_type, told.name, told.serial_number) == (0x20192, "Joint drive of some length", 4711)
     assert [(axis.number, axis.modes) for axis in told.axes] == [(0, 0b1010_0000)]
     assert [(tpdo.cob_id, [o.index for o in tpdo.objects]) for tpdo in told.tpdos] == [(0x185, [0x6041])]
@@ -93,7 +93,7 @@ def test_who_is_asked_says_what_it_is_and_nothing_is_written(
     assert {can_id for can_id, _ in node.seen} == {0x600 + id_ for id_ in range(1, 128)}
 
 
-def test_a_node_that_somebody_else_asks_is_left_alone(channel: str, found: Callable[..., Found]) -> None:
+def test_a_node_that_somebody_else_asks_is_left_alone(channel: str, found: Callable[..., ScanResult]) -> None:
     node, other = FakeNode(channel, 5, DRIVE), FakeNode(channel, 9, DRIVE)
     seen = found(node, other, send=lambda: other.send(0x605, bytes.fromhex("40 00 10 00 00 00 00 00")))
     assert list(seen.told) == [9]
@@ -102,7 +102,7 @@ def test_a_node_that_somebody_else_asks_is_left_alone(channel: str, found: Calla
 
 
 def test_a_node_that_somebody_begins_to_ask_meanwhile_is_left_alone_too(
-    channel: str, found: Callable[..., Found]
+    channel: str, found: Callable[..., ScanResult]
 ) -> None:
     other = FakeNode(channel, 9, DRIVE)
     begin = bytes.fromhex("40 41 60 00 00 00 00 00")
@@ -119,11 +119,11 @@ def test_a_node_that_somebody_begins_to_ask_meanwhile_is_left_alone_too(
 
 
 def test_a_node_that_falls_silent_is_told_as_far_as_it_answered(
-    channel: str, found: Callable[..., Found]
+    channel: str, found: Callable[..., ScanResult]
 ) -> None:
     node = FakeNode(channel, 5, DRIVE, deaf_to={(0x1018, 2)})
     told = found(node).told[5]
-    assert isinstance(told, Told)
+    assert isinstance(told, NodeAnswers)
     assert (told.vendor_id, told.product_code, told.tpdos) == (0x8A, None, ())
     assert told.problem is not None
     assert "1018" in told.problem
@@ -151,7 +151,7 @@ def test_traffic_tells_master_states_and_periods() -> None:
     assert traffic.others() == (0x7F0,)
 
 
-def test_a_silent_bus_is_never_called_well(found: Callable[..., Found]) -> None:
+def test_a_silent_bus_is_never_called_well(found: Callable[..., ScanResult]) -> None:
     lines = list(as_text(CanSettings(interface="virtual", channel="x"), found(), {}, active=True))
     assert "  silent      nothing was sent, by anybody: check bit rate, wiring and power" in lines
 
@@ -168,13 +168,13 @@ def made(folder: Path, name: str, revision: int = 3) -> None:
     (folder / name).write_text(text)
 
 
-def told(**changes: object) -> Told:
+def told(**changes: object) -> NodeAnswers:
     values = {
         "device_type": 0x20192, "error_register": 0, "name": None, "hardware": None, "software": None,
         "vendor_id": 0x8A, "product_code": 0x21, "revision": 3, "serial_number": None, "heartbeat_ms": 100,
         "axes": (), "tpdos": (),
     }  # fmt: skip
-    return Told(**(values | changes))  # type: ignore[arg-type]
+    return NodeAnswers(**(values | changes))  # type: ignore[arg-type]
 
 
 def test_the_file_of_vendor_and_product_is_proposed_the_best_first(tmp_path: Path) -> None:

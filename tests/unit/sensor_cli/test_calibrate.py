@@ -19,7 +19,7 @@ from drivers.insole import layout as layouts
 from drivers.insole.calibration import CellCalibration, Cells, load
 from drivers.insole.fit import BadFit, Load, fit, text
 from drivers.insole.foot import Foot
-from drivers.samples import State
+from drivers.samples import ComponentState
 from tests.support.waiting import until
 from tests.unit.bus.fake_node import FakeNode
 from tests.unit.imu.encode import witmotion
@@ -106,7 +106,7 @@ def feels(monkeypatch: pytest.MonkeyPatch) -> None:
         return made[-1]
 
     waits = SimpleNamespace(
-        wait=lambda _s: until(lambda: made[-1].quality(time.monotonic_ns()).state is State.OK)
+        wait=lambda _s: until(lambda: made[-1].quality(time.monotonic_ns()).state is ComponentState.OK)
     )
     monkeypatch.setattr(calibrate, "_imu_on_port", on_port)
     monkeypatch.setattr(calibrate, "threading", SimpleNamespace(Event=lambda: waits))

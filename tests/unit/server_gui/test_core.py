@@ -14,7 +14,7 @@ from server_gui.core.follow.feed import Feed, FollowSettings
 from server_gui.core.follow.mailbox import Mailbox
 from server_gui.core.follow.network import Network
 from server_gui.core.follow.robot import Robot
-from server_gui.core.tuning.edits import Change, unit_of
+from server_gui.core.tuning.edits import ReviewedEdit, unit_of
 from server_gui.core.tuning.stop import StopState
 from server_gui.core.tuning.writing import WriteState
 from server_gui.terminal.controls import Controls
@@ -273,7 +273,7 @@ def test_a_key_writes_and_the_lease_is_given_back(fake: FakeRobot, session: Foll
 def test_refused_write_is_told_in_the_robots_words(fake: FakeRobot, session: FollowedRobot) -> None:
     station = session.station
     unit = unit_of("gait.step_length", "m", Units())
-    station.write((Change("gait.step_length", unit, 0.4, 9.0, elsewhere=False),))
+    station.write((ReviewedEdit("gait.step_length", unit, 0.4, 9.0, elsewhere=False),))
     until(session, lambda: station.writing.state is WriteState.FAILED)
     assert "above 0.6" in station.writing.text
 

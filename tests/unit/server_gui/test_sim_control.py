@@ -8,7 +8,7 @@ import pytest
 from server_gui.processes.children import Child
 from server_gui.processes.demo_robot import DemoRobot
 from server_gui.processes.sim_control import SimControl, SimulatorRefuses
-from server_gui.processes.simulated import Part
+from server_gui.processes.simulated import RobotPart
 from tests.support.waiting import until
 
 
@@ -47,7 +47,7 @@ def test_a_robot_of_ours_says_which_of_its_parts_are_ready_and_lets_go_of_both(t
     with DemoRobot("stand", tmp_path) as own:
         until(lambda: own.address is not None or own.problem)
         own.check()
-        assert own.ready == (Part.SIMULATOR, Part.GATEWAY)
+        assert own.ready == (RobotPart.SIMULATOR, RobotPart.GATEWAY)
         assert SimControl(tmp_path).listed().active == ()
     assert not own.is_running
     with pytest.raises(SimulatorRefuses):

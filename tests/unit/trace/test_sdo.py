@@ -2,12 +2,12 @@
 
 import pytest
 
-from drivers.trace.sdo import Conversation, Said
+from drivers.trace.sdo import Conversation, SdoText
 
 OBJECT = (0x1008, 0)
 
 
-def told(conversation: Conversation, *frames: str) -> list[Said]:
+def told(conversation: Conversation, *frames: str) -> list[SdoText]:
     """Frames in hexadecimal; `>` those of the client, `<` those of the server."""
     return [
         (conversation.request if frame[0] == ">" else conversation.response)(bytes.fromhex(frame[1:]))
@@ -15,7 +15,7 @@ def told(conversation: Conversation, *frames: str) -> list[Said]:
     ]
 
 
-def values(said: list[Said]) -> list[bytes]:
+def values(said: list[SdoText]) -> list[bytes]:
     """What was carried by transfers that are over."""
     return [one.value for one in said if one.done and one.value is not None]
 

@@ -14,7 +14,7 @@ import pytest
 from ml.errors import UnusableData
 from ml.store import Store
 from ml.training import extract as module
-from ml.training.dataset import Ask, LeftOut, Part, part, versions
+from ml.training.dataset import Ask, LeftOut, SessionDecisions, part, versions
 from ml.training.extract import extract
 from tests.stores import SECRET
 from tests.support.waiting import until
@@ -97,8 +97,8 @@ def test_a_cluster_gives_the_same_bits_though_a_worker_is_killed_and_by_its_own_
     assert isinstance(here[-1], LeftOut)
     assert here[-1] == there[-1]
     for one, other in zip(here[:-1], there[:-1], strict=True):
-        assert isinstance(one, Part)
-        assert isinstance(other, Part)
+        assert isinstance(one, SessionDecisions)
+        assert isinstance(other, SessionDecisions)
         assert (one.ask, one.group, one.regression) == (other.ask, other.group, other.regression)
         for name in ("features", "truth", "source", "stamps_ns", "ranges"):
             mine, its = getattr(one, name), getattr(other, name)

@@ -79,7 +79,7 @@ def test_a_model_that_another_one_has_overtaken_while_it_was_judged_is_not_promo
     said = capsys.readouterr().out
     (pointer,) = Registry(folder_url).history("activity")
     assert pointer.who == "Ada"
-    assert "better, and nowhere much worse" in said
+    assert "not compared, but able to serve" in said
     assert f"in the place of nothing, and {pointer.model} serves by now" in said
 
 

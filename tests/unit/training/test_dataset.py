@@ -12,7 +12,7 @@ from ml.robot.task import recipe_named
 from ml.serving.grid import on_grid
 from ml.store import Store
 from ml.store.labels import REGRESSION, Label, LabelSource
-from ml.training.dataset import Ask, LeftOut, Part, part, versions
+from ml.training.dataset import Ask, LeftOut, SessionDecisions, part, versions
 from server_gui.core.recording import records
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.upload import send
@@ -26,14 +26,14 @@ def spool(tmp_path: Path) -> Path:
     return tmp_path / "spool"
 
 
-def asked(url: str, spool: Path, made: Made, recipe: str = RECIPE) -> Part | LeftOut:
+def asked(url: str, spool: Path, made: Made, recipe: str = RECIPE) -> SessionDecisions | LeftOut:
     store = put(url, spool, [made])
     return part(Ask(url, versions(store, [made.robot]), made.robot, made.session, recipe))
 
 
-def had(url: str, spool: Path, made: Made, recipe: str = RECIPE) -> Part:
+def had(url: str, spool: Path, made: Made, recipe: str = RECIPE) -> SessionDecisions:
     found = asked(url, spool, made, recipe)
-    assert isinstance(found, Part)
+    assert isinstance(found, SessionDecisions)
     return found
 
 
@@ -122,7 +122,9 @@ def test_what_cannot_be_learned_from_is_left_out_with_a_sentence(folder_url: str
     for number, (words, made) in enumerate(cases.items()):
         assert why(f"{folder_url}{number}", tmp_path / f"spool{number}", made) == words
     # Values that are missing for less than 100 ms are as live: the newest one holds.
-    assert isinstance(asked(f"{folder_url}x", tmp_path / "spoolx", replace(long, values=holes)), Part)
+    assert isinstance(
+        asked(f"{folder_url}x", tmp_path / "spoolx", replace(long, values=holes)), SessionDecisions
+    )
 
 
 def test_an_old_version_of_the_tables_says_what_it_said(folder_url: str, spool: Path) -> None:
@@ -132,9 +134,9 @@ def test_an_old_version_of_the_tables_says_what_it_said(folder_url: str, spool: 
     before = part(ask)
     relabel(store, spool, Label("exo", "s", BEGAN_UTC + 9 * S, BEGAN_UTC + 15 * S, "turn_left", "bob"))
     again, now = part(ask), part(changed(ask, versions=versions(store, ["exo"])))
-    assert isinstance(before, Part)
-    assert isinstance(again, Part)
-    assert isinstance(now, Part)
+    assert isinstance(before, SessionDecisions)
+    assert isinstance(again, SessionDecisions)
+    assert isinstance(now, SessionDecisions)
     assert (again.features == before.features).all()
     assert again.truth.tolist() == before.truth.tolist()
     assert len(now.truth) < len(before.truth)  # two people differ, so nobody knows

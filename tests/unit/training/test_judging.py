@@ -10,7 +10,7 @@ from ml.registry.card import ClassScore, Metrics
 from ml.robot.task import TASKS
 from ml.store.labels import person
 from ml.training.choosing import held_out, recipe_for
-from ml.training.judging import Judged, decide
+from ml.training.judging import Judged, Verdict, decide
 
 ACTIVITY, PHASE = TASKS["activity"], TASKS["gait_phase"]
 USUAL = Metrics(
@@ -89,8 +89,21 @@ def test_of_a_phase_the_error_must_fall() -> None:
 @pytest.mark.parametrize(("figures", "serves"), [({"macro_f1": 0.3}, True), ({"macro_f1": 0.2}, False)])
 def test_the_first_model_must_know_more_than_nothing(figures: Any, serves: bool) -> None:
     decision = decide(ACTIVITY, judged(better(**figures), None), None)
-    assert decision.better is serves
+    assert decision.verdict is (Verdict.NOT_COMPARED if serves else Verdict.NOT_BETTER)
+    assert (decision.may_serve, decision.better) == (serves, False), (
+        "nothing is better than what is not there"
+    )
     assert "saying always the same has 20.0 %; no model that was promoted serves yet" in decision.why[0]
+
+
+def test_what_came_with_gwrms_and_cannot_judge_these_sessions_is_named() -> None:
+    lacking = ("imu.roll", "imu.yaw", "left_insole.force", "right_insole.force")
+    decision = decide(ACTIVITY, judged(better(), None), None, lacking)
+    assert not decision.better
+    assert (
+        "these sessions lack: 4 (imu.roll, imu.yaw, left_insole.force, …); so it is not compared"
+        in (decision.why[1])
+    )
 
 
 def test_where_nothing_could_be_judged_nothing_is_promoted() -> None:

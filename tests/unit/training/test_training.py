@@ -11,6 +11,7 @@ from ml.errors import UnusableData, UnusableModel
 from ml.registry.card import DataSource
 from ml.registry.registry import Registry
 from ml.store.labels import REGRESSION, LabelSource
+from ml.training.judging import Verdict
 from ml.training.material import Wish
 from ml.training.training import Trained, train
 from tests.unit.training.walkers import CHANNELS, MOTIONS, Made, day, late_walk, put
@@ -55,7 +56,7 @@ def test_it_is_judged_by_people_that_it_has_not_learned_from(trained: Trained) -
     assert 0.8 < figures["worst_subject_covered"] <= figures["covered"] <= 1.0
     assert figures["promised_covered"] > 0.5
     assert figures["promised_wearers"] < 0.9, "there are too few to promise more"
-    assert trained.decision.better
+    assert trained.decision.verdict is Verdict.NOT_COMPARED
     assert trained.serving == ""
 
 

@@ -5,13 +5,13 @@ import pytest
 
 from ml.robot.task import TASKS
 from ml.store.labels import ACTIVITIES, LabelSource
-from ml.training.truth import NOBODY, Said, activities, phases
+from ml.training.truth import NOBODY, LabelSpan, activities, phases
 
 S = 10**9
 
 
-def said(begin: float, end: float, label: str, source: LabelSource = LabelSource.PERSON) -> Said:
-    return Said(round(begin * S), round(end * S), label, source)
+def said(begin: float, end: float, label: str, source: LabelSource = LabelSource.PERSON) -> LabelSpan:
+    return LabelSpan(round(begin * S), round(end * S), label, source)
 
 
 def at(*seconds: float) -> np.ndarray:

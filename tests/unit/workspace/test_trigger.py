@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from server_gui.core.workspace.trigger import Condition, Mode, On, State, Trigger
+from server_gui.core.workspace.trigger import Condition, Mode, On, Trigger, TriggerState
 
 NAN = math.nan
 
@@ -56,7 +56,7 @@ def test_an_edge_right_after_it_was_armed_is_seen(armed_s: float) -> None:
 
 def run(
     mode: Mode, hold_off_s: float = 0.0, before: float = 0.5, seconds: float = 20.0
-) -> list[tuple[float, State]]:
+) -> list[tuple[float, TriggerState]]:
     """A pulse at 5 s, 10 s, 15 s; span 2 s; how its state changes, and when."""
     trigger = Trigger()
     trigger.arm(Condition(On.RISE, "x", 0.5, mode=mode, hold_off_s=hold_off_s, before=before), 0.0)
@@ -72,22 +72,29 @@ def run(
 
 def test_normal_is_armed_again_and_single_stops() -> None:
     assert run(Mode.NORMAL)[:5] == [
-        (0.0, State.ARMED),
-        (5.0, State.TRIGGERED),
-        (6.0, State.SHOWN),
-        (6.1, State.ARMED),
-        (10.0, State.TRIGGERED),
+        (0.0, TriggerState.ARMED),
+        (5.0, TriggerState.TRIGGERED),
+        (6.0, TriggerState.SHOWN),
+        (6.1, TriggerState.ARMED),
+        (10.0, TriggerState.TRIGGERED),
     ]
-    assert run(Mode.SINGLE) == [(0.0, State.ARMED), (5.0, State.TRIGGERED), (6.0, State.STOPPED)]
+    assert run(Mode.SINGLE) == [
+        (0.0, TriggerState.ARMED),
+        (5.0, TriggerState.TRIGGERED),
+        (6.0, TriggerState.STOPPED),
+    ]
 
 
 def test_the_hold_off_lets_events_pass() -> None:
-    assert [at for at, state in run(Mode.NORMAL, hold_off_s=7.0) if state is State.TRIGGERED] == [5.0, 15.0]
+    assert [at for at, state in run(Mode.NORMAL, hold_off_s=7.0) if state is TriggerState.TRIGGERED] == [
+        5.0,
+        15.0,
+    ]
 
 
 @pytest.mark.parametrize(("before", "shown"), [(0.0, 7.0), (0.25, 6.5), (1.0, 5.0)])
 def test_the_share_before_says_how_long_it_waits_for_what_comes_after(before: float, shown: float) -> None:
-    done = [at for at, state in run(Mode.SINGLE, before=before) if state is State.STOPPED]
+    done = [at for at, state in run(Mode.SINGLE, before=before) if state is TriggerState.STOPPED]
     assert done == [pytest.approx(shown, abs=0.11)]
 
 
@@ -101,7 +108,7 @@ def test_auto_shows_what_comes_where_nothing_triggers_and_normal_keeps_the_last(
         for end in range(40, 101):
             trigger.take(times[:end], values[:end], 2.0)
         assert trigger.count == 1
-        assert trigger.state is State.ARMED
+        assert trigger.state is TriggerState.ARMED
         assert trigger.shows_live(9.9) is goes_on
 
 
@@ -109,9 +116,9 @@ def test_another_axis_of_time_arms_it_anew_and_off_is_off() -> None:
     trigger = Trigger()
     trigger.arm(Condition(On.ABOVE, "x", 0.5, before=0.0), None)
     trigger.take(np.array([1.0]), np.array([1.0]), 2.0)
-    assert trigger.state is State.TRIGGERED
+    assert trigger.state is TriggerState.TRIGGERED
     trigger.begin_anew()
-    assert (trigger.state, trigger.at_s) == (State.ARMED, None)
+    assert (trigger.state, trigger.at_s) == (TriggerState.ARMED, None)
     trigger.off()
     assert not trigger.take(np.array([2.0]), np.array([1.0]), 2.0)
     assert trigger.shows_live(2.0)

@@ -7,7 +7,7 @@ import pytest
 
 from ml.robot.task import ABNORMAL, UNKNOWN
 from ml.serving.predictor import Prediction
-from ml.serving.trust import SECOND_NS, WITHIN_S, Level, Trust, Trusting
+from ml.serving.trust import SECOND_NS, WITHIN_S, Trust, Trusting, TrustLevel
 
 RANGES = {"left_hip.position": (-0.5, 0.8)}
 CHANNELS = ("left_hip.position", "right_hip.position")
@@ -28,18 +28,18 @@ def trust(*stretches: tuple[int, str, float]) -> Trust:
 
 
 def test_at_first_nobody_knows() -> None:
-    assert Trusting(CHANNELS, RANGES).trust.level is Level.UNSEEN
-    assert trust((1, "walk", 0.0)).level is Level.UNSEEN
+    assert Trusting(CHANNELS, RANGES).trust.level is TrustLevel.UNSEEN
+    assert trust((1, "walk", 0.0)).level is TrustLevel.UNSEEN
 
 
 def test_what_is_as_in_learning_is_good() -> None:
     found = trust((5, "walk", 0.0))
     assert found == Trust(decisions=50, novelty=0.25)
-    assert found.level is Level.GOOD
+    assert found.level is TrustLevel.GOOD
 
 
-@pytest.mark.parametrize(("label", "level"), [(UNKNOWN, Level.UNSURE), (ABNORMAL, Level.DRIFTED)])
-def test_a_model_that_does_not_know_its_way_is_not_believed(label: str, level: Level) -> None:
+@pytest.mark.parametrize(("label", "level"), [(UNKNOWN, TrustLevel.UNSURE), (ABNORMAL, TrustLevel.DRIFTED)])
+def test_a_model_that_does_not_know_its_way_is_not_believed(label: str, level: TrustLevel) -> None:
     assert trust((10, "walk", 0.0), (20, label, 0.0)).level is level
 
 
@@ -47,7 +47,7 @@ def test_a_channel_that_leaves_its_range_is_named() -> None:
     found = trust((20, "walk", 0.0), (10, "walk", 0.9))
     assert found.outside == {"left_hip.position": pytest.approx(1 / 3)}
     assert found.drifted == ("left_hip.position",)
-    assert found.level is Level.DRIFTED
+    assert found.level is TrustLevel.DRIFTED
 
 
 def test_a_channel_of_which_no_range_is_known_is_not_judged() -> None:
@@ -55,4 +55,4 @@ def test_a_channel_of_which_no_range_is_known_is_not_judged() -> None:
 
 
 def test_what_was_a_minute_ago_counts_no_more() -> None:
-    assert trust((30, ABNORMAL, 2.0), (WITHIN_S, "walk", 0.0)).level is Level.GOOD
+    assert trust((30, ABNORMAL, 2.0), (WITHIN_S, "walk", 0.0)).level is TrustLevel.GOOD

@@ -1,7 +1,7 @@
-"""(j) An angle that creeps away from what its velocity adds up to: an encoder that slips, jump by jump.
+"""(j) Encoder slip: an angle that drifts away from the integral of its velocity.
 
-Over whole strides the sum of velocities comes back to where it began, however coarsely it was sampled;
-what does not come back is the encoder's.
+Over whole strides the integral of the velocity returns to its start, however coarsely it was sampled; what
+remains is the encoder's.
 """
 
 from typing import Final
@@ -9,13 +9,13 @@ from typing import Final
 import numpy as np
 
 from ml.danger.detector import Floats
-from ml.danger.now import JOINTS, Now, or_zero, spoken
+from ml.danger.observation import JOINTS, Observation, or_zero, readable_name
 
-FORGETS_S: Final = 6.0  # a time after which a third is left of what an angle has crept
+FORGETS_S: Final = 6.0  # time constant of the drift's decay
 
 
-class Creep:
-    """How far each angle has crept (rad); a gap in the rows adds nothing."""
+class EncoderSlip:
+    """Drift of each angle (rad); a gap in the rows adds nothing."""
 
     name = "creep"
     keys = JOINTS
@@ -26,7 +26,7 @@ class Creep:
         self._before = np.full((2, 6), np.nan)
         self._crept = np.zeros(6)
 
-    def measure(self, now: Now, *, learn: bool) -> Floats:  # noqa: ARG002 - it has nothing to learn
+    def measure(self, now: Observation, *, learn: bool) -> Floats:  # noqa: ARG002 - it has nothing to learn
         position, velocity = now.joint[:2]
         moved = position - self._before[0]
         apart = moved - 0.5 * now.step_s * (velocity + self._before[1])
@@ -37,4 +37,5 @@ class Creep:
         return np.where(np.isfinite(apart), np.abs(self._crept), np.nan)
 
     def words(self, key: str) -> str:
-        return f"{spoken(key)}: the angle creeps away from what its velocity adds up to: the encoder slips"
+        joint = readable_name(key)
+        return f"{joint}: the angle creeps away from what its velocity adds up to: the encoder slips"

@@ -21,7 +21,7 @@ from gateway.access.table import AccessTable
 from gateway.access.users import identity_of, peer_of, resolved
 from gateway.cli.serve import _local
 from gateway.connections import accounts
-from gateway.connections.doors import DoorProblem, Kind, kind_of
+from gateway.connections.listener_kind import ListenerKind, UnsafeListener, kind_of
 from gateway.connections.listeners import Listeners, inherited, listen, listen_locally
 from gateway.daemon import Daemon
 from gateway.main import main
@@ -66,14 +66,16 @@ def local(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 @pytest.mark.parametrize("host", ["127.0.0.1", "127.0.0.9", "::1"])
 def test_this_computer_is_served_with_keys_and_without(host: str, has_keys: bool) -> None:
     with listen(host, 0) as listener:
-        assert kind_of(listener, has_keys=has_keys) is (Kind.TLS if has_keys else Kind.PLAIN)
+        assert kind_of(listener, has_keys=has_keys) is (ListenerKind.TLS if has_keys else ListenerKind.PLAIN)
 
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "::"])
 def test_other_computers_are_served_with_keys_only(host: str) -> None:
     with listen(host, 0) as listener:
-        assert kind_of(listener, has_keys=True) is Kind.TLS
-        with pytest.raises(DoorProblem, match=r"`gwrms keys pair ROBOT.toml` here.*`gwrms pair HOST:PORT`"):
+        assert kind_of(listener, has_keys=True) is ListenerKind.TLS
+        with pytest.raises(
+            UnsafeListener, match=r"`gwrms keys pair ROBOT.toml` here.*`gwrms pair HOST:PORT`"
+        ):
             kind_of(listener, has_keys=False)
 
 
@@ -89,13 +91,13 @@ def test_without_keys_the_command_refuses_other_computers_and_says_what_leads_on
 
 def test_a_socket_that_was_handed_over_is_judged_by_where_it_listens(bench: Bench, tmp_path: Path) -> None:
     """Its robot's file says 127.0.0.1."""
-    with listen("0.0.0.0", 0) as handed, pytest.raises(DoorProblem):
+    with listen("0.0.0.0", 0) as handed, pytest.raises(UnsafeListener):
         Daemon(config(tmp_path), handed)
 
 
 def test_the_paper_s_port_is_for_this_computer_only(bench: Bench, tmp_path: Path) -> None:
     keyed(tmp_path)
-    robot, refused = config(tmp_path), pytest.raises(DoorProblem, match="classic_port")
+    robot, refused = config(tmp_path), pytest.raises(UnsafeListener, match="classic_port")
     with listen("127.0.0.1", 0) as port, listen("0.0.0.0", 0) as classic, refused:
         Daemon(robot, port, classic=classic)
 

@@ -1,4 +1,4 @@
-"""(g) Sensors that contradict each other: angle and velocity, tilt, rate and gravity."""
+"""(g) Sensors that contradict each other: angle against velocity, tilt against rate and gravity."""
 
 import math
 from typing import Final
@@ -6,14 +6,14 @@ from typing import Final
 import numpy as np
 
 from ml.danger.detector import Floats
-from ml.danger.now import JOINTS, Now, or_zero, spoken
+from ml.danger.observation import JOINTS, Observation, or_zero, readable_name
 
 SLOW: Final = 0.1  # of the newest sample
-HOLDS: Final = 0.94  # of a jump is left a sample later
+HOLDS: Final = 0.94  # share of a jump that is left a sample later
 
 
-class Agreement:
-    """Each number is what two sensors say of one thing, apart."""
+class SensorConsistency:
+    """Each number is the difference between two sensors of one quantity."""
 
     name = "agreement"
     keys = (*JOINTS, "tilt and rate", "tilt and gravity")
@@ -26,7 +26,7 @@ class Agreement:
         self._turned = 0.0
         self._apart = math.nan
 
-    def measure(self, now: Now, *, learn: bool) -> Floats:  # noqa: ARG002 - it has nothing to learn
+    def measure(self, now: Observation, *, learn: bool) -> Floats:  # noqa: ARG002 - it has nothing to learn
         position, velocity = now.joint[:2]
         tilts, rates = now.trunk[6:8], np.array([now.trunk[4], -now.trunk[3]])
         values = np.concatenate([position, velocity, tilts, rates])
@@ -46,8 +46,8 @@ class Agreement:
             ]
         )
 
-    def _gravity(self, now: Now) -> float:
-        """Return the tilt that is told against the one that gravity shows, over a second."""
+    def _gravity(self, now: Observation) -> float:
+        """Return the difference of the reported tilt from gravity's, smoothed over a second."""
         apart = math.atan2(-now.trunk[0], now.trunk[2]) - float(now.trunk[6])
         if math.isnan(apart):
             return math.nan
@@ -56,5 +56,5 @@ class Agreement:
 
     def words(self, key: str) -> str:
         if key in JOINTS:
-            return f"{spoken(key)}: the angle jumps, and the velocity does not show it"
+            return f"{readable_name(key)}: the angle jumps, and the velocity does not show it"
         return f"the trunk's {key} contradict each other"

@@ -1,7 +1,7 @@
-"""Thresholds from budgets: the lowest odds that cost no more false alarms an hour of healthy walking.
+"""Thresholds from budgets: the lowest odds that keep false alarms an hour of healthy walking within a budget.
 
-Where the budget is smaller than what was recorded can show, the tail of the healthy maxima is prolonged as
-an exponential, the limit of most tails (Coles 2001, §4): an estimate, blind to what was never recorded.
+If the recorded hours are too few to show such a small budget, the tail of the healthy maxima is extrapolated
+as an exponential, the limit of most tails (Coles 2001, §4): an estimate, blind to events never recorded.
 """
 
 import math
@@ -28,14 +28,14 @@ APART: Final = 0.1  # log odds between two levels at least
 
 
 def thresholds(maxima: Floats, hours: float) -> dict[Level, float]:
-    """Log odds by level, from the `maxima` of the blocks of so many healthy hours."""
+    """Return log odds by level, from the `maxima` of the blocks of so many healthy hours."""
     ordered = np.sort(maxima)[::-1]
     count, base, scale = _tail(ordered)
     found: dict[Level, float] = {}
     least = -np.inf
     for level in URGENT:
         tail = base + scale * np.log(count / (BUDGETS[level] * hours))
-        # What was seen is never undercut: no more alarms on it than the budget allows.
+        # Never lower than on the recorded hours, where there may be no more alarms than the budget allows.
         allowed = int(BUDGETS[level] * hours)
         seen = ordered[allowed] if allowed < len(ordered) else ordered[-1]
         found[level] = least = float(max(tail, seen + 1e-6, least + APART))
@@ -43,7 +43,7 @@ def thresholds(maxima: Floats, hours: float) -> dict[Level, float]:
 
 
 def extrapolated(maxima: Floats, hours: float, odds: float) -> float:
-    """How often an hour such log odds would be reached, by the same tail; NaN where nothing was seen."""
+    """Return the rate an hour at which such log odds are reached, by the same tail; NaN without maxima."""
     if not len(maxima):
         return math.nan
     count, base, scale = _tail(np.sort(maxima)[::-1])
@@ -51,14 +51,14 @@ def extrapolated(maxima: Floats, hours: float, odds: float) -> float:
 
 
 def _tail(ordered: Floats) -> tuple[int, float, float]:
-    """How many of the maxima, the largest first, are the tail; where it begins, and its scale."""
+    """Return the number of maxima in the tail (the largest come first), its start and its scale."""
     count = max(int(TAIL * len(ordered)), min(5, len(ordered)))
     base = float(ordered[count - 1])
     return count, base, max(float(np.mean(ordered[:count] - base)), APART)
 
 
 def rate_interval(events: int, hours: float) -> tuple[float, float]:
-    """95 % interval of a rate an hour (Garwood 1936); with none seen, at most 3.7 / hours.
+    """Return the 95 % interval of a rate an hour (Garwood 1936); with none seen, at most 3.7 / hours.
 
     NaN of no hours.
     """
@@ -69,13 +69,13 @@ def rate_interval(events: int, hours: float) -> tuple[float, float]:
 
 
 def rule_of_three(events: int, hours: float) -> float:
-    """95 % upper bound of a rate an hour, one-sided: 3 / hours where none was seen; NaN of no hours."""
+    """Return the 95 % upper bound of a rate an hour, one-sided: 3 / hours if none was seen, NaN of none."""
     if not hours:
         return math.nan
     return float(chi2.ppf(0.95, 2 * (events + 1)) / 2.0 / hours)
 
 
 def share_interval(hits: int, of: int) -> tuple[float, float]:
-    """95 % interval of a share (Clopper & Pearson 1934)."""
+    """Return the 95 % interval of a share (Clopper & Pearson 1934)."""
     low = beta.ppf(0.025, hits, of - hits + 1) if hits else 0.0
     return float(low), float(beta.ppf(0.975, hits + 1, of - hits) if hits < of else 1.0)

@@ -1,9 +1,9 @@
-"""(i) One thing that leaves what all others say: the robot's own moments, remembered, as its healthy model.
+"""(i) Residuals against the nearest neighbours among the robot's own healthy samples.
 
-A moment's joints are looked up among those of before; what a joint's set-point, torque, a foot's load and the
-trunk's lean were then, they should be now. A joint is looked up by the other joints alone, so that one which
-goes its own way finds the moments in which it should be elsewhere. Where no
-moment was alike, as in the first steps of stairs, nothing is said: a new activity changes all joints at once.
+The joints of a sample are searched for among earlier samples; each joint's set-point and torque, each foot's
+load and the trunk's lean should be as they were in the most similar ones. The search for a joint uses the
+other joints alone, so that a joint which deviates is compared with samples in which it was normal. Without a
+similar sample, as in the first steps on stairs, the result is NaN: a new activity changes all joints at once.
 """
 
 import collections
@@ -14,27 +14,27 @@ import numpy as np
 import numpy.typing as npt
 
 from ml.danger.detector import Floats
-from ml.danger.now import JOINTS, SIDES, Now, or_zero, spoken
+from ml.danger.observation import JOINTS, SIDES, Observation, or_zero, readable_name
 
-KEPT: Final = 1000  # moments
-FEWEST: Final = 150  # moments, before one is looked up
-LOOKS: Final = 600  # 42 s of health, till anything is told: much is new before, not wrong
-ALIKE: Final = 5  # moments that are asked
-NEW: Final = 0.3  # squared: a moment that is so far from all others is remembered …
-WAITS_S: Final = 10.0  # … unless something was wrong by so much later
-FARTHEST: Final = 4.0  # from moments alike: beyond that nobody can say
-DOUBTED: Final = 2.0  # at such a distance half is believed
-EVERY_S: Final = 0.07  # between two moments
-SMOOTH: Final = np.array([0.3] * 12 + [0.15] * 3)  # of the newest moment: over a quarter, and half a second
-# What makes a joint's angle (rad) and velocity (rad/s) another one.
+KEPT: Final = 1000  # samples
+FEWEST: Final = 150  # samples before the first search
+LOOKS: Final = 600  # 42 s of health before the first result: until then much is new, not wrong
+ALIKE: Final = 5  # neighbours
+NEW: Final = 0.3  # squared: a sample so far from all others is kept …
+WAITS_S: Final = 10.0  # … unless something was wrong within this time
+FARTHEST: Final = 4.0  # largest distance of a neighbour; beyond it the result is unknown
+DOUBTED: Final = 2.0  # at this distance a residual counts half
+EVERY_S: Final = 0.07  # between two samples
+SMOOTH: Final = np.array([0.3] * 12 + [0.15] * 3)  # weight of the newest sample: over ¼ s, ½ s
+# The scales of a joint's angle (rad) and velocity (rad/s) in a distance.
 _SCALE: Final = np.array([0.08] * 6 + [0.6, 0.8, 0.6] * 2)[:, None]
-_OWN: Final = np.array([*range(6), *[6] * 9])  # which search answers for which value
+_OWN: Final = np.array([*range(6), *[6] * 9])  # the search for each value
 
 Bools = npt.NDArray[np.bool_]
 
 
-class Memory:
-    """How far each thing is from what it was in the moments alike, over half a second."""
+class NearestNeighbours:
+    """Difference of each quantity from its mean over the nearest neighbours, smoothed over half a second."""
 
     keys = (
         *(f"{joint}.target" for joint in JOINTS),
@@ -48,7 +48,7 @@ class Memory:
     def __init__(self) -> None:
         self._there: Bools = np.zeros(12, dtype=np.bool_)
         self.said = np.full(15, np.nan)
-        self.alike = True  # whether there were moments like this one, as far as anybody can say
+        self.alike = True  # whether the newest sample had neighbours, or could not be compared
         self._due_s = -math.inf
         self._forget()
 
@@ -61,7 +61,7 @@ class Memory:
         self._waiting: collections.deque[tuple[float, Floats, Floats]] = collections.deque()
         self._source = np.random.default_rng(0)
 
-    def measure(self, now: Now, *, learn: bool) -> Floats:
+    def measure(self, now: Observation, *, learn: bool) -> Floats:
         if not learn:
             self._waiting.clear()
         if now.at_s < self._due_s:
@@ -76,7 +76,7 @@ class Memory:
 
     def _asked(self, at_s: float, state: Floats, values: Floats, *, learn: bool) -> Floats:
         there = np.isfinite(state)
-        if (there & ~self._there).any():  # another robot than before: nothing can be compared
+        if (there & ~self._there).any():  # another robot: old samples cannot be compared
             self._there = there
             self._forget()
         if not there.any() or not (there == self._there).all():
@@ -108,10 +108,10 @@ class Memory:
         known = np.isfinite(off) & (distance < FARTHEST)
         self._off += SMOOTH * np.where(known, off - self._off, 0.0)
         found = np.abs(self._off)
-        # What one foot bears less and the other more is a weight that was shifted.
+        # Less load on one foot and as much more on the other is a shift of weight.
         found[12:14] = np.minimum(found[12:14], abs(self._off[12:14].sum()))
         self.alike = bool(distance[6] < FARTHEST)
-        # One that lacks what is known now does not stand for it: else what was missing once stays unknown.
+        # A neighbour that lacks a value known now does not count, or the value would stay unknown for ever.
         lacks = (np.isnan(self._values[near[6]]) & np.isfinite(values)).any(axis=1)
         return np.where(known, found, np.nan), float(np.where(lacks, np.inf, search[6, near[6]]).min())
 
@@ -122,7 +122,7 @@ class Memory:
 
 
 def _mean(values: Floats) -> Floats:
-    """Of each row, of what is known there; NaN where nothing is."""
+    """Return the mean of each row's known values; NaN for a row without any."""
     known = np.isfinite(values)
     count = known.sum(axis=1)
     total: Floats = np.where(known, values, 0.0).sum(axis=1)
@@ -130,10 +130,10 @@ def _mean(values: Floats) -> Floats:
 
 
 def _alone(distance: Floats, there: Bools) -> Floats:
-    """How far each of six searches found moments more alike than the others, 0 to 1: its joint spoils theirs.
+    """Return by how much each of six searches has closer neighbours than the others, 0 to 1.
 
-    In a new activity all joints are new; one that is led astray is what the others cannot find. Only joints
-    that are there are asked; a single one has no others, and nobody can say: NaN.
+    In a new activity no search finds close ones; if a single joint deviates, only the search without it does.
+    Only joints that exist are compared; a single one has no others to compare: NaN.
     """
     ranked = np.sort(distance[there])
     if len(ranked) < 2:
@@ -144,39 +144,39 @@ def _alone(distance: Floats, there: Bools) -> Floats:
     return share
 
 
-class Kind:
-    """A detector: what the memory says of things of one kind, whose first asks it."""
+class NeighbourResiduals:
+    """A detector: the residuals of one quantity, such as torque; the first one updates them for all."""
 
-    needs = Memory.needs
+    needs = NearestNeighbours.needs
 
-    def __init__(self, name: str, memory: Memory, keys: slice) -> None:
+    def __init__(self, name: str, neighbours: NearestNeighbours, keys: slice) -> None:
         self.name = name
-        self.keys = Memory.keys[keys]
-        self.least = Memory.least[keys]
-        self._memory = memory
+        self.keys = NearestNeighbours.keys[keys]
+        self.least = NearestNeighbours.least[keys]
+        self._neighbours = neighbours
         self._own = keys
 
-    def measure(self, now: Now, *, learn: bool) -> Floats:
-        """Take the next sample; the memory takes it from the first of all kinds."""
+    def measure(self, now: Observation, *, learn: bool) -> Floats:
+        """Take the next sample; the detector of the first quantity hands it to the neighbours."""
         if self._own.start == 0:
-            self._memory.measure(now, learn=learn)
-        return self._memory.said[self._own]
+            self._neighbours.measure(now, learn=learn)
+        return self._neighbours.said[self._own]
 
     def words(self, key: str) -> str:
-        """Say what is wrong where this key is the worst."""
+        """Return the problem in words, if this key deviates most."""
         joint, _, what = key.partition(".")
         if what == "target":
-            return f"{spoken(joint)}: is led where it never is while the other joints are as they are"
+            return f"{readable_name(joint)}: is led where it never is while the other joints are as they are"
         if what:
-            return f"{spoken(joint)}: takes another torque than it did for the same motion"
+            return f"{readable_name(joint)}: takes another torque than it did for the same motion"
         if key == "lean":
             return "the trunk is told to lean otherwise than it did in the same motion"
         return f"the {key.replace(' load', ' foot')} bears another load than it did in the same motion"
 
 
-def kinds(memory: Memory) -> tuple[Kind, ...]:
-    """All that a memory says, each kind as a detector."""
-    return tuple(Kind(name, memory, keys) for name, keys in _KINDS.items())
+def residual_detectors(neighbours: NearestNeighbours) -> tuple[NeighbourResiduals, ...]:
+    """Return a detector for each quantity."""
+    return tuple(NeighbourResiduals(name, neighbours, keys) for name, keys in _KINDS.items())
 
 
 _KINDS: Final = {

@@ -1,7 +1,7 @@
-"""How large each number usually is on this robot: the largest of each second, its mean and spread.
+"""The normal range of each measure on this robot: mean and spread of the largest value of each second.
 
-What is learned waits until some seconds later nothing was wrong, so that a danger does not become usual while
-it grows. Nothing of another robot or wearer comes in.
+A second is learned only after some more seconds without trouble, so that a growing danger does not become
+normal. Nothing is taken from other robots or wearers.
 """
 
 import collections
@@ -13,15 +13,15 @@ import numpy.typing as npt
 Floats = npt.NDArray[np.float64]
 
 BLOCK_S: Final = 1.0
-FEWEST: Final = 25  # blocks, before a number says anything
-WAITS: Final = 10  # blocks that wait until it is sure that nothing was wrong
-MOST: Final = 3600.0  # blocks that are remembered: what is older fades
-SPREAD: Final = 0.25  # of the mean: no number is known better
-BEYOND: Final = 50.0  # spreads: more says no more
+FEWEST: Final = 25  # blocks before a measure is judged
+WAITS: Final = 10  # blocks that wait before they are learned
+MOST: Final = 3600.0  # blocks in memory: older ones fade
+SPREAD: Final = 0.25  # of the mean: the smallest spread assumed
+BEYOND: Final = 50.0  # spreads: larger deviations are clipped
 
 
-class Usual:
-    """For `count` numbers; `least` (count,) is the smallest spread that they may have."""
+class Baseline:
+    """Running mean and spread of several measures; `least` (count,) is the smallest spread of each."""
 
     def __init__(self, least: Floats) -> None:
         count = len(least)
@@ -35,9 +35,9 @@ class Usual:
         self._spread = np.full(count, np.inf)
 
     def take(self, at_s: float, numbers: Floats, *, quiet: bool) -> Floats:
-        """Take the numbers of a moment; how many spreads each is above its mean, NaN where unknown.
+        """Take the measures of a moment; return the spreads of each above its mean, NaN where unknown.
 
-        Where it is not `quiet`, what waits to be learned is forgotten.
+        If it is not `quiet`, the blocks that wait to be learned are dropped.
         """
         np.fmax(self._now, numbers, out=self._now)
         if not quiet:
@@ -67,6 +67,6 @@ class Usual:
 
     @property
     def known(self) -> npt.NDArray[np.bool_]:
-        """Which numbers have been seen for long enough."""
+        """The measures that have been seen for long enough."""
         known: npt.NDArray[np.bool_] = self._blocks >= FEWEST
         return known

@@ -1,4 +1,4 @@
-"""One moment of a robot for the detectors: its values as arrays, and where each leg is in its stride."""
+"""One sample of a robot for the detectors: its values as arrays, and the phase of each leg in its stride."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -29,15 +29,15 @@ CHANNELS: Final = (
     *TRUNK,
 )
 STANDING: Final = 20  # the bin of a leg that does not step; 0 … 19 are twentieths of its stride
-STANDS_S: Final = 2.5  # without a strike nobody walks
-STRUCK, LIFTED = 0.25, 0.12  # of the highest load: a foot is on the ground from one to the other
+STANDS_S: Final = 2.5  # without a heel strike for so long, the wearer stands
+STRUCK, LIFTED = 0.25, 0.12  # of the highest load: thresholds of heel strike and toe off
 FEWEST_N: Final = 150.0  # below that nobody stands on an insole
 USUAL_STRIDE_S: Final = 1.4
 
 
 @dataclass(slots=True)
-class Stepping:
-    """One leg's stride, by its insole: `struck` and `lifted` are true in the sample in which it happens."""
+class StrideTracker:
+    """One leg's stride, from its insole: `struck` and `lifted` are true for the one sample of the event."""
 
     highest: float = 0.0
     down: bool = True
@@ -49,7 +49,7 @@ class Stepping:
     stance_s: float = math.nan
 
     def take(self, at_s: float, force: float) -> None:
-        """Take the load (N) at a time; one that is missing changes nothing."""
+        """Take the load (N) at a time; a missing one changes nothing."""
         self.struck = self.lifted = False
         if math.isnan(force):
             return
@@ -70,25 +70,27 @@ class Stepping:
         self.strike_s = at_s
 
     def phase(self, at_s: float) -> float:
-        """0 at its strike … 1; NaN where it does not step."""
+        """Return the phase in the stride, 0 at the heel strike … 1; NaN if the leg does not step."""
         since = at_s - self.strike_s
         return min(since / self.stride_s, 0.999) if since < STANDS_S else math.nan
 
 
 @dataclass(slots=True)
-class Now:
-    """A moment; arrays are in the order of `JOINTS` and `SIDES`, NaN where nothing is known.
+class Observation:
+    """The newest sample; arrays are in the order of `JOINTS` and `SIDES`, NaN where unknown.
 
     `foot` is (3, 2): force, centre of pressure forward and to the left. `trunk` is in the order of `TRUNK`.
     """
 
     at_s: float = 0.0
-    step_s: float = 0.0  # since the moment before; 0 after a gap
+    step_s: float = 0.0  # since the sample before; 0 after a gap
     joint: Floats = field(default_factory=lambda: np.full((5, 6), np.nan))  # by JOINT_QUANTITIES
     foot: Floats = field(default_factory=lambda: np.full((3, 2), np.nan))
     trunk: Floats = field(default_factory=lambda: np.full(8, np.nan))
-    walking: bool = False  # both feet have struck of late
-    legs: tuple[Stepping, Stepping] = field(default_factory=lambda: (Stepping(), Stepping()))
+    walking: bool = False  # both feet had a heel strike recently
+    legs: tuple[StrideTracker, StrideTracker] = field(
+        default_factory=lambda: (StrideTracker(), StrideTracker())
+    )
 
     def take(self, at_s: float, values: Floats) -> None:
         """Take values in the order of `CHANNELS`."""
@@ -105,7 +107,7 @@ class Now:
         self.walking = all(at_s - leg.strike_s < STANDS_S for leg in self.legs)
 
     def bins(self) -> tuple[int, int]:
-        """Where each leg is in its stride."""
+        """Return the stride bin of each leg."""
         left, right = (leg.phase(self.at_s) for leg in self.legs)
         if not self.walking:
             return STANDING, STANDING
@@ -116,16 +118,16 @@ class Now:
 
 
 def or_zero(values: Floats) -> Floats:
-    """Return 0 for what is not known. It knows no infinities, and takes a sixth of `np.nan_to_num`'s time."""
+    """Replace NaN by 0, in a sixth of the time of `np.nan_to_num`; infinities stay."""
     found: Floats = np.where(np.isnan(values), 0.0, values)
     return found
 
 
 def in_order(channels: Sequence[str]) -> Mapping[int, int]:
-    """Where each of `CHANNELS` stands among a recording's channels; those that are missing are left out."""
+    """Map the index of each of `CHANNELS` to its index in a recording; missing channels are left out."""
     return {at: channels.index(name) for at, name in enumerate(CHANNELS) if name in channels}
 
 
-def spoken(name: str) -> str:
-    """Return a channel's component as people say it."""
+def readable_name(name: str) -> str:
+    """Return the name of a component for people, such as `left knee`."""
     return name.replace("_", " ")

@@ -1,18 +1,18 @@
-"""(h) Heat that will be too much: a motor's temperature, prolonged at its present rise."""
+"""(h) Overheating: a motor's temperature, extrapolated at its present rate of rise."""
 
 from typing import Final
 
 import numpy as np
 
 from ml.danger.detector import Floats
-from ml.danger.now import JOINTS, Now, or_zero, spoken
+from ml.danger.observation import JOINTS, Observation, or_zero, readable_name
 
-AHEAD_S: Final = 15.0  # how far ahead it is looked
-WARM_C: Final = 40.0  # below that nothing is said
+AHEAD_S: Final = 15.0  # horizon of the extrapolation
+WARM_C: Final = 40.0  # lower temperatures count as this
 
 
-class Drift:
-    """Temperature in some seconds; what drifts from stride to stride is compared in `strides`."""
+class Overheating:
+    """Extrapolated temperature of each motor; slow drift of the gait is compared in `strides`."""
 
     name = "drift"
     keys = tuple(f"{joint}.heat" for joint in JOINTS)
@@ -23,7 +23,7 @@ class Drift:
         self._warm = np.full(6, np.nan)
         self._rise = np.zeros(6)  # °C/s
 
-    def measure(self, now: Now, *, learn: bool) -> Floats:  # noqa: ARG002 - heat is too much for anybody
+    def measure(self, now: Observation, *, learn: bool) -> Floats:  # noqa: ARG002 - heat is too much for anybody
         heat = now.joint[4]
         before = np.where(np.isnan(self._warm), heat, self._warm)
         self._warm = np.where(np.isnan(heat), before, before + 0.1 * (heat - before))
@@ -33,4 +33,4 @@ class Drift:
         return np.where(np.isfinite(heat), coming, np.nan)
 
     def words(self, key: str) -> str:
-        return f"{spoken(key.partition('.')[0])}: the motor grows too hot"
+        return f"{readable_name(key.partition('.')[0])}: the motor grows too hot"

@@ -1,4 +1,4 @@
-"""(f) Stumbles: a step that does not come when it should, or comes too soon."""
+"""(f) Stumbles: a step that is late, or early."""
 
 import math
 from typing import Final
@@ -6,13 +6,13 @@ from typing import Final
 import numpy as np
 
 from ml.danger.detector import Floats
-from ml.danger.now import SIDES, Now
+from ml.danger.observation import SIDES, Observation
 
-SHOWS_S: Final = 1.0  # how long a step that came too soon, or a stance too short, is spoken of
+SHOWS_S: Final = 1.0  # how long an early step is reported
 
 
-class Rhythm:
-    """How late each foot's strike and lift are, in strides of this wearer; a phase that is set anew."""
+class StepTiming:
+    """How late, or early, each foot's heel strike is, in strides of this wearer."""
 
     name = "rhythm"
     keys = (*(f"{side} late" for side in SIDES), *(f"{side} early" for side in SIDES))
@@ -24,7 +24,7 @@ class Rhythm:
         self._until_s = [-math.inf, -math.inf]
         self._before_s = [-math.inf, -math.inf]
 
-    def measure(self, now: Now, *, learn: bool) -> Floats:  # noqa: ARG002 - it has nothing to learn
+    def measure(self, now: Observation, *, learn: bool) -> Floats:  # noqa: ARG002 - it has nothing to learn
         if not now.walking or np.isnan(now.foot[0]).any():
             self._before_s = [leg.strike_s for leg in now.legs]
             return np.full(4, np.nan)

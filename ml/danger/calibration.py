@@ -1,4 +1,4 @@
-"""One number out of all detectors: calibrated log odds, against which no evidence of danger ever speaks."""
+"""One probability from all detectors: calibrated log odds, which evidence of danger can only raise."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from ml.danger.detector import DETECTORS
 from ml.danger.levels import URGENT, Level
-from ml.danger.now import or_zero
+from ml.danger.observation import or_zero
 from ml.errors import UnusableModel
 
 Floats = npt.NDArray[np.float64]
@@ -22,11 +22,11 @@ BALANCED: Final = 0.1  # regularisation of the weights
 
 
 class Calibration(msgspec.Struct, frozen=True):
-    """What was learned from simulated wearers.
+    """The parameters that were fitted to simulated wearers.
 
-    `floor` and `scale` of each detector make evidence of its spreads, `weights` are of the worst and of the
-    second of it, `bias` makes log odds of them; `odds` → `share` is what came true.
-    `thresholds` are log odds by level's name, `budgets` the false alarms an hour that they are set for.
+    `floor` and `scale` of each detector turn its spreads into evidence; `weights` of the largest and the
+    second largest, and `bias`, turn evidence into log odds; `odds` → `share` maps those to the share of harm.
+    `thresholds` are log odds by level's name, `budgets` the false alarms an hour that they allow.
     """
 
     detectors: tuple[str, ...]
@@ -41,12 +41,12 @@ class Calibration(msgspec.Struct, frozen=True):
     learned_from: str
 
     def log_odds(self, above: Floats) -> Floats:
-        """Of spreads above what is usual, (…, detectors), NaN where a detector says nothing: (…,)."""
+        """Return the log odds (…,) of spreads above normal (…, detectors), NaN without data."""
         odds: Floats = evidence(above, self.floor, self.scale) @ np.array(self.weights) + self.bias
         return odds
 
     def probability(self, odds: Floats | float) -> Floats:
-        """Return what share of moments with such odds ended in harm."""
+        """Return the share of samples with such odds that ended in harm."""
         share: Floats = np.asarray(np.interp(odds, self.odds, self.share))
         return share
 
@@ -57,10 +57,10 @@ class Calibration(msgspec.Struct, frozen=True):
 
 
 def evidence(above: Floats, floor: Sequence[float], scale: Sequence[float]) -> Floats:
-    """(…, n) → (…, 2): how rare the spreads of the two worst detectors are; NaN says nothing.
+    """Return the evidence of the two most deviating detectors, (…, n) → (…, 2); NaN counts as none.
 
-    Below `floor`, which a tenth of all healthy blocks exceeds, nothing is said; from there on it is counted
-    in `scale`, the mean by which these blocks exceed it: one number means the same of each detector.
+    Spreads below `floor`, which a tenth of all healthy blocks exceeds, are no evidence; the rest is divided
+    by `scale`, the mean excess of these blocks, so that the numbers of all detectors are comparable.
     """
     beyond = np.maximum((or_zero(above) - np.array(floor)) / np.array(scale), 0.0)
     worst: Floats = np.partition(beyond, -2, axis=-1)[..., :-3:-1]
@@ -68,7 +68,7 @@ def evidence(above: Floats, floor: Sequence[float], scale: Sequence[float]) -> F
 
 
 def tails(maxima: Floats) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Floor and scale of each detector from the maxima of healthy blocks, (blocks, detectors)."""
+    """Return floor and scale of each detector from the maxima of healthy blocks, (blocks, detectors)."""
     spreads = np.nan_to_num(maxima)
     floor = np.quantile(spreads, 1.0 - RARE, axis=0)
     beyond = [column[column >= low] - low for column, low in zip(spreads.T, floor, strict=True)]
@@ -77,8 +77,8 @@ def tails(maxima: Floats) -> tuple[tuple[float, ...], tuple[float, ...]]:
 
 
 def fit(x: Floats, danger: npt.NDArray[np.bool_], counts: Floats) -> tuple[Floats, float]:
-    """Weights, never negative, and bias of a logistic regression on evidence in which each row `counts`."""
-    from scipy.optimize import minimize  # here: who serves needs none of it
+    """Fit a logistic regression, its rows weighted by `counts`; return weights (never negative) and bias."""
+    from scipy.optimize import minimize  # here: serving does not need it
 
     weight = counts / counts.sum()
     sign = np.where(danger, 1.0, -1.0)
@@ -96,7 +96,7 @@ def fit(x: Floats, danger: npt.NDArray[np.bool_], counts: Floats) -> tuple[Float
 
 
 def calibrated(odds: Floats, danger: npt.NDArray[np.bool_]) -> tuple[Sequence[float], Sequence[float]]:
-    """Knots of an isotonic regression from log odds to the share that ended in harm."""
+    """Return the knots of an isotonic regression from log odds to the share that ended in harm."""
     from sklearn.isotonic import IsotonicRegression
 
     low, high = np.quantile(odds, [0.0, 1.0])
@@ -106,9 +106,9 @@ def calibrated(odds: Floats, danger: npt.NDArray[np.bool_]) -> tuple[Sequence[fl
 
 
 def load(path: Path = SHIPPED) -> Calibration:
-    """Return what ships.
+    """Load a calibration, by default the shipped one.
 
-    Raises `UnusableModel` where the file is damaged, or was learned for other detectors.
+    Raises `UnusableModel` if the file is damaged, or was fitted for other detectors.
     """
     try:
         found = msgspec.json.decode(path.read_bytes(), type=Calibration)
@@ -120,7 +120,7 @@ def load(path: Path = SHIPPED) -> Calibration:
 
 
 def _unfit(one: Calibration) -> Iterator[str]:
-    """Why it would say what is not so."""
+    """Yield the reasons why a calibration cannot be used."""
     if one.detectors != DETECTORS:
         yield f"it is of the detectors {', '.join(one.detectors)}, and these are {', '.join(DETECTORS)}"
     if not len(one.floor) == len(one.scale) == len(DETECTORS) or len(one.weights) != 2:

@@ -1,0 +1,34 @@
+"""How bad a thing is, by the one table of alarms: for an event of it, and for the bus that it is on."""
+
+from collections.abc import Iterator
+
+from server_gui.core.alarms.alarm import Alarm, Alarms
+from server_gui.core.alarms.marks import NEWS, Mark
+from server_gui.core.follow.news import Item
+from server_gui.core.processing.bus_health import BusHealthLevel
+
+SOON_S = 3.0  # an alarm is found so soon before or after its event
+
+
+def event_mark(item: Item, alarms: Alarms | None) -> Mark:
+    """Return the mark of an event: while the alarm about the same thing lasts, as bad as that is."""
+    own = NEWS[item.kind]
+    about = [] if alarms is None or not item.about else [*_since(alarms, item)]
+    worst = min(about, key=lambda alarm: alarm.rank, default=None)
+    return own if worst is None else Mark(worst.mark.shape, worst.mark.colour, own.word)
+
+
+def bus_level(own: BusHealthLevel, bus: str, alarms: Alarms) -> BusHealthLevel:
+    """Return how bad a bus is: no better than the alarms about it and about its nodes."""
+    told = [
+        alarm.mark.colour for alarm in alarms.each if bus in (alarm.node, alarm.subject.removeprefix("bus."))
+    ]
+    if "bad" in told:
+        return BusHealthLevel.ALARM
+    return BusHealthLevel.WARNING if "warn" in told and own is not BusHealthLevel.ALARM else own
+
+
+def _since(alarms: Alarms, item: Item) -> Iterator[Alarm]:
+    for active in alarms.active:
+        if item.utc_s >= active.since_s - SOON_S:
+            yield from (one for one in (active.alarm, *active.alarm.under) if one.subject == item.about)

@@ -1,0 +1,124 @@
+"""A second recording beside the one that is played: both at one instant, by their beginnings or a heel strike."""
+
+from collections.abc import Callable
+from concurrent.futures import Future
+from enum import Enum
+from typing import Any
+
+from ml.store.sessions import Session
+from server_gui.core.archive.playback import LEAD_NS, Playback, PlayedRobot
+from server_gui.core.cloud.tape import Tape
+from server_gui.core.desk.station import Station
+from server_gui.core.processing.gait_events import EventKind, Leg
+from server_gui.core.settings.server_file import ServerSettings
+from server_gui.core.threads.answers import Deliver, when_done
+
+Do = Callable[[Callable[[], Any]], "Future[Any]"]
+
+
+class By(Enum):
+    """What of both is at one place; the word is shown."""
+
+    START = "their beginnings"
+    HEEL_STRIKE = "the last heel strike"
+
+
+class Followed(Playback):
+    """Is always where it is told to be, and has no time of its own."""
+
+    def follow(self, target_ns: int) -> None:
+        """Show this instant; what is after its end is shown as the past that it is."""
+        tape = self.tape
+        if tape is None or self.problem:
+            return
+        within_ns = min(max(target_ns, tape.first_ns), tape.last_ns)
+        fed_ns = self._fed_ns
+        if fed_ns is not None and not fed_ns <= within_ns <= fed_ns + LEAD_NS:
+            self.seek(within_ns)
+        if self._show_until(tape, within_ns):
+            self.position_ns = within_ns
+            self._robot.shown_ns = max(target_ns, tape.first_ns)
+
+
+class SideBySide:
+    """For the window's thread; `second` is beside `playback`, from whose beginning `offset_ns` is counted."""
+
+    def __init__(self, playback: Playback, settings: ServerSettings, do: Do, deliver: Deliver) -> None:
+        self.second = Followed(do, deliver, playback.desk.shown)
+        self.session: Session | None = None  # what is beside, or is looked into
+        self.problem = ""
+        self.by = By.START
+        self._offset_ns = 0  # of the second's instants after those of the first
+        self._first = playback
+        self._settings = settings
+        self._do = do
+        self._deliver = deliver
+
+    def open(self, session: Session) -> None:
+        """Put this one beside what is played, once it has been looked into."""
+        self.close()
+        self.session = session
+        when_done(
+            self._do(lambda: Tape.open(self._settings, session)),
+            self._deliver,
+            lambda tape: self._opened(session, tape),
+            lambda error: self._failed(session, error),
+        )
+
+    def close(self) -> None:
+        """Put it away."""
+        self.session, self.problem, self.by = None, "", By.START
+        self.second.close()
+
+    @property
+    def station(self) -> Station | None:
+        """What is beside, once it is there."""
+        return self.second.desk.selected
+
+    def step(self) -> None:
+        """Show what is at the instant of the first."""
+        self.second.follow(self._first.position_ns + self._offset_ns)
+        self.problem = self.problem or self.second.problem
+
+    def align(self, by: By) -> str:
+        """Align them; why that is not possible, else empty, and then nothing has changed."""
+        first, second = self._first.tape, self.second.tape
+        if first is None or second is None:
+            return "the second recording is still read"
+        if by is By.START:
+            self._offset_ns = second.first_ns - first.first_ns
+        else:
+            ours, theirs = (_heel_strike_ns(one.desk.selected) for one in (self._first, self.second))
+            if ours is None or theirs is None:
+                return "no heel strike is known in one of them up to here: go on a little"
+            self._offset_ns = theirs - ours
+        self.by = by
+        return ""
+
+    def _opened(self, session: Session, tape: Tape) -> None:
+        first = self._first.tape
+        if session is self.session and first is not None:
+            self.second.open(tape)
+            self._offset_ns = tape.first_ns - first.first_ns
+
+    def _failed(self, session: Session, error: Exception) -> None:
+        if session is self.session:
+            self.problem = str(error) or type(error).__name__
+
+
+def _heel_strike_ns(station: Station | None) -> int | None:
+    """Return the last one of the left leg, UTC."""
+    robot = None if station is None else station.robot
+    if (
+        station is None
+        or not isinstance(robot, PlayedRobot)
+        or robot.row_ns is None
+        or robot.stamp_ns is None
+    ):
+        return None
+    found = [
+        event.stamp_ns
+        for event in station.processing.derived().events
+        if event.kind is EventKind.HEEL_STRIKE and event.leg is Leg.LEFT
+    ]
+    return max(found) + robot.row_ns - robot.stamp_ns if found else None

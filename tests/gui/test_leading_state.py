@@ -1,0 +1,49 @@
+"""The strip of alarms leads with the state that the robot's card has."""
+
+import time
+
+import pytest
+
+from server_gui.core.alarms.texts import Kind
+from tests.gui.fakes import Around, Bench
+from tests.gui.test_alarms import settle
+from tests.support.desk import JOINTS, looked, telemetry
+
+
+def reset(bench: Bench, state: float, quality: str = "ok") -> None:
+    """A stop was just reset, with every drive in this state, and the left knee in this quality."""
+    received_ns = time.monotonic_ns()
+    columns: dict[str, list[float | None]] = {f"{joint}.state": [state] for joint in JOINTS}
+    bench.station.take(
+        [telemetry([received_ns], columns, received_ns), looked(state=quality, problem="late")]
+    )
+    bench.station.stopping.was_reset(held=False)
+    bench.look_again([looked(state=quality, problem="late")])
+
+
+def test_a_warning_leads_after_a_reset_with_how_to_go_on_beside_it(around: Around, bench: Bench) -> None:
+    reset(bench, 6.0, "stale")
+    settle(around, bench)
+    assert around.alarms.told[0][1].alarm.kind is Kind.RESET
+    assert around.alarms._icon.mark == bench.station.mark
+    said = around.alarms.accessibleDescription()
+    assert said.startswith("component stale: left knee: late (stop reset)")
+    assert "to go on: enable the drives" in said
+
+
+@pytest.mark.parametrize(("state", "is_off"), [(5.0, False), (6.0, True)])
+def test_without_a_warning_the_strip_is_as_bad_as_the_drives_are(
+    around: Around, bench: Bench, state: float, is_off: bool
+) -> None:
+    reset(bench, state)
+    settle(around, bench)
+    assert bench.station.mark.colour == ("dim" if is_off else "warn")
+    assert around.alarms._icon.mark == bench.station.mark
+    said = around.alarms.accessibleDescription()
+    assert said.startswith("stop reset: ")
+    assert ("every drive is off" in said) is is_off
+    assert ("all 6 drives in quick stop active" in said) is not is_off
+    around.alarms.acknowledge(around.alarms.told[0])
+    settle(around, bench)
+    assert around.alarms._icon.mark.colour == ("good" if is_off else "warn")
+    assert ("all ok" in around.alarms.accessibleDescription()) is is_off

@@ -1,0 +1,72 @@
+"""A recording with a fault in it: the alarm of that time is shown again, and leads to its signal."""
+
+import pytest
+
+from server_gui.core.archive.archive import Archive
+from server_gui.core.settings.server_file import ServerSettings
+from server_gui.views.recordings.player import SIGNALS, Player
+from tests.gui.archives import Shown, play, record
+
+FAULT_S = 5.0
+
+
+@pytest.fixture
+def player(shown: Shown, archive: Archive, settings: ServerSettings) -> Player:
+    record(settings, fault_s=FAULT_S)
+    play(shown, archive)
+    return shown.window.tabs.recordings.player
+
+
+def to_the_fault(shown: Shown, archive: Archive, player: Player) -> None:
+    """As its event in the bar leads there, and some seconds more."""
+    tape = archive.playback.tape
+    assert tape is not None
+    archive.playback.seek(tape.first_ns + round((FAULT_S + 2.0) * 1e9))
+    shown.until(lambda: player.alarms.told, "said what was wrong then")
+
+
+def test_before_the_fault_there_is_no_alarm_and_at_it_there_is(
+    shown: Shown, archive: Archive, player: Player
+) -> None:
+    shown.draw()
+    assert not player.alarms.isVisible()
+    to_the_fault(shown, archive, player)
+    shown.draw()
+    assert player.alarms.isVisible()
+    said = player.alarms.headline.text()
+    assert "left knee" in said
+    assert "0x2310" in said
+    shown.until(lambda: len(archive.playback.happened.flags) > 1, "found the fault's event")
+    assert any("left knee" in flag.text for flag in archive.playback.happened.flags)
+
+
+def test_nothing_can_be_cleared_or_acknowledged_in_the_past(
+    shown: Shown, archive: Archive, player: Player
+) -> None:
+    to_the_fault(shown, archive, player)
+    shown.window.resize(1900, 900)
+    shown.draw()
+    assert player.alarms.buttons.clear.isHidden()
+    assert player.alarms.buttons.acknowledge.isHidden()
+
+
+def test_its_signal_is_shown_before_and_after_the_fault(
+    shown: Shown, archive: Archive, player: Player
+) -> None:
+    to_the_fault(shown, archive, player)
+    shown.draw()
+    player.alarms.more.click()
+    shown.draw()
+    (row,) = (row for row in player.alarms.list.rows if row.isVisible() and not row.show_signal.isHidden())
+    row.show_signal.click()
+    shown.until(lambda: player.signals.scene.frozen, "stood still at it")
+    assert player._stack.currentIndex() == SIGNALS
+    assert not archive.playback.playing
+    assert any(name.startswith("left_knee.") for name in player.signals.chosen)
+    left, right = player.signals._window
+    at_ns, newest_ns = player.signals._jumped_ns, player.signals.scene.newest_ns
+    assert at_ns is not None
+    assert newest_ns is not None
+    at_s = (at_ns - newest_ns) / 1e9
+    assert left == pytest.approx(at_s - 5.0, abs=0.2)
+    assert right == pytest.approx(at_s + 5.0, abs=0.2)

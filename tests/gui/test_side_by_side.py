@@ -1,0 +1,112 @@
+"""Two recordings in the same plots: played together, aligned by their beginnings or by a heel strike."""
+
+import numpy as np
+import pytest
+
+from server_gui.core.archive.archive import Archive
+from server_gui.core.archive.side_by_side import By
+from server_gui.core.cloud.tape import Tape
+from server_gui.core.processing.gait_events import EventKind, Leg
+from server_gui.core.settings.server_file import ServerSettings
+from server_gui.views.recordings.player import SIGNALS, Player
+from tests.gui import rules
+from tests.gui.archives import Shown, record
+
+
+@pytest.fixture
+def player(shown: Shown, archive: Archive, settings: ServerSettings) -> Player:
+    """Both are marked and shown side by side, and stand still."""
+    for _ in range(2):
+        record(settings)
+    shown.open("Recordings")
+    page = shown.window.tabs.recordings.list
+    shown.until(lambda: page.sessions.rowCount() == 2, "listed both")
+    page.table.selectRow(0)
+    shown.draw()
+    assert not page.together.isEnabled()
+    page.table.selectAll()
+    shown.until(page.together.isEnabled, "looked into the first")
+    page.together.click()
+    archive.playback.play(on=False)
+    player = shown.window.tabs.recordings.player
+    shown.until(lambda: player.beside.station, "looked into the second")
+    return player
+
+
+def jump(shown: Shown, archive: Archive, player: Player, seconds: float) -> tuple[Tape, Tape]:
+    """Go to so many seconds after the beginning of the first."""
+    first, second = archive.playback.tape, player.beside.second.tape
+    assert first is not None
+    assert second is not None
+    archive.playback.seek(first.first_ns + round(seconds * 1e9))
+    shown.until(lambda: not archive.playback.is_loading, "showed the first")
+    shown.until(lambda: not player.beside.second.is_loading, "showed the second")
+    shown.draw()
+    return first, second
+
+
+def test_both_are_in_the_same_plots_at_one_time_since_their_beginnings(
+    shown: Shown, archive: Archive, player: Player
+) -> None:
+    assert player._stack.currentIndex() == SIGNALS
+    for seconds in (6.0, 3.0, 9.0):
+        first, second = jump(shown, archive, player, seconds)
+        assert player.beside.second.position_ns - second.first_ns == pytest.approx(seconds * 1e9, abs=1e6)
+        assert player.beside.second.position_ns != archive.playback.position_ns
+    player.signals.choose(["left_knee.position"])
+    shown.draw()
+    scene = player.signals.scene
+    times = scene.times(2.0)
+    beside = scene.values_beside("left_knee.position", times)
+    assert np.count_nonzero(~np.isnan(beside)) > len(times) / 2
+    assert first.session.session != second.session.session
+    assert player.beside_bar.isVisible()
+    assert "aligned by their beginnings" in player.beside_bar.said.text()
+    assert rules.out_of_reach(player) == []
+
+
+def test_by_a_heel_strike_their_strides_lie_over_each_other(
+    shown: Shown, archive: Archive, player: Player
+) -> None:
+    jump(shown, archive, player, 8.0)
+    player.beside_bar.by.setCurrentText(By.HEEL_STRIKE.value)
+    player.beside_bar.by.activated.emit(player.beside_bar.by.currentIndex())
+    shown.until(lambda: player.beside.by is By.HEEL_STRIKE, "aligned them")
+    shown.draw()
+    jump(shown, archive, player, 8.0)
+    since = []
+    for playback in (archive.playback, player.beside.second):
+        station = playback.desk.stations[0]
+        strikes = [
+            one.stamp_ns
+            for one in station.processing.derived().events
+            if one.kind is EventKind.HEEL_STRIKE and one.leg is Leg.LEFT
+        ]
+        since.append(((station.rings.newest_ns or 0) - max(strikes)) / 1e9)
+    assert since[0] % 1.0 == pytest.approx(since[1] % 1.0, abs=0.1)  # a stride takes a second
+
+
+def test_the_second_is_put_away_and_gone_with_the_first(
+    shown: Shown, archive: Archive, player: Player
+) -> None:
+    player.beside_bar.close_button.click()
+    shown.draw()
+    assert player.signals.scene.beside is None
+    assert not player.beside_bar.isVisible()
+    player._back()
+    assert player.beside.second.tape is None
+
+
+def test_a_second_that_cannot_be_read_is_said(
+    shown: Shown, archive: Archive, player: Player, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(*_: object) -> None:
+        raise OSError("the disk is away")
+
+    session = player.beside.session
+    assert session is not None
+    monkeypatch.setattr("server_gui.core.archive.side_by_side.Tape.open", broken)
+    player.show_beside(session)
+    shown.until(lambda: player.beside.problem, "told why not")
+    shown.draw()
+    assert "the disk is away" in player.beside_bar.said.text()

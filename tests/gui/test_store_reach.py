@@ -1,0 +1,112 @@
+"""Whether the store is reached is decided once: what the newest look said, and how uploading goes."""
+
+import shutil
+from pathlib import Path
+
+from server_gui.core.alarms.texts import Kind
+from server_gui.core.archive import library
+from server_gui.core.archive.library import Library
+from server_gui.core.cloud.store_reach import AGAIN_S, KNOWN_S, LOOK_S, Reach, StoreReach
+from server_gui.core.settings.server_file import ServerSettings
+from tests.gui.test_recording import AWAY, FakeKeeper, looked, report
+from tests.support.waiting import WAIT_S, until
+from tests.unit.cloud.recordings import record
+
+
+class Clock:
+    """Time that a test lets pass."""
+
+    def __init__(self) -> None:
+        self.now_s = 100.0
+
+    def __call__(self) -> float:
+        return self.now_s
+
+
+def test_a_store_that_nobody_has_looked_at_or_not_for_long_is_not_known() -> None:
+    clock = Clock()
+    reach = StoreReach(clock)
+    assert (reach.state, reach.is_known, reach.is_due) == (Reach.NOT_LOOKED, False, True)
+    reach.looked(None)
+    assert (reach.state, reach.is_known, reach.is_due) == (Reach.REACHED, True, False)
+    clock.now_s += LOOK_S
+    assert reach.is_due
+    clock.now_s += KNOWN_S
+    assert (reach.state, reach.is_known) == (Reach.OLD, False)
+
+
+def test_a_store_that_was_away_stays_so_until_a_look_says_otherwise() -> None:
+    clock, back = Clock(), list[str]()
+    reach = StoreReach(clock)
+    reach.on_return.append(lambda: back.append("back"))
+    reach.looked(AWAY)
+    clock.now_s += 10 * KNOWN_S
+    assert (reach.state, reach.trouble) == (Reach.AWAY, AWAY)
+    clock.now_s += AGAIN_S
+    reach.looked(None)
+    assert (reach.state, reach.trouble, back) == (Reach.REACHED, None, ["back"])
+    reach.looked(None)
+    assert back == ["back"]
+
+
+def test_an_upload_that_fails_is_no_reached_store_and_asks_for_a_look() -> None:
+    reach = StoreReach(Clock())
+    reach.looked(None)
+    reach.uploads(AWAY)
+    assert (reach.state, reach.trouble, reach.is_due) == (Reach.FAILING, AWAY, True)
+    reach.looked(None)
+    assert (reach.state, reach.is_due) == (Reach.FAILING, False), "the upload has not succeeded yet"
+    reach.uploads(None)
+    assert (reach.state, reach.is_due) == (Reach.REACHED, True)
+
+
+def test_a_look_that_fails_is_an_alarm_before_any_upload_fails_and_is_over_with_the_next_that_succeeds() -> (
+    None
+):
+    keeper, reach = FakeKeeper(report()), StoreReach(Clock())
+    recording, news = looked(keeper)
+    recording.rely_on(reach)
+    reach.looked(AWAY)
+    (told,) = (one.alarm for one in recording.alarms.active)
+    assert (told.kind, told.what) == (Kind.UPLOAD, AWAY)
+    said = recording.said(None)
+    assert "store not reached" in said.text
+    assert said.detail.startswith(AWAY)
+    reach.looked(None)
+    assert not recording.alarms.active
+    assert "all uploaded" in recording.said(None).text
+    assert keeper.asked == []
+    assert not news.items
+
+
+def test_what_waits_is_uploaded_as_soon_as_the_store_is_back() -> None:
+    keeper, reach = FakeKeeper(report(problem=AWAY, waiting=3)), StoreReach(Clock())
+    recording, _ = looked(keeper)
+    recording.rely_on(reach)
+    reach.uploads(AWAY)
+    reach.looked(AWAY)
+    assert keeper.asked == []
+    reach.looked(None)
+    assert keeper.asked == ["upload"]
+    assert recording.alarms.active, "until the upload has succeeded"
+
+
+def test_a_knock_sees_a_folder_that_has_gone_and_that_is_back(
+    settings: ServerSettings, tmp_path: Path
+) -> None:
+    empty = library.knock(settings)
+    assert (empty.problem, empty.is_empty) == (None, True)
+    record(settings.store.url, settings.recorder.spool)
+    shutil.move(tmp_path / "store", tmp_path / "away")
+    looking = Library(settings, lambda call: call())
+    looking.knock()
+    until(lambda: looking.reach.looked_s)
+    assert looking.reach.state is Reach.AWAY
+    assert "any more" in looking.reach.said
+    shutil.move(tmp_path / "away", tmp_path / "store")
+    looking.reach.uploads(AWAY)
+    looking.reach.uploads(None)
+    looking.knock()
+    until(lambda: looking.reach.state is Reach.REACHED)
+    assert looking.revision == 0, "nothing was listed"
+    assert looking.close(WAIT_S)
