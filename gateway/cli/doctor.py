@@ -116,7 +116,7 @@ def _is_here(options: argparse.Namespace) -> bool:
 
 
 def _gateway(config: RobotConfig, options: argparse.Namespace) -> Address | None:
-    """Whom to ask: the gateway that is named, else the file's own."""
+    """Return the gateway to ask: the one that is named, else the file's own."""
     if options.silent:
         return None
     return options.robot or Address("127.0.0.1", config.gateway.port)

@@ -53,7 +53,7 @@ def _motion(
     feet: tuple[Samples, Samples],
     feet_spin: tuple[Samples, Samples],
 ) -> Samples:
-    """How much moves, whichever way: (n, 10, samples)."""
+    """Return the amount of motion, in any direction: (n, 10, samples)."""
     left, right = (length(one) for one in feet_spin)
     left_jolt, right_jolt = (np.abs(length(one) - GRAVITY) for one in feet)
     signals = (
@@ -92,7 +92,7 @@ def _turning(heading: Samples) -> Samples:
 
 
 def _rest(left: Samples, right: Samples) -> Samples:
-    """How long the foot that moved last, and the other one, have rested."""
+    """Return the rest time of the foot that moved last, and of the other one."""
     feet = [(since(left > still), since(right > still)) for still in STILL]
     columns = [ordered(one, other) for ordered in (np.maximum, np.minimum) for one, other in feet]
     return np.stack(columns, axis=1)

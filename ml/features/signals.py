@@ -35,7 +35,7 @@ def along(vectors: Samples, axis: Samples) -> Samples:
 
 
 def across(vectors: Samples, part: Samples) -> Samples:
-    """How long (n, 3, samples) are across an axis along which they have this part: (n, samples)."""
+    """Return the length of vectors (n, 3, samples) across an axis, by their part along it: (n, samples)."""
     rest: Samples = np.sqrt(np.maximum(_dot(vectors, vectors) - part * part, 0.0))
     return rest
 

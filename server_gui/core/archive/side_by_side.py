@@ -1,4 +1,4 @@
-"""A second recording beside the one that is played: both at one instant, by their beginnings or a heel strike."""
+"""A second recording beside the one that is played, aligned by their beginnings or a heel strike."""
 
 from collections.abc import Callable
 from concurrent.futures import Future

@@ -71,11 +71,11 @@ class Header(QWidget):
 
     @property
     def outcome_text(self) -> str:
-        """What became of the STOP, as it is shown; empty while nothing is."""
+        """Result of the STOP as shown; empty without one."""
         return self._outcome.main_text if not self._outcome.isHidden() else ""
 
     def minimumSizeHint(self) -> QSize:
-        """Of what is never left out."""
+        """Size of the parts that are always shown."""
         return QSize(
             self.width() - self._room(has_outcome=self._has_outcome), super().minimumSizeHint().height()
         )
@@ -143,7 +143,7 @@ class Header(QWidget):
         return stopping is not None and (stopping.state is not StopState.IDLE or stopping.held)
 
     def _room(self, *, has_outcome: bool) -> int:
-        """How much is left for the chips."""
+        """Return the width left for the chips."""
         margins, spacing = self._row.contentsMargins(), self._row.spacing()
         fixed = [self._brand, self.reset_button, self.menu, self.stop]
         taken = sum(one.sizeHint().width() + spacing for one in fixed if not one.isHidden())

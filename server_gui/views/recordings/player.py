@@ -254,7 +254,7 @@ class Player(QWidget):
         self.labels.refresh(tape)
 
     def _refresh_alarms(self) -> None:
-        """What was wrong then; where something was, there is room for it from then on: nothing moves again."""
+        """Show the alarms of then; once there was one, its room stays, so that nothing moves again."""
         self.alarms.refresh()
         if self.alarms.told and self.alarms.isHidden():
             self.alarms.show()
