@@ -129,6 +129,7 @@ QLabel, QCheckBox {{ background: transparent; }}
 QLabel#dim, QLabel#note {{ color: {dim}; }}
 QLabel#title[tone="old"] {{ color: {old}; }}
 QLabel#dim[tone="bad"] {{ color: {bad}; }}
+QLabel#dim[tone="warn"] {{ color: {warn}; }}
 QLabel#title {{ font-weight: bold; }}
 QLabel#brand {{ color: {accent}; padding-right: 8px; }}
 QLabel#banner {{ background: {staged}; border: 1px solid {warn}; border-radius: 4px; padding: 5px 8px; }}

@@ -45,6 +45,8 @@ class _Seen:
     why_no_objects: str
     units: Mapping[str, tuple[float, str]] = field(default_factory=dict)
     other_file: str | None = None
+    held: Mapping[str, str] = field(default_factory=dict)
+    stop_held: str | None = None
 
 
 class OtherRobot(ClientError):
@@ -73,6 +75,8 @@ def gather(config: RobotConfig, how: How) -> Observations:
         bus_obstacles=dict(_obstacles(config)) if how.here else {},
         units=seen.units,
         other_file=seen.other_file,
+        held=seen.held,
+        stop_held=seen.stop_held,
     )
 
 
@@ -130,7 +134,8 @@ def _running(empty: Observations, how: How, robot: Robot) -> _Seen:
         return _Seen(buses, {}, samples, OTHER, other_file=other_file)
     objects = with_gateway.objects(robot, empty.nodes(), empty.descriptions)
     units = {f"{one.component}.{one.object}": (one.scale, one.unit) for one in described.parameters}
-    return _Seen(buses, objects, samples, NOT_HERE, units)
+    held, why = with_gateway.held(robot)
+    return _Seen(buses, objects, samples, NOT_HERE, units, held=held, stop_held=why)
 
 
 def _check_robot(config: RobotConfig, described: Robots, how: How) -> None:

@@ -28,6 +28,7 @@ class JointWords(PlainLabel):
         super().__init__()
         self._theme = theme
         self._errors: Sequence[tuple[str, str]] = ()
+        self._tone = "bad"
         self.setAccessibleName("What is wrong with joints")
         self.setWordWrap(True)
         self.setObjectName("dim")
@@ -36,10 +37,10 @@ class JointWords(PlainLabel):
         theme.changed.connect(self._fit)
         self._fit()
 
-    def say(self, errors: Sequence[tuple[str, str]]) -> None:
-        """Say what is wrong, by joints, in the order of the table."""
-        if list(errors) != list(self._errors):
-            self._errors = errors
+    def say(self, errors: Sequence[tuple[str, str]], tone: str = "bad") -> None:
+        """Say what is wrong, by joints, in the order of the table; `tone` is how bad the worst is."""
+        if (list(errors), tone) != (list(self._errors), self._tone):
+            self._errors, self._tone = errors, tone
             self._fit()
 
     def sizeHint(self) -> QSize:
@@ -66,7 +67,7 @@ class JointWords(PlainLabel):
         fits = (text for text in said or BARS if self._has_room(text))
         last = whole_words((said or BARS)[-1], self.fontMetrics(), self.width())
         set_text(self, next(fits, last))
-        set_tone(self, "bad" if said else "")
+        set_tone(self, self._tone if said else "")
         set_tip(self, said[0] if said else BARS[0])
         if self.height() != self._high:
             self.setFixedHeight(self._high)
