@@ -47,8 +47,9 @@ def record(
     if fault_s is not None:
         fine = round(fault_s * RATE_HZ)
         broken = len(walk.stamps_ns) - fine
-        walk.columns["left_knee.state"] = [4.0] * fine + [7.0] * broken
-        walk.columns["left_knee.error_code"] = [0.0] * fine + [float(0x2310)] * broken
+        states: list[float | None] = [*[4.0] * fine, *[7.0] * broken]
+        codes: list[float | None] = [*[0.0] * fine, *[float(0x2310)] * broken]
+        walk.columns["left_knee.state"], walk.columns["left_knee.error_code"] = states, codes
     with Spool(settings.recorder.spool, reserve_bytes=0) as spool:
         with Recorder(spool) as recorder:
             units = {name: "rad" if name.endswith("position") else "" for name in walk.columns}
