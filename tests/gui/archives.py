@@ -46,10 +46,9 @@ def record(
     walk = walking(SECONDS * RATE_HZ, rate_hz=RATE_HZ).batch
     if fault_s is not None:
         fine = round(fault_s * RATE_HZ)
-        broken = len(walk.stamps_ns) - fine
-        states: list[float | None] = [*[4.0] * fine, *[7.0] * broken]
-        codes: list[float | None] = [*[0.0] * fine, *[float(0x2310)] * broken]
-        walk.columns["left_knee.state"], walk.columns["left_knee.error_code"] = states, codes
+        for name, before, then in (("state", 4.0, 7.0), ("error_code", 0.0, float(0x2310))):
+            values = (before if row < fine else then for row in range(len(walk.stamps_ns)))
+            walk.columns[f"left_knee.{name}"] = [*values]
     with Spool(settings.recorder.spool, reserve_bytes=0) as spool:
         with Recorder(spool) as recorder:
             units = {name: "rad" if name.endswith("position") else "" for name in walk.columns}

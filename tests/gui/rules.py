@@ -18,6 +18,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from server_gui.views.frame.chip import Chip
 from server_gui.views.robots.panel import RobotCard
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.elided import ElidedLabel, PathLabel
@@ -147,8 +148,10 @@ def nameless(window: QWidget, every: Iterable[QWidget] | None = None) -> list[st
 
 def _has_number(label: QLabel) -> bool:
     """Names may have digits, too, and are elided in their middle."""
-    of_card = isinstance(label.parentWidget(), RobotCard) and label.objectName() == "title"
-    is_name = of_card or isinstance(label, PathLabel)
+    parent = label.parentWidget()
+    of_chip = isinstance(parent, Chip) and parent.accessibleName() == "robot"
+    of_robot = (of_chip or isinstance(parent, RobotCard)) and label.objectName() == "title"
+    is_name = of_robot or isinstance(label, PathLabel)
     return bool(DIGIT.search(label.text())) and not is_name
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QApplication
 
 from gateway.units import Units
 from server_gui.core.archive.collected_journals import CollectedJournal, JournalsFound, KeptJournals
@@ -24,8 +25,9 @@ from server_gui.views.audit.acts_model import (
     WHAT,
     WHO,
 )
-from server_gui.views.audit.page import Audit
+from server_gui.views.audit.page import NONE, NONE_CHOSEN, Audit
 from server_gui.views.theme import Theme
+from tests.gui import rules
 from tests.gui.fakes import Bench, destroy
 from tests.support.desk import described
 from tests.support.journals import RobotsJournal
@@ -61,6 +63,29 @@ def test_titles_alone_are_nothing_to_scroll_to(theme: Theme, bench: Bench) -> No
     made.refresh()
     assert not made.table.horizontalScrollBar().isVisible()
     destroy(made)
+
+
+def test_without_a_row_it_says_what_would_be_there_and_how_it_comes(theme: Theme, bench: Bench) -> None:
+    made = Audit(bench.desk, theme)
+    made.resize(500, 400)
+    made.show()
+    made.refresh()
+    assert made.empty.isVisible()
+    assert made.empty.text() == NONE
+    assert not made.table.isVisible()
+    QApplication.processEvents()
+    assert rules.cut_words(made, [made.empty]) == []
+    destroy(made)
+
+
+def test_where_filters_leave_no_row_they_are_what_is_told_of(view: Audit) -> None:
+    assert view.table.isVisible()
+    view.words.setText("no such thing")
+    assert view.empty.text() == NONE_CHOSEN
+    assert not view.table.isVisible()
+    view.words.clear()
+    assert view.table.isVisible()
+    assert not view.empty.isVisible()
 
 
 def column(view: Audit, place: int) -> list[str]:

@@ -4,7 +4,11 @@ import pytest
 from PySide6.QtGui import QFontMetrics
 from PySide6.QtWidgets import QApplication, QStyleOptionViewItem, QTableWidget, QTableWidgetItem
 
+from ml.store.sessions import Session
+from server_gui.views.recordings.sessions import NOTES, ROW, WRAPPED, SessionModel, SessionsTable
+from server_gui.views.theme import Theme
 from server_gui.views.widgets.elided import SentenceDelegate, whole_words
+from server_gui.views.widgets.rows import Filtered
 from tests.gui.fakes import destroy
 
 SAID = "its position jumped by 31.9° within 50 ms, which is not its speed"
@@ -31,4 +35,22 @@ def test_a_sentence_in_a_table_ends_with_a_whole_word_and_other_columns_are_as_e
         texts.append(option.text)
     assert texts[0] == SAID
     assert texts[1] in ("its position jumped by …", "its position jumped …")
+    destroy(table)
+
+
+def test_notes_of_a_recording_stand_in_as_many_lines_as_they_need(theme: Theme) -> None:
+    notes = "new insoles, left one with the spare cable; a stone in the shoe until 10:31"
+    model = SessionModel(theme)
+    model.take([Session("walker", "s1", notes=notes), Session("walker", "s2")])
+    table = SessionsTable(Filtered(model), theme)
+    for width in (420, 900):
+        table.resize(width, 200)
+        table.show()
+        QApplication.processEvents()
+        assert not table.isColumnHidden(NOTES)
+        rows = [row for row in range(2) if table.model().index(row, NOTES).data()]
+        room = table.columnWidth(NOTES) - 6
+        box = table.fontMetrics().boundingRect(0, 0, room, 1000, WRAPPED, notes)
+        assert table.rowHeight(rows[0]) >= box.height()
+        assert table.rowHeight(1 - rows[0]) == theme.px(ROW)
     destroy(table)

@@ -64,7 +64,7 @@ def _name(one: QWidget) -> str:
 
 
 @pytest.mark.parametrize("scale", [1.0, 1.5])
-@pytest.mark.parametrize("name", ["walker", "exo-of-the-second-laboratory-behind-the-stairs-07"])
+@pytest.mark.parametrize("name", ["walker", "exo-07-of-the-2nd-laboratory-behind-the-stairs-3"])
 def test_it_is_always_said_which_robot_is_looked_at_and_how_it_is(
     bench: Bench, theme: Theme, header: Header, scale: float, name: str
 ) -> None:

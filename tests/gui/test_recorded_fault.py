@@ -25,7 +25,7 @@ def to_the_fault(shown: Shown, archive: Archive, player: Player) -> None:
     shown.until(lambda: player.alarms.told, "said what was wrong then")
 
 
-def test_before_the_fault_there_is_no_alarm_and_at_it_there_is(
+def test_before_the_fault_there_is_no_alarm_and_at_it_there_is_about_which_nothing_can_be_done(
     shown: Shown, archive: Archive, player: Player
 ) -> None:
     shown.draw()
@@ -39,11 +39,6 @@ def test_before_the_fault_there_is_no_alarm_and_at_it_there_is(
     shown.until(lambda: len(archive.playback.happened.flags) > 1, "found the fault's event")
     assert any("left knee" in flag.text for flag in archive.playback.happened.flags)
 
-
-def test_nothing_can_be_cleared_or_acknowledged_in_the_past(
-    shown: Shown, archive: Archive, player: Player
-) -> None:
-    to_the_fault(shown, archive, player)
     shown.window.resize(1900, 900)
     shown.draw()
     assert player.alarms.buttons.clear.isHidden()

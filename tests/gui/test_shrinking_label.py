@@ -128,7 +128,7 @@ def test_the_words_of_a_fault_are_all_there(theme: Theme, bench: Bench, width: i
         codes[f"{joint}.error_code"] = [float(0x2310)]
         bench.station.take([telemetry([newest_ns + len(codes)], codes)])
         model.refresh()
-        below.say(table.unsaid)
+        below.say(table.unsaid, table.bars)
         QApplication.processEvents()
         metrics = QFontMetrics(theme.text_font())
         if table.unsaid:
@@ -149,12 +149,15 @@ def test_of_many_errors_the_first_is_whole_and_the_others_are_counted(theme: The
     below = JointWords(theme)
     below.resize(500, 20)
     below.show()
-    below.say([(f"joint {at}", f"0x{at:04X} something has happened to this drive") for at in range(6)])
+    errors = [(f"joint {place}", f"0x{place:04X} something has happened to this drive") for place in range(6)]
+    below.say(errors, frozenset({TORQUE}))
     assert below.text().startswith("joint 0: 0x0000 something has happened to this drive · ")
     assert below.text().endswith(" · 5 more")
     assert rules.cut_words(below, [below]) == []
-    below.say([])
-    assert below.text().startswith("Bars: ")
+    below.say([], frozenset({TORQUE}))
+    assert below.text() == "Bars: how much torque of its limit"
+    below.say([], frozenset())
+    assert below.text() == ""
     destroy(below)
 
 

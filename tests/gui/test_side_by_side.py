@@ -45,7 +45,7 @@ def jump(shown: Shown, archive: Archive, player: Player, seconds: float) -> tupl
     return first, second
 
 
-def test_both_are_in_the_same_plots_at_one_time_since_their_beginnings(
+def test_both_are_in_the_same_plots_at_one_time_since_their_beginnings_until_one_is_put_away(
     shown: Shown, archive: Archive, player: Player
 ) -> None:
     assert player._stack.currentIndex() == SIGNALS
@@ -61,12 +61,19 @@ def test_both_are_in_the_same_plots_at_one_time_since_their_beginnings(
     assert np.count_nonzero(~np.isnan(beside)) > len(times) / 2
     assert first.session.session != second.session.session
     assert player.beside_bar.isVisible()
-    assert "aligned by their beginnings" in player.beside_bar.said.text()
+    assert player.beside_bar.said.text().endswith("aligned by")
+    assert player.beside_bar.by.currentText() == "their beginnings"
     assert rules.out_of_reach(player) == []
+    player.beside_bar.close_button.click()
+    shown.draw()
+    assert player.signals.scene.beside is None
+    assert not player.beside_bar.isVisible()
+    player._back()
+    assert player.beside.second.tape is None
 
 
-def test_by_a_heel_strike_their_strides_lie_over_each_other(
-    shown: Shown, archive: Archive, player: Player
+def test_by_a_heel_strike_their_strides_lie_over_each_other_and_one_that_cannot_be_read_is_said(
+    shown: Shown, archive: Archive, player: Player, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     jump(shown, archive, player, 8.0)
     player.beside_bar.by.setCurrentText(By.HEEL_STRIKE.value)
@@ -85,21 +92,10 @@ def test_by_a_heel_strike_their_strides_lie_over_each_other(
         since.append(((station.rings.newest_ns or 0) - max(strikes)) / 1e9)
     assert since[0] % 1.0 == pytest.approx(since[1] % 1.0, abs=0.1)  # a stride takes a second
 
-
-def test_the_second_is_put_away_and_gone_with_the_first(
-    shown: Shown, archive: Archive, player: Player
-) -> None:
-    player.beside_bar.close_button.click()
-    shown.draw()
-    assert player.signals.scene.beside is None
-    assert not player.beside_bar.isVisible()
-    player._back()
-    assert player.beside.second.tape is None
+    _cannot_be_read(shown, player, monkeypatch)
 
 
-def test_a_second_that_cannot_be_read_is_said(
-    shown: Shown, archive: Archive, player: Player, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def _cannot_be_read(shown: Shown, player: Player, monkeypatch: pytest.MonkeyPatch) -> None:
     def broken(*_: object) -> None:
         raise OSError("the disk is away")
 

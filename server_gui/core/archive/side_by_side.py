@@ -1,4 +1,4 @@
-"""A second recording beside the one that is played, aligned by their beginnings or a heel strike."""
+"""A second recording beside the one that is played, aligned by their beginnings or by a heel strike."""
 
 from collections.abc import Callable
 from concurrent.futures import Future

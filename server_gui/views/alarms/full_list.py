@@ -2,8 +2,17 @@
 
 from typing import Final, Protocol
 
-from PySide6.QtCore import QRect, QSize, Qt, Signal
-from PySide6.QtWidgets import QBoxLayout, QFrame, QHBoxLayout, QPushButton, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtCore import QEvent, QRect, QSize, Qt, Signal
+from PySide6.QtWidgets import (
+    QApplication,
+    QBoxLayout,
+    QFrame,
+    QHBoxLayout,
+    QPushButton,
+    QSizePolicy,
+    QVBoxLayout,
+    QWidget,
+)
 
 from server_gui.core.alarms.texts import Kind
 from server_gui.views.alarms.words import Key, Told, details, headline, key_of, now_s
@@ -20,6 +29,7 @@ AROUND_BUTTONS: Final = 24  # pixels, of a row
 SPACE: Final = 6  # pixels above the buttons of a row
 MOST_PX: Final = 16_777_215  # what Qt takes for no end
 MORE: Final = "… more: rest the pointer here, or move it out of the list"
+LAYERS: Final = 4  # of layouts within layouts
 WRAPPED: Final = Qt.TextFlag.TextWordWrap.value
 OVER: Final = Mark("ring", "dim", "over")
 
@@ -214,6 +224,12 @@ class AlarmList(Overlay):
             row.hold(False)
         super().turn()
         self.refresh()
+        self._settle()
+
+    def _settle(self) -> None:
+        """Let words that need more lines have them before they are first seen: each layer tells the next."""
+        for _ in range(LAYERS if self.isVisible() else 0):
+            QApplication.sendPostedEvents(None, QEvent.Type.LayoutRequest)
 
     def refresh(self) -> None:
         """Show how each is now."""

@@ -124,10 +124,7 @@ class Audit(QWidget):
         everything.setContentsMargins(8, 8, 8, 8)
         everything.addLayout(row)
         everything.addWidget(self.table, 1)
-        everything.addWidget(self.empty, 0)
-        self._below_empty = QWidget()  # takes the room that is left where there is no row
-        self._below_empty.hide()
-        everything.addWidget(self._below_empty, 1)
+        everything.addWidget(self.empty, 1)
         everything.addWidget(self.verdict)
 
     def refresh(self) -> None:
@@ -182,8 +179,7 @@ class Audit(QWidget):
         has_rows = bool(self.chosen.rowCount())
         set_text(self.empty, NONE_CHOSEN if self.model.rows else NONE)
         self.table.setVisible(has_rows)
-        for part in (self.empty, self._below_empty):
-            part.setVisible(not has_rows)
+        self.empty.setVisible(not has_rows)
         asked = {name: history for name, history in self._called.items() if robot in ("", name)}
         told = {name: one for name, one in asked.items() if len(asked) <= MOST or one.is_altered}
         said = [f"{name}: {one.verdict}" for name, one in told.items()]

@@ -121,7 +121,7 @@ class Header(QWidget):
         needs = {name: chip.needs for name, chip in self._chips.items()}
         wide = dict(needs)
         for name in SPARE:
-            if name == "drives":  # before them the name of the robot gives way
+            if name == "link":  # before that the name of the robot gives way
                 needs["robot"] = min(needs["robot"], self._theme.px(LEAST))
             if sum(needs[one] + self._row.spacing() for one in shown) > room and name in shown:
                 shown.remove(name)

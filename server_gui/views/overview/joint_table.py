@@ -248,6 +248,11 @@ class JointTable(QTableView):
         """How bad the worst of that is."""
         return self._model.tone
 
+    @property
+    def bars(self) -> frozenset[int]:
+        """The columns with bars that are shown."""
+        return frozenset(column for column in (ANGLE, TORQUE) if not self.isColumnHidden(column))
+
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self._fit()
@@ -284,9 +289,12 @@ class JointTable(QTableView):
                 shown = self._with_room(widths)
             if sum(widths[known] for known in shown) <= room:
                 break
-        for column in (TORQUE, ANGLE, ERROR):  # errors stand below the table, too
+        least = (ANGLE, ERROR) if self._model.errors else (ERROR, ANGLE)  # errors stand below the table, too
+        for column in (TORQUE, *least):
             if sum(widths[known] for known in shown) > room:
                 shown.discard(column)
+        if sum(widths[known] for known in shown) + widths[ERROR] <= room:
+            shown.add(ERROR)
         return widths, shown
 
     def _with_room(self, widths: list[int]) -> set[int]:

@@ -7,6 +7,7 @@ from PySide6.QtCore import QRect, QSize, Qt
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QSizePolicy
 
+from server_gui.views.overview.joint_table import ANGLE, TORQUE
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text, set_tone
 from server_gui.views.widgets.elided import whole_words
@@ -14,11 +15,17 @@ from server_gui.views.widgets.plain import PlainLabel, set_tip
 
 WIDE: Final = 400  # at text of 100 %: then a line is enough for an error
 WRAPPED: Final = Qt.TextFlag.TextWordWrap.value
-BARS: Final = (
-    "Bars: how far from its target, 10° at the end, and how much torque of its limit",
-    "Bars: away from its target, and torque of its limit",
-    "Bars: off its target; torque of its limit",
-)
+# By the columns with bars that are shown; the fullest wording first.
+BARS: Final = {
+    frozenset({ANGLE, TORQUE}): (
+        "Bars: how far from its target, 10° at the end, and how much torque of its limit",
+        "Bars: away from its target, and torque of its limit",
+        "Bars: off its target; torque of its limit",
+    ),
+    frozenset({ANGLE}): ("Bars: how far from its target, 10° at the end", "Bars: off its target"),
+    frozenset({TORQUE}): ("Bars: how much torque of its limit", "Bars: torque of its limit"),
+    frozenset(): ("",),
+}
 
 
 class JointWords(PlainLabel):
@@ -29,6 +36,7 @@ class JointWords(PlainLabel):
         self._theme = theme
         self._errors: Sequence[tuple[str, str]] = ()
         self._tone = "bad"
+        self._bars: frozenset[int] = frozenset()
         self.setAccessibleName("What is wrong with joints")
         self.setWordWrap(True)
         self.setObjectName("dim")
@@ -37,10 +45,13 @@ class JointWords(PlainLabel):
         theme.changed.connect(self._fit)
         self._fit()
 
-    def say(self, errors: Sequence[tuple[str, str]], tone: str = "bad") -> None:
-        """Say what is wrong, by joints, in the order of the table; `tone` is how bad the worst is."""
-        if (list(errors), tone) != (list(self._errors), self._tone):
-            self._errors, self._tone = errors, tone
+    def say(self, errors: Sequence[tuple[str, str]], bars: frozenset[int], tone: str = "bad") -> None:
+        """Say what is wrong, by joints, in the order of the table; else what the bars of columns mean.
+
+        `tone` is how bad the worst is.
+        """
+        if (list(errors), bars, tone) != (list(self._errors), self._bars, self._tone):
+            self._errors, self._bars, self._tone = errors, bars, tone
             self._fit()
 
     def sizeHint(self) -> QSize:
@@ -64,11 +75,12 @@ class JointWords(PlainLabel):
     def _fit(self) -> None:
         """Say as much as has room: the first whole, and how many more there are."""
         said = wordings(self._errors)
-        fits = (text for text in said or BARS if self._has_room(text))
-        last = whole_words((said or BARS)[-1], self.fontMetrics(), self.width())
+        texts = said or BARS[self._bars]
+        fits = (text for text in texts if self._has_room(text))
+        last = whole_words(texts[-1], self.fontMetrics(), self.width())
         set_text(self, next(fits, last))
         set_tone(self, self._tone if said else "")
-        set_tip(self, said[0] if said else BARS[0])
+        set_tip(self, texts[0])
         if self.height() != self._high:
             self.setFixedHeight(self._high)
 

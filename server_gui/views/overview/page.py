@@ -130,8 +130,8 @@ class Overview(QWidget):
         return min(max(self.width() // self._theme.px(A_COLUMN), 1), len(SHARES))
 
     def show_plots_alone(self, alone: bool, *, with_now: bool = True) -> None:
-        """Show plots, below the first line or without it, and not the rest: for who labels what they show."""
-        self.now.setVisible(with_now or not alone)
+        """Show plots, and not the rest, for who labels what they show; the first line where it is wanted."""
+        self.now.setVisible(with_now)
         if alone is not self._is_plots:
             self._is_plots = alone
             for card in (self._status, self._posture, self._pressure, self._joints):
@@ -143,7 +143,7 @@ class Overview(QWidget):
         return QSize(self._theme.px(A_COLUMN), super().minimumSizeHint().height())
 
     def _arrange(self, columns: int) -> None:
-        """Lay as many cards as fit in a row, and the joints below, or above where there is little room."""
+        """Arrange as many cards as fit in a row, and the joints below; above where there is little room."""
         self._columns, grid = columns, self._grid
         grid.addWidget(self.now, 0, 0, 1, columns)
         cards = [] if self._is_plots else [self._status, self._posture, self._pressure]
@@ -185,7 +185,7 @@ class Overview(QWidget):
             plot.refresh(station, flags, slow=slow)
         if slow:
             self._model.refresh()
-            self._wrong.say(self._table.unsaid, self._table.tone)
+            self._wrong.say(self._table.unsaid, self._table.bars, self._table.tone)
             self._joints.set_note(*_age(station))
 
     # --- one time for all plots

@@ -73,6 +73,7 @@ class Player(QWidget):
         )
         self.beside_bar = BesideBar(self.beside)
         self._views = (self.overview, self.signals)
+        self._was_wrong = False  # in what was played of it
         self._around: tuple[str, int] | None = None  # a channel and an instant, to be shown once it is read
         self._stack = QStackedWidget()
         for view in self._views:
@@ -116,7 +117,8 @@ class Player(QWidget):
     def _make_room(self) -> None:
         """While somebody labels, what is labelled is in sight: the plots, beside what it was then."""
         alone = not self._has_room_for_all and self.labelling.isChecked()
-        self.overview.show_plots_alone(alone, with_now=self._is_roomy)
+        with_now = self._is_roomy or not (alone or self._was_wrong)  # an alarm says more of the drives
+        self.overview.show_plots_alone(alone, with_now=with_now)
 
     def heightForWidth(self, width: int) -> int:
         """As low as it can be: what scrolls it would give the views all that they would like to have."""
@@ -132,6 +134,8 @@ class Player(QWidget):
             self._around = None
             self.beside.close()
             self.beside_bar.refresh()
+            self._was_wrong = False
+            self._make_room()
             self.alarms.list.hide()
             self.alarms.hide()
 
@@ -139,6 +143,7 @@ class Player(QWidget):
         """Show another recording in the same plots: what is played goes on with it from its beginning."""
         self.beside.open(session)
         self.beside_bar.refresh()
+        self.labelling.setChecked(self._has_room_for_all)
         self._choice.button(SIGNALS).click()
 
     def show_around(self, channel: str, at_ns: int) -> None:
@@ -254,10 +259,13 @@ class Player(QWidget):
         self.labels.refresh(tape)
 
     def _refresh_alarms(self) -> None:
-        """Show the alarms of then; once there was one, its room stays, so that nothing moves again."""
+        """Show what was wrong then; once something was, its line stays, so that nothing moves again."""
         self.alarms.refresh()
-        if self.alarms.told and self.alarms.isHidden():
-            self.alarms.show()
+        if self.alarms.told and not self._was_wrong:
+            self._was_wrong = True
+            self._make_room()
+        is_in_the_way = not self._is_roomy and self._stack.currentIndex() == SIGNALS
+        self.alarms.setVisible(self._was_wrong and not is_in_the_way)
 
     def _refresh_flags(self, tape: Tape) -> None:
         journals, happened = self._archive.journals, self._playback.happened

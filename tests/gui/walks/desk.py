@@ -3,6 +3,7 @@
 import shutil
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from functools import partial
 from typing import Final
@@ -140,6 +141,24 @@ def replay(bench: Bench) -> None:
     hand.click("Label span")
     hand.sees("walk", "Ada", "person")
     hand.keep("labelled")
+    hand.click("← All")
+
+
+def side_by_side(bench: Bench) -> None:
+    """Two recordings in the same plots: marked in the list, aligned by their beginnings or a heel strike."""
+    hand = bench.hand
+    hand.click("Recordings")
+    today = time.strftime("%Y-%m-%d")
+    until(lambda: len(hand.ask(where=today)) > 1, "listed two recordings", AGAIN_S)
+    hand.click(today)
+    x, y = hand.where(today, 1)
+    hand.xdotool("mousemove", str(x), str(y), "keydown", "ctrl", "click", "1", "keyup", "ctrl")
+    hand.insist("Side by side", lambda: hand.reads("┅ dashed"), exactly=True)
+    hand.sees("┅ dashed", "aligned by", within_s=AGAIN_S)
+    hand.misses("reading …", within_s=AGAIN_S)
+    hand.keep("side-by-side")
+    hand.click("Put the second recording away")
+    hand.misses("┅ dashed")
     hand.click("← All")
 
 

@@ -86,7 +86,8 @@ class Hand:
                 time.sleep(STILL_S)
                 if self.can_see(name):
                     return True
-            self.wheel("page")
+            x, y, *_ = max(self.ask(where="page"), key=lambda one: one[2] * one[3])
+            self.xdotool("mousemove", str(x), str(y), "click", "5")
         return False
 
     def reveal(self, name: str, panel: str) -> None:

@@ -121,6 +121,7 @@ def drive_fault(bench: Bench) -> None:
 def fault_replayed(bench: Bench) -> None:
     """The recording of it: its event leads to the instant, the alarm of then is there, and its signal."""
     hand = bench.hand
+    hand.key("F9")  # without the panels there is room for it
     play_newest(hand)
     hand.misses("looking for events", within_s=AGAIN_S)
     hand.click("Events of the recording")
@@ -137,6 +138,7 @@ def fault_replayed(bench: Bench) -> None:
     hand.insist("Show the signal ± 5 s", lambda: hand.reads("right_hip."), place=-1)
     hand.keep("replay-fault-signal")
     hand.click("← All")
+    hand.key("F9")
     hand.click("Overview")
 
 
@@ -165,6 +167,7 @@ def insole_lost(bench: Bench) -> None:
     hand = bench.hand
     bench.robot.break_("sensor_unplugged", "left_insole")
     hand.sees("lost: left insole")
+    hand.reach("left insole: lost")
     hand.sees("left insole: lost")
     hand.misses("LEFT  0 N")
     hand.keep("insole")

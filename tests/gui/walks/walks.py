@@ -73,6 +73,15 @@ WALKS: Final = {
         )
     ),
     "developer": Walk(
-        (robot.alive, desk.pages, desk.recording, desk.replay, desk.uploaded, desk.learning, desk.store_gone)
+        (
+            robot.alive,
+            desk.pages,
+            desk.recording,
+            desk.replay,
+            desk.uploaded,
+            desk.side_by_side,
+            desk.learning,
+            desk.store_gone,
+        )
     ),
 }
