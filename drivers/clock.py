@@ -148,7 +148,7 @@ class DeviceClock:
 
 
 class ClockSpec(NamedTuple):
-    """How a format's counter counts."""
+    """Properties of a format's counter."""
 
     ticks_per_second: int
     modulus: int

@@ -8,7 +8,7 @@ from drivers.samples import Channel, Quality
 
 
 class ComponentKind(StrEnum):
-    """What a component is."""
+    """Kind of a component."""
 
     JOINT = "joint"
     DEVICE = "device"  # any other CANopen device that has parameters

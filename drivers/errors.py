@@ -1,4 +1,4 @@
-"""What a driver can say when it cannot do what it was asked.
+"""Errors of drivers.
 
     DriverError
     ├── SettingsError      the configuration contradicts itself or the device
@@ -47,7 +47,7 @@ class LssRefusal(DriverError):
 
 
 class NotPermitted(DriverError):
-    """What may not be written now was not sent."""
+    """The write is not allowed now, and was not sent."""
 
 
 class Mismatch(DriverError):

@@ -1,4 +1,4 @@
-"""How old a component's last sample is, and what that makes of its state."""
+"""Age of a component's last sample, and the state that follows from it."""
 
 from drivers.samples import ComponentState
 

@@ -1,4 +1,4 @@
-"""Which format a stream of bytes is in: every parser tries, and the one that explains most of it wins."""
+"""Identification of a byte stream's format: every parser tries, and the best match wins."""
 
 import re
 from collections.abc import Callable, Iterator
@@ -20,7 +20,7 @@ NUMBERS_LINE = re.compile(rb"[ \t]*[^,;\t\r\n]{0,24}([,;\t]" + NUMBER_OR_FOOT + 
 
 @dataclass(frozen=True, slots=True)
 class Match:
-    """How well a format explains some bytes."""
+    """Match of a format with some bytes."""
 
     format_name: str
     layout: str | None  # the shipped layout whose description fits, for insole formats that need one

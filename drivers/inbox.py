@@ -1,4 +1,4 @@
-"""What other threads put in for one that fetches it, whose wait always ends in time."""
+"""A queue from many threads to one, with waits that always end in time."""
 
 import contextlib
 import queue

@@ -1,4 +1,4 @@
-"""How every serial format is read: frames out of a byte stream that begins anywhere and may be damaged.
+"""Framing of serial formats: frames out of a byte stream that begins anywhere and may be damaged.
 
 A parser does no I/O. `feed` takes bytes as they come and returns the frames they complete; the result does
 not depend on where the stream was cut. The memory it keeps is bounded by its format's longest frame.
@@ -14,7 +14,7 @@ F = TypeVar("F")
 
 
 class Counters(msgspec.Struct):
-    """What a parser has seen since it was made."""
+    """Counters of a parser since it was made."""
 
     frames: int = 0  # valid ones
     bytes_dropped: int = 0  # bytes that are part of no valid frame
@@ -30,7 +30,7 @@ class Counters(msgspec.Struct):
 
 
 class Parser(Protocol[F]):
-    """What a serial device needs of a format."""
+    """Interface of a format's parser for a serial device."""
 
     @property
     def counters(self) -> Counters: ...

@@ -1,4 +1,4 @@
-"""What the drivers give: channels, samples, quality. SI units, robot's monotonic time."""
+"""The drivers' output: channels, samples, quality. SI units, robot's monotonic time."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -6,7 +6,7 @@ from enum import StrEnum
 
 
 class ComponentState(StrEnum):
-    """How far a component's values can be trusted."""
+    """Trust in a component's values."""
 
     OK = "ok"
     STALE = "stale"  # silent for longer than stale_after_s: values are null
@@ -42,7 +42,7 @@ class Sample:
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """What is not as it should be, in words: since when (monotonic clock), and what to check."""
+    """A problem in words: since when (monotonic clock), and what to check."""
 
     since_ns: int
     words: str
@@ -55,7 +55,7 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Quality:
-    """What is known about a component now."""
+    """Present quality of a component."""
 
     state: ComponentState
     age_ms: float | None  # since its last sample; None before the first

@@ -28,7 +28,7 @@ _COMMUNICATION = range(0x1000, 0x2000)
 
 @dataclass(frozen=True, slots=True)
 class Commissioning:
-    """Whose configuration it is; `baudrate` in bit/s."""
+    """The device of a configuration; `baudrate` in bit/s."""
 
     node_id: int
     node_name: str
@@ -38,7 +38,7 @@ class Commissioning:
 
 @dataclass(frozen=True, slots=True)
 class Configuration:
-    """What a DCF says: the device it is for, and its objects' numbers; values of other kinds are left out."""
+    """Contents of a DCF: its device, and its objects' numbers; values of other kinds are left out."""
 
     description: Description
     values: Mapping[Key, Number]

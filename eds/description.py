@@ -1,4 +1,4 @@
-"""What an EDS or DCF file says about a device, and what had to be repaired to read it."""
+"""The contents of an EDS or DCF file, and the repairs that were needed to read it."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ class _EdsText(io.StringIO):
 
 @dataclass(frozen=True, slots=True)
 class _Owner:
-    """Whom the file was made for, and for whom it is loaded."""
+    """The node that the file was made for, and the node that it is loaded for."""
 
     file_node_id: int | None
     node_id: int

@@ -1,4 +1,4 @@
-"""What is known of a product beside its EDS: what its maker's own objects mean, and what it does otherwise.
+"""Knowledge about a product beyond its EDS: the maker's own objects, and deviations from the standard.
 
 One TOML file a product or family in `profiles/`, each entry with the document that it is taken from. A
 profile is never needed: what has none is read by its EDS and CiA 402 alone. An entry counts only where the
@@ -43,7 +43,7 @@ class ProfileObject:
 
 @dataclass(frozen=True, slots=True)
 class Quirk:
-    """What a product does otherwise than others, and what follows from it."""
+    """A product's deviation from the standard, and its consequence."""
 
     text: str
     source: str

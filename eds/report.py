@@ -1,4 +1,4 @@
-"""What an EDS or DCF says about a device, as rows that a person or a program can read."""
+"""The contents of an EDS or DCF file as rows for people and programs."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping

@@ -1,4 +1,4 @@
-"""Where EDS files are: beside the robot's file, or among those that ship with GWRMS."""
+"""Search for EDS files: beside the robot's file, and among the shipped ones."""
 
 import difflib
 from pathlib import Path

@@ -56,7 +56,7 @@ def words(data: bytes, data_type: int) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Coding:
-    """How one object's value travels: its CiA 301 data type (by code) and its scale."""
+    """Encoding of one object's value: its CiA 301 data type (by code) and its scale."""
 
     data_type: int
     scale: float = 1.0
@@ -132,7 +132,7 @@ def coding_of(type_name: str, scale: float) -> Coding | None:
 
 
 class Limit(StrEnum):
-    """What a value can be beyond, by its key in the robot's file."""
+    """A limit of a value, by its key in the robot's file."""
 
     MIN = "min"
     MAX = "max"

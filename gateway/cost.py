@@ -1,4 +1,4 @@
-"""What monitoring costs this robot now, and whose it is: rates since the same connection last asked."""
+"""The cost of monitoring on this robot, by client: rates since the same connection's last request."""
 
 import resource
 import threading

@@ -15,11 +15,11 @@ from gateway.config.robot import RobotConfig
 from gateway.connections.authentication import Authentication
 from gateway.connections.classic import ClassicPort
 from gateway.connections.connection_slots import ConnectionSlots
+from gateway.connections.fair_share import FairShare
 from gateway.connections.incoming_bytes import IncomingBytes
 from gateway.connections.intake import Intake
 from gateway.connections.listener_kind import check_classic
 from gateway.connections.session import Session
-from gateway.connections.sharing import Sharing
 from gateway.process.loop import Loop, Timer
 from gateway.process.resting import ENDING
 from gateway.registry import MODULES, Spec
@@ -27,7 +27,7 @@ from gateway.service import Service
 from gateway.wire import framing
 
 if TYPE_CHECKING:
-    from gateway.access.known import KnownClients
+    from gateway.access.known_clients import KnownClients
 
 log = logging.getLogger(__name__)
 
@@ -70,7 +70,7 @@ class Daemon:
         self._service = Service(config, self._loop, specs)
         self._service.registry.when_off = self._look_whether_idle
         self._places = ConnectionSlots()
-        self._sharing = Sharing(self._loop)
+        self._sharing = FairShare(self._loop)
         self._ending = False
         self._told = False
         self._tidying = False

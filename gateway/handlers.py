@@ -1,4 +1,4 @@
-"""What answers the methods of the wire: one function each, whose types are the method's own."""
+"""Handlers of the wire's methods: one function each, with the method's own types."""
 
 from collections.abc import Callable
 from concurrent.futures import Future

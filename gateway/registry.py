@@ -1,4 +1,4 @@
-"""Which modules there are, and their lives: started on first use, stopped when the last client has left.
+"""The gateway's modules and their lives: started on first use, stopped after the last client has left.
 
 A module's code is imported only when it starts. Starting and stopping take threads of their own, because
 files are read and devices are opened and closed there, and no client waits for another's devices.
@@ -27,7 +27,7 @@ log = logging.getLogger(__name__)
 
 
 class Module(Protocol):
-    """What a module is to the daemon. `start` and `stop` may take their time; all else runs in the loop."""
+    """A module of the daemon. `start` and `stop` may take their time; all else runs in the loop."""
 
     @property
     def handlers(self) -> Handlers: ...
@@ -39,7 +39,7 @@ class Module(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Context:
-    """What a module is given. `keep(True)` keeps it running without any client until `keep(False)`.
+    """Context of a module. `keep(True)` keeps it running without any client until `keep(False)`.
 
     Who carries out stops says how: `stops_by(stop_now)`, from any thread. From then until `stops_by(None)`
     every stop of a client is `stop_now(who, reason)`, called in the thread that reads the clients, past the
@@ -55,7 +55,7 @@ class Context:
 
 @dataclass(frozen=True, slots=True)
 class Spec:
-    """Where a module lives, and which others it stands on."""
+    """Import path of a module, and the modules that it needs."""
 
     path: str
     needs: tuple[str, ...] = ()
@@ -78,7 +78,7 @@ MODULES: Mapping[str, Spec] = {
 
 
 class Phase(StrEnum):
-    """Where a module is in its life."""
+    """Phase of a module's life."""
 
     OFF = "off"
     STARTING = "starting"

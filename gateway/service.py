@@ -1,4 +1,4 @@
-"""What the gateway answers: parameters are checked, the method's module is started, its answer given."""
+"""The gateway's service: check a request's parameters, start its module, and answer."""
 
 import logging
 import time
@@ -40,7 +40,7 @@ from gateway.wire.stop import ROBOT_STOP
 from gateway.wire.stream import STREAM_START, STREAM_STOP, StreamStarted, StreamStartParams, StreamStopParams
 
 if TYPE_CHECKING:
-    from gateway.access.known import KnownClients
+    from gateway.access.known_clients import KnownClients
     from gateway.cost import Costs
     from gateway.guard.module import GuardModule
     from gateway.modules.component.module import ComponentModule

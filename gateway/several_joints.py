@@ -75,7 +75,7 @@ _BROKEN: Final[Mapping[Limit, str]] = {
 
 @dataclass(frozen=True, slots=True)
 class Spread:
-    """What is to be written, by parameter; and by joint why it is not, where it cannot be."""
+    """The values to write, by parameter; and by joint the reason, if it is left out."""
 
     changes: Mapping[str, Number]
     refused: Mapping[str, str]
@@ -307,7 +307,7 @@ def devices(description: Description) -> dict[str, tuple[object, object]]:
 
 
 class StoreOutcome(StrEnum):
-    """What came of a device that was asked to store."""
+    """Result of a device that was asked to store."""
 
     STORED = "stored"
     REFUSED = "refused"

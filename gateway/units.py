@@ -152,7 +152,7 @@ def percent_body_weight(body_mass: float) -> Unit:
 
 @dataclass(frozen=True, slots=True)
 class Units:
-    """Which unit each quantity is shown in.
+    """Display units of all quantities.
 
     `by_quantity` (such as `cop_x`) goes before `by_si` (such as `rad`); both name units by their symbols.
     `body_mass` (kg) makes `% BW` a unit of forces.

@@ -1,4 +1,4 @@
-"""Whose account this runs as."""
+"""The account that this process runs as."""
 
 import getpass
 import os

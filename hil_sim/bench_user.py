@@ -14,7 +14,7 @@ FEET = ("left", "right")
 
 
 class BenchUser:
-    """What is held now; the same until the next request."""
+    """Present actions of the user; the same until the next request."""
 
     def __init__(self) -> None:
         self.stamping: str | None = None

@@ -1,4 +1,4 @@
-"""What a gateway reports of the simulated robot: its channels, with the noise and resolution of the sensors.
+"""A gateway's channels of the simulated robot, with the noise and resolution of the sensors.
 
 Joints as their drives count them, insoles as `insole-cobs` and the trunk as `witmotion` send them. An insole
 without load has no centre of pressure (None).

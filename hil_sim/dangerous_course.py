@@ -9,7 +9,7 @@ from hil_sim.dangers import DANGERS, EVERYWHERE, LEVEL, LONGEST_S, DangerContext
 from hil_sim.exoskeleton import Exoskeleton
 from hil_sim.faults.injector import Faults
 from hil_sim.gait.activity import Activity
-from hil_sim.gait.mishaps import FallState
+from hil_sim.gait.stumble_and_fall import FallState
 
 HEALTHY, OVER = 0.0, -1.0  # what `now` says, but for the number of a danger from 1 on
 WALKS_S: Final = 5.0  # in a steady gait before a danger

@@ -12,7 +12,7 @@ from typing import Final
 from hil_sim.exoskeleton import JOINTS, Exoskeleton
 from hil_sim.faults.fault import Value
 from hil_sim.gait.activity import Activity
-from hil_sim.gait.mishaps import FallState
+from hil_sim.gait.stumble_and_fall import FallState
 from hil_sim.gait.timetable import Entry
 from hil_sim.gait.wearer import Foot
 from hil_sim.sensors.insoles import insole_cobs

@@ -1,4 +1,4 @@
-"""What the simulator says when it cannot do what it was asked."""
+"""Errors of the simulator."""
 
 
 class SimulatorError(Exception):

@@ -37,7 +37,7 @@ CONTROLLER_EDS = "gait_controller.eds"
 
 
 class Scenario(StrEnum):
-    """What the robot does once it is up."""
+    """Activity of the robot once it is up."""
 
     WALK = "walk"
     STAND = "stand"

@@ -1,4 +1,4 @@
-"""How a joint's drive is built in: its node id, which way its motor turns, its counts at the joint's zero."""
+"""Mounting of a joint's drive: its node id, the direction of its motor, its counts at the joint's zero."""
 
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""What somebody may ask of a running robot: a fault, an activity, a start. One request, one answer."""
+"""Requests to a running robot: a fault, an activity, a start. One request, one answer."""
 
 import math
 from collections.abc import Callable, Mapping

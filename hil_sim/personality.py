@@ -1,4 +1,4 @@
-"""Which EDS or DCF each drive of the robot shows to the bus: its personality."""
+"""The EDS or DCF that each drive of the robot presents on the bus: its personality."""
 
 from collections.abc import Collection, Iterable
 from pathlib import Path

@@ -32,7 +32,7 @@ class ScenarioFile(pytest.File):
 
 
 class ScenarioItem(pytest.Item):
-    """What stands in it, as a test."""
+    """A scenario file as a test."""
 
     def __init__(self, *, script: Script, **given: Any) -> None:
         super().__init__(**given)

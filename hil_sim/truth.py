@@ -17,7 +17,7 @@ from hil_sim.exoskeleton import JOINTS, Exoskeleton
 from hil_sim.gait.activity import Label
 from hil_sim.gait.gaits import LEFT, RIGHT
 from hil_sim.gait.generator import Generator
-from hil_sim.gait.mishaps import FallState
+from hil_sim.gait.stumble_and_fall import FallState
 from hil_sim.gait.wearer import Foot
 from hil_sim.sensors.suite import PERIOD_NS
 

@@ -1,4 +1,4 @@
-"""What can be wrong with data that is to be learned from, and with a model as a file."""
+"""Errors of training data and of model files."""
 
 
 class UnusableData(Exception):

@@ -1,4 +1,4 @@
-"""What a neural network needs around it."""
+"""Common parts of neural networks: scaling and training."""
 
 import warnings
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""How far something long is: whoever does it tells, whoever shows it listens."""
+"""Progress of long work: a function that reports it."""
 
 from typing import Protocol
 

@@ -1,4 +1,4 @@
-"""What the window needs of this computer, looked for before Qt is loaded, which would only crash."""
+"""Requirements of the window on this computer, checked before Qt is loaded, which would only crash."""
 
 import ctypes
 import importlib.metadata

@@ -1,1 +1,1 @@
-"""What the repository is kept with: what draws the reference, makes the pictures and measures a store."""
+"""Tools for the repository: generators of the reference, pictures, and measurements of a store."""

@@ -10,7 +10,7 @@ from concurrent.futures import Future
 from functools import partial
 
 from drivers.bus.heartbeat import Heartbeat
-from drivers.bus.life import HEARTBEATS_MISSED
+from drivers.bus.liveness import HEARTBEATS_MISSED
 from drivers.bus.node import Node
 from drivers.bus.sdo.channel import SdoChannel
 from drivers.bus.values import unsigned

@@ -2,7 +2,7 @@
 
 from collections.abc import Collection
 
-from drivers.bus.life import NodeLife
+from drivers.bus.liveness import NodeLife
 from drivers.bus.nmt import NmtState
 
 _PDO_BASES = (0x180, 0x280, 0x380, 0x480)  # of the predefined connection set

@@ -1,4 +1,4 @@
-"""How a node comes up: attempts in its worker's thread, one at a time, each later one after a longer pause.
+"""Boot-up of a node: attempts in its worker's thread, one at a time, with growing pauses.
 
 What happens meanwhile (the node reboots, its bus goes, a user comes) makes an attempt worthless: the
 generation counts on, and only an attempt of the latest one makes the node ready.

@@ -35,7 +35,7 @@ MAX_UNCLAIMED = 2048  # as many as there are 11-bit identifiers
 
 
 class BusUser:
-    """What is told when a bus comes, goes, and that time passes: in the bus's thread, never for long."""
+    """Listener to a bus coming and going, and to time passing: in the bus's thread, never for long."""
 
     @property
     def ready(self) -> bool:

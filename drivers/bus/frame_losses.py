@@ -14,7 +14,7 @@ LOOKS = 2  # in a row
 
 
 class FrameLosses(FindingState):
-    """Of one frame. The hot path does no more than `stamps.append`; judged is once a second."""
+    """Losses of one frame. The hot path does no more than `stamps.append`; judgement is once a second."""
 
     def __init__(self) -> None:
         super().__init__()

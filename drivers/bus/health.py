@@ -1,4 +1,4 @@
-"""How a bus is: its load, its error frames, what its controller says of itself; looked at once a second.
+"""Health of a bus: its load, error frames and controller state, checked once a second.
 
 For each frame the bus only counts. What is told here is of the time for which somebody has the bus open.
 """

@@ -1,4 +1,4 @@
-"""Whether a PDO's frames are as long as ever: other lengths mean that somebody has mapped it otherwise."""
+"""Check of PDOs' lengths: a changed length means that another master has remapped the PDO."""
 
 from collections.abc import Callable
 
@@ -7,7 +7,7 @@ WITHIN_S = 10.0
 
 
 class Lengths:
-    """Of one PDO with at least `size` bytes, as it was read; `remapped` is called once."""
+    """Length check of one PDO with at least `size` bytes, as it was read; `remapped` is called once."""
 
     def __init__(self, size: int, remapped: Callable[[], object]) -> None:
         self.usual = 0  # of the first frame that held it all; some devices send more bytes than are mapped

@@ -1,4 +1,4 @@
-"""What a master sends by itself: SYNC and its own heartbeat, each at its own period (CiA 301 §7.2.5)."""
+"""Periodic messages of a master: SYNC and its own heartbeat, each at its own period (CiA 301 §7.2.5)."""
 
 from collections.abc import Iterator
 

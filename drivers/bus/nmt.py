@@ -1,4 +1,4 @@
-"""What a node says about its own life: boot-up, heartbeat, answers to node guarding (CiA 301 §7.2.8)."""
+"""NMT states in a node's messages: boot-up, heartbeat, node guarding (CiA 301 §7.2.8)."""
 
 from enum import IntEnum
 

@@ -11,13 +11,13 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from typing import Protocol, TypeVar, cast
 
-from drivers.bus.asking import Asking
 from drivers.bus.boot_diagnosis import why_silent
 from drivers.bus.booting import Booting
 from drivers.bus.bus import BusUser, CanBus
 from drivers.bus.frame_losses import FrameLosses
-from drivers.bus.life import NodeLife
+from drivers.bus.liveness import NodeLife
 from drivers.bus.nmt import HEARTBEAT, NmtState
+from drivers.bus.node_polling import Asking
 from drivers.bus.objects import identity_problem, read, read_optional, read_rest
 from drivers.bus.outlet import Requests
 from drivers.bus.sdo.channel import SdoChannel

@@ -1,4 +1,4 @@
-"""How the requests of one SDO channel reach the bus."""
+"""Sending of one SDO channel's requests to the bus."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Which objects a device sends in its TPDOs, read from the device itself (CiA 301 §7.5.2.35, §7.5.2.37)."""
+"""TPDO mappings, read from the device itself (CiA 301 §7.5.2.35, §7.5.2.37)."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Which objects a device takes from its RPDOs, and a frame for one of them (CiA 301 §7.5.2.33, §7.5.2.35)."""
+"""RPDO mappings of a device, and frames for them (CiA 301 §7.5.2.33, §7.5.2.35)."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What an integrator says about a CAN bus and what is on it: `[can.…]`, `[device.…]` and `[channel.…]`."""
+"""Settings of a CAN bus and its devices: `[can.…]`, `[device.…]` and `[channel.…]`."""
 
 from collections.abc import Mapping
 from enum import StrEnum
@@ -33,23 +33,25 @@ def address_of(name: str) -> tuple[int, int]:
 
 
 class Role(StrEnum):
-    """Who the gateway is on its buses."""
+    """The gateway's role on its buses."""
 
-    OBSERVER = "observer"  # another controller owns the bus; only SDO requests that were asked for
-    MASTER = "master"  # a bench: NMT start, SYNC and a heartbeat are ours
+    OBSERVER = "observer"  # another controller owns the bus; the gateway only sends requested SDOs
+    MASTER = "master"  # on a bench: NMT start, SYNC and a heartbeat come from the gateway
 
 
 class CanSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """One bus. `more` holds python-can's own further keys, as they stand in the table."""
+    """One bus."""
 
     interface: str  # python-can's name: "socketcan", "socketcand", "virtual", "slcan", …
-    channel: str | int
-    bitrate: Annotated[int, msgspec.Meta(ge=1_000, le=1_000_000, extra={"unit": "bit/s"})] | None = None
-    sync_period_s: Seconds | None = None  # master only
-    node_id: NodeId | None = None  # our own, for our heartbeat
-    heartbeat_s: Seconds | None = None  # how often we send it; master only
-    trusted_network: bool = False  # of an interface over a network: whoever is on it may command the drives
-    more: dict[str, Any] = {}
+    channel: str | int  # such as "can0"; its form depends on the interface
+    bitrate: Annotated[int, msgspec.Meta(ge=1_000, le=1_000_000, extra={"unit": "bit/s"})] | None = (
+        None  # the gateway checks it
+    )
+    sync_period_s: Seconds | None = None  # period of the SYNC that the gateway sends; master only
+    node_id: NodeId | None = None  # the gateway's own, for its heartbeat
+    heartbeat_s: Seconds | None = None  # period of the gateway's heartbeat; master only
+    trusted_network: bool = False  # allow CAN over a network, on which anybody can command the drives
+    more: dict[str, Any] = {}  # python-can's further keys
 
     @classmethod
     def from_table(cls, table: Mapping[str, Any]) -> "CanSettings":
@@ -85,13 +87,15 @@ class CanSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
 
 
 class NodeTimes(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """How long one node is waited for, and by which SDO channel it is asked."""
+    """Time-outs of one node, and its SDO channel."""
 
-    sdo_timeout_s: Seconds = 0.5
-    store_timeout_s: LongSeconds = 10.0  # for the answer to 1010h and 1011h: flash takes its time
+    sdo_timeout_s: Seconds = 0.5  # time-out of an SDO answer
+    store_timeout_s: LongSeconds = 10.0  # time-out of 1010h and 1011h, which write flash
     sdo_cob_ids: tuple[CobId, CobId] | None = None  # request, response; None: 600h and 580h + node id
-    heartbeat_timeout_s: Seconds | None = None  # None: 2.5 times what the device says in 1017h
-    guard_time_s: Seconds | None = None  # node guarding by us, for a device without heartbeat; master only
+    heartbeat_timeout_s: Seconds | None = None  # None: 2.5 times the device's 1017h
+    guard_time_s: Seconds | None = (
+        None  # period of node guarding, for a device without heartbeat; master only
+    )
 
     def sdo_ids(self, node_id: int) -> tuple[int, int]:
         """Return the identifiers of its SDO channel, of requests and of responses, with their flags."""
@@ -100,13 +104,13 @@ class NodeTimes(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
 
 
 class DeviceSettings(NodeTimes, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A CANopen device that is no joint, such as a gait controller with parameters."""
+    """A CANopen device other than a joint, such as a gait controller."""
 
-    bus: str
-    node_id: NodeId
-    eds: str
-    stale_after_s: LongSeconds = 0.5
-    lost_after_s: LongSeconds = 2.0
+    bus: str  # NAME of its `[can.NAME]` table
+    node_id: NodeId  # its CANopen node id
+    eds: str  # its EDS or DCF file, beside this one or shipped
+    stale_after_s: LongSeconds = 0.5  # silence after which its values are `null`
+    lost_after_s: LongSeconds = 2.0  # silence after which it is lost
 
 
 class ChannelSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -115,12 +119,14 @@ class ChannelSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, k
     value = device's number · scale + offset, in `unit`
     """
 
-    object: ObjectName
+    object: ObjectName  # index and sub-index
     unit: str = ""  # SI, or "" for a pure number
-    scale: float = 1.0
-    offset: float = 0.0
-    poll_hz: Annotated[float, msgspec.Meta(ge=0, le=200)] = 4.0  # where no TPDO brings it; 0: never
-    words: dict[str, str] = {}  # for the numbers of a state, such as { 0 = "stance", 1 = "swing" }
+    scale: float = 1.0  # unit per count of the device
+    offset: float = 0.0  # in `unit`
+    poll_hz: Annotated[float, msgspec.Meta(ge=0, le=200)] = (
+        4.0  # rate of reading by SDO, if no TPDO brings it; 0: never
+    )
+    words: dict[str, str] = {}  # names of a state's numbers, such as { 0 = "stance", 1 = "swing" }
 
     @property
     def address(self) -> tuple[int, int]:

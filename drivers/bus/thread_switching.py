@@ -1,4 +1,4 @@
-"""How often Python's threads take turns while a bus is open."""
+"""Python's thread switch interval while a bus is open."""
 
 import sys
 import threading

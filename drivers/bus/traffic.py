@@ -1,4 +1,4 @@
-"""Who talks on a bus: frames a second by kind and node, as CiA 301's pre-defined connection set tells them.
+"""Traffic of a bus: frames a second by kind and node, by CiA 301's pre-defined connection set.
 
 Only of frames that come to us: an interface that filters for us lets no others through.
 """

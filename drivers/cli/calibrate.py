@@ -14,7 +14,7 @@ import msgspec
 from drivers.build_context import BuildContext
 from drivers.bus.bus import CanBus
 from drivers.bus.settings import CanSettings
-from drivers.cli.named import named
+from drivers.cli.robot_file_port import named
 from drivers.cli.sensor import run_parsed
 from drivers.errors import Unavailable
 from drivers.identify import format_of
@@ -24,7 +24,7 @@ from drivers.imu.device import Imu
 from drivers.imu.formats import FORMATS as IMU_FORMATS
 from drivers.imu.settings import Axes, ImuSettings, kind_of
 from drivers.imu.trunk import TrunkImu
-from drivers.insole import fit as fitting
+from drivers.insole import calibration_fit
 from drivers.insole.calibration import CellCalibration, loaded_counts
 from drivers.insole.device import USUAL_LAYOUT, layout_of, line_for
 from drivers.insole.foot import Foot
@@ -168,14 +168,14 @@ def _insole(options: argparse.Namespace) -> int:
     _read()
     tares = measure()
     _say("tare: " + " ".join(f"{tare:.0f}" for tare in tares))
-    loads: list[fitting.Load] = []
+    loads: list[calibration_fit.Load] = []
     while (mass := _mass()) is not None:
-        loads.append(fitting.Load(mass * STANDARD_GRAVITY, tuple(measure())))
-    fitted = fitting.fit(layout, tares, loads, base, options.power)
+        loads.append(calibration_fit.Load(mass * STANDARD_GRAVITY, tuple(measure())))
+    fitted = calibration_fit.fit(layout, tares, loads, base, options.power)
     for load, force in zip(loads, fitted.forces, strict=True):
         _say(f"  load {load.force:7.1f} N   measured {force:7.1f} N   off by {force - load.force:+6.1f} N")
     _say(f"  error {fitted.rms_error:.1f} N (rms)")
-    return _write(options.write, fitting.text(fitted, _now()))
+    return _write(options.write, calibration_fit.text(fitted, _now()))
 
 
 _Sole = tuple[Line[InsoleFrame], Layout, Foot | None]  # what is listened to, its cells, whose frames count

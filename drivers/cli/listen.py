@@ -17,7 +17,7 @@ SURE = 0.9  # a share of the bytes that needs no other baud rate tried
 
 @dataclass(frozen=True, slots=True)
 class BaudRateSample:
-    """What came at one baud rate."""
+    """Result of listening at one baud rate."""
 
     baudrate: int
     bytes: int

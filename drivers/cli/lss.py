@@ -131,7 +131,7 @@ def _misused(options: argparse.Namespace) -> str | None:
 
 
 class _Task:
-    """What one call works with."""
+    """Context of one call."""
 
     def __init__(
         self,

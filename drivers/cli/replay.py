@@ -27,7 +27,7 @@ DEFAULT_BAUDRATE = 115200
 
 
 class About(msgspec.Struct, frozen=True):
-    """What the bytes alone do not say; stands beside a capture, as CAPTURE.json."""
+    """Facts that the bytes lack; beside a capture, as CAPTURE.json."""
 
     baudrate: int
     seconds: float

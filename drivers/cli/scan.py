@@ -14,7 +14,7 @@ from drivers.bus.settings import CanSettings
 from drivers.cli.buses import named
 from drivers.cli.listen import best, listen
 from drivers.errors import Unavailable
-from drivers.scan.asking import NodeAnswers
+from drivers.scan.identification import NodeAnswers
 from drivers.scan.products import Library, files
 from drivers.scan.report import as_json, as_text
 from drivers.scan.scan import scan

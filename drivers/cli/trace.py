@@ -14,14 +14,14 @@ import msgspec
 from drivers.bus.frames import EXTENDED
 from drivers.bus.settings import CanSettings
 from drivers.cli.buses import named
-from drivers.cli.trace_known import TraceContext
+from drivers.cli.trace_context import TraceContext
 from drivers.cli.trace_load import Meters, show_load
 from drivers.trace.decoding import DecodedFrame, Decoder, FrameKind
 from drivers.trace.devices import Devices
 from drivers.trace.files import SUFFIXES, Captured, Put, is_file, writing
+from drivers.trace.filters import Filter, by_kind, by_node, by_object
 from drivers.trace.merged import merged
 from drivers.trace.sources import Batches, live, recorded, until
-from drivers.trace.wanted import Wanted, by_kind, by_node, by_object
 
 MORE = """\
 examples:
@@ -181,7 +181,7 @@ class TracePrinter:
     def __init__(
         self,
         known: TraceContext,
-        wanted: Sequence[Wanted],
+        wanted: Sequence[Filter],
         options: argparse.Namespace,
         *,
         with_interface: bool,
@@ -228,8 +228,8 @@ def _show_frames(source: Batches, sink: Put, shown: TracePrinter, options: argpa
             sys.stdout.flush()
 
 
-def _wanted(options: argparse.Namespace, known: TraceContext) -> list[Wanted]:
-    found: list[Wanted] = []
+def _wanted(options: argparse.Namespace, known: TraceContext) -> list[Filter]:
+    found: list[Filter] = []
     if options.node:
         found.append(by_node(options.node, known.all, known.on))
     if options.kind:

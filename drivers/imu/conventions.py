@@ -1,4 +1,4 @@
-"""How the makers of IMUs lay axes and angles."""
+"""Makers' conventions for IMU axes and angles."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from drivers.imu.settings import Axis
 
 @dataclass(frozen=True, slots=True)
 class Conventions:
-    """How a device lays its axes and angles.
+    """A device's conventions for axes and angles.
 
     `axes` are the sensor's axes along the trunk's x (forward), y (left) and z (up) when it is mounted as its
     maker means it; `angles` makes the orientation (sensor to the device's world) of its roll, pitch and yaw.

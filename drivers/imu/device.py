@@ -9,9 +9,9 @@ from drivers.imu.frame import ImuFrame, moments
 from drivers.imu.settings import ImuSettings
 from drivers.imu.trunk import TrunkImu
 from drivers.line import Line, Recognise, unrecognised
-from drivers.losses import Losses
 from drivers.reader_stalls import ReaderStalls
 from drivers.samples import ComponentState, Quality
+from drivers.sensor_losses import Losses
 
 
 class Imu(TrunkImu):

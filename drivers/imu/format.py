@@ -1,4 +1,4 @@
-"""What a file of an IMU's language defines as FORMAT: on a serial port, on a CAN bus, or a CANopen device."""
+"""The definition of an IMU's format, as FORMAT in a file: on a serial port, a CAN bus, or by CANopen."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

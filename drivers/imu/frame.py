@@ -1,4 +1,4 @@
-"""What any IMU format gives: one frame, in SI, in the sensor's own axes."""
+"""The common result of all IMU formats: one frame, in SI, in the sensor's own axes."""
 
 from collections.abc import Sequence
 
@@ -10,7 +10,7 @@ More = dict[str, float | int | str]
 
 
 class ImuFrame(msgspec.Struct, frozen=True):
-    """What one frame says; `None` for what it does not carry.
+    """Contents of one frame; `None` for missing ones.
 
     Axes and the order of the angles are the device's own: the format's `conventions` say what they are.
     """

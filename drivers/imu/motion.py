@@ -58,7 +58,7 @@ def tilt(up: Vector) -> tuple[float, float]:
 
 
 class Felt(NamedTuple):
-    """What one frame says of the trunk, in trunk axes."""
+    """The trunk's motion in one frame, in trunk axes."""
 
     indices: tuple[int, ...]  # of the channels that it gives
     values: tuple[float, ...]

@@ -1,4 +1,4 @@
-"""Whether an IMU can be believed: against gravity, against itself, against what a trunk can do."""
+"""Plausibility of an IMU: against gravity, its own channels, and the limits of a trunk."""
 
 import math
 from collections import deque

@@ -1,4 +1,4 @@
-"""What an integrator says about an IMU: the table `[imu.NAME]` of the robot's file, by its wiring."""
+"""Settings of an IMU: the table `[imu.NAME]` of the robot's file, by its wiring."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
@@ -22,18 +22,18 @@ USUAL = {"can_id": "witmotion-can", "node_id": "cia410", "port": "witmotion"}
 
 
 class MountedSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """How an IMU sits on the trunk, whatever it is wired to.
+    """Mounting of an IMU on the trunk, for every wiring.
 
-    `axes` says which sensor axis points along the trunk's x (forward), y (left) and z (up). `mounting` turns
-    what is left after that: roll, pitch, yaw (rad) of the sensor in the trunk.
+    `axes` are the sensor's axes along the trunk's x (forward), y (left) and z (up); `mounting` is the
+    remaining rotation: roll, pitch, yaw (rad) of the sensor in the trunk.
     """
 
-    axes: Axes | None = None  # None: as the format's device defines its own
-    mounting: tuple[Angle, Angle, Angle] = (0.0, 0.0, 0.0)
-    zero: str | None = None  # file of a zero taken by `gwrms calibrate imu`, beside the robot's file
-    stale_after_s: LongSeconds = 0.5
-    lost_after_s: LongSeconds = 2.0
-    format: str  # how it talks
+    axes: Axes | None = None  # sensor axes along forward, left and up; None: the device's own
+    mounting: tuple[Angle, Angle, Angle] = (0.0, 0.0, 0.0)  # remaining roll, pitch, yaw (rad)
+    zero: str | None = None  # file of `gwrms calibrate imu`, beside this one
+    stale_after_s: LongSeconds = 0.5  # silence after which its values are `null`
+    lost_after_s: LongSeconds = 2.0  # silence after which it is lost
+    format: str  # of its messages
 
     def __post_init__(self) -> None:
         if not any(self.format in wiring.formats for wiring in WIRINGS):
@@ -44,38 +44,42 @@ class ImuSettings(MountedSettings, frozen=True, forbid_unknown_fields=True, kw_o
     """One IMU on a serial port."""
 
     port: str  # a stable path: /dev/serial/by-id/…
-    baudrate: Annotated[int, msgspec.Meta(gt=0)] = 115200
-    format: str = USUAL["port"]
-    attitude: Attitude = "auto"  # auto: the device's, else from rates and acceleration
+    baudrate: Annotated[int, msgspec.Meta(gt=0)] = 115200  # of the serial line
+    format: str = USUAL["port"]  # of its messages; `gwrms sensor PORT` finds it
+    attitude: Attitude = (
+        "auto"  # source of the tilt; auto: the device, else a filter of rates and acceleration
+    )
 
 
 class CanImuSettings(MountedSettings, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """One IMU on a CAN bus that sends frames of its own."""
 
-    bus: str
-    can_id: CobId  # above 7FFh it is an extended one
-    format: str = USUAL["can_id"]
-    attitude: Attitude = "auto"
+    bus: str  # NAME of its `[can.NAME]` table
+    can_id: CobId  # of its frames; extended if above 7FFh
+    format: str = USUAL["can_id"]  # of its frames
+    attitude: Attitude = (
+        "auto"  # source of the tilt; auto: the device, else a filter of rates and acceleration
+    )
 
 
 class NodeImuSettings(MountedSettings, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """One IMU that is a CANopen device."""
 
-    bus: str
-    node_id: NodeId
-    format: str = USUAL["node_id"]
-    eds: str = "inclinometer.eds"  # the vendor's is better
-    sdo_timeout_s: Seconds = 0.5
-    heartbeat_timeout_s: Seconds | None = None  # None: 2.5 times what the device says in 1017h
+    bus: str  # NAME of its `[can.NAME]` table
+    node_id: NodeId  # its CANopen node id
+    format: str = USUAL["node_id"]  # of the device
+    eds: str = "inclinometer.eds"  # its EDS file; the vendor's own is better
+    sdo_timeout_s: Seconds = 0.5  # time-out of an SDO answer
+    heartbeat_timeout_s: Seconds | None = None  # None: 2.5 times the device's 1017h
 
     @property
     def times(self) -> NodeTimes:
-        """How long its node is waited for."""
+        """The time-outs of its node."""
         return NodeTimes(sdo_timeout_s=self.sdo_timeout_s, heartbeat_timeout_s=self.heartbeat_timeout_s)
 
 
 class Wiring(NamedTuple):
-    """What IMUs that are wired alike have in common."""
+    """The common part of IMUs with one kind of wiring."""
 
     formats: "Folder[Format] | Folder[CanFormat] | Folder[NodeFormat]"
     settings: type[MountedSettings]
@@ -86,14 +90,14 @@ WIRINGS = (SERIAL, Wiring(can.FORMATS, CanImuSettings), Wiring(canopen.FORMATS, 
 
 
 def wiring_of(format_name: str) -> Wiring:
-    """How devices of that language are wired; a serial one where nobody speaks it."""
+    """Return the wiring of a format; serial for an unknown one."""
     return next((wiring for wiring in WIRINGS if format_name in wiring.formats), SERIAL)
 
 
 def kind_of(table: Mapping[str, Any]) -> type[MountedSettings]:
-    """Which settings a table `[imu.NAME]` means: by its `format`, else by the key that only they have.
+    """Return the settings for a table `[imu.NAME]`: by its `format`, else by a key that only they have.
 
-    A format's own settings are looked up, which imports it, only where the table says more than its wiring.
+    A format's own settings are imported only if the table has more keys than its wiring.
     """
     name = table.get("format") or next(usual for key, usual in USUAL.items() if key in (*table, "port"))
     formats_there, settings = wiring_of(str(name))

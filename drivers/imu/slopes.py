@@ -1,4 +1,4 @@
-"""What a CiA 410 inclinometer says about itself, and how its slopes become the direction of up."""
+"""A CiA 410 inclinometer's slopes, and their conversion to the direction of up."""
 
 import math
 from dataclasses import dataclass
@@ -36,7 +36,7 @@ AXES = ("longitudinal", "lateral")
 
 @dataclass(frozen=True, slots=True)
 class MappedSlope:
-    """Where in a TPDO a slope is."""
+    """Place of a slope in a TPDO."""
 
     axis: int  # 0 longitudinal, 1 lateral
     place: MappedObject
@@ -48,7 +48,7 @@ class MappedSlope:
 
 @dataclass(frozen=True, slots=True)
 class SlopePlan:
-    """Where the slopes come from, and what an integrator should know about it."""
+    """Sources of the slopes, and notes for the integrator."""
 
     pair: SlopePair
     radians_per_count: float

@@ -1,4 +1,4 @@
-"""What every trunk IMU is to the gateway, whatever it is wired to: frames in, channels and quality out."""
+"""The common part of all trunk IMUs, however wired: frames in, channels and quality out."""
 
 from collections.abc import Mapping
 from pathlib import Path

@@ -16,7 +16,7 @@ STILL = math.radians(2.0)
 
 
 class NotUpright(DriverError):
-    """What was measured cannot be a zero."""
+    """The measurement cannot be a zero."""
 
 
 class Zero(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -1,4 +1,4 @@
-"""How an integrator describes an insole's stream: the tables `[csv]` and `[frame]` of a layout file."""
+"""Description of an insole's stream by an integrator: the tables `[csv]` and `[frame]` of a layout file."""
 
 from typing import Annotated, Literal
 

@@ -21,9 +21,9 @@ from drivers.insole.plausibility import FeetCheck, FootCheck, SwapCheck
 from drivers.insole.settings import InsoleSettings
 from drivers.latest import Latest
 from drivers.line import Line, Recognise, unrecognised
-from drivers.losses import Losses
 from drivers.reader_stalls import ReaderStalls
 from drivers.samples import Channel, ComponentState, Finding, Quality
+from drivers.sensor_losses import Losses
 
 USUAL_LAYOUT = "insole-16"
 CONTACT = {0: "in the air", 1: "on the ground"}

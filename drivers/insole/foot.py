@@ -1,4 +1,4 @@
-"""Which foot it is."""
+"""Left and right foot."""
 
 from typing import Literal
 

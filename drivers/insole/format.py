@@ -1,4 +1,4 @@
-"""What a file in `drivers/insole/formats` defines as FORMAT: an insole's language."""
+"""The definition of an insole's format, as FORMAT in a file of `drivers/insole/formats`."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What any insole format gives: the cells of one foot at one moment."""
+"""The common result of all insole formats: the cells of one foot at one moment."""
 
 import msgspec
 

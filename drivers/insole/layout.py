@@ -1,4 +1,4 @@
-"""Where an insole's cells are: named layouts that ship in `layouts/`, and the integrator's own files."""
+"""Layouts of insoles' cells: named ones that ship in `layouts/`, and the integrator's own files."""
 
 import math
 import tomllib

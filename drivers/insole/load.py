@@ -8,7 +8,7 @@ from drivers.insole.layout import Layout
 
 
 class Load(NamedTuple):
-    """What one foot carries."""
+    """Load of one foot."""
 
     force: float | None  # N; None where a cell is missing, since the sum would be too low
     cop_x: float | None  # m, foot frame; None below the force threshold
@@ -34,7 +34,7 @@ def load_of(pressures: Sequence[float | None], layout: Layout, force_threshold: 
 
 
 class Stance:
-    """Whether a foot is on the ground, and how much of both feet's load it carries."""
+    """Contact of a foot with the ground, and its share of both feet's load."""
 
     def __init__(self, force_threshold: float) -> None:
         self._threshold = force_threshold

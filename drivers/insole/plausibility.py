@@ -1,4 +1,4 @@
-"""Whether an insole can be believed: cells that are stuck or dead, a scale off by ten, feet that are swapped.
+"""Plausibility of an insole: stuck or dead cells, a scale off by ten, swapped feet.
 
 Everything is judged over steps, so that standing, sitting and a foot in the air say nothing.
 """

@@ -1,4 +1,4 @@
-"""What an integrator says about an insole: the table `[insole.NAME]` of the robot's file."""
+"""Settings of an insole: the table `[insole.NAME]` of the robot's file."""
 
 from typing import Annotated
 
@@ -14,14 +14,14 @@ class InsoleSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw
     """One foot. Two feet on one device: give both tables the same `port`."""
 
     port: str  # a stable path: /dev/serial/by-id/…
-    baudrate: Annotated[int, msgspec.Meta(gt=0)] = 230400
-    format: str = "insole-cobs"
-    layout: str | None = None  # a shipped one, or a .toml file beside the robot's file; None: the usual one
-    calibration: str | None = None  # a file of `gwrms calibrate insole`, beside the robot's file
-    foot: Foot | None = None  # None: by the component's name, left_… or right_…
-    force_threshold: Positive = 20.0  # N; below it the foot is in the air and has no centre of pressure
-    stale_after_s: LongSeconds = 0.5
-    lost_after_s: LongSeconds = 2.0
+    baudrate: Annotated[int, msgspec.Meta(gt=0)] = 230400  # of the serial line
+    format: str = "insole-cobs"  # of its stream; `gwrms sensor PORT` finds it
+    layout: str | None = None  # a shipped one, or a .toml file beside this one; None: the format's default
+    calibration: str | None = None  # file of `gwrms calibrate insole`, beside this one
+    foot: Foot | None = None  # None: from the component's name, left_… or right_…
+    force_threshold: Positive = 20.0  # N; below it the foot is in the air, without centre of pressure
+    stale_after_s: LongSeconds = 0.5  # silence after which its values are `null`
+    lost_after_s: LongSeconds = 2.0  # silence after which it is lost
 
     def __post_init__(self) -> None:
         if self.format not in FORMATS:

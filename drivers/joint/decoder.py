@@ -13,7 +13,7 @@ Values = tuple[float | None, ...]
 
 @dataclass(frozen=True, slots=True)
 class Decoder:
-    """What is made of one TPDO. `values` stand in the order of `channels`."""
+    """Decoder of one TPDO. `values` are in the order of `channels`."""
 
     channels: tuple[int, ...]
     size: int  # bytes that a frame has at least

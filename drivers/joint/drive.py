@@ -34,7 +34,7 @@ from drivers.joint.remap import free_tpdos, mappable, remap
 from drivers.joint.scaling import rated_torque
 from drivers.joint.settings import JointSettings
 from drivers.joint.stop_rpdo import find_stop_rpdo
-from drivers.joint.watching import JointWatch
+from drivers.joint.supervision import JointWatch
 from drivers.latest import Latest
 from drivers.samples import Channel, ComponentState, Finding, Quality
 from eds import Description

@@ -30,7 +30,7 @@ _INDEX = "the encoder's index"
 
 @dataclass(frozen=True, slots=True)
 class Method:
-    """What a homing method looks for, in words, and whether it moves."""
+    """A homing method in words, and whether it moves."""
 
     words: str
     moves: bool = True
@@ -88,7 +88,7 @@ def progress(statusword: int) -> HomingProgress:
 
 @dataclass(frozen=True, slots=True)
 class Setup:
-    """What is written before homing: the method, and speeds and acceleration in the drive's own units."""
+    """Settings before homing: the method, and speeds and acceleration in the drive's own units."""
 
     method: int
     switch_speed: int | None = None  # None: is left as it is
@@ -109,7 +109,7 @@ class Setup:
 
 @dataclass(frozen=True, slots=True)
 class AxisReading:
-    """What an axis said in one look."""
+    """One reading of an axis."""
 
     state: DriveState | None
     progress: HomingProgress

@@ -1,4 +1,4 @@
-"""Whether a joint bends as the same joint of the other leg does: judged in gait, where both go far."""
+"""Comparison of a joint with the same joint of the other leg, in gait, where both move far."""
 
 import math
 
@@ -62,7 +62,7 @@ class MirrorCheck(FindingState):
 
 
 class _Range:
-    """How far a joint went, and how much in all."""
+    """Range and total travel of a joint."""
 
     def __init__(self) -> None:
         self._low, self._high, self._path = math.inf, -math.inf, 0.0

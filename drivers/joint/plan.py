@@ -1,4 +1,4 @@
-"""Where each of a joint's values comes from: a TPDO, a poll by SDO, or nowhere."""
+"""The source of each of a joint's values: a TPDO, a poll by SDO, or none."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ class QuantitySource:
 
 @dataclass(frozen=True, slots=True)
 class ReadPlan:
-    """How a joint is read, and what an integrator should know about it."""
+    """Sources of a joint's values, and notes for the integrator."""
 
     decoders: tuple[tuple[Tpdo, Decoder], ...]
     polled_often: tuple[QuantitySource, ...]  # position and statusword that no TPDO brings

@@ -1,4 +1,4 @@
-"""Whether a joint can be believed: a frozen encoder, a jump, torque without motion, a sign that is wrong.
+"""Plausibility of a joint: a frozen encoder, a jump, torque without motion, a wrong sign.
 
 Judged is what is sampled anyway, some 20 times a second. Nothing that moves says nothing: a joint that stands
 in a standing wearer is never wrong.

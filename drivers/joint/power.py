@@ -1,4 +1,4 @@
-"""What may be asked of one axis's power drive system: stop, disable voltage, reset, and one step up.
+"""Commands to one axis's power drive system: stop, disable voltage, reset, and one step up.
 
 Whatever is on its way here ends when a stop is asked for: a way up is neither finished nor begun again.
 """

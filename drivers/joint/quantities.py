@@ -1,4 +1,4 @@
-"""What a joint can tell: CiA 402 objects, their units, and the channels made of them."""
+"""Quantities of a joint: CiA 402 objects, their units, and the channels made of them."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace

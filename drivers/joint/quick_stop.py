@@ -22,7 +22,7 @@ FIRST_PATIENCE_S = 0.05
 
 
 class StopOutcome(StrEnum):
-    """What is known about a drive after a stop was asked of it."""
+    """Knowledge about a drive after a stop."""
 
     CONFIRMED = "confirmed"  # its statusword says that it brakes, has stopped or is switched off
     UNCONFIRMED = "unconfirmed"  # it answers, but not that

@@ -1,4 +1,4 @@
-"""What a drive says about itself when it comes up: mapping, ratings, option codes."""
+"""Properties read from a drive when it comes up: mapping, ratings, option codes."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -26,7 +26,7 @@ _WAY_UP_STATES = (*WAY_UP, DriveState.OPERATION_ENABLED)
 
 @dataclass(frozen=True, slots=True)
 class Led:
-    """Where an axis was led: the state that its statusword said last, and why not further."""
+    """Result of leading an axis: its last state by the statusword, and the reason for not getting further."""
 
     state: DriveState | None
     problem: str | None = None
@@ -37,7 +37,7 @@ class Led:
 
 @dataclass(frozen=True, slots=True)
 class Errand:
-    """What a way up or down needs to know; `wanted` turns false when a stop has overtaken it."""
+    """Parameters of a way up or down; `wanted` turns false when a stop has overtaken it."""
 
     wanted: Callable[[], bool]
     timeout_s: float

@@ -16,7 +16,7 @@ BOOT_S = 10.0
 
 @dataclass(frozen=True, slots=True)
 class Device:
-    """Who it says that it is."""
+    """A device's own identity."""
 
     identity: Identity
     node_id: int  # now; 255: none

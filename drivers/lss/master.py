@@ -82,7 +82,7 @@ class Identity:
 
 
 class Bus(Protocol):
-    """What is needed of a `CanBus`."""
+    """The part of a `CanBus` that is needed."""
 
     name: str
 

@@ -12,13 +12,13 @@ from drivers.bus.settings import SDO_REQUEST, SDO_RESPONSE
 from drivers.bus.values import unsigned
 from drivers.errors import DeviceAbort, DriverError, NotPermitted
 from drivers.lss.master import Identity
-from drivers.scan.asking import TIMEOUT_S, sweep
+from drivers.scan.identification import TIMEOUT_S, sweep
 from drivers.scan.traffic import Traffic
 
 
 @dataclass(frozen=True, slots=True)
 class BusSurvey:
-    """What was heard on a bus in `seconds`."""
+    """Observations of a bus over `seconds`."""
 
     bus: str
     seconds: float

@@ -1,1 +1,1 @@
-"""What is on an unknown CAN bus: by listening, then, on request, by reading. Nothing is ever written."""
+"""Scan of an unknown CAN bus: by listening, then, on request, by reading. Nothing is ever written."""

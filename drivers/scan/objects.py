@@ -9,7 +9,7 @@ from drivers.bus.outlet import Requests
 from drivers.bus.sdo.channel import SdoChannel
 from drivers.bus.settings import SDO_REQUEST, SDO_RESPONSE, CanSettings
 from drivers.errors import DeviceAbort, DriverError, Unavailable
-from drivers.scan.asking import TIMEOUT_S
+from drivers.scan.identification import TIMEOUT_S
 from drivers.scan.scan import await_open
 
 LISTEN_S: Final = 1.0  # a gateway, or a controller, that reads by SDO does so more often

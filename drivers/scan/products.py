@@ -1,11 +1,11 @@
-"""Which EDS file is for a device that was found, and what of the file is not true of it."""
+"""The matching EDS file of a device that was found, and its deviations from the device."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import eds
-from drivers.scan.asking import NodeAnswers
+from drivers.scan.identification import NodeAnswers
 from eds import Description, EdsError
 from eds.report import pdo_rows
 from eds.shipped import SHIPPED, shipped

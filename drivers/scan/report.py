@@ -1,4 +1,4 @@
-"""What a scan has found, in words and as JSON."""
+"""Report of a scan, in words and as JSON."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict
@@ -7,7 +7,7 @@ from typing import Any
 from drivers.bus.emcy import parse_emcy
 from drivers.bus.settings import CanSettings
 from drivers.joint.cia402 import MODES
-from drivers.scan.asking import Axis, NodeAnswers
+from drivers.scan.identification import Axis, NodeAnswers
 from drivers.scan.products import Proposal
 from drivers.scan.scan import ScanResult
 from eds.profile import profile_of

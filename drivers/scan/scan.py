@@ -9,7 +9,7 @@ from drivers.bus.frames import STANDARD_IDS
 from drivers.bus.interfaces.controller_state import BusState
 from drivers.bus.settings import CanSettings
 from drivers.errors import DriverError, Unavailable
-from drivers.scan.asking import NodeAnswers, ask, sweep
+from drivers.scan.identification import NodeAnswers, ask, sweep
 from drivers.scan.traffic import Traffic
 
 OPEN_S = 5.0
@@ -18,7 +18,7 @@ NODES = range(1, 128)
 
 @dataclass(frozen=True, slots=True)
 class ScanResult:
-    """What a bus has told. `told` are the nodes that answered, or why one that did could not be read."""
+    """Result of a scan. `told` has each node's answers, or the reason why it could not be read."""
 
     seconds: float
     traffic: Traffic

@@ -1,4 +1,4 @@
-"""What a bus tells whoever listens: who lives on it, who commands, how often (CiA 301 §7.3.3)."""
+"""Passive observation of a bus: its nodes, masters and periods (CiA 301 §7.3.3)."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field

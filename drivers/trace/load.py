@@ -1,4 +1,4 @@
-"""What takes a bus's time: frames and share by node and kind, a second at a time.
+"""Bus load of a trace: frames and share by node and kind, a second at a time.
 
 Whose a frame is, and what it takes, is told as for the gateway's buses: `drivers.bus.traffic`, `health`.
 """
@@ -14,7 +14,7 @@ from drivers.trace.files import Captured
 
 @dataclass(frozen=True, slots=True)
 class Share:
-    """What one kind of one node takes; `percent` is `None` where the bit rate is not known."""
+    """Share of one kind of frame of one node; `percent` is `None` without a known bit rate."""
 
     kind: str
     node_id: int | None

@@ -1,4 +1,4 @@
-"""What is said on one SDO channel, heard from outside: expedited, segmented and in blocks (CiA 301 §7.2.4).
+"""SDO transfers, observed from outside: expedited, segmented and block (CiA 301 §7.2.4).
 
 A frame may be missing, and a conversation may have begun before we came: what does not fit is called what it
 is, and nothing is made up.

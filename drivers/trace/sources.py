@@ -1,4 +1,4 @@
-"""Where the frames of a trace come from: a bus that is listened to, or a recording."""
+"""Sources of a trace's frames: a live bus, or a recording."""
 
 import heapq
 import time

@@ -1,1 +1,1 @@
-"""Who may do what: keys, the clients that are known by theirs, roles, and how both are made known."""
+"""Access control: keys, known clients and their roles, and pairing."""

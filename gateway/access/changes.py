@@ -1,4 +1,4 @@
-"""What is changed in a robot's access folder: keys made, clients added and taken away."""
+"""Changes to a robot's access folder: make keys, add and remove clients."""
 
 import contextlib
 import os

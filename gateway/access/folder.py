@@ -1,4 +1,4 @@
-"""Where a robot's keys, its clients' certificates and their roles are: beside its file, as in /etc/gwrms.
+"""The folder of a robot's keys, its clients' certificates and their roles: beside its file, as in /etc/gwrms.
 
 keys/robot.key and keys/robot.crt are the robot's own, clients/NAME.crt those who are known, access.toml says
 what each may do. A key that was made for a first desk waits in keys.pairing/ until that desk is let in

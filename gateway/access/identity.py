@@ -1,4 +1,4 @@
-"""Who somebody is, and what they may do."""
+"""Identity of a client, and its permissions."""
 
 from typing import Final
 

@@ -1,4 +1,4 @@
-"""What each role may do: the one table that says so, from what the methods of the wire declare."""
+"""Permissions of each role: the one table, from the declarations of the wire's methods."""
 
 from collections.abc import Mapping
 from typing import Any, Final

@@ -1,4 +1,4 @@
-"""What people type after an option, checked as it is read."""
+"""Types of command-line options, which check values as they are parsed."""
 
 import argparse
 import math

@@ -11,7 +11,7 @@ from typing import Any, Final
 from gateway.amounts import counted
 from gateway.cli.text import say, say_json
 from gateway.tables.finding import Finding, Severity
-from gateway.tables.places import Places
+from gateway.tables.line_numbers import Places
 from gateway.tables.reading import Unreadable, as_far_as_readable, parse, read
 
 _DESCRIPTION = """\

@@ -1,4 +1,4 @@
-"""What `gwrms check` says of a robot's file: of its tables, of files beside it, and of this computer."""
+"""`gwrms check` of a robot's file: its tables, the files beside it, and this computer."""
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path

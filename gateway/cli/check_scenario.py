@@ -1,4 +1,4 @@
-"""What `gwrms check` says of a scenario: of its own tables, and of its `[guard]` as a gateway reads that.
+"""`gwrms check` of a scenario: its own tables, and its `[guard]` as a gateway reads it.
 
 The simulator knows nothing of gateways, and is looked for only here, where somebody has a scenario.
 """

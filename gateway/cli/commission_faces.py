@@ -3,8 +3,8 @@
 import time
 from collections.abc import Callable
 
+from gateway.cli.line_input import Typed
 from gateway.cli.text import say
-from gateway.cli.typed import Typed
 from gateway.commission.dialogue import Ask
 from gateway.commission.progress import CommissionStep
 from gateway.commission.writing import Written

@@ -44,7 +44,7 @@ class Answer(msgspec.Struct, frozen=True):
 
 
 class Lines:
-    """What comes in, read by a thread of its own, so that a stop is heard while something else is done."""
+    """Input lines, read by a thread of its own, so that a stop is noticed during other work."""
 
     def __init__(self, source: int) -> None:
         self.stop_asked = False

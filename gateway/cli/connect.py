@@ -1,4 +1,4 @@
-"""What every asking command shares: its arguments, and a robot to ask."""
+"""The common part of commands that query a robot: arguments and connection."""
 
 import argparse
 import fnmatch

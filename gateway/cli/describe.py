@@ -6,18 +6,20 @@ import time
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 
+import msgspec
+
 from gateway.amounts import NONE
 from gateway.cli import describe_buses
 from gateway.cli.connect import connect, parser
 from gateway.cli.text import budget, exact, say, say_json, table
 from gateway.client.blocking import Robot
+from gateway.client.held_controllers import HELD, held_channels, holding_channels
 from gateway.wire.bus import CLOSED
 from gateway.wire.component import ChannelInfo, ComponentInfo
 from gateway.wire.parameter import ParameterInfo
 from gateway.wire.robot import Description, GuardInfo, GuardRuleInfo, Hello
 from gateway.wire.stop import StopInfo
 
-HELD = "held"  # the word of a controller that waits to be started
 PAGE = 100  # columns
 LOAD_S, LOOK_S = 2.0, 0.2  # how long a bus that has just been opened is given, and how often it is looked
 
@@ -35,7 +37,8 @@ def main(argv: list[str]) -> int:
         names = holding_channels(description)
         values = robot.components(*names).values if names else {}
     if arguments.json:
-        say_json(description)
+        controllers = list(held_channels(description, values))
+        say_json(msgspec.to_builtins(description) | {"controllers_held": controllers})
     else:
         say("\n".join([*_you(hello), *held(description, values), *_chapters(description)]))
     return 0
@@ -59,22 +62,13 @@ def _you(hello: Hello | None) -> Iterator[str]:
         yield textwrap.fill(f"you are {hello.who}{not_for_you}", PAGE, subsequent_indent="  ") + "\n"
 
 
-def holding_channels(robot: Description) -> list[str]:
-    """Return the states of controllers, where one of them is `held`."""
-    controllers = (one for one in robot.channels if one.component in robot.stop.controllers)
-    return [one.name for one in controllers if one.enum and HELD in one.enum.values()]
-
-
 def held(robot: Description, values: Mapping[str, float | None]) -> Iterator[str]:
     """Tell of controllers whose own state is `held`: they move nothing until somebody starts them."""
-    words = {one.name: one.enum for one in robot.channels if one.enum}
-    for name in holding_channels(robot):
-        value = values.get(name)
-        if value is not None and words[name].get(f"{value:.0f}") == HELD:
-            yield (
-                f"{name} is {HELD}, as after a lost joint: it moves nothing until it is started again\n"
-                "(a simulated robot's: gwrms sim-fault --controller start)\n"
-            )
+    for name in held_channels(robot, values):
+        yield (
+            f"{name} is {HELD}, as after a lost joint: it moves nothing until it is started again\n"
+            "(a simulated robot's: gwrms sim-fault --controller start)\n"
+        )
 
 
 def _chapters(robot: Description) -> Iterator[str]:

@@ -14,9 +14,9 @@ from gateway.client import Address, ClientError, LinkSettings, Robot
 from gateway.config.reading import examine
 from gateway.config.robot import RobotConfig
 from gateway.doctor.file_edit import NotMended
+from gateway.doctor.fixing import Mender
 from gateway.doctor.gathering.computer import ROOT
 from gateway.doctor.gathering.gather import How, gather
-from gateway.doctor.mending import Mender
 from gateway.doctor.report import as_json, as_text, findings, status
 from gateway.doctor.table import RULES, judged
 from gateway.doctor.verdicts import Finding

@@ -3,8 +3,8 @@
 from msgspec import UNSET
 
 from gateway.cli.connect import check_names, connect, parameter_names, parser, widened
-from gateway.cli.shown import add_degrees, unit_of
 from gateway.cli.text import exact, say, say_json, table
+from gateway.cli.value_display import add_degrees, unit_of
 from gateway.units import Unit
 from gateway.wire.parameter import ParameterInfo, ParameterValue
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from gateway import config
 from gateway.access import changes
 from gateway.access.folder import AccessFolder
-from gateway.access.known import known_in
+from gateway.access.known_clients import known_in
 from gateway.access.pairing import Candidate, Pairing, PairingEnded
 from gateway.certificates import NAME, KeyProblem, grouped
 from gateway.cli import keys_push, qr_code

@@ -1,4 +1,4 @@
-"""How a command ends that may have put a joint under power: by a signal, or by a stop of every drive."""
+"""The end of a command that may have powered a joint: by a signal, or by a stop of every drive."""
 
 import signal
 from collections.abc import Iterator

@@ -34,7 +34,7 @@ NO_NODE: Final = "with --interface DEVICE is a node id, 1 to 127"
 
 
 class NotOne(ClientError):
-    """What is to be written is not one parameter."""
+    """The value to write is not a single parameter."""
 
 
 def main(argv: list[str]) -> int:

@@ -19,7 +19,7 @@ from gateway.certificates import KeyProblem
 from gateway.connections.listener_kind import UnsafeListener, is_loopback
 from gateway.connections.listeners import Listeners, default_socket, inherited, listen, listen_locally, rest
 from gateway.daemon import Daemon
-from gateway.process import notify
+from gateway.process import systemd_notify
 from gateway.process.memory import share_heap
 from gateway.process.resting import ENDING
 from gateway.tables.finding import Finding
@@ -92,7 +92,7 @@ def main(arguments: Sequence[str]) -> int:
         return _refuse(handed, error)
     share_heap()
     sockets = _listeners(robot, handed)
-    by_hand, watched = handed is None or handed.woken, notify.watchdog_s()
+    by_hand, watched = handed is None or handed.woken, systemd_notify.watchdog_s()
     idle = watched is None
     try:
         daemon = Daemon(
@@ -109,7 +109,7 @@ def main(arguments: Sequence[str]) -> int:
             raise
         return _refuse(handed, error)
     if watched is not None:
-        daemon.repeat(watched / 2, lambda: notify.tell("WATCHDOG=1"))
+        daemon.repeat(watched / 2, lambda: systemd_notify.tell("WATCHDOG=1"))
     gc.freeze()  # what was loaded so far lives as long as the process
     with daemon.end_on_signals():
         daemon.run(ready=lambda: _announce(daemon, anew=not sockets.woken))
@@ -194,7 +194,7 @@ def _refuse(handed: Listeners, error: Exception) -> int:
 
 
 def _announce(daemon: Daemon, *, anew: bool) -> None:
-    notify.tell("READY=1")
+    systemd_notify.tell("READY=1")
     if anew:
         host, port = daemon.address
         sys.stdout.write(f"listening on {f'[{host}]' if ':' in host else host}:{port}\n")

@@ -51,7 +51,7 @@ _CHANGE: Final = re.compile(r"([^=]+)(?:=([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d
 
 @dataclass(frozen=True, slots=True)
 class TypedValue:
-    """What was typed: a number as it stands, and its unit, where one was given; without it, what is held."""
+    """A typed value: a number and its unit, if one was given; without a number, the held value."""
 
     name: str
     number: str | None

@@ -1,4 +1,4 @@
-"""What `gwrms store` and `gwrms restore` share: the device that is named, and what it has done."""
+"""The common part of `gwrms store` and `gwrms restore`: the named device, and its result."""
 
 import argparse
 

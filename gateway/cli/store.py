@@ -24,7 +24,7 @@ examples:
 
 
 class StoreResult(Struct, frozen=True):
-    """What came of one device; `said` is its own words, or why not."""
+    """Result of one device; `said` is its own words, or the reason of a failure."""
 
     components: tuple[str, ...]
     outcome: StoreOutcome

@@ -54,7 +54,7 @@ class NotForUnits(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Service:
-    """What is to be run: the robot's file, for the whole computer as `user`, or for one user's session."""
+    """The service to install: the robot's file, for the whole computer as `user`, or one user's session."""
 
     config: RobotConfig
     name: str = "gwrms"

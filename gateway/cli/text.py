@@ -1,4 +1,4 @@
-"""What the commands print: aligned tables for people, one JSON line for machines."""
+"""Output of the commands: aligned tables for people, one JSON line for machines."""
 
 import difflib
 import sys

@@ -17,8 +17,8 @@ from gateway.cli.connect import (
     parser,
     widened,
 )
-from gateway.cli.shown import Channels, add_degrees, utc
 from gateway.cli.text import measured, say, say_json, warn
+from gateway.cli.value_display import Channels, add_degrees, utc
 from gateway.client import Batch, ClientError, Robot
 from gateway.plain_text import plain
 from gateway.wire.robot import Clock

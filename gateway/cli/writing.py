@@ -1,4 +1,4 @@
-"""What `gwrms set` and `gwrms params apply` share: a write, for good or on trial, and what came of it."""
+"""The common part of `gwrms set` and `gwrms params apply`: a write, permanent or on trial, and its result."""
 
 import argparse
 from collections.abc import Mapping

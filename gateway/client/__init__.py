@@ -1,4 +1,4 @@
-"""How servers and scripts reach a robot: `Client` for asyncio, `Robot` for blocking scripts.
+"""Clients of a robot's gateway: `Client` for asyncio, `Robot` for blocking scripts.
 
 connection (one TCP connection) → link (reconnection, clock, streams) → client (the methods) → blocking (a
 thread).

@@ -1,4 +1,4 @@
-"""Where a robot listens: HOST:PORT as people type it, or the path of its Unix socket."""
+"""Address of a gateway: HOST:PORT as typed, or the path of its Unix socket."""
 
 from dataclasses import dataclass, field
 

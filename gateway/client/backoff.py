@@ -1,4 +1,4 @@
-"""How long to wait before the next attempt: doubling, bounded, with jitter."""
+"""Pauses between attempts: doubling, bounded, with jitter."""
 
 import random
 from collections.abc import Callable

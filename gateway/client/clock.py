@@ -1,4 +1,4 @@
-"""How the robot's clocks relate to ours, from exchanges of `clock.read`."""
+"""Offset between the robot's clocks and ours, from exchanges of `clock.read`."""
 
 import collections
 from dataclasses import dataclass

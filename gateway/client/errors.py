@@ -1,4 +1,4 @@
-"""What a client can say when a robot does not do what it was asked.
+"""Errors of a client.
 
     ClientError
     ├── BadAddress         the text is not HOST:PORT (also a ValueError)

@@ -30,7 +30,7 @@ from gateway.wire.stream import (
 
 
 class ConnectionState(Enum):
-    """Where a link stands."""
+    """State of a link."""
 
     IDLE = "idle"  # not started
     CONNECTING = "connecting"
@@ -41,7 +41,7 @@ class ConnectionState(Enum):
 
 @dataclass(frozen=True, slots=True)
 class LinkSettings:
-    """How a link behaves: times in seconds."""
+    """Settings of a link: times in seconds."""
 
     client: str = "gwrms"  # the name that the robot's journal shows
     token: str | None = None

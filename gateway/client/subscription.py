@@ -36,7 +36,7 @@ class Batch:
 
 @dataclass(slots=True)
 class StreamCounters:
-    """What came and what did not, since the subscription began."""
+    """Counters of received and missing data since the subscription began."""
 
     notifications: int = 0
     rows: int = 0

@@ -8,7 +8,7 @@ from drivers.bus.values import unsigned
 from drivers.errors import DriverError
 from drivers.joint.cia402 import ENERGISED, DriveState, drive_state
 from drivers.joint.quantities import AXIS_OFFSET
-from drivers.scan.asking import NodeAnswers
+from drivers.scan.identification import NodeAnswers
 from gateway.commission.bench import Bench
 from gateway.commission.dialogue import Talk, press
 

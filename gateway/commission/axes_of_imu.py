@@ -1,4 +1,4 @@
-"""Which axes of an IMU point forward, left and up, from three postures of the trunk (REP-103)."""
+"""The axes of an IMU (forward, left and up), from three postures of the trunk (REP-103)."""
 
 import math
 from collections.abc import Sequence

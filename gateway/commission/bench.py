@@ -1,4 +1,4 @@
-"""What commissioning reaches: a CAN bus whose drives are asked by SDO, one at a time.
+"""Hardware access of commissioning: CAN buses whose drives are read by SDO, one at a time.
 
 They are commanded by a homing alone, for which one of them is put under power (`power.py`).
 """

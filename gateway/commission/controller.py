@@ -5,7 +5,7 @@ from collections.abc import Mapping
 
 import eds
 from drivers.bus.settings import address_of
-from drivers.scan.asking import NodeAnswers
+from drivers.scan.identification import NodeAnswers
 from drivers.scan.products import Library
 from eds.datatypes import DATA_TYPES
 from gateway.coding import NUMBERS

@@ -15,7 +15,7 @@ NO, YES = "n", "y"
 
 @dataclass(frozen=True, slots=True)
 class At:
-    """Which step begins: `gateway.commission.progress` knows them all. Nobody answers it."""
+    """Begin of a step, of those in `gateway.commission.progress`. It needs no answer."""
 
     part: str  # of the robot, or a joint
     step: str
@@ -30,7 +30,7 @@ class Say:
 
 @dataclass(frozen=True, slots=True)
 class DeviceReading:
-    """What a device tells while somebody makes up an answer; `value` is `None` where it tells nothing."""
+    """A device's value while a question waits; `value` is `None` without one."""
 
     name: str
     value: float | str | None
@@ -65,7 +65,7 @@ Talk = Generator[Say | Ask | Moving | At, str, T]
 
 
 class Face(Protocol):
-    """Where it is read and typed."""
+    """A face of the dialogue: shows messages and reads answers."""
 
     def say(self, text: str) -> None: ...
 

@@ -1,4 +1,4 @@
-"""What has been found out until now, and how: kept beside the file it becomes, after every finding."""
+"""The findings so far and their sources: kept beside the future file, and saved after every finding."""
 
 import fcntl
 import os

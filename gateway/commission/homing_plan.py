@@ -1,4 +1,4 @@
-"""What a homing rests on: what must be known before, how far and how fast it may go, and that in words."""
+"""Prerequisites and limits of a homing, also in words for the person at the robot."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -33,7 +33,7 @@ STILL_S = 5.0
 
 @dataclass(frozen=True, slots=True)
 class HomingBasis:
-    """What homing rests on. `ends` are how far it goes by hand (rad), None where nobody has shown it."""
+    """Prerequisites of homing. `ends` are its limits by hand (rad), None if nobody has shown them."""
 
     joint: str
     axis: Axis

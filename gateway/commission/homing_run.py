@@ -21,7 +21,7 @@ OLD_ZERO = (HomingProgress.UNDER_WAY, HomingProgress.NOT_STARTED)  # what a posi
 
 @dataclass(frozen=True, slots=True)
 class HomingLimits:
-    """What it may do, in counts of the zero before homing."""
+    """Limits of homing, in counts of the zero before."""
 
     setup: Setup
     low: int

@@ -13,7 +13,7 @@ from gateway.commission.bench import Bench
 from gateway.commission.dialogue import Say, Talk, choose, press, word
 from gateway.commission.dialogue import number as ask_number
 from gateway.commission.draft import Draft
-from gateway.commission.live import watched
+from gateway.commission.live_values import watched
 from gateway.commission.scale import HeldPose, Nominal, Scale
 
 USUAL = ("left_hip", "left_knee", "left_ankle", "right_hip", "right_knee", "right_ankle")

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import eds
 from drivers.errors import DriverError
-from drivers.scan.asking import NodeAnswers
+from drivers.scan.identification import NodeAnswers
 from drivers.scan.products import Library
 from drivers.scan.scan import ScanResult
 from eds import EdsError

@@ -33,7 +33,7 @@ OFF = LIMP_STATES  # what confirms that the axis has no power
 
 @dataclass(frozen=True, slots=True)
 class PoweredRunResult:
-    """What came of it. `off` is whether the drive has confirmed that it has no power."""
+    """Result of the run. `off` is whether the drive has confirmed that it has no power."""
 
     problem: str | None
     off: bool
@@ -54,7 +54,7 @@ class NotStopped(Exception):
 
 
 class RunEnded(Exception):
-    """Why it must not go on."""
+    """The run must end; with the reason."""
 
 
 class PoweredRun:

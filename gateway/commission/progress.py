@@ -1,4 +1,4 @@
-"""How far it is: every step, whether the draft has what it finds, and which one is gone through now."""
+"""Progress of commissioning: every step, its completion by the draft, and the present one."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ ROBOT, END = "robot", "sensors and file"  # parts that are no joint
 
 
 class StepState(StrEnum):
-    """Of a step."""
+    """State of a step."""
 
     DONE = "done"  # what it finds is in the draft
     NOW = "now"
@@ -79,7 +79,7 @@ class CommissionStep:
 
 
 class Progress:
-    """Of one dialogue: `at` is told of each step that begins."""
+    """Progress of one dialogue: `at` is called for each step that begins."""
 
     def __init__(self, draft: Draft) -> None:
         self._draft = draft

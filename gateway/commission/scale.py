@@ -19,7 +19,7 @@ class HeldPose:
 
 @dataclass(frozen=True, slots=True)
 class Nominal:
-    """What the drive says of its encoder (608Fh) and gear (6091h); `None` where it does not know."""
+    """The drive's own values of encoder (608Fh) and gear (6091h); `None` if unknown."""
 
     counts_per_revolution: float | None
     gear_ratio: float | None
@@ -27,7 +27,7 @@ class Nominal:
 
 @dataclass(frozen=True, slots=True)
 class Scale:
-    """How counts become the joint's angle; see `JointSettings`."""
+    """Conversion of counts to the joint's angle; see `JointSettings`."""
 
     counts_per_revolution: float
     gear_ratio: float

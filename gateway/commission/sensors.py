@@ -19,7 +19,7 @@ IMU = "imu.trunk"
 
 @dataclass(frozen=True, slots=True)
 class Sensor:
-    """What talks on a port: its format, how fast, whether it is an insole."""
+    """A sensor on a port: its format, its baud rate, whether it is an insole."""
 
     port: str
     baudrate: int

@@ -62,7 +62,7 @@ class SerialPorts:
 
 
 class _Swing:
-    """How far an insole's whole load goes up and down, in whatever it counts."""
+    """Range of an insole's whole load, in its own counts."""
 
     def __init__(self, sensor: Sensor) -> None:
         self.port = sensor.port

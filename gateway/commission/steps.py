@@ -5,7 +5,7 @@ What the draft has is not asked again: a dialogue that was interrupted goes on w
 
 from collections.abc import Sequence
 
-from drivers.scan.asking import NodeAnswers
+from drivers.scan.identification import NodeAnswers
 from drivers.scan.products import Library
 from gateway.commission import joints, nodes
 from gateway.commission.axes import Axis, axes_of

@@ -37,7 +37,7 @@ class _File(msgspec.Struct):
 
 @dataclass(frozen=True, slots=True)
 class Stopped:
-    """What came of it by drive; of none where none is known yet."""
+    """Result of a stop by drive; of no drives while none is known."""
 
     drives: Mapping[str, StopOutcome]
     problem: str = ""  # of the bus

@@ -23,7 +23,7 @@ NOT_FINISHED = "is not in it, because it was not finished: the same command goes
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """What became of the file."""
+    """Result of writing the file."""
 
     file: str
     text: str

@@ -1,4 +1,4 @@
-"""What cannot work in `[channel."component.name"]`, or likely is not what was meant."""
+"""Mistakes and unlikely values in `[channel."component.name"]`."""
 
 from collections.abc import Iterator
 

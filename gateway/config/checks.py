@@ -1,4 +1,4 @@
-"""What cannot work in a robot's file though each of its tables can be read, with table, key and what to do.
+"""Mistakes between the tables of a robot's file, each with table, key and remedy.
 
 Tables that could not be read are told already: what names them is not wrong for that (`RobotConfig.names`).
 """

@@ -36,7 +36,7 @@ TABLES: Mapping[str, str] = {
 
 @dataclass(frozen=True, slots=True)
 class WatchedBy:
-    """What a rule of this name watches, and what it needs for that."""
+    """A kind of rule: its condition, and the inputs that it needs."""
 
     trips: str  # when, in words; `code` stands for its keys
     rule: type[GuardRule]
@@ -136,9 +136,9 @@ WATCHES: Mapping[str, WatchedBy] = {
 
 
 class GuardSettings(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """`[guard]`. With `heartbeat_ms` the drives are armed to stop by themselves when the gateway dies."""
+    """`[guard]`: the heartbeat that arms the drives, and the rules."""
 
-    heartbeat_ms: Annotated[int, Meta(ge=10, le=20_000)] | None = None
+    heartbeat_ms: Annotated[int, Meta(ge=10, le=20_000)] | None = None  # arms drives to stop without it
     rule: dict[str, GuardRule] = {}
 
 

@@ -1,4 +1,4 @@
-"""What cannot work in `[guard]`, each in words with the table, the key and what to do."""
+"""Mistakes in `[guard]`, each in words with table, key and remedy."""
 
 import fnmatch
 from collections.abc import Iterator

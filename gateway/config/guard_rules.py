@@ -1,4 +1,4 @@
-"""What a rule of the guard may say: each kind with its keys, in SI units, and when it trips in words."""
+"""The guard's kinds of rules: their keys, in SI units, and their conditions in words."""
 
 from collections.abc import Mapping
 from enum import StrEnum
@@ -43,7 +43,7 @@ SIDED: Mapping[str, tuple[ComponentKind, str]] = {
 
 
 class Action(StrEnum):
-    """What a rule that trips leads to; in this order."""
+    """Consequences of a tripped rule; in this order."""
 
     QUICK_STOP = "quick_stop"  # on every drive, held until it is reset
     REVERT_TRIALS = "revert_trials"  # what was written on trial is taken back
@@ -52,20 +52,22 @@ class Action(StrEnum):
 
 
 class Blind(StrEnum):
-    """What a rule does that cannot see what it watches."""
+    """Reaction of a rule to a missing input."""
 
     ALARM = "alarm"
     ACT = "act"  # as if it had tripped
 
 
 class GuardRule(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What every rule has. `on` are globs of components; without them, all that have what is watched."""
+    """The common keys of all rules."""
 
-    watch: str
-    on: Annotated[tuple[str, ...], Meta(min_length=1)] | None = None
-    actions: Annotated[tuple[Action, ...], Meta(min_length=1)] = (Action.ALARM,)
-    blind: Blind = Blind.ALARM
-    clear_s: Positive = 1.0  # how long all must be well again before it is over
+    watch: str  # kind of the rule
+    on: Annotated[tuple[str, ...], Meta(min_length=1)] | None = (
+        None  # globs of components; None: all with the input
+    )
+    actions: Annotated[tuple[Action, ...], Meta(min_length=1)] = (Action.ALARM,)  # when it trips
+    blind: Blind = Blind.ALARM  # reaction to a missing input
+    clear_s: Positive = 1.0  # time without trouble until it is over
 
     def words(self, unit: str, /) -> str:
         """Return the condition on which it trips; `unit` is that of the watched quantity."""

@@ -1,4 +1,4 @@
-"""What can work in a robot's file and is likely not what was meant: warnings, each with what likely was."""
+"""Possible but unlikely values in a robot's file: warnings, each with the likely intention."""
 
 import fnmatch
 import math

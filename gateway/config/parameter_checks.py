@@ -1,4 +1,4 @@
-"""What cannot work in `[parameter."component.name"]`, and in what a joint or device releases."""
+"""Mistakes in `[parameter."component.name"]`, and in the `release` of a joint or device."""
 
 from collections.abc import Iterator
 

@@ -36,46 +36,40 @@ COMPONENT_TABLES = tuple(ComponentKind)  # each kind by its name
 class RobotSettings(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """`[robot]`."""
 
-    name: Annotated[str, Meta(min_length=1)]
+    name: Annotated[str, Meta(min_length=1)]  # the robot's name for clients and journals
 
 
 class GatewaySettings(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """`[gateway]`: where it listens (port 0 picks one) and how long modules stay after the last client.
+    """`[gateway]`: the gateway's address, its folders, and its limits."""
 
-    `records` is the folder of journal, held stop and pending reverts, relative to the robot's file.
-    `access` is the folder of keys, clients and roles, beside the robot's file unless named; `socket` a Unix
-    socket for people on the robot, "" for none.
-    `classic_port` serves the process list as the paper's daemon does, for comparison.
-    Beyond `max_cpu_percent` of a core, streams send fewer rows. For a client that is slow, `buffer_kb` of its
-    streams wait; one that takes nothing for `stuck_s` is dropped.
-    """
-
-    host: str = "127.0.0.1"
-    port: Annotated[int, Meta(ge=0, le=65535)] = 7420
-    role: Role = Role.OBSERVER
-    linger_s: Annotated[float, Meta(ge=0, le=86_400)] = 5.0
-    records: str | None = None
-    access: str = "."
-    socket: str | None = None  # None: in the folder that the service manager gives for it, if any
-    classic_port: Annotated[int, Meta(ge=0, le=65535)] | None = None
-    max_cpu_percent: Annotated[float, Meta(gt=0)] | None = None
-    buffer_kb: Annotated[int, Meta(ge=64, le=65_536)] = 1024
-    stuck_s: Annotated[float, Meta(gt=0, le=3600)] = 30.0
+    host: str = "127.0.0.1"  # address to listen on
+    port: Annotated[int, Meta(ge=0, le=65535)] = 7420  # 0 picks a free one
+    role: Role = Role.OBSERVER  # on the CAN buses
+    linger_s: Annotated[float, Meta(ge=0, le=86_400)] = 5.0  # how long modules run on after the last client
+    records: str | None = None  # folder of journal, held stop and pending reverts; relative to this file
+    access: str = "."  # folder of keys, clients and roles; relative to this file
+    socket: str | None = None  # Unix socket for local users, "": none; None: in systemd's folder, if any
+    classic_port: Annotated[int, Meta(ge=0, le=65535)] | None = None  # port of the paper's protocol
+    max_cpu_percent: Annotated[float, Meta(gt=0)] | None = (
+        None  # of a core; beyond it, streams send fewer rows
+    )
+    buffer_kb: Annotated[int, Meta(ge=64, le=65_536)] = 1024  # stream data kept for a slow client
+    stuck_s: Annotated[float, Meta(gt=0, le=3600)] = (
+        30.0  # a client that reads nothing for so long is dropped
+    )
 
 
 class ControlLoopSettings(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """`[control_loop]`: the robot's own control program, on this computer.
 
-    `processes` are names, or globs of them, as `ps` shows them, or of the programs that they run. Where `bus`
-    is given, it puts a frame with `can_id` there each `period_ms`; one that comes more than `late_ms` after
-    its time (half a period) is an overrun.
+    With `bus`, the gateway watches the loop's frame there; a frame that is too late is an overrun.
     """
 
-    processes: Annotated[tuple[str, ...], Meta(min_length=1)]
-    bus: str | None = None
-    can_id: Annotated[int, Meta(ge=0, le=0x1FFF_FFFF)] = 0x080
-    period_ms: Annotated[float, Meta(gt=0, le=10_000)] | None = None
-    late_ms: Annotated[float, Meta(gt=0)] | None = None
+    processes: Annotated[tuple[str, ...], Meta(min_length=1)]  # names as in `ps`, or programs; globs
+    bus: str | None = None  # bus of the loop's periodic frame
+    can_id: Annotated[int, Meta(ge=0, le=0x1FFF_FFFF)] = 0x080  # identifier of that frame
+    period_ms: Annotated[float, Meta(gt=0, le=10_000)] | None = None  # its period
+    late_ms: Annotated[float, Meta(gt=0)] | None = None  # delay of an overrun; None: half a period
 
     @property
     def tolerance_ms(self) -> float:
@@ -84,34 +78,33 @@ class ControlLoopSettings(Struct, frozen=True, forbid_unknown_fields=True, kw_on
 
 
 class JointTable(JointSettings, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """`[joint.NAME]`: a joint, and what its EDS offers as parameters."""
+    """`[joint.NAME]`: a joint, and the parameters of its EDS."""
 
-    parameters: Literal["eds"] | None = None  # every writable number of the EDS, to be read
-    release: tuple[str, ...] = ()  # names or globs of those that may be changed too
+    parameters: Literal["eds"] | None = None  # "eds": every writable number of the EDS, for reading
+    release: tuple[str, ...] = ()  # names or globs of those that may also be changed
 
 
 class DeviceTable(DeviceSettings, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """`[device.NAME]`: another device, and what its EDS offers as parameters."""
+    """`[device.NAME]`: another device, and the parameters of its EDS."""
 
-    parameters: Literal["eds"] | None = None
-    release: tuple[str, ...] = ()
+    parameters: Literal["eds"] | None = None  # "eds": every writable number of the EDS, for reading
+    release: tuple[str, ...] = ()  # names or globs of those that may also be changed
 
 
 class ParameterSettings(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """`[parameter."component.name"]`: one object of a CANopen device that may be changed, and how far.
+    """`[parameter."component.name"]`: an object of a CANopen device, and the limits of changing it.
 
-    value = device's number · scale, in `unit`. `max_step` limits one change. `live` allows changes while a
-    drive is enabled. `states` are the CiA 402 states that allow a change.
+    value = device's number · scale, in `unit`
     """
 
-    object: ObjectName
-    unit: str = ""
-    scale: float = 1.0
-    min: float | None = None
-    max: float | None = None
-    max_step: Annotated[float, Meta(gt=0)] | None = None
-    live: bool = False
-    states: tuple[str, ...] | None = None
+    object: ObjectName  # index and sub-index
+    unit: str = ""  # SI, or "" for a pure number
+    scale: float = 1.0  # unit per count of the device
+    min: float | None = None  # in `unit`
+    max: float | None = None  # in `unit`
+    max_step: Annotated[float, Meta(gt=0)] | None = None  # largest change in one write, in `unit`
+    live: bool = False  # allow changes while a drive is enabled
+    states: tuple[str, ...] | None = None  # CiA 402 states that allow a change; None: as `live` says
 
     @property
     def address(self) -> tuple[int, int]:

@@ -1,4 +1,4 @@
-"""Whether the SDO channels of the robot's file (`sdo_cob_ids`) can be taken for nothing else on their buses.
+"""Conflicts of the robot's SDO channels (`sdo_cob_ids`) with other identifiers on their buses.
 
 Else one node's answer would confirm what was asked of another one.
 """

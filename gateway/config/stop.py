@@ -1,4 +1,4 @@
-"""What an integrator says about the stop: `[stop]` of the robot's file."""
+"""Settings of the stop: `[stop]` of the robot's file."""
 
 from enum import StrEnum
 from typing import Annotated
@@ -9,7 +9,7 @@ from drivers.bus.settings import ObjectName, address_of
 
 
 class Fallback(StrEnum):
-    """What follows, in this order, on a drive that has not confirmed its quick stop in time."""
+    """Measures, in this order, for a drive that has not confirmed its quick stop in time."""
 
     DISABLE_VOLTAGE = "disable_voltage"
     NMT_STOP = "nmt_stop"
@@ -31,11 +31,11 @@ _WORDS = {
 
 
 class ControllerStop(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """`[[stop.controller]]`: an object of who commands the drives, and the value that stops it."""
+    """`[[stop.controller]]`: an object of the controller that commands the drives, and its stopping value."""
 
-    component: str
-    object: ObjectName
-    value: int
+    component: str  # NAME of its `[device.NAME]` table
+    object: ObjectName  # index and sub-index
+    value: int  # the value that stops it
 
     @property
     def address(self) -> tuple[int, int]:
@@ -44,8 +44,8 @@ class ControllerStop(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 
 
 class StopSettings(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """`[stop]`: a stop is answered within `timeout_s`, whatever drives and controllers do until then."""
+    """`[stop]`: the time-out of a stop's answer, and further measures."""
 
-    timeout_s: Annotated[float, Meta(gt=0, le=4)] = 2.5
-    fallback: tuple[Fallback, ...] = ()
+    timeout_s: Annotated[float, Meta(gt=0, le=4)] = 2.5  # time of the answer, whatever is confirmed by then
+    fallback: tuple[Fallback, ...] = ()  # measures for a drive without confirmation, in this order
     controller: tuple[ControllerStop, ...] = ()

@@ -1,4 +1,4 @@
-"""Who people on the robot are: their names and groups, looked up beside all else, and for a limited time.
+"""Names and groups of local users, looked up in the background, with a time limit.
 
 A directory of accounts on the network may hang, and nothing can interrupt who asks it. So nobody who reads
 clients asks; and who is let in by number alone comes in without an answer.

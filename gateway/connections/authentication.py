@@ -13,7 +13,7 @@ from gateway.wire import framing
 
 if TYPE_CHECKING:
     from gateway.access.identity import Peer
-    from gateway.access.known import Access, KnownClients
+    from gateway.access.known_clients import Access, KnownClients
     from gateway.connections.accounts import Accounts
     from gateway.connections.handshakes import Handshakes
 
@@ -97,7 +97,7 @@ class Authentication:
     @property
     def _access(self) -> "Access":
         if self._people is None:
-            from gateway.access.known import Access
+            from gateway.access.known_clients import Access
 
             self._people = Access(self._folder)
         return self._people

@@ -25,7 +25,7 @@ class Client(Protocol):
 
 
 class FairQueue(Generic[T]):
-    """What waits. It belongs to the loop's thread. What a client that has gone wanted is dropped."""
+    """Queue of waiting work. It belongs to the loop's thread. The work of a gone client is dropped."""
 
     def __init__(self) -> None:
         self._waiting: dict[str, dict[Client, deque[T]]] = {}  # by address

@@ -14,7 +14,7 @@ from collections.abc import Callable
 from typing import Final
 
 from gateway.access.identity import Identity
-from gateway.access.known import Access
+from gateway.access.known_clients import Access
 from gateway.certificates import KeyProblem, fingerprint
 from gateway.connections.tls import TlsStream, context_of
 from gateway.process.loop import READ, Loop, Timer

@@ -10,7 +10,7 @@ from concurrent.futures import Future
 
 from gateway.access.identity import Identity
 from gateway.connections.listener_kind import Stream
-from gateway.connections.pace import COSTLY_NS, FLOOD_S, Account, Pace
+from gateway.connections.rate_limit import COSTLY_NS, FLOOD_S, Account, RateLimit
 from gateway.connections.stop_lines import StopSplitter
 from gateway.process.loop import HANGUP, READ, Loop, Timer
 from gateway.wire import framing
@@ -40,7 +40,7 @@ _NOTHING_YET = b"\r\n\0"  # of these UTF-16 and UTF-32 have the last before the 
 
 
 class ReceivedBytes:
-    """What one read has brought, on its way to the loop."""
+    """Bytes of one read, on their way to the loop."""
 
     __slots__ = ("cpu_ns", "ended", "lines", "lost", "refusals", "stamp_ns", "stop", "stopped", "stops")
 
@@ -74,7 +74,7 @@ class IncomingBytes:
         stop_now: Callable[[], StopNow | None],
         spent: Callable[[], int],
         finished: "Callable[[IncomingBytes], None]",
-        pace: Pace,
+        pace: RateLimit,
     ) -> None:
         self.socket = connection
         self.peer = peer

@@ -15,7 +15,7 @@ from gateway.access.identity import Identity
 from gateway.connections.acceptor import Acceptor
 from gateway.connections.incoming_bytes import IncomingBytes, StopNow
 from gateway.connections.listener_kind import Stream
-from gateway.connections.pace import Pace
+from gateway.connections.rate_limit import RateLimit
 from gateway.process.loop import Loop
 
 Admit = Callable[[Stream, str, Identity], object]  # admits a client, with its address
@@ -45,7 +45,7 @@ class Intake:
         self._stop_now = stop_now
         self._inlets: set[IncomingBytes] = set()
         self._spent_ns = 0
-        self._pace = Pace(self._front)
+        self._pace = RateLimit(self._front)
         self._acceptors = [
             Acceptor(self._front, one, partial(self._came, came)) for one, came in listeners.items()
         ]

@@ -23,7 +23,7 @@ _SPARE = 64  # above every number that sockets are handed over with
 
 
 class HandoverError(Exception):
-    """What was handed over cannot be served."""
+    """The handed-over sockets cannot be served."""
 
 
 @dataclass(frozen=True, slots=True)

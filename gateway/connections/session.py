@@ -16,8 +16,8 @@ from typing import Concatenate, ParamSpec, Protocol
 import msgspec
 from msgspec import UNSET, UnsetType
 
+from gateway.connections.fair_share import FairShare
 from gateway.connections.incoming_bytes import FOREIGN, IncomingBytes, ReceivedBytes
-from gateway.connections.sharing import Sharing
 from gateway.connections.stop_lines import STOP
 from gateway.process.futures import outcome
 from gateway.process.loop import WRITE, Loop, Timer
@@ -80,7 +80,7 @@ class Session:
         inlet: IncomingBytes,
         handle: "Callable[[Session, framing.Request], Answer]",
         stuck_s: float,
-        sharing: Sharing,
+        sharing: FairShare,
         refusal: framing.RpcError | None = None,
     ) -> None:
         self.peer = inlet.peer

@@ -1,4 +1,4 @@
-"""Which lines ask for a stop: every line whose method can be read as `robot.stop`, whatever its form. Pure.
+"""Detection of stops: every line whose method can be read as `robot.stop`, whatever its form. Pure.
 
 Where a line is JSON, its method counts, and never what stands in the parameters of another. Where it is none
 (cut off, too long, not UTF-8), `"method": "robot.stop"` anywhere in it counts: rather a stop too many.

@@ -9,7 +9,7 @@ from typing import Final
 
 from drivers.realtime_priority import lent_realtime
 from gateway.access.folder import AccessFolder
-from gateway.access.known import KnownClients
+from gateway.access.known_clients import KnownClients
 from gateway.certificates import KeyProblem
 from gateway.private import forbid_core_dumps
 

@@ -20,7 +20,7 @@ from gateway.tables.finding import lines, mistakes
 
 
 class NotMended(Exception):
-    """What could not be done, and why."""
+    """A fix that failed, and the reason."""
 
 
 def change(path: Path, edits: Sequence[Edit]) -> None:

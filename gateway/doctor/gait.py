@@ -33,7 +33,7 @@ def other(side: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Match:
-    """How a joint's curve is like the normal one (−1 … 1): as it is, and half a stride later."""
+    """Similarity of a joint's curve with the normal one (−1 … 1): as it is, and half a stride later."""
 
     own: float
     half: float

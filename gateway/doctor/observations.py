@@ -103,6 +103,8 @@ class Observations:
     why_no_objects: str = "devices are asked only through a gateway, or with --active"
     bus_obstacles: Mapping[str, str] = field(default_factory=dict)  # bus → why it cannot be opened as it is
     units: Mapping[str, tuple[float, str]] = field(default_factory=dict)  # parameter's address → scale, unit
+    held: Mapping[str, str] = field(default_factory=dict)  # controller → its state, where that is held
+    stop_held: str | None = None  # why a stop is held, where one is and a gateway was asked
     other_file: str | None = None  # why the gateway judges by another file than this
 
     def heard_on(self, bus: str) -> Mapping[int, IdentifierFrames] | None:

@@ -85,8 +85,8 @@ RULES: tuple[DoctorRule, ...] = (
     ),
     DoctorRule(
         "component",
-        "a driver says that something else is wrong, or a bus has no interface",
-        "channels: quality; computer: CAN interfaces",
+        "a driver says that something else is wrong, a controller is held, or a bus has no interface",
+        "channels: quality, state; computer: CAN interfaces",
         components.component,
     ),
     DoctorRule(

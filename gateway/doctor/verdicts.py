@@ -1,4 +1,4 @@
-"""What the doctor says of one thing: it is wrong, with figures and what mends it, or it cannot be judged."""
+"""The doctor's verdicts: a finding with figures and remedies, or a lack of data."""
 
 import json
 from dataclasses import dataclass
@@ -81,7 +81,7 @@ class Run:
 
 @dataclass(frozen=True, slots=True)
 class Advice:
-    """What only hands can mend."""
+    """A remedy that only hands can carry out."""
 
     words: str
 
@@ -102,7 +102,7 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Unknown:
-    """What could not be judged, and why: it is never called well."""
+    """A lack of data, with the reason: it is never reported as healthy."""
 
     rule: str
     about: str

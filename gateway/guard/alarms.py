@@ -1,4 +1,4 @@
-"""What the guard has to say: in the journal, but never as a flood, and as channels of its own."""
+"""Alarms of the guard: in the journal, without floods, and as channels of its own."""
 
 import logging
 import time
@@ -20,7 +20,7 @@ STATE_WORDS = {int(state): state.words for state in RuleState}
 
 
 class Append(Protocol):
-    """How an entry gets into the journal."""
+    """Function that appends an entry to the journal."""
 
     def __call__(self, who: str, what: str, /, **details: Any) -> object: ...
 

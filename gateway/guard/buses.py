@@ -1,4 +1,4 @@
-"""What a rule can look at on a CAN bus: whether it is there at all, and whether SYNC comes in time."""
+"""Inputs of rules on a CAN bus: its presence, and the timing of SYNC."""
 
 import time
 

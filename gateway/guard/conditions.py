@@ -1,4 +1,4 @@
-"""What a rule compares: bands with hysteresis, and what is made of values: I²t, where they end, drift."""
+"""Conditions of rules: bands with hysteresis, and derived values: I²t, extrapolation, drift."""
 
 import math
 from collections.abc import Callable
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Band:
-    """Where a number may lie, its ends included; to be back in it, it must be `hysteresis` inside."""
+    """Allowed range of a number, ends included; to return, it must be `hysteresis` inside."""
 
     low: float
     high: float
@@ -45,7 +45,7 @@ class Heat:
 
 
 class StoppingPoint:
-    """Where a joint comes to rest (rad): it goes on for `reaction_s`, then brakes by `deceleration` (rad/s²).
+    """Stopping point of a joint (rad): it goes on for `reaction_s`, then brakes by `deceleration` (rad/s²).
 
     Its parts are its position (0) and its velocity (1).
     """
@@ -66,7 +66,7 @@ class StoppingPoint:
 
 
 class Drift:
-    """How far something has moved since `settle_s` after a stop that is held; 0 while none is.
+    """Movement since `settle_s` after a held stop; 0 without one.
 
     What has moved by more than `most` counts anew from there: its reason is over when it rests again.
     """

@@ -1,4 +1,4 @@
-"""What a rule can look at: a channel, a component's signs of life, its emergency messages, or nothing."""
+"""Inputs of rules: a channel, a component's signs of life, its emergency messages, or none."""
 
 import math
 import threading
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from drivers.bus.emcy import Emcy
 from gateway.config.guard_rules import EmcyRule, GuardRule
-from gateway.guard.judging import Joined, Judging
+from gateway.guard.thresholds import Joined, Judging
 from gateway.guard.watcher import GRACE_NS, RuleState, RuleTransition, Watcher
 
 Changed = Callable[[Watcher, RuleTransition], None]

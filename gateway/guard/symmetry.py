@@ -9,7 +9,7 @@ SLICES = 16  # of a window: it moves on by one of them at a time
 
 @dataclass(slots=True)
 class _Slice:
-    """What a part of the window has seen."""
+    """Statistics of a part of the window."""
 
     number: int
     low: float

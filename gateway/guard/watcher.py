@@ -31,7 +31,7 @@ class RuleState(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class RuleTransition:
-    """What has become of a watcher; `acts` where the rule's actions are due."""
+    """New state of a watcher; `acts` if the rule's actions are due."""
 
     state: RuleState
     stamp_ns: int

@@ -31,7 +31,7 @@ from gateway.guard.inputs import (
     SilenceWatcher,
     UnseenWatcher,
 )
-from gateway.guard.judging import Beside, judging
+from gateway.guard.thresholds import Beside, judging
 from gateway.guard.watcher import Watcher
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ UNASKED_NS = 5_000_000_000  # after so long without an answer, or the lack of on
 
 @dataclass(frozen=True, slots=True)
 class Wire:
-    """What every watcher of a rule is made with; `begins` are what its opening does, each returns its end."""
+    """Common arguments of a rule's watchers; `begins` are called on opening, each returns its end."""
 
     robot: "Robot"
     now_ns: int

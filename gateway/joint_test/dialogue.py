@@ -37,11 +37,11 @@ from gateway.commission.powered_run import NotStopped, PoweredRunResult
 from gateway.config.robot import JointTable, RobotConfig
 from gateway.joint_test import limits as limiting
 from gateway.joint_test import parameters, undo_file
+from gateway.joint_test.guard_watch import Guarding
 from gateway.joint_test.limits import AskedLimits, Drive, JointTestLimits, NotAllowed
 from gateway.joint_test.motion import Wish, planned
 from gateway.joint_test.recording import JointTestRecording
 from gateway.joint_test.run import NEEDED, POSITION_MODE, READ_S, TORQUE_MODE, JointTestPlan, TestRun
-from gateway.joint_test.watching import Guarding
 from gateway.records.records import Records
 
 LEAST_PERIOD_S, MOST_PERIOD_S = 0.005, 0.02
@@ -98,7 +98,7 @@ class Test:
 
 @dataclass(frozen=True, slots=True)
 class DriveFacts:
-    """What is known of the drive before it has power."""
+    """Facts about the drive before it has power."""
 
     angle: float
     period_s: float

@@ -1,4 +1,4 @@
-"""How far, how fast and how hard a joint may be moved: the narrowest of what file and drive allow."""
+"""Limits of a joint test (range, speed, torque): the narrowest of file and drive."""
 
 import fnmatch
 import math
@@ -21,7 +21,7 @@ class NotAllowed(Exception):
 
 @dataclass(frozen=True, slots=True)
 class JointTestLimits:
-    """What ends a test; angles are the joint's own (rad)."""
+    """Limits that end a test; angles are the joint's own (rad)."""
 
     low: float
     high: float
@@ -44,7 +44,7 @@ class AskedLimits:
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """What the drive says of itself; `None` where it does not."""
+    """The drive's own limits; `None` if unknown."""
 
     low: float | None  # 607Dh, as angles of the joint
     high: float | None

@@ -1,4 +1,4 @@
-"""How a joint is moved in each test: the target of each cycle, from the position in the one before.
+"""Motion of each joint test: the target of each cycle, from the position in the one before.
 
 Angles are rad of the joint, relative to where it stood; of a relay the targets are torques (N·m).
 """
@@ -22,7 +22,7 @@ MOST_SHARE = 0.25  # of the sample rate that a chirp may reach
 
 
 class JointTestKind(StrEnum):
-    """Which test."""
+    """Kind of test."""
 
     STEP = "step"
     CHIRP = "chirp"
@@ -37,7 +37,7 @@ class JointTestKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Wish:
-    """What is asked for. `amplitude` is in rad; of a relay it is how far the joint may swing."""
+    """The requested test. `amplitude` is in rad; of a relay it is the allowed swing."""
 
     kind: JointTestKind
     amplitude: float

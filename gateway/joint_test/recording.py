@@ -1,4 +1,4 @@
-"""What a test leaves: a file of JSON lines with its conditions, every sample as it came, and how it ended.
+"""Recording of a joint test: JSON lines with its conditions, every sample, and its end.
 
 The first line is an object, the following are arrays in the order of its `columns`, the last is an object
 with `ended`. Lines are there as soon as they are written, so that a program that is killed leaves what it

@@ -28,10 +28,10 @@ from drivers.samples import Sample
 from gateway.commission.power import Power
 from gateway.commission.powered_run import PoweredRun, RunEnded
 from gateway.joint_test import parameters
+from gateway.joint_test.guard_watch import Guarding
 from gateway.joint_test.limits import JointTestLimits
 from gateway.joint_test.motion import Wish, motion
 from gateway.joint_test.recording import Row
-from gateway.joint_test.watching import Guarding
 
 POSITION_MODE, TORQUE_MODE = 8, 10
 TARGET_POSITION, TARGET_TORQUE = (0x607A, 4), (0x6071, 2)
@@ -44,7 +44,7 @@ READ_S = 30.0  # for its parameters to be read
 
 @dataclass(frozen=True, slots=True)
 class JointTestPlan:
-    """What is to be done, within which limits, SYNC by SYNC."""
+    """Plan of a test: motion and limits, SYNC by SYNC."""
 
     wish: Wish
     limits: JointTestLimits
@@ -55,7 +55,7 @@ class JointTestPlan:
 
 @dataclass(frozen=True, slots=True)
 class DriveSample:
-    """What the drive told after one SYNC; `None` where its PDOs do not bring it."""
+    """The drive's values after one SYNC; `None` for those that its PDOs lack."""
 
     sync_ns: int
     stamp_ns: int

@@ -1,4 +1,4 @@
-"""What a file says of parameters beside what a robot holds, one verdict each."""
+"""Comparison of a file's parameters with a robot's, with one verdict each."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from enum import StrEnum
@@ -10,7 +10,7 @@ from gateway.wire.parameter import ParameterInfo, ParameterValue
 
 
 class ComparisonVerdict(StrEnum):
-    """What becomes of one parameter when the file is applied."""
+    """Effect of applying the file on one parameter."""
 
     SAME = "same"
     DIFFERENT = "different"  # and may be written

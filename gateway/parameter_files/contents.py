@@ -1,4 +1,4 @@
-"""What all files of parameters have in common: of which robot and device they are, and what they say."""
+"""The common contents of parameter files: their robot, device and values."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -34,7 +34,7 @@ class Scope:
 
 @dataclass(frozen=True, slots=True)
 class Saved:
-    """What a file says: values by the robot's names, and what a person should know before using it."""
+    """Contents of a file: values by the robot's names, and remarks for a person."""
 
     values: Mapping[str, Number]
     remarks: tuple[str, ...] = ()

@@ -1,4 +1,4 @@
-"""Which kind of file of parameters a file is: its name says so."""
+"""The format of a parameter file, by its name."""
 
 from pathlib import Path
 from typing import Final

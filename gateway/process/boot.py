@@ -1,4 +1,4 @@
-"""Which boot the monotonic clock counts from."""
+"""The boot from which the monotonic clock counts."""
 
 import functools
 import uuid

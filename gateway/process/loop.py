@@ -36,7 +36,7 @@ class Timer:
 
 
 class Poll:
-    """What `select.epoll` is, on systems that have none."""
+    """Interface of `select.epoll`, for systems without it."""
 
     def __init__(self) -> None:
         poll = select.poll()

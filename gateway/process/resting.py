@@ -1,4 +1,4 @@
-"""What a gateway is while nobody needs it: a bare interpreter that sleeps at its sockets until one comes.
+"""A gateway at rest: a bare interpreter that sleeps at its sockets until a client comes.
 
 Run as a script, without site-packages, with the gateway's own command line as arguments
 (`connections/listeners.py` does both ways). It imports next to nothing, so that it stays as small as Python

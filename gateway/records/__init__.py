@@ -1,1 +1,1 @@
-"""What must outlive the process: the journal, the held stop, and the writes that are to be taken back."""
+"""Durable records: the journal, the held stop, and writes to be reverted."""

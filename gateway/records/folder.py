@@ -1,4 +1,4 @@
-"""Where one robot's records lie, and that only one gateway keeps them."""
+"""The folder of one robot's records, locked for one gateway."""
 
 import fcntl
 import os

@@ -40,7 +40,7 @@ _CLOSED: Final = "the journal is closed, the gateway is ending"
 
 @dataclass(frozen=True, slots=True)
 class Sizes:
-    """How large the journal's files get, in bytes."""
+    """Maximum sizes of the journal's files, in bytes."""
 
     piece: int = 8 * 1024 * 1024  # one that has so many is closed
     kept: int = 256 * 1024 * 1024  # all closed ones together; the newest of them is kept in any case

@@ -1,4 +1,4 @@
-"""How much of the journal one client may fill: its flood must not push out what others did.
+"""Limits of one client's share of the journal: its flood must not push out others' entries.
 
 Each client has two accounts, of entries and of bytes: one for stops and resets, one for all else. Entries
 that go beyond are counted, and one entry sums them up (ADR 13).
@@ -34,7 +34,7 @@ _PORT: Final = re.compile(r":[0-9]+(\)?)$")
 
 
 class Share(Enum):
-    """How an entry counts."""
+    """Weight of an entry."""
 
     OUTCOME = "outcome"  # is written whatever there was before, and counts
     ACT = "act"  # has happened whether it is written or not: stops and resets
@@ -53,7 +53,7 @@ class TooMany(OSError):
 
 @dataclass(slots=True)
 class _Account:
-    """What one client may still write; refilled with time."""
+    """One client's remaining allowance; refilled with time."""
 
     stamp_ns: int
     entries: float = ENTRIES_AT_ONCE
@@ -79,7 +79,7 @@ class _Account:
 
 @dataclass(slots=True)
 class _LeftOut:
-    """What was not written of one client."""
+    """Entries of one client that were not written."""
 
     due_ns: int
     counts: dict[str, int] = field(default_factory=dict)

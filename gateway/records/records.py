@@ -13,7 +13,7 @@ log = logging.getLogger(__name__)
 
 
 class Records:
-    """What is kept beyond the process.
+    """Durable records of the process.
 
     Where the folder cannot be used, every entry fails and says why: what must be explained is then refused,
     and what must happen all the same, a stop above all, happens.

@@ -1,4 +1,4 @@
-"""What is to be taken back: every write, from before its first download until it is done or undone.
+"""Writes to be reverted: each from before its first download until it is done or undone.
 
 A gateway that crashes leaves here what it had begun and what was on trial; the next one takes it back.
 """

@@ -1,4 +1,4 @@
-"""What somebody else has kept of a journal: heads that the robot signed, and what they say of it now.
+"""Witnesses of a journal: heads that the robot signed and others keep, and their comparison with it.
 
 A chain that was rewritten whole holds in itself. Only who has seen another one can tell.
 """
@@ -21,7 +21,7 @@ from gateway.wire.control import SignedHead
 
 
 class WitnessVerdict(StrEnum):
-    """What is known of a journal."""
+    """Result of checking a journal."""
 
     INTACT = "intact"  # every entry is the one that a witness has seen
     BROKEN = "broken"
@@ -30,7 +30,7 @@ class WitnessVerdict(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """Of a journal; `at` is the first entry that is wrong, or of which that is not known."""
+    """Result for a journal; `at` is the first wrong or unproven entry."""
 
     verdict: WitnessVerdict
     text: str

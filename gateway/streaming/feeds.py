@@ -55,7 +55,7 @@ class Tap:
 
 
 class Feed:
-    """What every feed does: taps in, batches out, closed with its last subscriber.
+    """Common part of all feeds: taps in, batches out, closed with its last subscriber.
 
     Of what it is asked for, it gives one row of `shed`, as the gateway's budget allows.
     """

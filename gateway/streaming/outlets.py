@@ -1,4 +1,4 @@
-"""What a feed gives: encoded batches, and each subscriber's end of it.
+"""Output of a feed: encoded batches, and each subscriber's queue.
 
 An outlet numbers its notifications and, when its client is slow, drops the oldest rows and counts them.
 """
@@ -48,7 +48,7 @@ def encode_batch(
 
 
 class Rate(Protocol):
-    """What a feed gives: of the rows that are asked for, one of `shed`."""
+    """Rate of a feed: of the requested rows, one of `shed`."""
 
     rate_hz: float
     channels: int

@@ -1,4 +1,4 @@
-"""What streams and snapshots read: sources of samples, and the channels of them that somebody wants."""
+"""Sources of streams and snapshots: components' samples, and the selected channels."""
 
 import fnmatch
 import re
@@ -46,7 +46,7 @@ class Selection:
 
 
 class Wanted:
-    """What names and globs mean, in time that does not grow with how many names there are.
+    """Set of names and globs, with lookups whose time does not grow with their number.
 
     Raises:
         RpcError: bad_params, where there are more of them than anybody needs.

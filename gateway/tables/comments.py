@@ -1,4 +1,4 @@
-"""What the comment behind a struct's field says: the meaning of the key, for people who write it."""
+"""The comments behind a struct's fields: the meaning of each key, for people who write it."""
 
 import ast
 import inspect

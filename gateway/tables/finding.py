@@ -1,4 +1,4 @@
-"""What is wrong with a file, or likely is: which table and key, what is allowed, what was likely meant."""
+"""Mistakes and unlikely values in a file: table and key, the allowed and the likely intended value."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from typing import Any
 
 
 class Severity(StrEnum):
-    """How bad it is."""
+    """Severity of a finding."""
 
     MISTAKE = "mistake"  # the file is refused
     WARNING = "warning"  # it can be used, and is likely not what was meant, or something is not there yet

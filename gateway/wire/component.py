@@ -10,7 +10,7 @@ QualityInfo = dict[str, str | int | float | None]  # state, age_ms, problem, and
 
 
 class LayoutInfo(Struct, frozen=True):
-    """Where an insole's cells are as it is worn: [x, y, area] of `cell_0`, `cell_1` …, in m and m².
+    """Positions of an insole's cells as worn: [x, y, area] of `cell_0`, `cell_1` …, in m and m².
 
     x is forward from the rear edge of the heel, y to the left from the foot's centre line.
     """
@@ -29,7 +29,7 @@ class EmcyInfo(Struct, frozen=True):
 
 
 class AngleInfo(Struct, frozen=True):
-    """How a joint's counts become its angle (rad): `rad_per_count` · counts + `zero_offset`.
+    """Conversion of a joint's counts to its angle (rad): `rad_per_count` · counts + `zero_offset`.
 
     `rad_per_count` is negative where counts fall when the joint bends.
     """

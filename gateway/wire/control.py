@@ -63,7 +63,7 @@ class JournalProof(Struct, frozen=True):
 
 
 class RecordsInfo(Struct, frozen=True):
-    """Where the journal is kept, and why it cannot be written."""
+    """Folder of the journal, and the reason if it cannot be written."""
 
     folder: str
     problem: str | None = None

@@ -1,4 +1,4 @@
-"""What monitoring costs the robot."""
+"""Messages on the cost of monitoring."""
 
 from msgspec import Struct
 
@@ -7,7 +7,7 @@ from gateway.wire.role import Role
 
 
 class BudgetInfo(Struct, frozen=True):
-    """What the gateway may use of a core; beyond it, its streams send one row of `shed`."""
+    """The gateway's CPU budget, of a core; beyond it, its streams send one row of `shed`."""
 
     max_cpu_percent: float
     shed: int
@@ -25,7 +25,7 @@ class StreamCost(Struct, frozen=True):
 
 
 class ClientCost(Struct, frozen=True):
-    """What one client causes; `cpu_percent` is of one core, and of what clients share it has its part."""
+    """Cost of one client; `cpu_percent` is of one core, with its part of the shared cost."""
 
     who: str
     cpu_percent: float | None
@@ -37,7 +37,7 @@ class ClientCost(Struct, frozen=True):
 
 
 class BusCost(Struct, frozen=True):
-    """What the gateway does on one bus; each SDO request that it sends is answered by a frame as long.
+    """The gateway's load on one bus; the answer to each SDO request is a frame of the same length.
 
     `load_percent` is what its frames and their answers take of the bus, without stuff bits; `None` where the
     bitrate is not known. What it only receives is there without it.

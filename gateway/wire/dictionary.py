@@ -60,7 +60,7 @@ class ObjectReadParams(Params, frozen=True):
 
 
 class ObjectValue(Struct, frozen=True):
-    """What a device holds: a number in its own counts, a text, or bytes in hexadecimal.
+    """A device's value: a number in its own counts, a text, or bytes in hexadecimal.
 
     `words` is the same for people; `problem` says why nothing is known.
     """

@@ -1,4 +1,4 @@
-"""What is not as it should be: since when, and what to check."""
+"""Messages on findings: since when, and what to check."""
 
 from msgspec import Struct
 

@@ -28,7 +28,7 @@ INTERNAL_ERROR: Final = -32603
 
 
 class ErrorKind(StrEnum):
-    """What an error means, for programs; the message is for people."""
+    """Kind of an error, for programs; the message is for people."""
 
     BAD_PARAMS = "bad_params"
     UNKNOWN_NAME = "unknown_name"

@@ -1,4 +1,4 @@
-"""What a client can make grow, and how far: of one connection, of one address, and of all together.
+"""Limits on everything that a client can make grow: by connection, by address, and in total.
 
 The same numbers stand in docs/reference/limits.md. What is asked for beyond one of them is answered by an
 error that names it; a stop is subject to none of them.

@@ -1,4 +1,4 @@
-"""What a search for objects of a device means: the same on the robot and at the desk."""
+"""Search for objects of a device: the same on the robot and at the desk."""
 
 import re
 from collections.abc import Callable

@@ -29,7 +29,7 @@ SCHEME: Final = "gwrms://"
 
 
 class Offer(Struct, frozen=True, forbid_unknown_fields=True):
-    """What the desk says: its certificate (PEM), the name that it would like, and its proof."""
+    """The desk's message: its certificate (PEM), its proposed name, and its proof."""
 
     certificate: str
     name: str
@@ -37,7 +37,7 @@ class Offer(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Reply(Struct, frozen=True):
-    """What the robot says; `problem` where nothing came of it."""
+    """The robot's answer; `problem` if pairing failed."""
 
     proof: str = ""
     robot: str = ""

@@ -51,7 +51,7 @@ class ProcessUse(Struct, frozen=True, gc=False):  # there are many of them
 
 
 class GatewayUse(Struct, frozen=True):
-    """What the gateway itself costs; `cpu_percent` is of one core."""
+    """The gateway's own use; `cpu_percent` is of one core."""
 
     cpu_percent: float | None
     rss_bytes: int
@@ -72,7 +72,7 @@ class NetworkUse(Struct, frozen=True):
 
 
 class Throttling(Struct, frozen=True):
-    """How far the cores are held back, as far as the system tells."""
+    """Throttling of the cores, as far as the system reports it."""
 
     events: int | None  # times that a core was too hot since boot, summed over the cores
     cooling: dict[str, float]  # cooling device of the processor → share of the most that it can hold back

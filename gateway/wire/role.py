@@ -1,10 +1,10 @@
-"""Who a client is on a robot: three roles, each of which may do what those before it may."""
+"""Roles of clients on a robot: three, each with all permissions of those before it."""
 
 from enum import StrEnum
 
 
 class Role(StrEnum):
-    """Of a person or program; a stop is for all of them."""
+    """Role of a person or program; every role may stop."""
 
     VIEWER = "viewer"  # looks, and stops
     OPERATOR = "operator"  # takes the lease, writes, tries

@@ -53,7 +53,7 @@ class Enabled(Struct, frozen=True):
 
 
 class DriveReaction(Struct, frozen=True):
-    """What one drive does by itself: option codes as the drive holds them, `None` where they are unknown."""
+    """One drive's own reactions: option codes as the drive holds them, `None` if they are unknown."""
 
     quick_stop_option: int | None = None  # 605Ah
     abort_connection_option: int | None = None  # 6007h
@@ -63,7 +63,7 @@ class DriveReaction(Struct, frozen=True):
 
 
 class StopInfo(Struct, frozen=True):
-    """How a stop acts on this robot, and whether one is held now."""
+    """Settings of the stop on this robot, and whether one is held now."""
 
     held: bool
     reason: str | None

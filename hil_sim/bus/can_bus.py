@@ -55,7 +55,7 @@ ErrorListener = Callable[[int], None]  # the class of the error
 
 
 class Disturbance:
-    """What a fault does to the frames of a bus; this one lets them all pass."""
+    """Effect of a fault on the frames of a bus; this one lets them all pass."""
 
     def leaves(self, frame: Frame, sender: object, /) -> bool:  # noqa: ARG002 - the shape of a disturbance
         """Return whether a frame that is sent queues for the bus; `CanBus.queue` goes past everybody."""

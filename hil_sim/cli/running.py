@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable
 from types import FrameType
 
-from hil_sim.pace import Pace
+from hil_sim.real_time import RealTimeCheck
 from hil_sim.simulation_host import SimulationHost
 
 
@@ -28,7 +28,7 @@ def run(robot: SimulationHost, seconds: float | None, prepare: Callable[[], None
     try:
         robot.open()
         prepare()
-        Pace(robot.loop, say)
+        RealTimeCheck(robot.loop, say)
         if not robot.config_is_ours:
             say(f"kept {robot.config} as it is; delete it to have it written anew")
         sys.stdout.write(json.dumps({"ready": True, "config": str(robot.config)}) + "\n")

@@ -1,4 +1,4 @@
-"""What the controller sees of its drives in their PDOs, and the controlword that each is to get next."""
+"""The controller's view of its drives by their PDOs, and the next controlword of each."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -22,7 +22,7 @@ STOPPED_BY_COMMAND = 255  # in HOLDER
 
 
 class ControllerState(IntEnum):
-    """What object 2010h shows."""
+    """States in object 2010h."""
 
     IDLE = 0  # not booted
     STARTING = 1  # waits for the statusword of every drive

@@ -8,7 +8,7 @@ STEP_S = 0.001
 
 @dataclass(frozen=True, slots=True)
 class JointConstants:
-    """What the joint is made of, all seen at the joint. Modelled, in the range of published exoskeletons."""
+    """Mechanical constants, all seen at the joint. Modelled, in the range of published exoskeletons."""
 
     inertia: float = 0.4  # kg·m², of the limb; the rotor's comes to it through the gear
     viscous_friction: float = 8.0  # N·m·s/rad

@@ -7,7 +7,7 @@ from typing import Protocol
 
 @dataclass(slots=True)
 class Reference:
-    """What is demanded now; `torque` comes on top of what the control makes of the others."""
+    """Present demand; `torque` is added to the control's output for the others."""
 
     position: float = 0.0
     velocity: float = 0.0

@@ -12,7 +12,7 @@ from hil_sim.node.dictionary import Key
 
 
 class Ramp(Enum):
-    """How to come to rest."""
+    """Ramp to standstill."""
 
     OFF = "the current goes at once"
     SLOW_DOWN = "profile deceleration"

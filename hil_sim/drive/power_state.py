@@ -19,7 +19,7 @@ class PowerState(Enum):
 
 
 class Command(StrEnum):
-    """What moves the machine: the commands of the controlword, then what the drive itself sees."""
+    """Commands of the power state machine: those of the controlword, then the drive's own."""
 
     SHUTDOWN = "shutdown"
     SWITCH_ON = "switch on"  # the same bits mean "disable operation" in OPERATION ENABLED

@@ -15,7 +15,7 @@ _STANDSTILL = 0.02  # rad/s
 
 @dataclass(slots=True)
 class Offsets:
-    """What a cyclic master adds on top (60B1h, 60B2h)."""
+    """Additive terms of a cyclic master (60B1h, 60B2h)."""
 
     velocity: float = 0.0
     torque: float = 0.0

@@ -15,7 +15,7 @@ _NOT_WATCHED = (0, 0xFFFF_FFFF)  # 6065h and 6067h; 0 is what vendors' files say
 
 
 class Control(Enum):
-    """Which loop is closed."""
+    """The closed loop."""
 
     POSITION = "position"
     VELOCITY = "velocity"
@@ -42,7 +42,7 @@ class Gains:
 
 @dataclass(frozen=True, slots=True)
 class Window:
-    """How near is near enough, and for how long."""
+    """Size and time of a window."""
 
     size: float
     time_s: float
@@ -50,7 +50,7 @@ class Window:
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """What the objects say; the comments name them."""
+    """Settings in the drive's objects, which the comments name."""
 
     counts_per_radian: float  # 608Fh, 6091h
     gear: float

@@ -1,4 +1,4 @@
-"""What a drive watches in itself: supply, current, heat and following error, with the codes of 603Fh.
+"""Self-supervision of a drive: supply, current, heat and following error, with the codes of 603Fh.
 
 Error codes of CiA 402-2 table 17 and CiA 301 table 26.
 """
@@ -49,7 +49,7 @@ def warning(servo: Servo, supply_v: float) -> bool:
 
 
 class FollowingErrorWatch:
-    """How long the joint has been further from its reference than 6065h allows."""
+    """Timer of a following error beyond 6065h."""
 
     def __init__(self) -> None:
         self.late_s = 0.0

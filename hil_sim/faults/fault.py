@@ -1,4 +1,4 @@
-"""What a fault is: where it can act, with which parameters, and what it looks like from outside."""
+"""Definition of a fault: its possible targets, its parameters, and its symptoms."""
 
 import math
 import os
@@ -23,7 +23,7 @@ class FaultRefused(SimulatorError):
 
 
 class FaultTarget(Enum):
-    """What a fault acts on: the devices that it may be asked for."""
+    """Target of a fault: the devices on which it is possible."""
 
     DRIVE = tuple(JOINTS)
     NODE = (*JOINTS, CONTROLLER)
@@ -37,7 +37,7 @@ class FaultTarget(Enum):
 
 
 class Form(Enum):
-    """How a parameter is written."""
+    """Form of a parameter's value."""
 
     REAL = "g"
     WHOLE = ".0f"
@@ -107,7 +107,7 @@ Parameter = Number | FolderName
 
 @dataclass(frozen=True, slots=True)
 class Site:
-    """Where one fault acts, with which values, and the randomness that is its own."""
+    """Context of one fault: device, values, and its own random numbers."""
 
     robot: Exoskeleton
     device: str

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from hil_sim.faults import bus, drives, growing, host, nodes, sdo, sensors, wearer
+from hil_sim.faults import bus, drives, host, nodes, progressive, sdo, sensors, wearer
 from hil_sim.faults.fault import Fault
 
 FAULTS: Mapping[str, Fault] = {
@@ -11,7 +11,7 @@ FAULTS: Mapping[str, Fault] = {
     **bus.FAULTS,
     **drives.FAULTS,
     **sensors.FAULTS,
-    **growing.FAULTS,
+    **progressive.FAULTS,
     **wearer.FAULTS,
     **host.FAULTS,
 }

@@ -11,7 +11,7 @@ _BLOCK_SUBCOMMAND = 1
 
 
 class _Answers(Disturbance):
-    """What happens to the answers of one node's SDO servers; this one swallows them."""
+    """Fault of the answers of one node's SDO servers; this one swallows them."""
 
     def __init__(self, site: Site) -> None:
         self._site = site

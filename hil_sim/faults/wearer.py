@@ -1,4 +1,4 @@
-"""What goes wrong with who wears the machine: nothing is broken, and yet it does not walk as it should."""
+"""Faults of the wearer: nothing is broken, but the gait is not as it should be."""
 
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager

@@ -1,1 +1,1 @@
-"""How the wearer moves: joint angles, load on the feet, trunk."""
+"""Motion of the wearer: joint angles, load on the feet, trunk."""

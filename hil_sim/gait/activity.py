@@ -1,10 +1,10 @@
-"""What a wearer can be told to do, and what a wearer is seen to do."""
+"""Activities that a wearer can be told to do, and labels of those actually done."""
 
 from enum import IntEnum, StrEnum
 
 
 class Activity(IntEnum):
-    """What the wearer is to do (object 2005h of the gait controller)."""
+    """Activity that the wearer is told to do (object 2005h of the gait controller)."""
 
     STAND = 0
     WALK = 1
@@ -20,7 +20,7 @@ class Activity(IntEnum):
 
 
 class Label(StrEnum):
-    """What the wearer does at a moment, as ground truth names it."""
+    """Activity that the wearer does at a moment, as named in the ground truth."""
 
     STAND = "stand"
     WALK = "walk"

@@ -7,10 +7,10 @@ from hil_sim.gait import posture
 from hil_sim.gait.activity import Activity, Label
 from hil_sim.gait.curves import Leg
 from hil_sim.gait.gaits import GAITS, LEFT, RIGHT
-from hil_sim.gait.mishaps import TRIP_PHASE, Fall, FallState, Stumble, side_of_fall
 from hil_sim.gait.posture import LYING, SITTING, STANDING
 from hil_sim.gait.profiles import Ramp, mix
 from hil_sim.gait.rhythm import Lag, Rhythm
+from hil_sim.gait.stumble_and_fall import TRIP_PHASE, Fall, FallState, Stumble, side_of_fall
 from hil_sim.gait.subject import NOMINAL, WearerSettings
 from hil_sim.gait.walk import Shape, lifted, stance_share, swing
 

@@ -1,4 +1,4 @@
-"""What the ground gives one foot over its stance: vertical force, shear, way of the centre of pressure.
+"""Ground reaction of one foot over its stance: vertical force, shear, path of the centre of pressure.
 
 Modelled, not measured: two humps with a valley between, which grow with speed, a quick first part where the
 heel strikes, and rockers that roll from heel to toe. The humps' ratios and times follow the measured curves

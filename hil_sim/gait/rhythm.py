@@ -15,7 +15,7 @@ FIRST_PHASE = 0.85  # the left leg begins with the end of a swing
 
 
 class Deviations(NamedTuple):
-    """What this stride is multiplied with."""
+    """Factors of this stride."""
 
     cycle: float = 1.0
     left_step: float = 1.0

@@ -1,4 +1,4 @@
-"""Who wears the machine: body, habits and impairment, for one nominal person and as many others as wanted.
+"""The wearer's body, habits and impairment: one nominal person, and any number of others.
 
 The spread between subjects is modelled: body mass and leg length as in adults, habits of a few degrees (the
 standard deviations between subjects in Schwartz et al. 2008 are 4° to 7°, most of it an offset).
@@ -17,7 +17,7 @@ _MACHINE_KG = 16.0
 
 @dataclass(frozen=True, slots=True)
 class Habit:
-    """What one joint of a subject adds to the common curve (rad): an offset, two harmonics of the stride."""
+    """A subject's deviation in one joint (rad): an offset, two harmonics of the stride."""
 
     offset: float = 0.0
     first: float = 0.0

@@ -18,7 +18,7 @@ _SPREAD = 0.08  # by what share a pace differs from time to time
 
 
 class Entry(NamedTuple):
-    """What is wanted for how long (s; from one command to the next, transitions included)."""
+    """An entry of the timetable: an activity and its duration (s; between two commands, with transitions)."""
 
     activity: Activity
     seconds: float = math.inf

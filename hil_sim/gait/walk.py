@@ -18,7 +18,7 @@ _ANKLE_PER_TOE_HEIGHT = 1.5  # rad/m of dorsiflexion in swing
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """What an operator can set: lengths in m, time in s, angle in rad."""
+    """The settings of the gait: lengths in m, time in s, angle in rad."""
 
     step_length: float
     cycle_time: float

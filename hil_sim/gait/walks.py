@@ -1,4 +1,4 @@
-"""How people walk who walk differently, as a table: joints, timing, load and pace of each walk.
+"""Impaired gaits, as a table: joints, timing, load and pace of each.
 
 Modelled, not measured: set by hand, so that the curves have the features, and the loads about the sizes, that
 the literature has for each walk. Nobody's recording is in it, and people differ far more than these do.
@@ -44,7 +44,7 @@ Range = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class Joint:
-    """What one joint does otherwise: degrees of flexion or dorsiflexion that come to it.
+    """One joint's deviation: degrees of flexion or dorsiflexion that are added.
 
     `scale` multiplies its motion about where it is in standing, then `bent` comes to all of it, `swung` most
     in mid-swing, `landed` most at heel strike.
@@ -71,7 +71,7 @@ _SAME: Final = Joint()
 
 @dataclass(frozen=True, slots=True)
 class Limb:
-    """What one leg does otherwise. `stance` is a share of the stride, `heel` a way of the pressure (m).
+    """One leg's deviations. `stance` is a share of the stride, `heel` a path of the pressure (m).
 
     `step` multiplies the step that this leg makes, `takes` what it bears of the weight; of that a crutch
     carries `crutch`. The centre of pressure begins `heel` further before the heel than in others.

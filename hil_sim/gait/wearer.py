@@ -1,4 +1,4 @@
-"""What ground, trunk and joints feel of the motion: foot loads, attitude and acceleration, joint loads.
+"""Effects of the motion on ground, trunk and joints: foot loads, attitude, acceleration, joint loads.
 
 Newton holds at every moment: all vertical forces (feet, crutches, seat, ground under a fallen body) less the
 weight are mass times the trunk's vertical acceleration, the body taken as a mass in its trunk. Over a stride

@@ -1,4 +1,4 @@
-"""What a mistake is: lines of robot.toml, something about the robot itself, files of its computer."""
+"""Definition of a mistake: in lines of robot.toml, in the robot itself, or in files of its computer."""
 
 import re
 from collections.abc import Callable, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""Why a device refuses an SDO request (CiA 301 §7.2.4.3.17)."""
+"""SDO abort codes (CiA 301 §7.2.4.3.17)."""
 
 from enum import IntEnum
 

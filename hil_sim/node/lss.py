@@ -30,14 +30,14 @@ _AT_MOST = frozenset({3, 5})
 
 
 class LssState(Enum):
-    """Of the slave's state machine."""
+    """State of the slave's state machine."""
 
     WAITING = auto()
     CONFIGURATION = auto()
 
 
 class Owner(Protocol):
-    """What the services do to their device."""
+    """The services' interface to their device."""
 
     def tell(self, data: bytes, /) -> None:
         """Send an answer."""

@@ -1,4 +1,4 @@
-"""What a device keeps without power: in this process, or in a file that outlives it."""
+"""Non-volatile memory of a device: in this process, or in a file that outlives it."""
 
 import json
 import os

@@ -13,7 +13,7 @@ class NmtState(IntEnum):
 
 
 class NmtService(IntEnum):
-    """What an NMT master may ask for; the first byte of COB-ID 0."""
+    """Commands of an NMT master; the first byte of COB-ID 0."""
 
     START = 1
     STOP = 2

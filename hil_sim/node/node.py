@@ -368,7 +368,7 @@ class Node:
 
 
 class _Layer:
-    """What LSS does to its device."""
+    """LSS's interface to its device."""
 
     def __init__(self, node: Node) -> None:
         self._node = node

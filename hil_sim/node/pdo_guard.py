@@ -1,4 +1,4 @@
-"""What an SDO client may change of a PDO, and when (CiA 301 §7.5.2.35 to §7.5.2.38).
+"""Rules for changes of a PDO by an SDO client (CiA 301 §7.5.2.35 to §7.5.2.38).
 
 COB-ID, inhibit time and mapping change while the PDO is not valid, mapped objects while their number is 0.
 """

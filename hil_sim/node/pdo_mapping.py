@@ -1,4 +1,4 @@
-"""What a PDO carries: its mapping, and which objects may be mapped (CiA 301 §7.5.2.36, §7.5.2.38)."""
+"""PDO mapping: the mapped objects, and those that may be mapped (CiA 301 §7.5.2.36, §7.5.2.38)."""
 
 import struct
 from contextlib import suppress

@@ -29,7 +29,7 @@ class Transfer(Protocol):
 
 
 class Received:
-    """What a download brings for `entry`; `announced` is its length where the client said it.
+    """Data of a download for `entry`; `announced` is the length that the client gave, if any.
 
     Raises `SdoAbort` as soon as it is seen that it cannot be taken.
     """

@@ -44,7 +44,7 @@ class Recorded(NamedTuple):
 
 
 class _Implausible(ValueError):
-    """What a reader has read is not what stands there."""
+    """The reader's result cannot be right."""
 
 
 class _Lines:

@@ -32,7 +32,7 @@ def seen(identifiers: set[int]) -> set[int]:
 
 
 class RecordedDictionary(Dictionary):
-    """What is known of a device; `recorded` are the objects whose value was in the recording."""
+    """Knowledge about a device; `recorded` are the objects whose value was in the recording."""
 
     def __init__(self, description: Description) -> None:
         super().__init__(description)

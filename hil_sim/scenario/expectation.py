@@ -1,4 +1,4 @@
-"""What a scenario expects: something observed, a condition, and when it must hold."""
+"""Expectations of a scenario: an observed value, a condition, and its time."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ _TOLD = 4  # changes that a line of the result tells
 
 
 class Track(Enum):
-    """What is observed over time; the value is what a scenario calls it."""
+    """An observed quantity over time; the value is its name in scenarios."""
 
     STATE = "component"  # each component's state, as the gateway says
     PROBLEM = "problem"  # … and what is wrong with it in words, "" for nothing
@@ -27,7 +27,7 @@ class Track(Enum):
 
 
 class Moment(NamedTuple):
-    """What was seen on one track at one simulated time."""
+    """The values of one track at one simulated time."""
 
     time_s: float
     values: Mapping[str, Seen]
@@ -54,7 +54,7 @@ _NAMED = {
 
 
 class ScenarioResult(StrEnum):
-    """What came of an expectation, or of a scenario."""
+    """Result of an expectation, or of a scenario."""
 
     PASSED = "passed"
     FAILED = "failed"
@@ -63,7 +63,7 @@ class ScenarioResult(StrEnum):
 
 
 class When(Enum):
-    """How a condition has to hold."""
+    """Time mode of a condition."""
 
     AT = "at_s"  # at the first look at or after a time
     WITHIN = "within_s"  # at some moment of a window
@@ -72,7 +72,7 @@ class When(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Timing:
-    """When a condition has to hold (simulated s)."""
+    """Time of a condition (simulated s)."""
 
     when: When
     begin_s: float
@@ -101,7 +101,7 @@ class Timing:
 
 @dataclass(frozen=True, slots=True)
 class Condition:
-    """What a value must be, and how that is said."""
+    """Condition on a value, and its words."""
 
     words: str
     holds: Callable[[Seen], bool]

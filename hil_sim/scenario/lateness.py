@@ -1,4 +1,4 @@
-"""Whether the computer had time for simulator and gateway: where not, what failed proves nothing.
+"""Check of the computer's spare time: without it, a failed expectation proves nothing.
 
 Measured a tenth of a second at a time: by how much the simulator's events came late, and how long the gateway
 was ready to run and waited for a processor. Only what is worth noticing counts, so that a lively computer's
@@ -20,7 +20,7 @@ _SHARE = 0.1  # of a window that may be lost
 
 @dataclass(frozen=True, slots=True)
 class Loss:
-    """What was lost in the look that ended at `time_s` (simulated)."""
+    """Time lost before `time_s` (simulated), since the last check."""
 
     time_s: float
     simulator_s: float

@@ -15,7 +15,7 @@ _LEASE_S = 60.0
 
 
 class Link(Protocol):
-    """What asks a gateway."""
+    """Connection for queries to a gateway."""
 
     def ask(self, method: str, params: Result, answered: Answered) -> None: ...
 

@@ -26,7 +26,7 @@ _LOOK_NS = SECOND_NS // 2  # how often to look whether everything is decided
 
 @dataclass(frozen=True, slots=True)
 class ScenarioOutcome:
-    """What a scenario gave; `skipped_s` is simulated time that the computer was too slow for.
+    """Result of a scenario; `skipped_s` is simulated time that the computer was too slow for.
 
     `problem` says why it could not be run; then there are no verdicts.
     """

@@ -1,4 +1,4 @@
-"""Where scenario files are: as they are named, or among those that ship with GWRMS."""
+"""Search for scenario files: as named, and among the shipped ones."""
 
 from pathlib import Path
 from typing import Final

@@ -14,7 +14,7 @@ class ScenarioError(SimulatorError):
 
 
 class Unusable(Exception):
-    """Of this table nothing more can be said; why is among the mistakes."""
+    """An unusable table; the reason is among the mistakes."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""How long a process was ready to run while no processor was free for it, as Linux's scheduler tells."""
+"""Time that a process was ready to run without a free processor, by Linux's scheduler."""
 
 import contextlib
 from pathlib import Path
@@ -9,7 +9,7 @@ _DELAY = (
 
 
 class Waiting:
-    """Of the process `pid`, thread by thread."""
+    """Waiting time of the process `pid`, thread by thread."""
 
     def __init__(self, pid: int, proc: Path = Path("/proc")) -> None:
         self._tasks = proc / str(pid) / "task"

@@ -1,4 +1,4 @@
-"""What can be wrong with a sensor and its line: plain switches, all off, to be set while the robot runs."""
+"""Faults of a sensor and its line: plain switches, all off, to be set while the robot runs."""
 
 import math
 from dataclasses import dataclass, field
@@ -20,7 +20,7 @@ class LineFaults:
 
 @dataclass(slots=True)
 class InsoleFaults(LineFaults):
-    """What else can be wrong with an insole."""
+    """Further faults of an insole."""
 
     stuck_cell: int | None = None  # the number of a cell that always says the same
     saturated: bool = False  # its amplifier ends far too low, and it says so where its format can
@@ -32,7 +32,7 @@ class InsoleFaults(LineFaults):
 
 @dataclass(slots=True)
 class ImuFaults(LineFaults):
-    """What else can be wrong with an IMU."""
+    """Further faults of an IMU."""
 
     drift: float = 0.0  # rad/s that its gyro about y reads too much, and its pitch with it; 0 takes it away
     slipped: float = 0.0  # rad about y by which it sits on the trunk otherwise than it was built in

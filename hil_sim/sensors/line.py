@@ -8,7 +8,7 @@ from hil_sim.sensors.uart import heard_at
 
 
 class Port(Protocol):
-    """Where the line ends: a pseudo-terminal, or whoever listens in a test."""
+    """End of the line: a pseudo-terminal, or a listener in a test."""
 
     @property
     def baudrate(self) -> int:

@@ -16,7 +16,7 @@ _SOON_FRAMES, _SOON_NS = 200, 2 * SECOND_NS
 
 
 class Tick(NamedTuple):
-    """When a frame is made by the sensor's own counters; below zero where a counter is about to wrap to 0."""
+    """Time of a frame by the sensor's own counters; below zero if a counter is about to wrap to 0."""
 
     number: int
     time_ns: int

@@ -1,4 +1,4 @@
-"""What the cells of an insole measure, whatever language it speaks."""
+"""Measurements of an insole's cells, independent of its format."""
 
 import math
 import random

@@ -42,7 +42,7 @@ INSOLES: dict[str, tuple[SerialFormat[Pressures], tuple[Cell, ...]]] = {
 
 @dataclass(frozen=True, slots=True)
 class SensorChoice:
-    """Which languages they speak: one of `IMUS` and one of `INSOLES`."""
+    """Formats of the sensors: one of `IMUS` and one of `INSOLES`."""
 
     imu: str = "witmotion"
     insole: str = "insole-cobs"

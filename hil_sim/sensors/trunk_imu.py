@@ -1,4 +1,4 @@
-"""What an IMU on the trunk measures, whatever language it speaks."""
+"""Measurements of an IMU on the trunk, independent of its format."""
 
 import math
 import random
@@ -24,7 +24,7 @@ _NOISE_RATE = 0.002  # rad/s
 
 
 class TrunkSensor(Protocol):
-    """What tells the trunk's motion, over whatever line."""
+    """Sensor of the trunk's motion, on any line."""
 
     def tell(self, measured: "Motion", now_ns: int, /) -> None: ...
 

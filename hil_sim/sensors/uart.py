@@ -1,4 +1,4 @@
-"""What a serial receiver makes of bytes that were sent at another baud rate than it listens at."""
+"""Bytes as received at another baud rate than they were sent at."""
 
 _SAMPLES = 10  # of one character: start bit, eight data bits, stop bit, each in its middle
 

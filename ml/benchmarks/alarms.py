@@ -1,4 +1,4 @@
-"""What models say of the benchmarks' recordings, moment by moment, never having seen who is in them.
+"""Models' output on the benchmarks' recordings, moment by moment, for people unseen in training.
 
 For rules on predictions, which are to be tried on recordings before they may act on a robot.
 """
@@ -27,7 +27,7 @@ TO_FALLING: Final = 2  # IPOL has 100 Hz, and falls are looked for at 50
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Told:
-    """What was said of one recording; times in seconds since it began.
+    """Model output on one recording; times in seconds since it began.
 
     `probabilities`: of each class, (n,) at `at_s` (n,). `causes`: of each class, from when to when it was so;
     a fall is at its impact. `length_s` of the recording were looked at.

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from ml.benchmarks.danger_data import SUDDEN, WALKS, Seen, read
+from ml.benchmarks.danger_data import SUDDEN, WALKS, Seen, judgeable, read
 from ml.benchmarks.outcome import Outcome
 from ml.danger.calibration import Calibration, calibrated, evidence, fit, load, tails
 from ml.danger.detector import DETECTORS
@@ -24,6 +24,7 @@ from ml.danger.false_alarm_budget import (
 )
 from ml.danger.levels import Level, Levels, sustained
 from ml.danger.observation import CHANNELS
+from ml.errors import UnusableData
 from ml.features.recipe import Features, Recipe
 from ml.features.windows import Samples
 
@@ -34,6 +35,7 @@ FOLDS: Final = 4
 LEAD_S: Final = 0.3  # before harm: what is said later is not foreseen
 PERIOD_S: Final = 0.04
 BINS: Final = 10  # of the reliability diagram
+LEVELS: Final = {Level.EARLY: "early", Level.ADVICE: "advice", Level.ALARM: "alarm", Level.STOP: "stop"}
 WHY: Final = (
     "synthetic: wearers of gwrms sim-record --scenario dangers, judged by weights and thresholds of others"
     " (sim-danger) or by those that ship (sim-danger-shipped,"
@@ -68,10 +70,15 @@ class Judged:
 
 
 def learn(seen: Sequence[Seen], told: str) -> Calibration:
-    """Weights by all; the curve and thresholds by each wearer as the others' weights judge it."""
+    """Weights by all; the curve and thresholds by each wearer as the others' weights judge it.
+
+    Raises:
+        UnusableData: they show no healthy walking, or no danger.
+
+    """
     odds = _out_of_fold(seen)
     parts = _fit(seen)
-    known = [one.healthy | one.coming for one in seen]
+    known = [one.judged for one in seen]
     said = np.concatenate([each[rows] for each, rows in zip(odds, known, strict=True)])
     true = np.concatenate([one.coming[rows] for one, rows in zip(seen, known, strict=True)])
     knots, share = calibrated(said, true)
@@ -93,6 +100,10 @@ Parts = tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...], float]
 
 def _fit(seen: Sequence[Seen]) -> Parts:
     """Floors, scales, weights and bias. Each danger counts alike, however long; so does each class."""
+    if not any(walking(one).any() for one in seen):
+        raise UnusableData("nobody walks on level ground: thresholds cannot be learned")
+    if not any(_counts(one).any() for one in seen):
+        raise UnusableData("nobody meets a danger that something shows before: weights cannot be learned")
     blocks = [_maxima(one, one.above[:, at]) for one in seen for at in range(len(DETECTORS))]
     maxima = np.concatenate(
         [np.stack(blocks[at : at + len(DETECTORS)], axis=1) for at in range(0, len(blocks), len(DETECTORS))]
@@ -202,17 +213,20 @@ DANGER: Final = Recipe("danger/all", 25.0, 1, CHANNELS, _looked_at)
 
 def evaluate(path: Path, search: bool) -> Outcome:  # noqa: ARG001 - there is nothing to choose
     """Folds of wearers; weights, curve and thresholds by the others alone."""
-    seen = read(path)
-    return outcome(cross_judged(seen))
+    seen, left_out = judgeable(path, read(path))
+    found = outcome(cross_judged(seen))
+    return replace(found, notes=(*found.notes, *left_out))
 
 
 def evaluate_shipped(path: Path, search: bool) -> Outcome:  # noqa: ARG001 - there is nothing to choose
     """Judge the calibration that ships, on wearers from whom it was not learned."""
-    calibration, seen = load(), read(path)
+    calibration = load()
+    seen, left_out = judgeable(path, read(path))
     found = outcome([judge(one, calibration) for one in seen])
     maxima = np.concatenate([_maxima(one, calibration.log_odds(one.above)) for one in seen])
     stops = 100.0 * extrapolated(maxima, _hours(seen), calibration.by_level[Level.STOP])
-    return replace(found, figures={**found.figures, "stops_per_100_h_extrapolated": stops})
+    figures = {**found.figures, "stops_per_100_h_extrapolated": stops}
+    return replace(found, figures=figures, notes=(*found.notes, *left_out))
 
 
 def cross_judged(seen: Sequence[Seen]) -> list[Judged]:
@@ -269,7 +283,7 @@ def of_danger(found: Sequence[Event]) -> dict[str, float]:
 def _rates(judged: Sequence[Judged]) -> dict[str, float]:
     hours = _hours([one.seen for one in judged])
     found = {"healthy_hours": hours}
-    for level, name in ((Level.EARLY, "early"), (Level.ADVICE, "advice"), (Level.ALARM, "alarm")):
+    for level, name in LEVELS.items():
         found |= per_hour(judged, level, name, [walking(one.seen) for one in judged])
     stops = sum(false_alarms(one, Level.STOP, walking(one.seen)) for one in judged)
     found |= {"stops": float(stops), "stops_per_100_h_upper": 100.0 * rule_of_three(stops, hours)}
@@ -284,7 +298,7 @@ def per_hour(judged: Sequence[Judged], level: Level, name: str, rows: Sequence[F
     """How often a level was reached anew in an hour of these moments, with its interval."""
     hours = sum(float(own.sum()) for own in rows) * PERIOD_S / 3600.0
     count = sum(false_alarms(one, level, own) for one, own in zip(judged, rows, strict=True))
-    low, high = rate_interval(count, hours) if hours else (float("nan"), float("nan"))
+    low, high = rate_interval(count, hours)
     each = count / hours if hours else float("nan")
     return {f"{name}_per_hour": each, f"{name}_low": low, f"{name}_high": high}
 
@@ -311,7 +325,7 @@ def reliability(judged: Sequence[Judged]) -> list[tuple[float, float, int]]:
 
 
 def _said(judged: Sequence[Judged]) -> tuple[Floats, Floats]:
-    rows = [one.seen.healthy | one.seen.coming for one in judged]
+    rows = [one.seen.judged for one in judged]
     said = np.concatenate([one.probability[each] for one, each in zip(judged, rows, strict=True)])
     true = np.concatenate([one.seen.coming[each] for one, each in zip(judged, rows, strict=True)])
     return said, true.astype(np.float64)

@@ -1,7 +1,7 @@
 """Recordings for `sim-danger`: simulated dangers with their truth, and how each detector saw them."""
 
 import copy
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO, Final
@@ -10,6 +10,7 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
+from ml.danger.detector import DETECTORS
 from ml.danger.monitor import PERIOD_S, Evidence
 from ml.danger.observation import CHANNELS
 from ml.errors import UnusableData
@@ -60,6 +61,12 @@ class Seen:
         own: npt.NDArray[np.bool_] = (self.danger >= 1.0) & (self.danger % 1.0 == 0.0)
         return own
 
+    @property
+    def judged(self) -> npt.NDArray[np.bool_]:
+        """Moments that count: healthy ones, and those in which a danger comes."""
+        own: npt.NDArray[np.bool_] = self.healthy | self.coming
+        return own
+
 
 def read(path: Path) -> list[Seen]:
     """Read the detectors' input of a file of `gwrms sim-record --scenario dangers`.
@@ -78,6 +85,23 @@ def read(path: Path) -> list[Seen]:
     if len({one.subject for one in found}) < 2:
         raise UnusableData(f"{path} holds fewer than two wearers: nobody is left to be judged by")
     return found
+
+
+def judgeable(path: Path, seen: Sequence[Seen]) -> tuple[list[Seen], tuple[str, ...]]:
+    """Return the wearers who have moments that count, and in words who has none.
+
+    Raises:
+        UnusableData: there are fewer than two.
+
+    """
+    found = [one for one in seen if one.judged.any()]
+    without = [one.subject for one in seen if not one.judged.any()]
+    if len(found) < 2:
+        raise UnusableData(
+            f"{path} holds fewer than two wearers who were recorded beyond their first {LEARNED_S:.0f} s"
+        )
+    told = f"left out, since nothing of them is recorded beyond the first {LEARNED_S:.0f} s: wearers"
+    return found, (f"{told} {', '.join(without)}",) if without else ()
 
 
 def _sessions(file: BinaryIO) -> Iterator[tuple[_Head, list[list[Any]]]]:
@@ -101,9 +125,10 @@ def _seen(head: _Head, rows: list[list[Any]]) -> Seen:
     danger_at, every = head.columns.index("danger"), round(PERIOD_S * 100 + 0.5)
     rows = rows[::every]
     values = np.array([[row[at] for at in columns] for row in rows], dtype=np.float64)
+    values = values.reshape(-1, len(CHANNELS))
     danger = np.array([row[danger_at] for row in rows])
     at_s = np.array([row[0] for row in rows]) / 1e9
-    label = np.array([row[1] for row in rows])
+    label = np.array([row[1] for row in rows], dtype=np.str_)
     return Seen(str(head.subject), tuple(head.dangers), at_s, watched(at_s, values, danger), danger, label)
 
 
@@ -120,4 +145,4 @@ def watched(at_s: Floats, values: Floats, danger: Floats) -> Floats:
         elif danger_now == HEALTHY and before is not None:
             evidence, before = before, None
         found.append(evidence.take(now, row))
-    return np.array(found)
+    return np.array(found).reshape(-1, len(DETECTORS))

@@ -29,7 +29,7 @@ GRID: Final = (SETTINGS, FallSettings(falling=25), FallSettings(falling=16), Fal
 
 @dataclass(frozen=True, slots=True)
 class Alarm:
-    """What came of one recording."""
+    """Result of one recording."""
 
     fall: bool
     stumble: bool

@@ -1,19 +1,21 @@
 """The format of IPOL 2019/265: IMUs on both feet of healthy people and of patients, walked there and back."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
+from ml.benchmarks import losses
 from ml.benchmarks.arrays import Arrays
 from ml.benchmarks.strides import heel_strikes
 from ml.features.gait_status import RATE_HZ
 
 HEALTHY: Final = "healthy"
 CHANNELS: Final = tuple(f"{foot}_gyr_{axis}" for foot in ("lfoot", "rfoot") for axis in "xyz")
+SENSORS: Final = (3, 3)  # channels of each
 MOST_RAD_S: Final = 60.0  # a foot that turns faster was not recorded in rad/s
 FLAT_AFTER: Final = 60  # samples from a foot's own strike, at most, until it lies flat
 
@@ -69,6 +71,16 @@ def _names(file: Arrays, name: str, rows: int) -> npt.NDArray[np.str_]:
     if not np.isin(number, range(len(names))).all():
         raise file.problem(f"has numbers in {name!r} that {name + '_names'!r} does not name")
     return names[number].astype(np.str_)
+
+
+def lossy(walks: Sequence[Walk], share: float) -> list[Walk]:
+    """Return the same walks with so many of each sensor's packets lost; the first of each is there."""
+    made = []
+    for number, walk in enumerate(walks):
+        rates = losses.lossy(walk.rates, SENSORS, share, number)
+        rates[:1] = walk.rates[:1]
+        made.append(replace(walk, rates=rates))
+    return made
 
 
 def landings(moving: npt.NDArray[np.bool_]) -> npt.NDArray[np.intp]:

@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from ml.benchmarks import losses
 from ml.benchmarks.impaired import HEALTHY
 from ml.robot import conformal
 
@@ -59,6 +60,18 @@ def figures_of(people: Sequence[Person], rows: Mapping[str, Mapping[str, float]]
     found |= {"mixed_gain_points": _gains(patients), "mixed_gain_low": low, "mixed_gain_high": high}
     for model in MODELS:
         found |= _adaptation(people, model)
+    return found
+
+
+def lost_of(people: Sequence[Person], shares: Sequence[float]) -> dict[str, float]:
+    """Return the worst group's figure and the mean of the groups where packets are lost."""
+    groups = [[one for one in people if one.group == name] for name in {one.group for one in people}]
+    found: dict[str, float] = {}
+    for model in MODELS:
+        for share in shares:
+            figure = losses.at(f"{model}_rmse_percent", share)
+            rmse = [_mean(own, figure) for own in groups]
+            found |= {f"worst_group_{figure}": max(rmse), figure: float(np.mean(rmse))}
     return found
 
 

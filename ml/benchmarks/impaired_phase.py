@@ -5,15 +5,15 @@ as many, a third of each group. Everybody is judged by both, before and after a 
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
-from ml.benchmarks import folds, impaired, metrics
-from ml.benchmarks.impaired_groups import MODELS, Person, figures_of, rows_of
+from ml.benchmarks import folds, impaired, losses, metrics
+from ml.benchmarks.impaired_groups import MODELS, Person, figures_of, lost_of, rows_of
 from ml.benchmarks.impaired_strides import Decisions, decisions, late_of, lessons, minutes
 from ml.benchmarks.models.gait_phase import PhaseModel, PhaseSettings
 from ml.benchmarks.outcome import Outcome
@@ -35,6 +35,7 @@ WHY: Final = (
 
 Floats = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
+Lost = Mapping[float, Decisions]  # the same decisions, by the share of packets that are lost
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,11 +47,19 @@ class Fold:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Judged:
-    """What two models said of one person: errors of the phase, in cycles."""
+class Said:
+    """What one model said of one person: errors of the phase, in cycles."""
 
-    error: tuple[Floats, Floats]  # of MODELS
-    adapted: tuple[Floats, Floats]  # of the later decisions, after the minute
+    error: Floats
+    adapted: Floats  # of the later decisions, after the minute
+    lost: Mapping[float, Floats]  # of all, by the share of packets that are lost
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Judged:
+    """What the models said of one person."""
+
+    said: tuple[Said, Said]  # of MODELS
     late: Flags  # which decisions come after the minute
 
 
@@ -67,18 +76,23 @@ def evaluate(path: Path, search: Search) -> Outcome:  # noqa: ARG001 - there is 
     makes_of = {
         one: "+".join(sorted({walk.sensor for walk in walks if walk.subject == one})) for one in groups
     }
+    lost = {
+        share: replace(data, features=decisions(impaired.lossy(walks, share), later).features)
+        for share in losses.SHARES
+    }
     late = late_of(data, minutes(walks, later))
     split = list(folds_of(groups))
     teachers = {one for fold in split for model in fold.teachers for one in model}
     taught = lessons([walk for walk in walks if walk.subject in teachers], later, data)
     del walks  # they fill a fifth of a gigabyte
-    work = folds.over(lambda fold: _fold(taught, data, late, fold), split)
+    work = folds.over(lambda fold: _fold(taught, data, lost, late, fold), split)
     judged = {subject: one for found in work for subject, one in found.items()}
     people = [_person(data, groups, makes_of[subject], judged, subject) for subject in sorted(groups)]
     rows = rows_of(people)
     makes = ", ".join(f"{name} {samples / RATE_HZ * 1000:.0f} ms" for name, samples in sorted(later.items()))
     settings = f"fixed, those of ipol-phase; labels moved earlier: {makes}"
-    return Outcome(figures_of(people, rows), len(people), rows, "group", settings=settings, notes=(WHY,))
+    figures = figures_of(people, rows) | lost_of(people, losses.SHARES)
+    return Outcome(figures, len(people), rows, "group", settings=settings, notes=(WHY,))
 
 
 def folds_of(groups: Mapping[int, str]) -> Iterator[Fold]:
@@ -111,14 +125,11 @@ def mixed(groups: Mapping[int, str], count: int) -> list[int]:
     return chosen
 
 
-def _fold(taught: Decisions, data: Decisions, late: Flags, fold: Fold) -> dict[int, Judged]:
+def _fold(taught: Decisions, data: Decisions, lost: Lost, late: Flags, fold: Fold) -> dict[int, Judged]:
     own = {one: data.subject == one for one in fold.held_out}
     # One model after the other: each keeps what it has learned from.
-    healthy, both = (_of_model(_fitted(taught, people), data, late, own) for people in fold.teachers)
-    return {
-        one: Judged((healthy[one][0], both[one][0]), (healthy[one][1], both[one][1]), late[rows])
-        for one, rows in own.items()
-    }
+    healthy, both = (_of_model(_fitted(taught, people), data, lost, late, own) for people in fold.teachers)
+    return {one: Judged((healthy[one], both[one]), late[rows]) for one, rows in own.items()}
 
 
 def _fitted(taught: Decisions, people: Sequence[int]) -> PhaseModel:
@@ -127,16 +138,16 @@ def _fitted(taught: Decisions, people: Sequence[int]) -> PhaseModel:
 
 
 def _of_model(
-    model: PhaseModel, data: Decisions, late: Flags, people: Mapping[int, Flags]
-) -> dict[int, tuple[Floats, Floats]]:
-    """Return each person's errors, and those after the minute once it has been learned from."""
+    model: PhaseModel, data: Decisions, lost: Lost, late: Flags, people: Mapping[int, Flags]
+) -> dict[int, Said]:
     found = {}
     for subject, rows in people.items():
         early, later = data.of(rows & ~late), data.of(rows & late)
         adapted = np.zeros(0)
         if len(later.phase) >= LEAST_LATER and len(early.phase):
             adapted = _errors(model.personal(early.features, early.phase, early.stride), later)
-        found[subject] = (_errors(model, data.of(rows)), adapted)
+        less = {share: _errors(model, one.of(rows)) for share, one in lost.items()}
+        found[subject] = Said(_errors(model, data.of(rows)), adapted, less)
     return found
 
 
@@ -153,18 +164,21 @@ def _person(
     figures = {"hindsight_rmse_percent": _percent(hindsight[~np.isnan(hindsight)])}
     for place, model in enumerate(MODELS):
         likes = [one for one in groups if one != subject and (place or groups[one] == impaired.HEALTHY)]
-        errors = [np.abs(judged[one].error[place]) for one in likes]
+        errors = [np.abs(judged[one].said[place].error) for one in likes]
         whose = np.repeat(likes, [len(one) for one in errors])
         width = conformal.reach(np.concatenate(errors), whose)
-        before, after = own.error[place][own.late], own.adapted[place]
+        said = own.said[place]
+        before, after = said.error[own.late], said.adapted
         figures |= {
-            f"{model}_rmse_percent": _percent(own.error[place]),
-            f"{model}_covered": float((np.abs(own.error[place]) <= width).mean()),
+            f"{model}_rmse_percent": _percent(said.error),
+            f"{model}_covered": float((np.abs(said.error) <= width).mean()),
             f"{model}_interval_percent": 100.0 * width,
-            f"{model}_early_rmse_percent": _percent(own.error[place][~own.late]),
+            f"{model}_early_rmse_percent": _percent(said.error[~own.late]),
             f"{model}_later_rmse_percent": _percent(before) if len(after) else np.nan,
             f"{model}_adapted_rmse_percent": _percent(after),
         }
+        for share, less in said.lost.items():
+            figures[losses.at(f"{model}_rmse_percent", share)] = _percent(less)
     return Person(subject, groups[subject], makes, figures)
 
 

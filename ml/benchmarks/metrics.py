@@ -1,4 +1,4 @@
-"""What a benchmark's figures are made of."""
+"""Building blocks of a benchmark's figures."""
 
 import numpy as np
 import numpy.typing as npt

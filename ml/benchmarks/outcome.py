@@ -1,4 +1,4 @@
-"""What an evaluation found, as plain data for a report, a table or JSON."""
+"""Outcome of an evaluation, as plain data for a report, a table or JSON."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -23,7 +23,7 @@ class Outcome:
 
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """What a figure should reach, and what would be better still."""
+    """Goal of a figure, and a stretch goal beyond it."""
 
     limit: float
     at_most: bool = False

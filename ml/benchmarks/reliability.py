@@ -11,7 +11,7 @@ from typing import Final
 import msgspec
 
 from ml.benchmarks.danger import cross_judged, learn, reliability
-from ml.benchmarks.danger_data import read
+from ml.benchmarks.danger_data import judgeable, read
 
 SIZE, EDGE = 320, 62  # px, of the diagram and of its margin
 LINE, POINT, TEXT = "#8a94a0", "#3a80c4", "#77818d"  # to be read on light and dark
@@ -64,7 +64,7 @@ def _words(x: float, y: float, text: str) -> str:
 def main(arguments: Sequence[str]) -> int:
     """Draw; where a third file is named, write there what all these wearers teach."""
     recording, picture, *calibration = map(Path, arguments)
-    seen = read(recording)
+    seen, _ = judgeable(recording, read(recording))
     picture.write_text(drawn(reliability(cross_judged(seen))), encoding="utf-8")
     if calibration:
         told = f"{recording.name}: {len({one.subject for one in seen})} simulated wearers"

@@ -1,4 +1,4 @@
-"""What the `sim-*` benchmarks share: simulated people in folds, sensors that are missing, and noise.
+"""The common part of the `sim-*` benchmarks: simulated people in folds, missing sensors, and noise.
 
 They are synthetic: they show what sensors can tell and what breaks it, not how well people are understood.
 """
@@ -39,7 +39,7 @@ Flags = npt.NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True)
 class Variant:
-    """Which sensors a robot has, and whether they are those that were learned from."""
+    """Sensors of a robot, and whether they are as in training."""
 
     name: str  # before the names of its figures; "" for the whole robot
     groups: tuple[str, ...]

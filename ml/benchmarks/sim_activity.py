@@ -40,7 +40,7 @@ OTHER: Final = -1  # the truth of what is no class
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Judged:
-    """What was said of people that were not learned from; arrays have a row each."""
+    """Judgement of people unseen in training; arrays have a row each."""
 
     classes: tuple[str, ...]
     truth: npt.NDArray[np.int_]  # index into the classes, or OTHER

@@ -34,7 +34,7 @@ WHY: Final = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Watched:
-    """What was said of one recording."""
+    """Judgement of one recording."""
 
     activity: str
     judged: Judged

@@ -4,6 +4,7 @@ If the recorded hours are too few to show such a small budget, the tail of the h
 as an exponential, the limit of most tails (Coles 2001, §4): an estimate, blind to events never recorded.
 """
 
+import math
 from collections.abc import Mapping
 from typing import Final
 
@@ -42,7 +43,9 @@ def thresholds(maxima: Floats, hours: float) -> dict[Level, float]:
 
 
 def extrapolated(maxima: Floats, hours: float, odds: float) -> float:
-    """Return the rate an hour at which such log odds are reached, by the same tail."""
+    """Return the rate an hour at which such log odds are reached, by the same tail; NaN without maxima."""
+    if not len(maxima):
+        return math.nan
     count, base, scale = _tail(np.sort(maxima)[::-1])
     return float(count / hours * np.exp(min((base - odds) / scale, 0.0)))
 
@@ -55,13 +58,20 @@ def _tail(ordered: Floats) -> tuple[int, float, float]:
 
 
 def rate_interval(events: int, hours: float) -> tuple[float, float]:
-    """Return the 95 % interval of a rate an hour (Garwood 1936); with none seen, at most 3.7 / hours."""
+    """Return the 95 % interval of a rate an hour (Garwood 1936); with none seen, at most 3.7 / hours.
+
+    NaN of no hours.
+    """
+    if not hours:
+        return math.nan, math.nan
     low = chi2.ppf(0.025, 2 * events) / 2.0 / hours if events else 0.0
     return float(low), float(chi2.ppf(0.975, 2 * (events + 1)) / 2.0 / hours)
 
 
 def rule_of_three(events: int, hours: float) -> float:
-    """Return the 95 % upper bound of a rate an hour, one-sided: 3 / hours where none was seen."""
+    """Return the 95 % upper bound of a rate an hour, one-sided: 3 / hours if none was seen, NaN of none."""
+    if not hours:
+        return math.nan
     return float(chi2.ppf(0.95, 2 * (events + 1)) / 2.0 / hours)
 
 

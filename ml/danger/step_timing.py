@@ -12,7 +12,7 @@ SHOWS_S: Final = 1.0  # how long an early step is reported
 
 
 class StepTiming:
-    """How late, or early, each foot's heel strike is, in strides of this wearer."""
+    """Lateness, or earliness, of each foot's heel strike, in strides of this wearer."""
 
     name = "rhythm"
     keys = (*(f"{side} late" for side in SIDES), *(f"{side} early" for side in SIDES))

@@ -17,13 +17,21 @@ def bins(signals: Samples, width: int, count: int) -> Samples:
     return flat(newest.reshape(*newest.shape[:-1], count, width).mean(axis=-1))
 
 
-def moments(signals: Samples, length: int) -> Samples:
-    """(n, signals, samples) → mean, standard deviation, largest, smallest over the newest `length`."""
-    newest = signals[..., -length:]
-    mean = newest.mean(axis=-1)
-    return np.concatenate(
-        [mean, deviation(newest, mean[..., None]), newest.max(axis=-1), newest.min(axis=-1)], axis=1
-    )
+def moments(signals: Samples, *lengths: int) -> Samples:
+    """(n, signals, samples) → mean, standard deviation, largest, smallest over the newest of each length.
+
+    The lengths grow: what is largest of fewer samples is compared with those before them alone.
+    """
+    columns = np.empty((len(signals), len(lengths), 4, signals.shape[1]))
+    for at, length in enumerate(lengths):
+        newest = signals[..., -length:]
+        mean = newest.mean(axis=-1)
+        columns[:, at, 0], columns[:, at, 1] = mean, deviation(newest, mean[..., None])
+    begins = [max(signals.shape[-1] - length, 0) for length in reversed(lengths)]
+    for at, farthest in ((2, np.maximum), (3, np.minimum)):
+        apart = farthest.reduceat(signals, begins, axis=-1)[..., ::-1]
+        columns[:, :, at] = farthest.accumulate(apart, axis=-1).swapaxes(1, 2)
+    return flat(columns)
 
 
 def deviation(signals: Samples, mean: Samples) -> Samples:

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ml.features.blocks import bins, flat
-from ml.features.gait_status import CHANNELS, GAIT_STATUS, RATE_HZ, SOFTEN
+from ml.features.gait_status import CHANNELS, GAIT_STATUS, RATE_HZ, SOFTEN, by_part, headed
 from ml.features.gaps import mended
 from ml.features.recipe import Features, Recipe
 from ml.features.signals import GRAVITY, along, length, up
@@ -24,25 +24,21 @@ TURNED: Final = range(50, LOOK_BACK // COARSE + 1, 10)  # of these, over which a
 
 def _compute(windows: Samples) -> Features:
     filled = mended(windows)
-    coarse = np.ascontiguousarray(filled[..., ::COARSE])
-    trunk, spin, left, left_spin, right, right_spin = np.split(coarse, 6, axis=1)
-    yaw = along(spin, up(trunk))
-    heading = _heading(yaw, along(left_spin, up(left)) + along(right_spin, up(right)))
-    feet = np.stack([length(left_spin), length(right_spin)])
-    signals = (length(spin), feet.sum(axis=0), feet.min(axis=0), np.abs(length(trunk) - GRAVITY))
+    acceleration, spin = by_part(filled[..., ::COARSE])
+    vertical = up(acceleration)
+    heading = headed(along(spin, vertical), SECOND)
+    rate = length(spin)
+    left, right = rate[:, 1], rate[:, 2]
+    jolt = np.abs(length(acceleration[:, 0]) - GRAVITY)
+    motion = np.stack([rate[:, 0], left + right, np.minimum(left, right), jolt]).swapaxes(0, 1)
+    stretches = LOOK_BACK // COARSE // STRETCH
     columns: list[npt.NDArray[Any]] = [
-        GAIT_STATUS.compute(np.ascontiguousarray(filled[..., -GAIT_STATUS.look_back :])),
-        bins(heading, STRETCH, coarse.shape[-1] // STRETCH),
-        bins(np.log(SOFTEN + np.stack(signals, axis=1)), STRETCH, coarse.shape[-1] // STRETCH),
+        GAIT_STATUS.compute(filled[..., -GAIT_STATUS.look_back :]),
+        bins(heading, STRETCH, stretches),
+        bins(np.log(SOFTEN + motion), STRETCH, stretches),
         _turned(heading),
     ]
     return np.concatenate(columns, axis=1, dtype=np.float32)
-
-
-def _heading(trunk: Samples, feet: Samples) -> Samples:
-    """Yaw rates of trunk and feet (n, 2, samples), positive the way that the trunk turned last second."""
-    way = np.where(trunk[:, -SECOND:].sum(axis=1) < 0, -1.0, 1.0)
-    return np.stack([trunk, feet], axis=1) * way[:, None, None]
 
 
 def _turned(heading: Samples) -> Samples:

@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from ml.features.blocks import bins, deviation, flat, moments, since
+from ml.features.blocks import bins, flat, moments, since
 from ml.features.gaps import mended
 from ml.features.recipe import Features, Recipe
 from ml.features.signals import GRAVITY, across, along, length, up
@@ -28,53 +28,60 @@ SOFTEN: Final = 0.05  # added before a logarithm: the noise of a sensor at rest
 
 
 def _compute(windows: Samples) -> Features:
-    trunk, spin, left, left_spin, right, right_spin = np.split(mended(windows), 6, axis=1)
-    vertical = up(trunk)
-    lift, yaw = along(trunk, vertical), along(spin, vertical)
-    motion = _motion(trunk, spin, lift, yaw, (left, right), (left_spin, right_spin))
-    heading = _heading(yaw, along(left_spin, up(left)) + along(right_spin, up(right)))
-    shape = np.log(SOFTEN + motion[:, [1, 2, 4, 5, 6, 7]])
+    acceleration, spin = by_part(mended(windows))
+    vertical = up(acceleration)
+    yaw = along(spin, vertical)
+    heading = headed(yaw, 100)
+    motion = _motion(acceleration, spin, along(acceleration[:, 0], vertical[:, 0]), yaw[:, 0])
     columns = [
         bins(heading, 10, 20),
         _turned(heading),
-        bins(shape, 10, 20),
-        *(moments(motion, samples) for samples in LENGTHS),
-        *(_turning(heading[..., -samples:]) for samples in LENGTHS),
-        _rest(length(left_spin), length(right_spin)),
+        bins(np.log(SOFTEN + motion[:, [1, 2, 4, 5, 6, 7]]), 10, 20),
+        moments(motion, *LENGTHS),
+        _turning(heading),
+        _rest(length(spin[:, 1:])),
     ]
     return np.concatenate(columns, axis=1, dtype=np.float32)
 
 
-def _motion(
-    trunk: Samples,
-    spin: Samples,
-    lift: Samples,
-    yaw: Samples,
-    feet: tuple[Samples, Samples],
-    feet_spin: tuple[Samples, Samples],
-) -> Samples:
-    """How much moves, whichever way: (n, 10, samples)."""
-    left, right = (length(one) for one in feet_spin)
-    left_jolt, right_jolt = (np.abs(length(one) - GRAVITY) for one in feet)
+def by_part(windows: Samples) -> tuple[Samples, Samples]:
+    """(n, channels, samples) → acceleration and angular velocity of trunk and feet, (n, 3, 3, samples) each.
+
+    In memory the windows of a channel lie together: what is computed of it is one long loop.
+    """
+    channels = np.ascontiguousarray(windows.swapaxes(0, 1))
+    parts = channels.reshape(3, 2, 3, *channels.shape[1:])
+    return np.moveaxis(parts[:, 0], 2, 0), np.moveaxis(parts[:, 1], 2, 0)
+
+
+def headed(yaw: Samples, newest: int) -> Samples:
+    """Yaw rates (n, 2, samples) of the trunk and of both feet together.
+
+    They are positive the way that the trunk turned in the `newest` samples.
+    """
+    trunk = yaw[:, 0]
+    way = np.where(trunk[:, -newest:].sum(axis=1) < 0, -1.0, 1.0)
+    return (np.stack([trunk, yaw[:, 1] + yaw[:, 2]]) * way[:, None]).swapaxes(0, 1)
+
+
+def _motion(acceleration: Samples, spin: Samples, lift: Samples, yaw: Samples) -> Samples:
+    """How much moves, whichever way: (n, 10, samples). `lift` and `yaw` are the trunk's."""
+    weight, rate = length(acceleration), length(spin)
+    left, right = rate[:, 1], rate[:, 2]
+    jolt = np.abs(weight[:, 1:] - GRAVITY)
     signals = (
         lift - GRAVITY,
-        across(trunk, lift),
-        across(spin, yaw),
-        length(spin),
+        across(acceleration[:, 0], lift),
+        across(spin[:, 0], yaw),
+        rate[:, 0],
         left + right,
         np.maximum(left, right),
         np.minimum(left, right),
-        left_jolt + right_jolt,
-        np.abs(left_jolt - right_jolt),
-        length(trunk),
+        jolt[:, 0] + jolt[:, 1],
+        np.abs(jolt[:, 0] - jolt[:, 1]),
+        weight[:, 0],
     )
-    return np.stack(signals, axis=1)
-
-
-def _heading(trunk: Samples, feet: Samples) -> Samples:
-    """Yaw rates of trunk and feet (n, 2, samples), positive the way that the trunk turned last second."""
-    way = np.where(trunk[:, -100:].sum(axis=1) < 0, -1.0, 1.0)
-    return np.stack([trunk, feet], axis=1) * way[:, None, None]
+    return np.stack(signals).swapaxes(0, 1)
 
 
 def _turned(heading: Samples) -> Samples:
@@ -87,15 +94,17 @@ def _turned(heading: Samples) -> Samples:
 
 
 def _turning(heading: Samples) -> Samples:
-    spread = deviation(heading, heading.mean(axis=-1, keepdims=True))
-    return np.concatenate([spread, np.abs(heading).max(axis=-1)], axis=1)
+    """Return how unsteadily and how fast, at most, it turned over every length, whichever way."""
+    found = moments(heading, *LENGTHS).reshape(len(heading), len(LENGTHS), 4, -1)
+    _, spread, most, least = np.moveaxis(found, 2, 0)
+    return flat(np.stack([spread, np.maximum(most, -least)], axis=2))
 
 
-def _rest(left: Samples, right: Samples) -> Samples:
-    """How long the foot that moved last, and the other one, have rested."""
-    feet = [(since(left > still), since(right > still)) for still in STILL]
-    columns = [ordered(one, other) for ordered in (np.maximum, np.minimum) for one, other in feet]
-    return np.stack(columns, axis=1)
+def _rest(feet: Samples) -> Samples:
+    """(n, 2, samples), how fast they turn → how long the one that moved last, and the other, have rested."""
+    moves = feet > np.array(STILL)[:, None, None, None]
+    rested = since(moves.reshape(-1, feet.shape[-1])).reshape(len(STILL), -1, 2)
+    return np.concatenate([rested.max(axis=-1), rested.min(axis=-1)]).T
 
 
 GAIT_STATUS: Final = Recipe("gait_status", RATE_HZ, LOOK_BACK, CHANNELS, _compute)

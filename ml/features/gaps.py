@@ -11,9 +11,9 @@ def mended(windows: Samples) -> Samples:
     A gap that is not over at the newest sample holds what came before; one at the oldest, what comes after.
     Nothing after the newest sample is needed. A channel without any sample in its window stays NaN.
     """
-    missing = np.isnan(windows)
-    if not missing.any():
+    if not np.isnan(windows.min()):  # NaN where any is: quicker than to ask each
         return windows
+    missing = np.isnan(windows)
     count = windows.shape[-1]
     at = np.arange(count)
     last = np.maximum.accumulate(np.where(missing, -1, at), axis=-1)

@@ -1,4 +1,4 @@
-"""The same features, live: a ring of one robot's newest samples."""
+"""The same features, live: one robot's newest samples."""
 
 import numpy as np
 
@@ -11,29 +11,41 @@ class FeatureStream:
 
     def __init__(self, recipe: "Recipe") -> None:
         self._recipe = recipe
-        self._ring: Samples | None = None
-        self._next = 0
+        self._samples: Samples | None = None  # (channels, twice the look-back), of which …
+        self._end = 0  # … so many have come
 
     def push(self, sample: Samples) -> None:
         """Take one sample (channels,) in the recipe's order."""
-        length = self._recipe.look_back
-        if self._ring is None:
-            self._ring = np.repeat(np.asarray(sample, dtype=np.float64)[:, None], 2 * length, axis=1)
-        # Written twice, a length apart, so that the newest `length` samples always lie in one piece.
-        self._ring[:, self._next] = self._ring[:, self._next + length] = sample
-        self._next = (self._next + 1) % length
+        if self._samples is None:
+            first = np.asarray(sample, dtype=np.float64)[:, None]
+            self._samples = self._room(np.repeat(first, self._recipe.look_back, axis=1))
+        elif self._end == self._samples.shape[1]:
+            self._samples = self._room(self._samples[:, -self._recipe.look_back :])
+        self._samples[:, self._end] = sample
+        self._end += 1
+
+    def _room(self, held: Samples) -> Samples:
+        """Return new memory, half of it taken by what is held: windows of the old one stay what they were."""
+        room = np.empty((len(held), 2 * held.shape[1]))
+        self._end = held.shape[1]
+        room[:, : self._end] = held
+        return room
 
     def window(self) -> Samples:
-        """Return the window (1, channels, look-back) as it is now; those of several robots can be stacked.
+        """Return the window (1, channels, look-back) as it is now.
+
+        It is not copied, as what has come is never overwritten.
 
         Raises:
             ValueError: no sample has come yet.
 
         """
-        if self._ring is None:
+        if self._samples is None:
             raise ValueError(f"{self._recipe.name}: no sample has come yet")
-        return self._ring[None, :, self._next : self._next + self._recipe.look_back].copy()
+        window = self._samples[None, :, self._end - self._recipe.look_back : self._end]
+        window.flags.writeable = False
+        return window
 
     def features(self) -> Features:
         """(1, features) of the window that ends with the newest sample."""
-        return self._recipe.compute(self.window())
+        return self._recipe.of_each([self.window()])

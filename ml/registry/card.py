@@ -17,7 +17,7 @@ _NOT_CONTENT: Final = ("id", "made")  # two that learned the same have the same 
 
 
 class DataSource(Enum):
-    """Where its examples come from."""
+    """Source of a model's examples."""
 
     RECORDED = "recorded"
     SIMULATED = "simulated"
@@ -33,7 +33,7 @@ class TableVersion(Struct, frozen=True):
 
 
 class ClassScore(Struct, frozen=True):
-    """How well one class was told from the others, on data never seen."""
+    """Scores of one class, on unseen data."""
 
     precision: float
     recall: float
@@ -50,7 +50,7 @@ class Bin(Struct, frozen=True):
 
 
 class Metrics(Struct, frozen=True):
-    """How it was judged, on data that it never saw.
+    """Scores of a model, on unseen data.
 
     `confusion`: a row a true class, a column a class that was said, in the card's order; a last column for
     "unknown". `calibration_error` is the expected one: the mean of |said - right| over decisions.

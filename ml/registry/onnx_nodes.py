@@ -1,4 +1,4 @@
-"""What scikit-learn's converter does not know of our models, as nodes of an ONNX graph."""
+"""ONNX nodes for parts of our models that scikit-learn's converter does not know."""
 
 from collections.abc import Sequence
 from typing import Any, Final

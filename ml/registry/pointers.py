@@ -1,4 +1,4 @@
-"""Which model serves, and which did before: numbered objects that are written once and never altered.
+"""Pointers to the serving model and those before it: numbered objects, written once and never altered.
 
 So two who promote at once both find their place in the history, and neither undoes the other unseen.
 """
@@ -50,7 +50,7 @@ class Pointer(Struct, frozen=True):
 
 
 class RollbackTarget(NamedTuple):
-    """Where a rollback goes: the number that it writes, a model or "", and what is before that."""
+    """Target of a rollback: the number that it writes, a model or "", and the one before that."""
 
     number: int
     model: str

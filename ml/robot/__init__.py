@@ -1,4 +1,4 @@
-"""What a robot's own models predict, from the channels that this robot has.
+"""A robot's own models, for the channels that this robot has.
 
 classes.py    what they say: the names alone
 task.py       the tasks: classes, what labels mean, which sensors support what; the recipe for a robot

@@ -29,7 +29,7 @@ def joints_activity(pair: Samples) -> Samples:
     signals = _unnamed(pair)
     ends = np.stack([pair.max(axis=1), pair.min(axis=1)], axis=1)
     return np.concatenate(
-        [*(moments(signals, samples) for samples in LENGTHS), bins(ends, 10, 10), flat(ends[..., -1:])],
+        [moments(signals, *LENGTHS), bins(ends, 10, 10), flat(ends[..., -1:])],
         axis=1,
     )
 
@@ -44,8 +44,8 @@ def trunk_activity(trunk: Samples) -> Samples:
     signals = trunk.copy()
     sideways = [1, 3, 5, 7]  # acceleration to the left, roll and yaw rate, tilt to the side: whichever way
     signals[:, sideways] = np.abs(trunk[:, sideways])
-    lengths = (moments(signals, samples) for samples in LENGTHS)
-    return np.concatenate([*lengths, bins(signals, 10, 10), _turned(trunk[:, 5])], axis=1)
+    columns = [moments(signals, *LENGTHS), bins(signals, 10, 10), _turned(trunk[:, 5])]
+    return np.concatenate(columns, axis=1)
 
 
 def joints_phase(pair: Samples) -> Samples:
@@ -66,8 +66,8 @@ def trunk_falling(trunk: Samples) -> Samples:
     """How light the body is, how fast it turns and tips over, from which posture; a usual lean is no news."""
     leaning = trunk[:, 6:] - trunk[:, 6:, :BEFORE].mean(axis=-1, keepdims=True)
     leaning[:, 1] = np.abs(leaning[:, 1])
-    tilts = (moments(leaning, samples) for samples in SHORT_LENGTHS)
-    return np.concatenate([FALLING.compute(trunk[:, :6]), *tilts, bins(leaning, 5, 10)], axis=1)
+    tilts = moments(leaning, *SHORT_LENGTHS)
+    return np.concatenate([FALLING.compute(trunk[:, :6]), tilts, bins(leaning, 5, 10)], axis=1)
 
 
 def _unnamed(pair: Samples) -> Samples:

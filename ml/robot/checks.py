@@ -1,4 +1,4 @@
-"""Whether a state is a model of ours: everything there, of its type, and of its size."""
+"""Validation of a model's state: complete, with the right types and sizes."""
 
 from collections.abc import Mapping
 from typing import Any, Final

@@ -1,4 +1,4 @@
-"""What a robot's own models say, task by task: the names alone, which need no library.
+"""Classes of a robot's own models, task by task: the names alone, which need no library.
 
 They stand in task.py too, with the sensors that it takes to tell them. Its text is part of every model's
 fingerprint, so it cannot take them from here without making all models be learned again.

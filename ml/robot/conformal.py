@@ -1,4 +1,4 @@
-"""How sure a model must be before it speaks, so that what is true of new wearers is within what it says.
+"""Conformal thresholds: how sure a model must be, so that its sets cover the truth of new wearers.
 
 A prediction's set holds the likeliest classes, until their probabilities together reach the threshold; where
 it is one class alone, the model says that. Wearers are what is exchangeable, not decisions: one wearer's are

@@ -41,7 +41,7 @@ Network = Callable[[Task, int], Any]  # for a task, from a seed
 
 @dataclass(frozen=True, slots=True)
 class _Lesson:
-    """What `learn` is asked."""
+    """Arguments of `learn`."""
 
     task: Task
     recipe: Recipe

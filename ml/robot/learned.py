@@ -1,4 +1,4 @@
-"""What has been learned for one task: scikit-learn's parts and numbers, and what they judge of features.
+"""A trained model of one task: scikit-learn's parts and numbers, and their predictions from features.
 
 A row is judged by itself: alone, among a thousand or live, its verdict has the same bits.
 """
@@ -26,7 +26,7 @@ ABNORMAL_FROM: Final = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Verdicts:
-    """What is judged of n rows.
+    """Output for n rows.
 
     `probabilities` (n, classes) are calibrated. `label` (n,) is an index into the classes, or NONE where the
     model abstains. `novelty` (n,) is 0 for what is as in learning; abnormal begins at ABNORMAL_FROM.

@@ -1,4 +1,4 @@
-"""What a model says of robots: live, of many at once, and of a whole recording.
+"""Predictions for robots: live, of many at once, and of a whole recording.
 
 A decision is made at each grid point that is a multiple of `every_ns`, when the window before it has no gap.
 Live and over a recording the predictions are the same, bit by bit.
@@ -21,7 +21,7 @@ Row = tuple[int, Sequence[float | None]]  # stamp, ns; values in the order of th
 
 @dataclass(frozen=True, slots=True)
 class Prediction:
-    """What `model` makes of the window that ended at `stamp_ns` of the robot's monotonic clock.
+    """Output of `model` for the window that ended at `stamp_ns` of the robot's monotonic clock.
 
     `label` is a class of the task, UNKNOWN where the model abstains, ABNORMAL where it has learned from
     nothing like this. `probability` is the likeliest class's, also then. `novelty` is 0 for what is as in
@@ -43,7 +43,7 @@ class Prediction:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Window:
-    """What a decision is due about: (1, channels, look-back) samples, the newest at `stamp_ns`."""
+    """Input of a due decision: (1, channels, look-back) samples, the newest at `stamp_ns`."""
 
     stamp_ns: int
     samples: Samples
@@ -82,10 +82,8 @@ def judged(model: str, learned: Learned, windows: Sequence[Window]) -> list[Pred
     """Return a prediction for each window, of whichever robot; judged together."""
     if not windows:
         return []
-    samples = np.concatenate([window.samples for window in windows])
-    return _predictions(
-        model, learned, [window.stamp_ns for window in windows], learned.recipe.compute(samples)
-    )
+    rows = learned.recipe.of_each([window.samples for window in windows])
+    return _predictions(model, learned, [window.stamp_ns for window in windows], rows)
 
 
 def replayed(

@@ -1,4 +1,4 @@
-"""How far a robot's predictions can be trusted: whether it is still like what its model has learned from."""
+"""Trust in a robot's predictions: whether its input still resembles the training data."""
 
 import collections
 from collections.abc import Iterable, Mapping
@@ -34,7 +34,7 @@ class TrustLevel(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Trust:
-    """What the last minute of decisions says of a model on one robot.
+    """Trust in a model on one robot, by the last minute of decisions.
 
     `abnormal` and `unknown` are shares of the decisions, `novelty` their mean. `outside` is each
     channel's share of samples that lie where hardly any was that the model has learned from; channels
@@ -64,7 +64,7 @@ class Trust:
 
 
 class _Second:
-    """What was counted in one second of the robot's clock."""
+    """Counts of one second of the robot's clock."""
 
     def __init__(self, number: int, channels: int) -> None:
         self.number = number

@@ -27,7 +27,7 @@ COUNTS: Final = timedelta(hours=2)  # after that what a killed compaction has le
 
 
 class Claim(msgspec.Struct, frozen=True):
-    """Who compacts, until when."""
+    """Claim of a compaction, until its end."""
 
     who: str
     until: datetime

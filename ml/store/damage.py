@@ -1,4 +1,4 @@
-"""What is wrong with a table's file, as far as that is proven: two ways of reading that share nothing agree.
+"""Proof of damage of a table's file: two independent ways of reading must agree.
 
 Arrow reads the store in a way of its own, all else by the store's objects. Where one of them finds a file
 damaged, a network or a permission may be the reason; only what both find is damage.

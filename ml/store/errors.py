@@ -1,4 +1,4 @@
-"""What can go wrong with a store.
+"""Errors of a store.
 
 StoreError
 ├── ColumnTaken        another writer has made a column since it was looked at: look again, and append anew

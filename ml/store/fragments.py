@@ -59,7 +59,7 @@ class DataFile:
 
 @dataclass(frozen=True, slots=True)
 class Extent:
-    """What some files hold together."""
+    """Joint extent of some files."""
 
     files: Sequence[DataFile]
 

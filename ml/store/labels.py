@@ -32,7 +32,7 @@ REGRESSION: Final = "regression set"  # of a session: no model learns from it, e
 
 
 class LabelSource(Enum):
-    """Who says so, the most trusted first."""
+    """Source of a label, the most trusted first."""
 
     PERSON = "person"
     SIMULATOR = "simulator"  # its own truth

@@ -1,4 +1,4 @@
-"""Which of several rows that say something of the same was said last.
+"""Precedence of rows about the same fact: the latest is valid.
 
 Each row but telemetry's has the spool that it came from, the batch in that and its number in the batch: of
 one spool these say what came later, whatever the clocks said. Between several spools only the time does.

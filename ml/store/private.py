@@ -1,4 +1,4 @@
-"""What is known of a wearer's body is for its owner alone: files 0600, in folders 0700."""
+"""Private files, for data about a wearer's body: mode 0600, in folders 0700."""
 
 import os
 import stat

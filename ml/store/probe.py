@@ -1,4 +1,4 @@
-"""Whether a store keeps several writers apart: of many who create one object, exactly one may succeed."""
+"""Test of a store for several writers: of many that create one object, exactly one may succeed."""
 
 import functools
 import uuid

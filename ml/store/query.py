@@ -48,7 +48,7 @@ class QueryError(StoreError):
 
 @dataclass(frozen=True, slots=True)
 class QueryResult:
-    """What a query finds; the rows come while they are read."""
+    """Result of a query; the rows come while they are read."""
 
     schema: pa.Schema
     batches: Iterator[pa.RecordBatch]

@@ -53,7 +53,7 @@ class NoSuchSession(StoreError):
 
 
 class Session(msgspec.Struct, frozen=True):
-    """What is known of a session. `ended` is None while it goes on, and where its server died.
+    """Facts about a session. `ended` is None while it runs, and if its server died.
 
     Its telemetry is from `first` to before `last`, None where it has none. `parameters` are the values at
     its start, `units` each channel's unit as the robot described it, `versions` software by name. `setup` is

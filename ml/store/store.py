@@ -45,7 +45,7 @@ Batches = Callable[[], Iterator[pa.RecordBatch]]
 
 
 class About(msgspec.Struct, frozen=True):
-    """What a store is, decided when it is first used."""
+    """Properties of a store, fixed when it is first used."""
 
     format: int = FORMAT
     shards: int = 1  # of sharded tables; see docs/explanation/scale.md

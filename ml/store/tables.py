@@ -73,7 +73,7 @@ def field(name: str, kind: Any, unit: str | None = None, channel: str | None = N
 
 
 class ColumnFacts(NamedTuple):
-    """What is known of a column: its unit, empty where it has no dimension, and whose values are in it."""
+    """Facts about a column: its unit, empty without dimension, and the channel of its values."""
 
     unit: str | None = None
     channel: str | None = None

@@ -1,4 +1,4 @@
-"""What a power cut has torn off in the log of a table in a folder, and how it is set aside.
+"""Log entries torn by a power cut in a folder's table, and their removal.
 
 The table format's library writes entries, checkpoints and the hint at the newest of these without
 synchronising them, so after a power cut any of them may be missing, or a beginning of itself. An entry that

@@ -1,4 +1,4 @@
-"""How the libraries' errors become ours.
+"""Translation of the libraries' errors into ours.
 
 A server's answer may quote keys and signatures, so it is never passed on: neither in our messages nor as
 the cause of our errors.

@@ -51,7 +51,7 @@ class Pin(msgspec.Struct, frozen=True):
 
 @dataclass(frozen=True, slots=True)
 class Compacted:
-    """What a compaction did to one table."""
+    """Effect of a compaction on one table."""
 
     location: str
     files_before: int

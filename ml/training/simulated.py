@@ -1,4 +1,4 @@
-"""What `gwrms sim-record` wrote: sessions of simulated wearers, each with its channels and its truth."""
+"""Sessions of simulated wearers from `gwrms sim-record`, each with its channels and its truth."""
 
 import gzip
 import zlib

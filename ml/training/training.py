@@ -26,10 +26,10 @@ from ml.robot.learned import Learned
 from ml.robot.task import Task
 from ml.store.labels import LabelSource
 from ml.training.adapting import adapted, divided
-from ml.training.choosing import held_out, judging, recipe_for, split
+from ml.training.data_split import held_out, judging, recipe_for, split
 from ml.training.dataset import LeftOut, SessionDecisions
 from ml.training.judging import Decision, Judged, decide, judge
-from ml.training.material import Material, Wish, material
+from ml.training.training_sessions import Material, Wish, material
 
 SEED: Final = 0
 

@@ -1,4 +1,4 @@
-"""What is so at each instant, as a session's labels say: an activity, or the phase of each leg.
+"""Truth at each instant, by a session's labels: an activity, or the phase of each leg.
 
 Of labels about one instant the most trusted source's count; where two authors of one source differ, nobody
 knows. A leg's phase goes evenly from one heel strike to its next.

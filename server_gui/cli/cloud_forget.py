@@ -9,7 +9,7 @@ from gateway.cli.connect import ask
 from gateway.cli.text import say, say_json, warn
 from ml.registry.registry import Registry
 from ml.store import Store, StoreError, UnsafeStore
-from ml.store.forgetting import Name
+from ml.store.erasure import Name
 from server_gui.cli.cloud_options import add_url, parser, progress, reach, spool
 from server_gui.core.cloud import forget as forgetting
 from server_gui.core.cloud.exports import ExportState

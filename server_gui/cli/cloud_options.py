@@ -1,4 +1,4 @@
-"""What the store's commands share: arguments, the store they mean, times, progress on a terminal."""
+"""The common part of the store's commands: arguments, store, times, progress on a terminal."""
 
 import argparse
 import contextlib

@@ -21,8 +21,8 @@ from gateway.cli.connect import (
     modules_of,
     widened,
 )
-from gateway.cli.shown import Channels
 from gateway.cli.text import measured, say
+from gateway.cli.value_display import Channels
 from gateway.client import LinkSettings, Robot
 from server_gui.qt_needs import can_open
 from server_gui.terminal.braille import Sample, draw, extent

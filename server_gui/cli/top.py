@@ -43,10 +43,10 @@ def main(argv: list[str]) -> int:
         sys.stderr.write("gwrms top: this is no terminal; gwrms watch and gwrms describe need none\n")
         return 1
     from server_gui.processes.shutdown_signals import ShutdownRequested, ShutdownSignals
+    from server_gui.terminal.adapted_models import Learned
     from server_gui.terminal.controls import Controls
     from server_gui.terminal.dashboard import Dashboard
     from server_gui.terminal.followed_robot import EVERY_PARAMETER, FollowedRobot
-    from server_gui.terminal.learned import Learned
 
     settings = _settings()
     ends_s = math.inf if arguments.seconds is None else time.monotonic() + arguments.seconds

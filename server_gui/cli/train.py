@@ -14,7 +14,7 @@ from ml.registry.registry import Registry
 from ml.robot.task import TASKS
 from ml.store.private import private_files
 from ml.training.judging import Judged
-from ml.training.material import Wish
+from ml.training.training_sessions import Wish
 from server_gui.cli.cloud_options import add_url, parser, url
 from server_gui.cli.models import NOTHING
 from server_gui.core.models.training import Progress

@@ -11,7 +11,7 @@ from server_gui.processes.simulated import START_S, RobotPart, address_in
 
 
 class FileGateway(DemoRobot):
-    """Of a robot that is there: nothing is simulated."""
+    """Gateway for an existing robot: nothing is simulated."""
 
     name: Final = "gateway"
 

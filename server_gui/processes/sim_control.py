@@ -1,4 +1,4 @@
-"""How a simulator of ours is asked for faults and a start: its control socket, as `gwrms sim-fault` does."""
+"""Control of our simulator (faults and start) by its socket, as `gwrms sim-fault` does."""
 
 import os
 import socket
@@ -41,7 +41,7 @@ class Listed(msgspec.Struct, frozen=True):
 
 
 class SimControl:
-    """Of the simulator that runs in `folder`; each call waits for its answer.
+    """Control of the simulator in `folder`; each call waits for its answer.
 
     Raises:
         SimulatorRefuses: by every call.

@@ -15,7 +15,7 @@ START_S: Final = 60.0  # for a simulator or a gateway to become ready, on a slow
 
 
 class RobotPart(Enum):
-    """What a simulated robot is made of, in the order in which it starts."""
+    """Part of a simulated robot, in the order of their start."""
 
     SIMULATOR = "simulator"
     GATEWAY = "gateway"

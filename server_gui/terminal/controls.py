@@ -1,4 +1,4 @@
-"""What keys do: choose a parameter, raise or lower it, stop, end a held stop, quit. Draws nothing."""
+"""Keys of the dashboard: choose a parameter, raise or lower it, stop, end a held stop, quit. No drawing."""
 
 import math
 import sys

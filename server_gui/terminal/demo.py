@@ -48,7 +48,7 @@ class DemoFailed(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """What the command line asked for."""
+    """Options of the command line."""
 
     window: bool
     headless: bool

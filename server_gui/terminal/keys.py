@@ -8,7 +8,7 @@ from typing import Self
 
 
 class Key(Enum):
-    """What can be pressed."""
+    """Keys of the dashboard."""
 
     UP = "up"
     DOWN = "down"

@@ -61,7 +61,7 @@ NOT_WRITTEN = (WriteState.FAILED, WriteState.NOT_STORED, WriteState.UNKNOWN)
 
 @dataclass(frozen=True, slots=True)
 class PanelWidths:
-    """How much room there is: columns of the drawings, 0 where one is left out."""
+    """Widths of the drawings in columns, 0 for those left out."""
 
     angle: int
     past: int

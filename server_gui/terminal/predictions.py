@@ -1,4 +1,4 @@
-"""What models say, as text: of a robot that is followed, and of a session that was predicted again."""
+"""Predictions as text: of a robot that is followed, and of a session that was predicted again."""
 
 import itertools
 from collections.abc import Iterable, Iterator, Sequence
@@ -12,8 +12,8 @@ from ml.registry.card import Card, age_days
 from ml.robot.task import ABNORMAL, TASKS, UNKNOWN
 from ml.serving.predictor import Prediction
 from ml.serving.trust import Trust
-from server_gui.core.prediction.current import NewestPrediction
 from server_gui.core.prediction.live import Watched
+from server_gui.core.prediction.newest_predictions import NewestPrediction
 from server_gui.core.prediction.replay import Replayed
 from server_gui.core.prediction.state import WITHIN_DAYS, Quality
 

@@ -1,4 +1,4 @@
-"""What a run showed, added up: did the joints move, did the feet alternate, was anything lost."""
+"""Summary of a run: did the joints move, did the feet alternate, was anything lost."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -29,7 +29,7 @@ class Range:
 
 @dataclass(slots=True)
 class Foot:
-    """How often one foot was loaded."""
+    """Load statistics of one foot."""
 
     rows: int = 0
     loaded: int = 0

@@ -1,4 +1,4 @@
-"""What models say of a robot, in marks and words for header and overview; also that they do not know."""
+"""Predictions about a robot, in marks and words for header and overview; *unknown* too."""
 
 import re
 from collections.abc import Iterator
@@ -14,7 +14,7 @@ from server_gui.core.desk.leg_phase import LegPhase, apart, leg_phase, phase_at
 from server_gui.core.desk.station import Station
 from server_gui.core.models.names import model_name, told_name
 from server_gui.core.prediction.adaptation import LEARNED_S, TRIED_S, AdaptationState, Adapting
-from server_gui.core.prediction.current import STALE_S, Recalled, StationPredictions, Told
+from server_gui.core.prediction.newest_predictions import STALE_S, Recalled, StationPredictions, Told
 from server_gui.core.processing.gait_events import Leg
 from server_gui.views.marks import Mark, enabled_text
 

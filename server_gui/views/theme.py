@@ -15,7 +15,7 @@ BASE_POINTS: Final = 9.0
 
 
 class Look(Enum):
-    """Which palette."""
+    """Palette."""
 
     DARK = "dark"
     LIGHT = "light"
@@ -129,6 +129,7 @@ QLabel, QCheckBox {{ background: transparent; }}
 QLabel#dim, QLabel#note {{ color: {dim}; }}
 QLabel#title[tone="old"] {{ color: {old}; }}
 QLabel#dim[tone="bad"] {{ color: {bad}; }}
+QLabel#dim[tone="warn"] {{ color: {warn}; }}
 QLabel#title {{ font-weight: bold; }}
 QLabel#brand {{ color: {accent}; padding-right: 8px; }}
 QLabel#banner {{ background: {staged}; border: 1px solid {warn}; border-radius: 4px; padding: 5px 8px; }}

@@ -5,7 +5,7 @@ from collections.abc import Callable, Set
 from typing import Final
 
 from ml.store import NoSuchTable, Store, upkeep
-from ml.store.forgetting import Name
+from ml.store.erasure import Name
 from ml.store.labels import person, wearer
 from ml.store.tables import EVENTS, LABELS, SESSIONS
 from server_gui.core.cloud import forget, mend

@@ -24,9 +24,9 @@ from ml.store import Store, StoreError, upkeep
 from ml.store.labels import holding, utc_ns, wearer
 from ml.store.objects import Objects
 from ml.store.tables import LABELS, TELEMETRY
-from ml.training import choosing, dataset, training
+from ml.training import data_split, dataset, training
 from ml.training.dataset import SessionDecisions
-from ml.training.material import Wish
+from ml.training.training_sessions import Wish
 from tests.explore_store.disk import Ended
 from tests.explore_store.judging import rows_of_version
 from tests.explore_store.ledger import Promoted
@@ -75,7 +75,7 @@ def _changes(world: World, known: dict[str, tuple[str, ...]]) -> Iterator[tuple[
 
 def _split(world: World, parts: Sequence[SessionDecisions], held: Set[str]) -> Split:
     """What is learned from and judged by is looked at in passing."""
-    found = choosing.split(parts, held)
+    found = data_split.split(parts, held)
     world.classes.split = found
     return found
 

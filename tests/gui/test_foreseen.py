@@ -14,7 +14,7 @@ from ml.serving.trust import Trust
 from server_gui.core.desk.leg_phase import leg_phase
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.events import LinkChanged
-from server_gui.core.prediction.current import OFF, NewestPrediction, Recalled
+from server_gui.core.prediction.newest_predictions import OFF, NewestPrediction, Recalled
 from server_gui.core.prediction.news import Ruled, Serves
 from server_gui.core.prediction.state import Quality
 from server_gui.core.processing.gait_events import Leg

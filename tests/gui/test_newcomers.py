@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QApplication
 from gateway.client import NotConnected
 from server_gui.core.tuning.stop import Proof
 from server_gui.views.frame.main_window import MainWindow
-from server_gui.views.overview.joint_table import STOP, JointModel
+from server_gui.views.overview.joint_table import ERROR, STATE, STOP, JointModel
 from server_gui.views.overview.page import Overview
 from server_gui.views.parameters.panel import ParametersPanel
 from server_gui.views.parameters.tree import NAME, NEW
@@ -112,12 +112,17 @@ def test_stop_names_the_robot_that_was_chosen_with_the_next_frame(window: MainWi
         assert window.header.stop.accessibleName() == f"STOP {station.title}"
 
 
-def test_a_device_in_trouble_has_one_colour_and_word_everywhere(bench: Bench) -> None:
+def test_a_device_in_trouble_has_one_colour_and_word_everywhere(theme: Theme, bench: Bench) -> None:
     bench.station.take([walking(100), looked(state="stale", problem="no new sample for 0.7 s")])
     (alarm,) = (one.alarm for one in bench.station.alarms.active)
     (line,) = (line for line in lines(bench.station) if "left knee" in line.text)
     assert line.mark == alarm.mark
     assert line.text == f"left knee: {alarm.mark.word}"
+    model = JointModel(bench.desk, theme)
+    model.refresh()
+    row = JOINTS.index("left_knee")
+    inks = {model.index(row, column).data(Qt.ItemDataRole.ForegroundRole).name() for column in (STATE, ERROR)}
+    assert inks == {theme.colour(alarm.mark.colour).name()}, "also in the table of joints"
 
 
 def test_a_drive_that_is_enabled_again_has_no_proof_of_an_old_stop(theme: Theme, bench: Bench) -> None:

@@ -1,4 +1,4 @@
-"""What a type means to whoever writes a value, in words."""
+"""Meaning of a type in words, for people who write a value."""
 
 import enum
 import functools

@@ -29,11 +29,11 @@ from tools.draw.structs import Key, docstring, table, written
 PAGE: Final = "robot-toml.md"
 _HEAD: Final = """# robot.toml
 
-The file that describes a robot to its gateway: `gwrms gateway robot.toml`. `[robot]` is needed,
-everything else is not. Keys in bold are needed in their table; an unknown key is refused, and the key is
-named that was meant ([check files](../how-to/check-files.md), also while you type). Values are in SI
-units; files that are named lie beside this one. How to find out
-what to write: [wire a joint](../how-to/wire-a-joint.md), [wire a sensor](../how-to/wire-a-sensor.md), [a
+This file describes a robot to its gateway: `gwrms gateway robot.toml`. Only `[robot]` is required.
+Keys in bold are required in their table; an unknown key is refused, with the likely one
+([check files](../how-to/check-files.md), also while you type). Values are in SI
+units; paths are relative to this file. To find the right
+values: [wire a joint](../how-to/wire-a-joint.md), [wire a sensor](../how-to/wire-a-sensor.md), [a
 first real robot](../how-to/first-robot.md)."""
 _TABLES: Final[tuple[tuple[str, type[Struct], tuple[str, ...]], ...]] = (
     ("`[robot]`", RobotSettings, ()),
@@ -53,34 +53,29 @@ _TABLES: Final[tuple[tuple[str, type[Struct], tuple[str, ...]], ...]] = (
     ("`[guard]`", GuardSettings, ("rule",)),
     ("`[guard.rule.NAME]`", GuardRule, ()),
 )
-_TIMES: Final = """`stale_after_s` and `lost_after_s` are the silence after which its values are `null`, and
-after which it is lost."""
-_NODE: Final = f"""`bus` is the NAME of a `[can.NAME]` table, `node_id` the CANopen node id there, and `eds`
-the vendor's file, beside this one or [shipped](../../eds/files/SOURCES.md). {_TIMES}"""
-_GATEWAY: Final = """With the role `observer` another controller owns the buses: the gateway sends only SDO
-requests that were asked for, a stop, and the guard's heartbeat. As `master`, on a bench, it also starts
-nodes, and sends SYNC and a heartbeat where its buses say so. Before you change `host`, read
-[who may connect](../../SECURITY.md). `linger_s` and the budget are explained in
-[measure the cost](../how-to/measure-the-cost.md)."""
-_PARAMETER: Final = "The stricter of this and the device's EDS counts: [parameters](parameters.md)."
-_MAKER: Final = "[vendor-specific objects](../how-to/wire-a-joint.md#vendor-specific-objects)"
-_CHANNEL: Final = f"""The channel is there as `COMPONENT.NAME`, of a joint or a device, with the type that the
-EDS gives its object. Where a TPDO of the node brings it, it is read there; else it is asked for by SDO
-`poll_hz` times a second. So a device gets channels, and a joint {_MAKER}."""
-_RULE: Final = (
-    "Every rule has these keys, and those of what it watches: [the table of rules](guard.md#rules)."
+_NODE: Final = "Shipped EDS files: [sources](../../eds/files/SOURCES.md)."
+_GATEWAY: Final = """With the role `observer`, another controller owns the buses: the gateway sends only
+requested SDOs, a stop, and the guard's heartbeat. As `master`, on a bench, it also starts
+nodes, and sends SYNC and a heartbeat if configured for the bus.
+Before you change `host`, read [security](../../SECURITY.md).
+`linger_s` and `max_cpu_percent` are explained in [measure the cost](../how-to/measure-the-cost.md).
+`classic_port` is for comparison with [the paper](../explanation/paper.md)."""
+_PARAMETER: Final = (
+    "The stricter of these limits and those of the device's EDS apply: [parameters](parameters.md)."
 )
+_MAKER: Final = "[vendor-specific objects](../how-to/wire-a-joint.md#vendor-specific-objects)"
+_CHANNEL: Final = f"""The channel is named `COMPONENT.NAME`, of a joint or a device, and has the type of its
+object in the EDS. It is read from a TPDO of the node if one brings it, else by SDO at
+`poll_hz`. This is how a device gets channels, and a joint {_MAKER}."""
+_RULE: Final = "Every rule has these keys, and those of its kind: [the table of rules](guard.md#rules)."
 _MORE: Final[Mapping[str, str]] = {
-    "`[robot]`": "`name` is how clients and journals call it.",
     "`[gateway]`": _GATEWAY,
-    "`[can.NAME]`": "Every further key is python-can's own, and goes to the interface as it stands.",
+    "`[can.NAME]`": "All further keys are python-can's own, and are passed to the interface.",
     "`[joint.NAME]`": _NODE,
     "`[device.NAME]`": _NODE,
-    "`[insole.NAME]`": _TIMES,
-    "`[imu.NAME]` on a serial port": _TIMES,
     '`[parameter."COMPONENT.NAME"]`': _PARAMETER,
     '`[channel."COMPONENT.NAME"]`': _CHANNEL,
-    "`[stop]`": "What a fallback does, and its dangers: [stop](../explanation/stop.md#the-robots-file).",
+    "`[stop]`": "Effects and dangers of a fallback: [stop](../explanation/stop.md#the-robots-file).",
     "`[guard.rule.NAME]`": _RULE,
 }
 

@@ -10,44 +10,44 @@ from tools.draw.structs import docstring, table, written
 PAGE: Final = "server-toml.md"
 _HEAD: Final = """# server.toml
 
-The desk's and the collector's file: `--config FILE`, or `~/.config/gwrms/server.toml`. All of it may be
-left out. Robots that `--robot` names come on top. How it is used: [record robots](../how-to/record.md),
-[predict](../how-to/predict.md#rules). What is wrong with one: [check files](../how-to/check-files.md)."""
+The file of the desk and the collector: `--config FILE`, or `~/.config/gwrms/server.toml`. All of it is
+optional; `--robot` adds robots. Its use: [record robots](../how-to/record.md),
+[predict](../how-to/predict.md#rules). To find mistakes in it: [check files](../how-to/check-files.md)."""
 _TABLES: Final = (
-    ("`[robots]`", RobotSettings, 'Usually just NAME = "HOST:PORT". The name is the robot\'s in the store.'),
+    ("`[robots]`", RobotSettings, 'Usually just NAME = "HOST:PORT". NAME is the robot\'s name in the store.'),
     (
         "`[store]`",
         StoreSettings,
-        """`url` is `file:///folder` (without it `~/.local/share/gwrms/store`) or `s3://bucket/prefix`; keys
-for S3 come from the AWS environment or profile, never from here. `shards` and `several_writers`: [how far one
-store goes](../explanation/scale.md). With `compact_h = 0` somebody else says `gwrms cloud compact`, as
-where several servers share a store, or the network is dear; a collector never compacts a store with one
-writer alone, and only while `upload` allows it.""",
+        """The default of `url` is `~/.local/share/gwrms/store`; keys for S3 come from the AWS environment or
+profile, never from this file. On `shards` and `several_writers`: [scale](../explanation/scale.md). Set
+`compact_h = 0` and run `gwrms cloud compact` elsewhere if several servers share a store, or if the network is
+expensive. A collector compacts only with `several_writers`, and only while `upload` allows it.""",
     ),
     (
         "`[recorder]`",
         RecordingSettings,
-        """`spool` is `~/.local/share/gwrms/spool` without this key; one collector a spool. `upload`:
-`"always"`, as soon as a batch is full; `"idle"`, while no robot has sent a row for 10 s, so that a shared
-radio link stays the robots' own, but with more than 2 GiB waiting at once; `"manual"`, when `gwrms collect
---upload` says so.""",
+        """The default of `spool` is `~/.local/share/gwrms/spool`; each collector needs its own. `upload`:
+`"always"`: as soon as a batch is full; `"idle"`: while no robot has sent a row for 10 s, to leave a shared
+radio link to the robots, but at once with more than 2 GiB pending; `"manual"`: on
+`gwrms collect --upload`.""",
     ),
     (
         "`[prediction]`",
         PredictionSettings,
-        """`every_ms` is by task; without it `{ activity = 100, gait_phase = 40, falling = 40 }`. What
-models say of each robot is recorded too.""",
+        """The default of `every_ms` is `{ activity = 100, gait_phase = 40, falling = 40 }`. Predictions are
+recorded, too.""",
     ),
     (
         "`[[rules]]`",
         RuleSettings,
-        "Without such a table there are none. Try a rule before it may stop a robot.",
+        "There are no rules by default. Test a rule on recordings before it may stop a robot.",
     ),
 )
 _PROMOTERS: Final = """## `[promoters]`
 
-Whose models a rule may stop a robot by: NAME = "SHA-256", the line that `gwrms models key` says on
-their desk. Without it, no rule stops a robot ([who promoted it](models.md#who-promoted-it))."""
+Desks whose promoted models may stop a robot by a rule: NAME = "SHA-256", the line printed by
+`gwrms models key` on that desk. Without it, no rule stops a robot
+([promoters](models.md#who-promoted-it))."""
 
 
 def draw() -> str:

@@ -8,7 +8,7 @@ _CONTROLLER, _BUS_OFF, _RESTARTED = 0x04, 0x40, 0x100
 
 
 class BusState(StrEnum):
-    """How much the controller still takes part (ISO 11898-1 fault confinement)."""
+    """State of the CAN controller (ISO 11898-1 fault confinement)."""
 
     ACTIVE = "error active"
     WARNING = "error warning"

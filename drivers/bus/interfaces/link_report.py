@@ -1,4 +1,4 @@
-"""What is wrong with a SocketCAN link, in words and with the exact line that mends it."""
+"""Problems of a SocketCAN link, in words and with the exact line that repairs it."""
 
 import socket
 

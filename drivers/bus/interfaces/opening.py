@@ -1,4 +1,4 @@
-"""Which transport serves which interface name."""
+"""Choice of the transport by the interface's name."""
 
 from collections.abc import Callable
 

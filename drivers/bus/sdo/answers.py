@@ -18,7 +18,7 @@ INBOX = 64
 
 @dataclass(slots=True)
 class SdoCounters:
-    """What happened on one channel."""
+    """Counters of one channel."""
 
     transfers: int = 0
     timeouts: int = 0

@@ -35,7 +35,7 @@ class Interrupted(Exception):
 
 
 class Outlet(Protocol):
-    """How a channel's requests reach the bus; see `CanBus.offer` and `CanBus.send_urgent`."""
+    """Outlet of a channel's requests to the bus; see `CanBus.offer` and `CanBus.send_urgent`."""
 
     def offer(self, data: bytes, wanted: Callable[[], bool]) -> Callable[[], bool]: ...
 

@@ -1,4 +1,4 @@
-"""Which requests of one SDO channel are unanswered, and which of them an answer settles.
+"""Unanswered requests of one SDO channel, and their match with answers.
 
 An answer names its object but not its request. A server answers in the order of the requests, and CAN keeps
 the order of one identifier: so an answer is taken for that to the oldest request that it fits, and nothing

@@ -1,4 +1,4 @@
-"""How long one node takes to answer by SDO, and whether it does at all."""
+"""Round-trip times of one node's SDO answers, and its silence."""
 
 import threading
 from collections import deque

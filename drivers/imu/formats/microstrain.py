@@ -31,7 +31,7 @@ OVERRANGE = 0x0077  # an axis of accelerometer or gyroscope at its end
 
 
 class Field(NamedTuple):
-    """What is in a field: its layout, what it is called, and SI for each of its units."""
+    """Definition of a field: its layout, its name, and the SI value of its units."""
 
     layout: struct.Struct
     name: str
@@ -40,7 +40,7 @@ class Field(NamedTuple):
 
 
 class Values(NamedTuple):
-    """What a packet says, by name, in SI; and what it says that is not known."""
+    """Values of a packet, by name, in SI, and its unknown fields."""
 
     numbers: dict[str, tuple[Any, ...]]
     unknown: More

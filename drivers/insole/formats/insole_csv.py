@@ -11,8 +11,8 @@ from drivers.insole.description import SECONDS, Column, CsvDescription, Flag
 from drivers.insole.foot import Foot
 from drivers.insole.format import MICROSECONDS, Format, MakeParser
 from drivers.insole.frame import InsoleFrame
+from drivers.insole.frame_order import LARGEST, Order
 from drivers.insole.layout import Layout
-from drivers.insole.order import LARGEST, Order
 from drivers.parsing import DelimitedParser
 
 # What a header's column means where the description does not say.
@@ -27,7 +27,7 @@ COMMON_FEET = ("foot", "side")
 
 @dataclass(frozen=True, slots=True)
 class Columns:
-    """Where in a line everything is."""
+    """Places of all values in a line."""
 
     width: int | None  # None: the line may have any
     cells: Mapping[Foot | None, tuple[int, ...]]

@@ -13,8 +13,8 @@ from drivers.insole.description import Flag, FrameDescription
 from drivers.insole.foot import Foot
 from drivers.insole.format import MICROSECONDS, Format, MakeParser
 from drivers.insole.frame import InsoleFrame
+from drivers.insole.frame_order import LONGEST_TIME_S, Order
 from drivers.insole.layout import Layout
-from drivers.insole.order import LONGEST_TIME_S, Order
 from drivers.parsing import IMPOSSIBLE, FrameScanner, needs
 
 REALS = ("f32", "f64")

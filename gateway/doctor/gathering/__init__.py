@@ -1,1 +1,1 @@
-"""What the doctor looks at, gathered once: nothing here judges, enables or moves."""
+"""The doctor's observations, gathered once: nothing here judges, enables or moves."""

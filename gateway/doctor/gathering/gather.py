@@ -8,7 +8,7 @@ from pathlib import Path
 
 import eds
 from drivers.bus.interfaces.opening import obstacle
-from drivers.scan.asking import NodeAnswers
+from drivers.scan.identification import NodeAnswers
 from drivers.scan.products import Library, files
 from eds.shipped import SHIPPED
 from gateway.client import Address, ClientError, LinkSettings, Robot, Unreachable
@@ -26,7 +26,7 @@ OTHER = "the gateway goes by another file than this one"
 
 @dataclass(frozen=True, slots=True)
 class How:
-    """How to look: for how long, by which gateway, and what may be sent where there is none."""
+    """Options of the observation: duration, gateway, and what may be sent without one."""
 
     seconds: float = 20.0
     gateway: Address | None = None  # None: nobody is asked
@@ -45,6 +45,8 @@ class _Seen:
     why_no_objects: str
     units: Mapping[str, tuple[float, str]] = field(default_factory=dict)
     other_file: str | None = None
+    held: Mapping[str, str] = field(default_factory=dict)
+    stop_held: str | None = None
 
 
 class OtherRobot(ClientError):
@@ -73,6 +75,8 @@ def gather(config: RobotConfig, how: How) -> Observations:
         bus_obstacles=dict(_obstacles(config)) if how.here else {},
         units=seen.units,
         other_file=seen.other_file,
+        held=seen.held,
+        stop_held=seen.stop_held,
     )
 
 
@@ -130,7 +134,8 @@ def _running(empty: Observations, how: How, robot: Robot) -> _Seen:
         return _Seen(buses, {}, samples, OTHER, other_file=other_file)
     objects = with_gateway.objects(robot, empty.nodes(), empty.descriptions)
     units = {f"{one.component}.{one.object}": (one.scale, one.unit) for one in described.parameters}
-    return _Seen(buses, objects, samples, NOT_HERE, units)
+    held, why = with_gateway.held(robot)
+    return _Seen(buses, objects, samples, NOT_HERE, units, held=held, stop_held=why)
 
 
 def _check_robot(config: RobotConfig, described: Robots, how: How) -> None:

@@ -1,4 +1,4 @@
-"""Which objects the doctor wants to know, and of whom."""
+"""The objects that the doctor reads, by device."""
 
 from collections.abc import Iterator
 

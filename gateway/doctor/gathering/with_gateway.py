@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from drivers.bus.interfaces.controller_state import BusState
 from eds import Description
 from gateway.client import ClientError, Robot
+from gateway.client.held_controllers import held_channels, holding_channels
 from gateway.doctor.gathering.objects import wanted
 from gateway.doctor.observations import BusFacts, Object, Place, Samples, Value
 from gateway.wire.bus import CLOSED, Buses
@@ -82,6 +83,15 @@ def samples(robot: Robot, described: Robots, seconds: float) -> Samples:
         "the gateway sent no samples",
         problems,
     )
+
+
+def held(robot: Robot) -> tuple[dict[str, str], str | None]:
+    """Return the controllers that are held now, by the state that says so; and why a stop is held."""
+    described = robot.describe()
+    names = holding_channels(described)
+    values = robot.components(*names).values if names else {}
+    found = {name.partition(".")[0]: name for name in held_channels(described, values)}
+    return found, (described.stop.reason or "no reason given") if described.stop.held else None
 
 
 def objects(

@@ -17,7 +17,7 @@ from drivers.bus.values import unsigned
 from drivers.component import Component, ComponentKind
 from drivers.errors import DeviceAbort, DriverError
 from drivers.imu.settings import NodeImuSettings
-from drivers.scan.asking import TIMEOUT_S
+from drivers.scan.identification import TIMEOUT_S
 from eds import Description
 from gateway.config.robot import RobotConfig
 from gateway.doctor.gathering.objects import wanted

@@ -1,1 +1,1 @@
-"""What the doctor knows to find, a file for each place where it looks."""
+"""The doctor's rules, a file for each source of observations."""

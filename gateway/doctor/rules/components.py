@@ -1,4 +1,4 @@
-"""What the drivers of joints and sensors say by themselves, where no other finding explains it."""
+"""Problems reported by the drivers of joints and sensors, unless another finding explains them."""
 
 from collections.abc import Iterable, Iterator
 
@@ -10,6 +10,8 @@ from gateway.doctor.verdicts import Advice, Finding, Run, Unknown, Verdict
 _RESTART = Advice("start the gateway again while nobody is in the robot, so that it takes the file")
 _COPY = Advice("where this is a copy of the robot's file, or an old one: take that which the gateway serves")
 _CHANNEL = Advice("where it is another one: correct interface and channel in the robot's file")
+_RESET = Advice("see that nobody is in danger, then gwrms reset; then start the controller")
+_START = Advice("start the controller (a simulated robot's: gwrms sim-fault --controller start)")
 _DESCRIBE = Advice("gwrms describe says since when, and what to check")
 
 
@@ -20,6 +22,7 @@ def component(seen: Observations) -> Iterator[Verdict]:
         yield Finding("component", str(seen.config.path), words, (seen.other_file,), (_RESTART, _COPY))
     yield from _buses(seen)
     yield from _strangers(seen)
+    yield from _held(seen)
     sampled = {name.partition(".")[0] for name in seen.samples.columns}
     for kind in COMPONENT_TABLES:
         for name in getattr(seen.config, kind):
@@ -29,6 +32,15 @@ def component(seen: Observations) -> Iterator[Verdict]:
                 yield Finding("component", header(kind, name), words, (problem,), (_DESCRIBE,))
             elif name not in sampled and kind != "device":  # a device has no channels
                 yield Unknown("component", header(kind, name), seen.samples.why_none)
+
+
+def _held(seen: Observations) -> Iterator[Verdict]:
+    """Yield controllers that move nothing, although nothing else may be wrong any more."""
+    for name, channel in seen.held.items():
+        words = "it is held, as after a lost joint or a stop: it moves nothing until it is started again"
+        why = () if seen.stop_held is None else (f"a stop is held: {seen.stop_held}",)
+        fixes = (_START,) if seen.stop_held is None else (_RESET, _START)
+        yield Finding("component", name, words, (f"{channel} = held", *why), fixes)
 
 
 def _buses(seen: Observations) -> Iterator[Verdict]:

@@ -29,7 +29,7 @@ T = TypeVar("T")
 
 @dataclass(slots=True)
 class Robot:
-    """What could be built, and why the rest could not."""
+    """The components that could be built, and the reasons for the rest."""
 
     buses: dict[str, CanBus] = field(default_factory=dict)
     components: dict[str, Component] = field(default_factory=dict)
@@ -41,7 +41,7 @@ class Robot:
 
 @dataclass(frozen=True, slots=True)
 class Builder:
-    """How components of one kind are made of their tables, and learn of all others once those are there."""
+    """Builder of one kind of components from their tables; `join` introduces them to all others."""
 
     build: Callable[[str, Any, BuildContext], Component]
     join: Callable[[Mapping[str, Component]], None] | None = None

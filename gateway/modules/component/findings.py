@@ -1,4 +1,4 @@
-"""What `robot.describe` tells of buses, of findings and of the last EMCY."""
+"""The parts of `robot.describe` on buses, findings and the last EMCY."""
 
 from collections.abc import Iterable, Mapping
 from typing import cast
@@ -6,7 +6,7 @@ from typing import cast
 from msgspec import UNSET, UnsetType
 
 from drivers.bus.bus import CanBus
-from drivers.bus.life import NodeLife
+from drivers.bus.liveness import NodeLife
 from drivers.bus.nmt import HEARTBEAT
 from drivers.bus.node import Node
 from drivers.component import Component

@@ -14,13 +14,13 @@ from gateway.records.records import Records
 from gateway.wire.role import Role
 
 if TYPE_CHECKING:
-    from gateway.access.known import KnownClients
+    from gateway.access.known_clients import KnownClients
 
 log = logging.getLogger(__name__)
 
 
 class Admission(Struct, frozen=True):
-    """What the journal says of one: their role, and the SHA-256 of their certificate, if they come by one."""
+    """A client in the journal: its role, and the SHA-256 of its certificate, if it has one."""
 
     role: Role
     key: str | None = None
@@ -30,7 +30,7 @@ People = Mapping[str, Admission]  # by `client NAME`, `user NAME` or `group NAME
 
 
 class AccessJournal:
-    """What was told last is kept beside the journal; an entry comes first, so that none is ever lost."""
+    """Journal of admissions. The last state is kept beside the journal; entries come first: none is lost."""
 
     def __init__(self, records: Records, folder: AccessFolder) -> None:
         self._folder = folder
@@ -47,7 +47,7 @@ class AccessJournal:
                 return
             self._stamp = stamp
             if stamp or self._file.exists():
-                from gateway.access.known import known_in  # for robots that know somebody
+                from gateway.access.known_clients import known_in  # for robots that know somebody
 
                 self.tell(known_in(self._folder))
         except OSError as error:

@@ -1,4 +1,4 @@
-"""What an EDS offers as parameters: its writable numbers, by readable names, locked until released.
+"""Parameters from an EDS: its writable numbers, by readable names, locked until released.
 
 Its texts and other bytes are there to be read.
 """

@@ -23,7 +23,7 @@ class _Held:
 
 
 class Leases:
-    """Who may write now. It belongs to the loop's thread.
+    """The right to write. It belongs to the loop's thread.
 
     `changed(session, what)` is told what has happened to whose lease: taken, renewed, given back, or why it
     ended. After all but the first two nobody may write until somebody takes it anew.

@@ -1,4 +1,4 @@
-"""What is kept of one write beyond the process: its entry in the undo file, and what the journal says of it.
+"""The durable record of one write: its entry in the undo file, and its lines in the journal.
 
 The entry is durable first, and its end is told before it goes: whatever the journal says was begun has its
 end there, also where the gateway was killed in between; then the next one tells it. Both are durable before

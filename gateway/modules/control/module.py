@@ -78,7 +78,7 @@ from gateway.wire.stop import (
 LOOK_S = 1.0  # between looks who is let in
 
 if TYPE_CHECKING:
-    from gateway.access.known import KnownClients
+    from gateway.access.known_clients import KnownClients
     from gateway.connections.session import Session
     from gateway.modules.component.module import ComponentModule
     from gateway.registry import Context

@@ -19,7 +19,7 @@ WRITABLE = ("rw", "rwr", "rww")
 
 
 class Lock(Enum):
-    """Why a parameter that an EDS offers is read-only: in a word, and what to do about it."""
+    """Reason why an EDS's parameter is read-only: in a word, and the remedy."""
 
     TEXT = "no number"
     UNRELEASED = "not released"

@@ -1,4 +1,4 @@
-"""Whose objects are read next: a few objects of a few devices at a time, in turn between the clients.
+"""Fair order of reads: a few objects of a few devices at a time, in turn between the clients.
 
 Everything that a robot offers is a thousand transfers on its buses, and a client may ask for it again and
 again. So what is asked waits here as it was asked, and not as a thousand jobs before the devices: a write
@@ -24,7 +24,7 @@ SLOW_S: Final = 0.2  # a device that takes longer for these
 
 
 class Named(Protocol):
-    """What is read: a parameter, or an object."""
+    """An object to read: a parameter, or any other."""
 
     @property
     def name(self) -> str: ...

@@ -1,4 +1,4 @@
-"""What may be written to a robot's devices now: one rule, on the way there and on the way back.
+"""Permission to write to a robot's devices: one rule for writing and for reverting.
 
 Only parameters that the robot's file names, at the address that it names, within limits and largest step, in
 the allowed states of the drives that they may move.

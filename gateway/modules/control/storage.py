@@ -60,7 +60,7 @@ RESTORING = Command(
 
 
 class Storage:
-    """What every device of a robot can store."""
+    """Storing of parameters in every device of a robot."""
 
     def __init__(
         self,

@@ -25,7 +25,7 @@ NOTHING = "nothing was written"
 
 @dataclass(frozen=True, slots=True)
 class Leave:
-    """What one write may do: what it might when it was asked for, until a stop, or until nobody wants it."""
+    """Permission of one write: as of its request, until a stop, or until nobody wants it."""
 
     permit: Permit
     overtaken: Callable[[], str | None]  # by what it has become pointless

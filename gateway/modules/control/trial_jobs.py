@@ -1,4 +1,4 @@
-"""What becomes of a write on trial: confirmed, taken back, or claimed by a stop. In the writer's thread.
+"""The end of a write on trial: confirmed, reverted, or claimed by a stop. In the writer's thread.
 
 One job after another decides it, by the undo file: who comes first, the confirmation or the end of its time,
 wins.

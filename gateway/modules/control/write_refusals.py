@@ -1,4 +1,4 @@
-"""Why an object of a device cannot be written, and the lines of the robot's file that would allow it."""
+"""Reasons why an object cannot be written, and the lines of the robot's file that would allow it."""
 
 from collections.abc import Sequence
 from collections.abc import Set as AbstractSet
@@ -29,7 +29,7 @@ class WriteRefusal:
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Where the robot's file describes a component: its header, and what it says."""
+    """Table of a component in the robot's file: its header and settings."""
 
     component: str
     header: str

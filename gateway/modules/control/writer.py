@@ -19,7 +19,7 @@ T = TypeVar("T")
 
 
 class Turn(IntEnum):
-    """Whose turn comes first; among equals, who came first."""
+    """Priority of jobs; first come, first served among equals."""
 
     CLAIM = 0  # what a stop has set
     TRIAL = 1  # confirmed, or taken back

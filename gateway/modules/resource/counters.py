@@ -1,4 +1,4 @@
-"""What the computer's counters are, whichever way they are read: `procfs` on Linux, `portable` elsewhere."""
+"""The computer's counters, however they are read: by `procfs` on Linux, by `portable` elsewhere."""
 
 from collections.abc import Collection
 from typing import NamedTuple, Protocol

@@ -1,4 +1,4 @@
-"""What a snapshot measures only when it is named: disks, network, temperatures, throttling, kernel, clock."""
+"""Optional parts of a snapshot: disks, network, temperatures, throttling, kernel, clock."""
 
 import ctypes
 import platform

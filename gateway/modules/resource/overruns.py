@@ -12,7 +12,7 @@ USUAL = 32  # cycles in time that tell what the loop itself runs in one
 
 
 class Reason(StrEnum):
-    """Where the time of a late cycle went."""
+    """Cause of a late cycle."""
 
     OTHERS = "others_ran"  # it was ready, and others ran
     OWN_WORK = "own_work"  # it ran longer than it usually does
@@ -28,7 +28,7 @@ class Late:
 
 
 class Deadline:
-    """When the next frame is due: one period after the last."""
+    """Due time of the next frame: one period after the last."""
 
     def __init__(self, period_ns: int, tolerance_ns: int) -> None:
         self._period_ns = period_ns
@@ -52,7 +52,7 @@ class Deadline:
 
 @dataclass(frozen=True, slots=True)
 class Blame:
-    """What the loop itself had between two looks, why it was late, and which processes had the rest."""
+    """The loop's own use between two measurements, the cause of its delay, and the other processes' use."""
 
     reason: Reason
     own: Spent

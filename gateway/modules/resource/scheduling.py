@@ -1,4 +1,4 @@
-"""How the control loop's processes and threads get on: scheduling, waiting, page faults, disk (procfs)."""
+"""Scheduling of the control loop's processes and threads: policy, waiting, page faults, disk (procfs)."""
 
 import re
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""Which threads there are, what each has run and waited to run, and how it is scheduled: Linux's procfs.
+"""Threads of this computer: run time, waiting time and scheduling policy, from Linux's procfs.
 
 A look is one read a thread, of descriptors that stay open (proc(5); sched-stats.rst in the kernel's own
 documentation): a quarter of a millisecond for 130 threads.
@@ -27,7 +27,7 @@ Id = tuple[int, int]  # process, thread
 
 
 class Spent(NamedTuple):
-    """What a thread has had since it began."""
+    """Run and waiting time of a thread since its start."""
 
     ran_ns: int
     waited_ns: int  # ready to run, while others did
@@ -37,7 +37,7 @@ Look = dict[Id, Spent]
 
 
 class Schedule(NamedTuple):
-    """How a thread is scheduled; `priority` is 1 to 99 of a real-time policy, else its nice value."""
+    """Scheduling of a thread; `priority` is 1 to 99 of a real-time policy, else its nice value."""
 
     policy: str
     priority: int

@@ -1,4 +1,4 @@
-"""Who knows whether anything may move: the machine behind a lock, fed and asked from any thread.
+"""The one authority over motion: the stop's state machine behind a lock, for any thread.
 
 A stop takes effect here first: from the instant in which `feed` returns, whatever a permit forbids is refused
 at the last moment before it would go out (`SdoChannel.download`), and only then are the drives asked to stop.
@@ -29,7 +29,7 @@ LOCKED = "it stops a controller, and a stop is held: reset it first"
 
 @dataclass(frozen=True, slots=True)
 class Permit:
-    """What one write may do: everything that it may when it is asked for, until the next stop."""
+    """Permission of one write: as of its request, until the next stop."""
 
     authority: "Authority"
     asked_ns: int  # when it came in

@@ -1,4 +1,4 @@
-"""What a stop needs of a joint's driver."""
+"""The part of a joint's driver that a stop needs."""
 
 from collections.abc import Callable
 from concurrent.futures import Future

@@ -14,7 +14,7 @@ from enum import StrEnum
 
 
 class Phase(StrEnum):
-    """What the robot may do. From `STOPPING` to `RELEASING` a stop is held."""
+    """Phase of the stop. From `STOPPING` to `RELEASING` a stop is held."""
 
     FREE = "free"
     ENABLING = "enabling"
@@ -26,7 +26,7 @@ class Phase(StrEnum):
 
 
 class Input(StrEnum):
-    """What can happen."""
+    """Input of the state machine."""
 
     STOP = "stop asked for"
     TRIP = "guard's rule trips"
@@ -44,7 +44,7 @@ class Input(StrEnum):
 
 
 class Action(StrEnum):
-    """What is to be done, in this order."""
+    """Action of the state machine; carried out in this order."""
 
     STOP_ALL = "stop every drive and controller"
     STOP_AGAIN = "stop it again"
@@ -130,7 +130,7 @@ _ENDS = frozenset({_I.ANSWERED, _I.PROVED, _I.UNPROVED, _I.REMOVED, _I.KEPT, _I.
 
 @dataclass(frozen=True, slots=True)
 class ResetFinding:
-    """What a reset found of a drive or controller, and when the request for that answer was sent."""
+    """A reset's finding about a drive or controller, and the time of the request behind it."""
 
     at_rest: bool
     asked_ns: int
@@ -172,7 +172,7 @@ class Event:
 
 @dataclass(frozen=True, slots=True)
 class Transition:
-    """Where an event has led, what is to be done now, and why what was asked for is not done."""
+    """Result of an event: the new state, the actions due, and the reason of a refusal."""
 
     state: StopMachineState
     actions: tuple[Action, ...] = ()

@@ -30,7 +30,7 @@ _UNREAD = ResetFinding(at_rest=False, asked_ns=0)
 
 @dataclass(frozen=True, slots=True)
 class Descent:
-    """What a way down has come to: where each drive is, what is wrong, and what was read last."""
+    """Result of a descent: each drive's state, the problems, and the last readings."""
 
     drives: dict[str, str]
     problems: dict[str, str]

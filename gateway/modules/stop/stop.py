@@ -1,4 +1,4 @@
-"""What follows a stop that is on its way: a second try on a cold start, the last resort, the answer in time.
+"""The course of a stop: a second try on a cold start, the last resort, the answer in time.
 
 The stop acts first, in a thread of its own; here, in the loop, is only told what came of it.
 """

@@ -54,7 +54,7 @@ class _Waiting:
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """Who wants a stop, and why; where the answer goes."""
+    """A requested stop: client and reason, and the way of its answer."""
 
     who: str
     reason: str

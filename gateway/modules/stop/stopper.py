@@ -1,4 +1,4 @@
-"""How one drive is stopped: by quick stop; where that is not confirmed, by what `[stop] fallback` allows."""
+"""Stop of one drive: by quick stop; if it is not confirmed, by the allowed `[stop] fallback`."""
 
 import time
 from collections.abc import Callable, Iterable, Mapping

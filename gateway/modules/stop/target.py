@@ -1,4 +1,4 @@
-"""What a stop goes to, drives and controllers alike: each can be asked, and reports what is known then."""
+"""Targets of a stop, drives and controllers alike: each takes a request and reports."""
 
 import threading
 import time
@@ -13,7 +13,7 @@ from gateway.process.futures import pass_on
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """What is known about one target, and which fallback was carried out on it, in words."""
+    """Report on one target, with the fallback that was carried out, in words."""
 
     outcome: StopOutcome
     fallback: str | None = None

@@ -19,7 +19,7 @@ Work = Callable[[], object]
 
 
 class StopThreadEnded(Exception):
-    """What was asked for came too late: the module that carries out stops is ending."""
+    """Too late: the module that carries out stops is ending."""
 
 
 class StopThread:

@@ -16,7 +16,7 @@ from hil_sim.node.dictionary import Key
 
 
 class Cyclic(Mode):
-    """What the three have in common; 60B1h and 60B2h feed forward where they do not offset the target."""
+    """Common part of the three modes; 60B1h and 60B2h feed forward unless they offset the target."""
 
     target: ClassVar[Key]
     control: ClassVar[Control]

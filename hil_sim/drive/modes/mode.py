@@ -1,4 +1,4 @@
-"""What every mode of operation is made of: set-points in, motion of the servo out, bits of the statusword."""
+"""The common parts of all modes of operation: set-points in, motion of the servo out, statusword bits."""
 
 from enum import IntEnum
 
@@ -80,7 +80,7 @@ class Mode:
 
 
 class Dwell:
-    """Whether an error has stayed within a window for the window's time."""
+    """Timer for an error that stays within a window for the window's time."""
 
     def __init__(self) -> None:
         self._inside_s = 0.0

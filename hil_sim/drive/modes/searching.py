@@ -1,4 +1,4 @@
-"""What each homing method looks for, search after search, and the motion of a search (CiA 402-2 §11)."""
+"""The searches of each homing method, and the motion of a search (CiA 402-2 §11)."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -12,7 +12,7 @@ from hil_sim.drive.settings import Settings
 
 
 class Until(Enum):
-    """What ends a search."""
+    """End of a search."""
 
     SWITCH_CLOSED = "the limit switch behind which the search began or to which it goes is closed"
     SWITCH_OPEN = "it is open again"

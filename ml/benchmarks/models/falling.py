@@ -27,7 +27,7 @@ TOGETHER: Final = 32_768  # rows judged at a time
 
 @dataclass(frozen=True, slots=True)
 class FallSettings:
-    """What was tuned."""
+    """Tuned settings."""
 
     falling: int = 20  # samples before the impact that are falling
     unclear: int = 50  # samples before the impact that are neither, up to those

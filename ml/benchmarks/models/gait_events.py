@@ -24,7 +24,7 @@ TOP: Final = 6  # samples around a bump's top, of which none is higher
 
 @dataclass(frozen=True, slots=True)
 class EventSettings:
-    """What was tuned."""
+    """Tuned settings."""
 
     hidden: tuple[int, int] = (96, 48)
     penalty: float = 1e-3

@@ -21,7 +21,7 @@ BATCH: Final = 256  # rows a step
 
 @dataclass(frozen=True, slots=True)
 class PhaseSettings:
-    """What was tuned."""
+    """Tuned settings."""
 
     hidden: tuple[int, int] = (96, 48)
     penalty: float = 1e-3

@@ -10,7 +10,7 @@ from ml.neural import scaled
 
 @dataclass(frozen=True, slots=True)
 class StatusSettings:
-    """What was tuned."""
+    """Tuned settings."""
 
     learning_rate: float = 0.12
     rounds: int = 50

@@ -19,7 +19,7 @@ Features = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class TerrainSettings:
-    """What was tuned."""
+    """Tuned settings."""
 
     cost: float = 10.0
     sharpness: float = 2.0  # of the kernel, divided by the number of features

@@ -15,7 +15,7 @@ from server_gui.core.alarms.causes import Stall, stood_still
 from server_gui.core.alarms.marks import ENABLED, age_text
 from server_gui.core.alarms.texts import Kind, check_of, error_check, error_text
 from server_gui.core.follow.robot import FollowedComponent, Robot
-from server_gui.core.prediction.current import ShownDanger
+from server_gui.core.prediction.newest_predictions import ShownDanger
 from server_gui.core.processing import bus_health
 from server_gui.core.tuning.stop import StopProgress, StopState
 

@@ -18,6 +18,13 @@ def event_mark(item: Item, alarms: Alarms | None) -> Mark:
     return own if worst is None else Mark(worst.mark.shape, worst.mark.colour, own.word)
 
 
+def colour_of(subject: str, alarms: Alarms, otherwise: str = "bad") -> str:
+    """Return the colour of the worst alarm about a component; `otherwise` where there is none."""
+    about = (alarm for alarm in alarms.each if alarm.subject == subject)
+    worst = min(about, key=lambda alarm: alarm.rank, default=None)
+    return otherwise if worst is None else worst.mark.colour
+
+
 def bus_level(own: BusHealthLevel, bus: str, alarms: Alarms) -> BusHealthLevel:
     """Return how bad a bus is: no better than the alarms about it and about its nodes."""
     told = [

@@ -49,7 +49,7 @@ class CollectedJournal:
 
 @dataclass(frozen=True, slots=True)
 class JournalsFound:
-    """What a look has found, by the robot's name in the store; `problem` says why nothing could be read."""
+    """Journals by the robot's name in the store; `problem` is the reason if none could be read."""
 
     by_robot: Mapping[str, CollectedJournal] = field(default_factory=lambda: MappingProxyType({}))
     problem: str | None = None

@@ -18,7 +18,7 @@ ROBOT, STORE = "robot", "store"  # who tells
 
 @dataclass(frozen=True)
 class History:
-    """What there was when it was made; two that are equal tell the same. `kept` is what was collected."""
+    """Snapshot of a robot's past; equal ones have equal contents. `kept` is the collected journal."""
 
     station: Station | None
     kept: CollectedJournal | None

@@ -38,7 +38,7 @@ class BadLabel(ValueError):
 
 
 class Where(Enum):
-    """Where new labels are after they were given."""
+    """Place of new labels."""
 
     STORE = "store"
     SPOOL = "spool"  # safe on this computer, and in the store with the next upload
@@ -46,7 +46,7 @@ class Where(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Kept:
-    """What became of labels: how many are new, how many were so already."""
+    """Result of labelling: the numbers of new labels, and of those that existed already."""
 
     new: int
     known: int

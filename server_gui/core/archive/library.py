@@ -1,4 +1,4 @@
-"""What store and spool hold, looked at now and then in a thread; a store that is away is tried again."""
+"""Contents of store and spool, refreshed in a thread; an unreachable store is tried again."""
 
 import time
 from collections.abc import Mapping
@@ -26,7 +26,7 @@ AGAIN_S: Final = 5.0  # before a store that was away is tried again
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """What a look has found; `problem` says why the store's part is missing, in words."""
+    """Sessions of store and spool; `problem` is the reason, in words, if the store's part is missing."""
 
     sessions: tuple[Session, ...] = ()  # newest first
     usage: tuple[Usage, ...] = ()

@@ -25,7 +25,7 @@ from server_gui.core.desk.station import Station
 from server_gui.core.desk.ticks import drawable, nullable
 from server_gui.core.follow.events import Described, LinkChanged, Telemetry
 from server_gui.core.follow.robot import STALE_NS, Robot
-from server_gui.core.prediction.current import Recalled
+from server_gui.core.prediction.newest_predictions import Recalled
 from server_gui.core.prediction.news import Serves
 from server_gui.core.threads.answers import Deliver, when_done
 from server_gui.core.tuning.commands import Commands

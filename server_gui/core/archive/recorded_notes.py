@@ -14,7 +14,7 @@ NOTE: Final = "note: "
 
 
 class RecordedNotes:
-    """Of what `playback` shows; they are taken back as labels are."""
+    """Notes on the recording in `playback`; they are withdrawn as labels are."""
 
     def __init__(self, playback: Playback, labels: SessionLabels) -> None:
         self._playback = playback

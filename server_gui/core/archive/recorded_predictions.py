@@ -1,4 +1,4 @@
-"""What models said of a robot while it was recorded, from the store and from what waits in the spool."""
+"""Predictions during a recording, from the store and from pending batches of the spool."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ _numbers = msgspec.json.Decoder(dict[str, float])
 
 @dataclass(frozen=True, slots=True)
 class PastPrediction:
-    """What a model said of the window that ended at `utc_ns`."""
+    """A model's prediction for the window that ended at `utc_ns`."""
 
     utc_ns: int
     prediction: Prediction

@@ -15,7 +15,7 @@ _LEASE: Final = re.compile(r"\b(?:the |a )?lease\b")  # as the wire and the jour
 
 @dataclass(frozen=True, slots=True)
 class Act:
-    """What somebody did to one thing; values are SI, None where the journal has none.
+    """An act on one thing; values are SI, None if the journal has none.
 
     `thing` is a parameter, a component or nothing; `n` and `hash` are those of the entry that began it.
     """

@@ -1,4 +1,4 @@
-"""What the window can do with recordings: export, upload, copy to another place, verify."""
+"""Actions on recordings in the window: export, upload, copy to another place, verify."""
 
 import contextlib
 import dataclasses

@@ -1,4 +1,4 @@
-"""Whether what arrived is what was sent: MD5 against the entity tag that an S3 service gives."""
+"""Checks of transfers: MD5 against the entity tag of an S3 service."""
 
 import hashlib
 import re
@@ -12,11 +12,11 @@ _PLAIN: Final = re.compile(r"[0-9a-f]{32}")
 
 
 class Altered(StoreError):
-    """What arrived is not what was sent."""
+    """The received data differs from the sent data."""
 
 
 class Digest:
-    """Of an object's pieces: what a service would call it that got it in one go, or in these pieces."""
+    """Digest of an object's pieces, as a service computes it for one part, or for these parts."""
 
     def __init__(self) -> None:
         self._whole = hashlib.md5(usedforsecurity=False)

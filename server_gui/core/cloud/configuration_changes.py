@@ -1,4 +1,4 @@
-"""What was otherwise when another session began: parameters, firmware, EDS, calibration, models, wearer.
+"""Changes between two sessions: parameters, firmware, EDS, calibration, models, wearer.
 
 What one of the two sessions does not tell is *not recorded*: it is in a list of its own, and never taken for
 unchanged.
@@ -22,7 +22,7 @@ DIGITS: Final = 6
 
 
 class ChangeKind(StrEnum):
-    """What a difference is of; the order is that in which they are told."""
+    """Kind of a difference, in the order of their listing."""
 
     ROBOT = "robot"
     WEARER = "wearer"
@@ -76,7 +76,7 @@ class Difference(Struct, frozen=True):
 
 
 class Changes(Struct, frozen=True):
-    """What differs, the most likely to matter first; and what at least one of the two does not tell."""
+    """Differences, the most relevant first; and facts that at least one of the two sessions lacks."""
 
     differences: tuple[Difference, ...]
     unrecorded: tuple[Difference, ...]

@@ -1,4 +1,4 @@
-"""How a store is reached, in words: where its keys come from, never what they are."""
+"""Access to a store, in words: the source of its keys, never the keys."""
 
 import os
 from collections.abc import Mapping

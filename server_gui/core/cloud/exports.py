@@ -1,4 +1,4 @@
-"""What was exported or copied on this desk: a list, so that it is found where a wearer is forgotten.
+"""List of exports and copies of this desk, so that they are found when a wearer is forgotten.
 
 A file of the list for each place, in the user's own data; whatever is made is noted before it is there.
 """
@@ -14,15 +14,15 @@ from urllib.parse import unquote, urlsplit
 
 import msgspec
 
-from ml.store import Store, StoreError, durable, forgetting
-from ml.store.forgetting import Name
+from ml.store import Store, StoreError, durable, erasure
+from ml.store.erasure import Name
 from ml.store.private import private_folder
 from server_gui.core.atomic_files import draft
 from server_gui.core.settings.server_file import exports_folder
 
 
 class ExportState(Enum):
-    """Of an exported file or a copy, when it is looked for again."""
+    """State of an exported file or a copy, at the next check."""
 
     AS_MADE = "as it was made"
     CHANGED = "has changed since, or was not ended"
@@ -144,7 +144,7 @@ def _store(note: _Note, wanted: Sequence[Name]) -> Exported | None:
     """Nothing where the copy has none of it."""
     try:
         store = Store.existing(note.place)
-        has_some = forgetting.counted(store, wanted) or forgetting.left(store, wanted)
+        has_some = erasure.counted(store, wanted) or erasure.left(store, wanted)
     except StoreError as error:
         parts = urlsplit(note.place)
         is_gone = parts.scheme == "file" and not Path(unquote(parts.path)).exists()

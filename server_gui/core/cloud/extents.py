@@ -1,4 +1,4 @@
-"""Whether log and file are right about the time of a file's rows: a query for a time reads no other files."""
+"""Check of the times that log and file claim for a file's rows: queries by time skip other files."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field

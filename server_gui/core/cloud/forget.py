@@ -13,16 +13,16 @@ from typing import Final
 
 import msgspec
 
-from ml.store import Store, durable, forgetting, upkeep
-from ml.store.forgetting import Name, Worn
+from ml.store import Store, durable, erasure, upkeep
+from ml.store.erasure import Name, Worn
 from ml.store.labels import person
 from ml.store.snapshot import Snapshot
 from ml.store.tables import EVENTS, LABELS, SESSIONS
 from ml.store.upkeep import Pin
 from server_gui.core.cloud import exports, mend, spool_reader
-from server_gui.core.cloud.counting import Advance
 from server_gui.core.cloud.exports import Exported
 from server_gui.core.cloud.repeated_upload import Again
+from server_gui.core.cloud.row_counting import Advance
 from server_gui.core.evidence import file as evidence
 from server_gui.core.recording.batching import EventKind
 from server_gui.core.recording.rows import Record
@@ -41,7 +41,7 @@ class CannotForget(Exception):
 
 @dataclass(frozen=True, slots=True)
 class ErasurePlan:
-    """What there is of somebody: sessions, rows in the store by location, and what else has some of them."""
+    """Data of a wearer: sessions, rows in the store by location, and other places with some of them."""
 
     sessions: Sequence[Name]
     rows: Mapping[str, int]
@@ -77,7 +77,7 @@ def plan(
     names = sorted({*found.sessions, *_begun(spool, name)})
     return ErasurePlan(
         names,
-        forgetting.counted(store, names),
+        erasure.counted(store, names),
         sum(not spool_reader.is_empty(spool, number) for number in spool_reader.waiting(spool)),
         [
             number
@@ -85,20 +85,20 @@ def plan(
             if not spool_reader.named(spool, number).isdisjoint(names)
         ],
         [file for _, file in spool_reader.damaged(spool)],
-        forgetting.pinned(store, names),
+        erasure.pinned(store, names),
         learned(names),
         exports.found(names, store.url),
-        sorted(forgetting.writers(store) - {identity(spool)}),
+        sorted(erasure.writers(store) - {identity(spool)}),
     )
 
 
 def _worn(store: Store, spool: Path, name: str) -> Worn:
     """Also by second copies of the spool: another computer may have removed the store's rows already."""
-    stored = (forgetting.told(store, table) for table in (SESSIONS, LABELS))
+    stored = (erasure.told(store, table) for table in (SESSIONS, LABELS))
     kept = spool_reader.kept(spool)
     here = (spool_reader.rows(spool, table, kept) for table in (SESSIONS, LABELS))
     sessions, labels = ([*there, *mine] for there, mine in zip(stored, here, strict=True))
-    return forgetting.worn(sessions, labels, name)
+    return erasure.worn(sessions, labels, name)
 
 
 def upload(store: Store, spool: Spool, known: ErasurePlan, name: str, expect: Expect) -> None:
@@ -148,7 +148,7 @@ def forget(store: Store, spool: Spool, known: ErasurePlan, name: str, expect: Ex
         upkeep.unpin(store, named.location, named.version, named.by)
     for number in known.copies:
         spool.drop(number)
-    forgetting.delete(store, known.sessions)
+    erasure.delete(store, known.sessions)
     mend.accept(store, spool, expect, MADE)
     _tell(store, spool, known, name)
     left = [*proof(store, spool.folder, known), *exports.remove(known.sessions, store.url)]
@@ -160,7 +160,7 @@ def forget(store: Store, spool: Spool, known: ErasurePlan, name: str, expect: Ex
 def proof(store: Store, spool: Path, known: ErasurePlan) -> list[str]:
     """Look again, into every file of store and spool; what is left of it, in words."""
     wanted = set(known.sessions)
-    found = [f"{store.url}/{path} has rows of theirs" for path in forgetting.left(store, known.sessions)]
+    found = [f"{store.url}/{path} has rows of theirs" for path in erasure.left(store, known.sessions)]
     found += (
         f"batch {number} of the spool {spool} has rows of theirs"
         for number in spool_reader.kept(spool)
@@ -172,7 +172,7 @@ def proof(store: Store, spool: Path, known: ErasurePlan) -> list[str]:
 
 
 class _Begun(msgspec.Struct, frozen=True):
-    """What is being removed, for whoever goes on: when the tables do not tell it any more."""
+    """A removal in progress, for its continuation: the tables may not show it any more."""
 
     wearer_sha256: str
     sessions: list[Name]

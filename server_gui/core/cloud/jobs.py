@@ -27,7 +27,7 @@ KNOWN: Final = (JobFailed, StoreError, RecordingError, NobodyCollects, OSError)
 
 
 class JobState(Enum):
-    """Where a job stands."""
+    """State of a job."""
 
     WAITING = "waiting"
     RUNNING = "running"

@@ -25,9 +25,9 @@ from ml.store.store import Store
 from ml.store.tables import EVENTS
 from ml.store.translation import translated
 from server_gui.core.cloud import verify
-from server_gui.core.cloud.counting import Advance, Batch
 from server_gui.core.cloud.receipt_check import Proof, prove
 from server_gui.core.cloud.repeated_upload import Again, Untouched, Whose, whose
+from server_gui.core.cloud.row_counting import Advance, Batch
 from server_gui.core.recording.batching import EventKind
 from server_gui.core.recording.errors import Damaged, SpoolUnusable
 from server_gui.core.recording.receipts import RECEIPTS, Altered, Receipt, ReceiptPart, Receipts
@@ -38,7 +38,7 @@ from server_gui.core.recording.upload import Sent, upload
 
 @dataclass(frozen=True, slots=True)
 class RepairPlan:
-    """What is to be done: files to take out, second copies to bring again, what nobody can bring."""
+    """Plan of a repair: files to take out, second copies to restore, and rows that are lost."""
 
     files: Sequence[DataFile]
     batches: Sequence[int]
@@ -55,7 +55,7 @@ class RepairPlan:
 
 @dataclass(frozen=True, slots=True)
 class Mended:
-    """What was done, and in words what could not be done."""
+    """Result of a repair, with its failures in words."""
 
     files: Sequence[DataFile]
     batches: Sequence[int]

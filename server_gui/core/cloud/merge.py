@@ -28,7 +28,7 @@ _SETTINGS: Final = ("python_enable_replacements=false", "TimeZone='UTC'")
 
 @dataclass(frozen=True, slots=True)
 class Naming:
-    """What names a row: two with these values are one, and have the same `contents` (all, where empty)."""
+    """Identity of a row: two with these values are one, with the same `contents` (all, if empty)."""
 
     keys: tuple[str, ...]
     contents: tuple[str, ...] = ()

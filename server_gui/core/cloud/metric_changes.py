@@ -1,4 +1,4 @@
-"""What of the walk moved from one session to another: the metrics that edits are judged by, over recordings.
+"""Changes of the walk between two sessions, by the metrics of edits.
 
 The gait cycles of both are compared as those before and after an edit: equal activity, equal speed, without a
 slow drift. Two sessions differ in more than anybody has noted, so a metric *moved with* what changed; that

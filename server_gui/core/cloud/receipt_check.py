@@ -1,4 +1,4 @@
-"""Whether what receipts say is in the store: each batch's rows once, and as they were sent."""
+"""Comparison of receipts with the store: each batch's rows once, and as they were sent."""
 
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence, Set
@@ -13,7 +13,7 @@ from ml.store.errors import StoreError, StoreRefused, StoreUnreachable
 from ml.store.fragments import DataFile
 from ml.store.store import Store
 from ml.store.tables import TABLES
-from server_gui.core.cloud.counting import Advance, Batch, Claim, count
+from server_gui.core.cloud.row_counting import Advance, Batch, Claim, count
 from server_gui.core.recording.receipts import (
     RECEIPTS,
     Altered,
@@ -34,7 +34,7 @@ _MINUTE: Final = timedelta(minutes=1)  # what marks are apart, if they are not l
 
 @dataclass(slots=True)
 class Proof:
-    """What was proven; `problems` name what was not, in words."""
+    """Result of the proof; `problems` are its failures, in words."""
 
     here: int = 0  # batches with a receipt of this store
     batches: int = 0  # of them, those that were found as they were sent

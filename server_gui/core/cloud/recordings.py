@@ -40,7 +40,7 @@ Lacking = Callable[
 
 
 class Recordings:
-    """What there was of them when this was made; for one thread.
+    """Recordings at the time of its making; for one thread.
 
     Where the store cannot be reached, `problem` says why, and the recordings are those of which this
     computer's spool has something, also what it keeps of uploaded batches. Where the spool or a batch of it

@@ -1,4 +1,4 @@
-"""What a spool's receipts say of a store that was moved: that what went to the one is in the other."""
+"""Receipts after a store was copied: batches of the old store are in the new one too."""
 
 import msgspec
 

@@ -27,7 +27,7 @@ def whose(of: DataFile | ReceiptPart) -> Whose:
 
 
 class Again(Store):
-    """What is there stays, what is missing is added, and what retention has removed does not come back.
+    """Repeated upload: existing rows stay, missing ones are added, rows removed by retention stay away.
 
     Rows are looked for by their names: a copy of a store may have them and not the numbers of their batches.
     Where `closed`, because a damaged file stays there, nothing is looked for and nothing added.

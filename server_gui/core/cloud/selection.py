@@ -1,4 +1,4 @@
-"""What is exported of a session."""
+"""Selection of a session's data for an export."""
 
 import fnmatch
 from collections.abc import Iterable, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""What waits in a spool that nobody records into, brought to a store; what keeps one batch keeps no other."""
+"""Upload of a spool without a collector; a problem of one batch does not stop the others."""
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager
@@ -10,7 +10,7 @@ from ml.store.errors import StoreError, StoreRefused, StoreUnreachable
 from ml.store.objects import Objects
 from ml.store.store import ABOUT
 from server_gui.core.cloud import verify
-from server_gui.core.cloud.counting import Advance
+from server_gui.core.cloud.row_counting import Advance
 from server_gui.core.recording.errors import Damaged
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.upload import ahead, lost_batches, send
@@ -18,7 +18,7 @@ from server_gui.core.recording.upload import ahead, lost_batches, send
 
 @dataclass(frozen=True, slots=True)
 class Emptied:
-    """What was done; in words what is lost, what waits and why, and what else is to be known."""
+    """Result of emptying a spool: losses, pending batches with reasons, and remarks, in words."""
 
     url: str
     uploaded: int

@@ -13,7 +13,7 @@ KNOWN_S: Final = 60.0  # after a look: longer than one of S3 that fails, later n
 
 
 class Reach(Enum):
-    """What is known of it."""
+    """Reach of the store."""
 
     NOT_LOOKED = "not looked at yet"
     REACHED = "reached"
@@ -24,7 +24,7 @@ class Reach(Enum):
 
 
 class StoreReach:
-    """What the newest look has said, whoever looked; for the window's thread."""
+    """Result of the newest check, by whomever; for the window's thread."""
 
     def __init__(self, clock_s: Callable[[], float] = time.monotonic) -> None:
         self.problem: str | None = None  # why it is not reached; stays until a look says otherwise

@@ -1,4 +1,4 @@
-"""Which channels become which ROS 2 topic, and a row's values become its message."""
+"""Mapping of channels to ROS 2 topics, and of rows to messages."""
 
 import functools
 import math

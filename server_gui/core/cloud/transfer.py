@@ -36,7 +36,7 @@ Listing = Mapping[str, Object]
 
 @dataclass(frozen=True, slots=True)
 class Copied:
-    """What a copy did, and by what each object was found to have arrived: its MD5, or its size alone."""
+    """Result of a copy: the objects checked by MD5, and those checked by size alone."""
 
     by_checksum: int = 0
     by_size: int = 0

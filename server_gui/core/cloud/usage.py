@@ -1,4 +1,4 @@
-"""What a store holds: its tables, and who takes how much of it."""
+"""Contents of a store: its tables, and the space that each robot takes."""
 
 from collections import defaultdict
 from collections.abc import Iterator, Sequence

@@ -1,4 +1,4 @@
-"""What verify has found: what was looked at, what is wrong with it, and how far it is proven."""
+"""Result of `verify`: the checks, the problems, and the extent of the proof."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from server_gui.core.cloud.receipt_check import Proof
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """What was looked at, and in words what is wrong with it."""
+    """The checked files, and their problems in words."""
 
     files: Sequence[DataFile]
     proof: Proof

@@ -1,4 +1,4 @@
-"""Whether everything is there: every file of every table, every row of each batch that the spool has sent."""
+"""Check for completeness: every file of every table, every row of each batch that the spool has sent."""
 
 import contextlib
 import sys
@@ -16,8 +16,8 @@ from ml.store.store import Store
 from ml.store.tables import TABLES, TELEMETRY
 from ml.store.upkeep import Pin, pins
 from server_gui.core.cloud import spool_reader
-from server_gui.core.cloud.counting import AT_ONCE, Advance, Batch
 from server_gui.core.cloud.receipt_check import Proof, prove
+from server_gui.core.cloud.row_counting import AT_ONCE, Advance, Batch
 from server_gui.core.cloud.verdict import Verdict
 from server_gui.core.recording.errors import SpoolUnusable
 from server_gui.core.recording.receipts import RECEIPTS, Altered, Receipt, Receipts, went_to

@@ -1,4 +1,4 @@
-"""What store and spool have of robots' journals as the robots signed them: the witnesses of this desk."""
+"""Signed journal entries in store and spool: this desk's witnesses."""
 
 from collections.abc import Iterator
 from pathlib import Path

@@ -44,7 +44,7 @@ SSH_FAILED: Final = 255  # it did not connect, or the connection is gone
 
 @dataclass(frozen=True, slots=True)
 class Exit:
-    """How a command has ended: its status (None: it did not start), and what it said last."""
+    """End of a command: its status (None: it did not start), and its last words."""
 
     status: int | None
     last_words: str = ""
@@ -77,7 +77,7 @@ Talk = Callable[[Sequence[str], str], Talker]  # `gwrms` with these arguments, o
 
 
 class LogLineKind(Enum):
-    """Of a line of the log: what stands before it."""
+    """Kind of a line of the log: its prefix."""
 
     SAID = "  "
     ASKED = "? "

@@ -10,7 +10,7 @@ ENTER: Final = " Then press Enter."
 
 
 class ReadingMessage(msgspec.Struct, frozen=True):
-    """What a device tells while a question waits; `value` is `None` where it tells nothing."""
+    """A device's value while a question waits; `value` is `None` without one."""
 
     name: str
     value: float | str | None
@@ -34,7 +34,7 @@ class StepMessage(msgspec.Struct, frozen=True):
 
 
 class WrittenMessage(msgspec.Struct, frozen=True):
-    """What became of the robot's file."""
+    """Result of writing the robot's file."""
 
     file: str
     text: str
@@ -45,7 +45,7 @@ class WrittenMessage(msgspec.Struct, frozen=True):
 
 
 class StoppedMessage(msgspec.Struct, frozen=True):
-    """What came of a stop."""
+    """Result of a stop."""
 
     confirmed: bool
     words: str
@@ -53,7 +53,7 @@ class StoppedMessage(msgspec.Struct, frozen=True):
 
 
 class Error(msgspec.Struct, frozen=True):
-    """Why it cannot go on at all."""
+    """Reason why it cannot continue."""
 
     message: str
 

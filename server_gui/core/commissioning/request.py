@@ -11,7 +11,7 @@ SUFFIX: Final = ".commission"  # of what is kept beside the file until that is w
 
 @dataclass(frozen=True, slots=True)
 class CommissioningRequest:
-    """What `gwrms commission` is told. Without `computer` it runs on this one, else there, by SSH."""
+    """Arguments of `gwrms commission`. Without `computer` it runs on this one, else there, by SSH."""
 
     file: str
     bus: str

@@ -8,7 +8,7 @@ from server_gui.core.alarms.marks import Mark
 
 
 class Stage(Enum):
-    """How it is."""
+    """Stage of commissioning."""
 
     NOT_STARTED = "not started"
     STARTING = "starting"
@@ -30,7 +30,7 @@ class Stage(Enum):
 
 @dataclass(frozen=True, slots=True)
 class StageView:
-    """How a stage is shown, and what can be done in it."""
+    """Appearance of a stage, and its possible actions."""
 
     mark: Mark
     words: str

@@ -10,7 +10,7 @@ from ml.serving.trust import TrustLevel
 from server_gui.core.alarms.robot_alarms import undriven
 from server_gui.core.desk.station import Station
 from server_gui.core.models.names import told_name
-from server_gui.core.prediction.current import NewestPrediction, Recalled, Told
+from server_gui.core.prediction.newest_predictions import NewestPrediction, Recalled, Told
 from server_gui.core.prediction.state import Quality
 
 NOT_SEEN: Final = ("lost", "stale")

@@ -47,7 +47,7 @@ from server_gui.core.follow.news import News, NewsKind
 from server_gui.core.follow.robot import Robot
 from server_gui.core.follow.robot_news import RobotNews
 from server_gui.core.objects.objects import Objects
-from server_gui.core.prediction.current import StationPredictions
+from server_gui.core.prediction.newest_predictions import StationPredictions
 from server_gui.core.prediction.news import Endangered, PredictionNews, Ruled, turn
 from server_gui.core.processing.robot_processing import RobotProcessing
 from server_gui.core.threads.answers import Deliver, Result, when_done

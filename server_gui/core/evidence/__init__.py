@@ -1,1 +1,1 @@
-"""What an edit of a robot's parameters did: gait cycles before and after it, compared. No Qt, no threads."""
+"""Effect of an edit on the gait: cycles before and after it, compared. No Qt, no threads."""

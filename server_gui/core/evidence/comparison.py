@@ -29,7 +29,7 @@ AROUND: Final = 0.01  # and so much around them
 
 
 class Word(StrEnum):
-    """What became of a metric, or of all of them."""
+    """Judgement of a metric, or of all of them."""
 
     BETTER = "better"
     WORSE = "worse"
@@ -64,7 +64,7 @@ class Measured(Struct, frozen=True):
 
 
 class Evidence(Struct, frozen=True):
-    """What an edit did: the word for all of it, the strongest metric, and every metric."""
+    """Effect of an edit: the overall judgement, the strongest metric, and every metric."""
 
     word: Word
     strongest: str  # the series of a metric; empty where none differs
@@ -81,7 +81,7 @@ Spans = Sequence[tuple[int, int]]  # from, to (ns)
 
 @dataclass(frozen=True, slots=True)
 class Spell:
-    """When the old values were in force, and when the new ones: on the robot's clock (ns)."""
+    """Times of the old and the new values: on the robot's clock (ns)."""
 
     before: Spans
     after: Spans

@@ -26,7 +26,7 @@ ID: Final = 10  # digits of the hash of the journal's entry
 
 
 class EditState(StrEnum):
-    """What became of an edit."""
+    """State of an edit."""
 
     ASKED = "NOT KNOWN how it ended"
     ON_TRIAL = "on trial"

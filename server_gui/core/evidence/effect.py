@@ -1,4 +1,4 @@
-"""How much a step changed a number that varies from cycle to cycle, and how sure that is.
+"""Size and certainty of a step in a number that varies from cycle to cycle.
 
 Linear least squares: what counts is the coefficient of `step` beside everything else in `design`, such as a
 trend in time (a drift is not an effect) and the stride's time (equal speed). Cycles that follow each other

@@ -1,4 +1,4 @@
-"""What is kept of an A/B trial or a sweep, beside the evidence: what was held when, what came of it (SI)."""
+"""Record of an A/B trial or a sweep, beside its evidence: periods and results (SI)."""
 
 from msgspec import Struct
 

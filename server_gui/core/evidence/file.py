@@ -43,7 +43,7 @@ class EditEvidence(Struct, frozen=True):
 
 
 class _Line(Struct):
-    """What every format has."""
+    """Common part of all formats."""
 
     format: int
 

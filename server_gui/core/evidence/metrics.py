@@ -1,4 +1,4 @@
-"""What is compared before and after an edit: each metric, its unit, the better way, what is too small."""
+"""Metrics that are compared before and after an edit: unit, better direction, smallest relevant change."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -6,7 +6,7 @@ from typing import Final
 
 
 class Better(Enum):
-    """Which way of a metric is the better one; of some nobody can say without the wearer."""
+    """Better direction of a metric; unknown for some without the wearer."""
 
     LESS = "less"
     NEARER = "nearer to zero"  # of what may be on either side of it

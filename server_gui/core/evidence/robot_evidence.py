@@ -50,7 +50,7 @@ JOINT: Final = "joint"  # the kind of component
 
 @dataclass(frozen=True, slots=True)
 class Recorded:
-    """What comes from now on is in the recording of this name; empty: in none."""
+    """From now on, events are in the recording of this name; empty: in none."""
 
     session: str
 

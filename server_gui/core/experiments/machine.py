@@ -1,4 +1,4 @@
-"""Where an experiment stands, and what comes next: a table, states by events. What is not in it is ignored.
+"""State machine of an experiment: a table of states by events. Other events are ignored.
 
 Whatever happens after the first write ends in `OVER`, where the device was read to hold the original value
 and nothing is on trial, or in `NOT_CONFIRMED`, which is an error. There is no other way out.
@@ -10,7 +10,7 @@ from typing import Final
 
 
 class ExperimentState(Enum):
-    """Of an experiment; the last three are its ends."""
+    """State of an experiment; the last three are its ends."""
 
     LOOKING = "watching the walk before anything is written"
     WRITING = "writing a value on trial"
@@ -28,7 +28,7 @@ class ExperimentState(Enum):
 
 
 class Event(Enum):
-    """What has come."""
+    """Event of the state machine."""
 
     READY = "enough was seen of the walk"
     WRITTEN = "the robot has written and read back"
@@ -46,7 +46,7 @@ class Event(Enum):
 
 
 class Action(Enum):
-    """What is asked of the robot then."""
+    """Request to the robot."""
 
     NONE = 0
     WRITE = "the next value, on trial"

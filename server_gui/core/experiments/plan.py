@@ -1,4 +1,4 @@
-"""What an experiment will do, stated before it begins: values, order, how long each is held, its bounds.
+"""Plan of an experiment, stated before it begins: values, order, dwell times and bounds.
 
 An A/B trial is pairs of both values. Which of a pair comes first is drawn, evenly from `orders`: those in
 which neither value comes early, or at both ends, much more often than the other. A sweep goes from the value
@@ -35,7 +35,7 @@ BENT: Final = 0.5  # of what that would be where all early ones begin with the o
 
 
 class ExperimentKind(StrEnum):
-    """Of experiment."""
+    """Kind of experiment."""
 
     AB = "A/B trial"
     SWEEP = "sweep"
@@ -47,7 +47,7 @@ class BadPlan(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Bounds:
-    """What a joint may do at most, in SI; None: that is not looked at."""
+    """Bounds of a joint, in SI; None: not watched."""
 
     error: float | None = None  # tracking error (rad)
     current: float | None = None  # A
@@ -63,7 +63,7 @@ class ExperimentStep:
 
 @dataclass(frozen=True, slots=True)
 class Dwell:
-    """How long each value is held: gait cycles, or seconds, after those cycles that are left out."""
+    """Dwell time at each value: gait cycles, or seconds, after the transient cycles."""
 
     cycles: int = USUAL_CYCLES
     transient: int = USUAL_TRANSIENT

@@ -1,4 +1,4 @@
-"""Whether the values of pairs differ: by the very draw that chose their order, so no drift is an effect.
+"""Randomisation test: differences of pairs against the draw of their order, so no drift is an effect.
 
 If a parameter does nothing, each pair would have given the same two numbers in whatever order its values
 came: only the names on them were drawn. So the statistic is computed for every order that might have been
@@ -25,7 +25,7 @@ TINY: Final = 1e-9  # of what binary fractions leave of nothing
 
 @dataclass(frozen=True, slots=True)
 class Randomised:
-    """Of each metric: the second value's minus the first's, its interval, p for all metrics together."""
+    """Results by metric: difference second minus first, its interval, p adjusted for all metrics."""
 
     difference: Floats
     low: Floats

@@ -1,4 +1,4 @@
-"""What a sweep shows: each metric's mean at each value with its interval, and which value would be best.
+"""Responses of a sweep: each metric's mean at each value with its interval, and the best value.
 
 Values come in the order of time. So a drift looks like a response: what is proposed wants an A/B trial.
 """

@@ -1,4 +1,4 @@
-"""What is kept of an experiment: its record, its verdict, and its strides, as an edit's evidence is."""
+"""Result of an experiment: its record, verdict and strides, in the form of an edit's evidence."""
 
 import hashlib
 from collections.abc import Sequence

@@ -17,8 +17,8 @@ from server_gui.core.evidence.experiment import Period
 from server_gui.core.evidence.robot_evidence import RobotEvidence
 from server_gui.core.experiments.machine import Action, Event, ExperimentState, after
 from server_gui.core.experiments.plan import BadPlan, ExperimentKind, ExperimentPlan
+from server_gui.core.experiments.stop_rules import StopRules
 from server_gui.core.experiments.verdict import HeldPeriod
-from server_gui.core.experiments.watch import ExperimentWatch
 from server_gui.core.follow.events import Described, Looked, Telemetry
 from server_gui.core.follow.events import Event as Fact
 from server_gui.core.follow.robot import Robot
@@ -83,7 +83,7 @@ class Run:
         self.joints = self._walk.joints
         component = plan.name.partition(".")[0]
         self.edited = tuple(joint for joint in self.joints if joint == component)
-        self.watch = ExperimentWatch(plan.name, self.edited or self.joints, plan.bounds, plan.said)
+        self.watch = StopRules(plan.name, self.edited or self.joints, plan.bounds, plan.said)
         self.watch.take(described)
         self.place = 0  # of the step
         self._write: int | None = None  # that is on trial

@@ -1,4 +1,4 @@
-"""What an A/B trial says: each metric's means over the periods, pair by pair, tested by their draw."""
+"""Verdict of an A/B trial: each metric's means over the periods, pair by pair, tested by their draw."""
 
 import collections
 from collections.abc import Iterable, Iterator, Sequence

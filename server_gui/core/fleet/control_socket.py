@@ -1,4 +1,4 @@
-"""How a collector that runs is asked: a Unix socket in its spool's folder, one JSON line in, one out."""
+"""Control of a running collector: a Unix socket in its spool's folder, one JSON line in, one out."""
 
 import asyncio
 import contextlib
@@ -22,14 +22,14 @@ class NobodyCollects(Exception):
 
 
 class Request(msgspec.Struct, frozen=True, omit_defaults=True):
-    """What is asked for, and what is said with it."""
+    """A request, with its text."""
 
     ask: str
     text: str = ""
 
 
 class _Uploading(msgspec.Struct, frozen=True):
-    """Of the uploader's state, why it did not succeed the last time it tried."""
+    """The uploader's problem in its last attempt."""
 
     problem: str | None
 

@@ -1,4 +1,4 @@
-"""How a robot's link does: counted from the feed's events, in the network's thread."""
+"""Statistics of a robot's link, counted from the feed's events, in the network's thread."""
 
 import collections
 import time

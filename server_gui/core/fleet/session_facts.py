@@ -1,4 +1,4 @@
-"""What is so when a session begins, from what the robot and this program say of themselves."""
+"""Facts at the start of a session, from the robot and this program."""
 
 import hashlib
 import importlib.metadata

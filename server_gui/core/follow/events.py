@@ -1,4 +1,4 @@
-"""What a robot's feed tells: small frozen facts, handed from the network's thread to whoever shows them."""
+"""Events of a robot's feed: small frozen facts, handed from the network's thread to their consumers."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -28,7 +28,7 @@ class LinkChanged:
 
 @dataclass(frozen=True, slots=True)
 class Described:
-    """What the robot is made of; comes anew with every link."""
+    """The robot's description; new with every link."""
 
     description: Description
     calendar_ns: int = 0  # the robot's minus ours when it came
@@ -93,7 +93,7 @@ class Journalled:
 
 @dataclass(frozen=True, slots=True)
 class Costs:
-    """What monitoring costs the robot, client by client."""
+    """Cost of monitoring on the robot, client by client."""
 
     cost: GatewayCost
 
@@ -113,7 +113,7 @@ class Refused(Failed):
 
 @dataclass(frozen=True, slots=True)
 class Identified:
-    """What each device says that it is, by component and by object's address."""
+    """Identity of each device, by component and by object's address."""
 
     devices: Mapping[str, Mapping[str, str]]
 

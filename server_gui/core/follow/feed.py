@@ -59,7 +59,7 @@ COMPUTER: Final = "resource"  # the component whose channels are the robot's com
 
 
 class FollowSettings(Struct, frozen=True):
-    """What is asked of a robot, how often, and in whose name; `channels` and `parameters` are globs.
+    """Settings of following a robot; `channels` and `parameters` are globs.
 
     What of them this robot does not have is left out. `rate_hz` 0 gives every source's own samples.
     """

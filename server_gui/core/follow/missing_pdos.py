@@ -43,7 +43,7 @@ def told_words(node: NodeInfo) -> tuple[str, str]:
 
 
 class MissingPdos:
-    """Of one robot's nodes, look by look."""
+    """Missing PDOs of one robot's nodes, measurement by measurement."""
 
     def __init__(self) -> None:
         self._some: dict[tuple[str, int], list[tuple[int, float]]] = {}  # when, and how many

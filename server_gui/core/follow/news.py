@@ -1,4 +1,4 @@
-"""What happened, to any robot, newest first and bounded; what repeats is one item, faults go last."""
+"""News of all robots, newest first and bounded; repetitions are one item, faults are dropped last."""
 
 import collections
 import dataclasses
@@ -15,7 +15,7 @@ _NUMBER: Final = re.compile(r"\b\d+(\.\d+)?(?= ?(?:s|ms|%|°)(?:\W|$))")
 
 
 class NewsKind(Enum):
-    """What sort of thing happened; the word is shown."""
+    """Kind of news; the word is shown."""
 
     LINK = "LINK"
     STATE = "STATE"

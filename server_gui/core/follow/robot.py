@@ -1,4 +1,4 @@
-"""What is known of one robot now, as plain state: events go in, views read it. No Qt, no threads."""
+"""Present state of one robot: events go in, views read it. No Qt, no threads."""
 
 import collections
 import time
@@ -51,7 +51,7 @@ class FollowedComponent:
 
 @dataclass(slots=True)
 class LinkStatus:
-    """How the robot is reached, and how well."""
+    """State and quality of the link to the robot."""
 
     state: ConnectionState = ConnectionState.IDLE
     problem: str | None = None

@@ -8,7 +8,7 @@ from server_gui.core.follow.robot import Robot
 
 
 class Tell(Protocol):
-    """How news is told, of a component where that is `about` one."""
+    """Function that reports news, of a component if it is `about` one."""
 
     def __call__(self, kind: NewsKind, text: str, about: str = "") -> None:
         """Tell it."""

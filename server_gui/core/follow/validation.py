@@ -41,11 +41,11 @@ DEEPEST: Final = 16  # values within values
 
 
 class Unfit(ProtocolError):
-    """What a robot has sent cannot be kept; says what, and where."""
+    """A robot's data cannot be recorded; with the field and the reason."""
 
 
 class Validator:
-    """What one robot may send, by what it has sent before; for the thread that follows it."""
+    """Validation of one robot's data, against its earlier data; for the thread that follows it."""
 
     def __init__(self) -> None:
         self._channels: frozenset[str] = frozenset()

@@ -1,1 +1,1 @@
-"""What tests of a joint on a bench have measured: read from their files, computed, compared; without Qt."""
+"""Results of joint tests on a bench: read from their files, computed, compared; without Qt."""

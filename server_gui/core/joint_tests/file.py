@@ -44,7 +44,7 @@ class Head(msgspec.Struct, frozen=True):
 
 
 class Ended(msgspec.Struct, frozen=True):
-    """How it ended; `off` is whether the drive has confirmed that it is disabled."""
+    """End of a test; `off` is whether the drive has confirmed that it is disabled."""
 
     problem: str | None
     off: bool

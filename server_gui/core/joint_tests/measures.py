@@ -34,7 +34,7 @@ class Proposal(Struct, frozen=True):
 
 
 class JointTestResult(Struct, frozen=True):
-    """What one test says."""
+    """Result of one test."""
 
     measures: list[Measure]
     curves: list[Curve]

@@ -27,7 +27,7 @@ SHORT: Final = 16  # of its signs, as people compare it
 
 @dataclass(frozen=True, slots=True)
 class Serving:
-    """Whom each model serves that was promoted, who has signed each of that, and which came with GWRMS."""
+    """Robots by promoted model, the signers of the promotions, and the shipped models."""
 
     whom: Mapping[str, list[str]]
     shipped: frozenset[str]
@@ -86,7 +86,7 @@ class Entry:
 
 @dataclass(frozen=True, slots=True)
 class Catalogue:
-    """What a look has found, newest first; `problem` says why there is nothing, or not all."""
+    """Models, newest first; `problem` is the reason if some or all are missing."""
 
     entries: tuple[Entry, ...] = ()
     damaged: tuple[str, ...] = ()

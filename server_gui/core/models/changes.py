@@ -1,4 +1,4 @@
-"""What a promotion or a way back would change, said before it is done; done only while that is still so."""
+"""Effect of a promotion or rollback, shown before it is done; done only while it still holds."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ UNPROMOTED: Final = "no promoted model; until then a robot is served by what cam
 
 @dataclass(frozen=True, slots=True)
 class ModelChange:
-    """Of what serves one robot, or all ("") that have no model of their own; None: no promoted model."""
+    """Change of the model that serves one robot, or all ("") without their own; None: no promoted model."""
 
     task: str
     robot: str

@@ -25,7 +25,7 @@ NOT_BETTER: Final = (
 
 
 class Tone(Enum):
-    """How something is said."""
+    """Tone of a message."""
 
     PLAIN = ""
     GOOD = "good"

@@ -26,7 +26,7 @@ WORDS: Final = {
 
 
 class Progress(msgspec.Struct, frozen=True):
-    """How far it is."""
+    """Progress of a training."""
 
     what: str
     done: int
@@ -34,7 +34,7 @@ class Progress(msgspec.Struct, frozen=True):
 
 
 class Trained(msgspec.Struct, frozen=True):
-    """What came of it: the model's id, what it may take the place of, and how training has judged it."""
+    """Result of a training: the model's id, the model that it may replace, and the judgement."""
 
     model: str
     verdict: str
@@ -80,7 +80,7 @@ class TrainingFailed(JobFailed):
 
 @dataclass(frozen=True, slots=True)
 class TrainingWish:
-    """What is to be learned, from the store's labelled sessions; `robot` "": from all, for every robot."""
+    """The requested training, on the store's labelled sessions; `robot` "": all robots."""
 
     task: str
     robot: str = ""

@@ -1,4 +1,4 @@
-"""What a device's value is in other notations: decimal, hexadecimal, binary, bits by name, text."""
+"""A device's value in other notations: decimal, hexadecimal, binary, bits by name, text."""
 
 import re
 import struct

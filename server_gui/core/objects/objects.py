@@ -24,7 +24,7 @@ LAST: Final = 0xFFFF
 
 @dataclass(slots=True, eq=False)
 class Dictionary:
-    """What the EDS of one device says; `problem` says why it is not known."""
+    """Objects of one device by its EDS; `problem` is the reason if they are unknown."""
 
     objects: list[ObjectInfo] = field(default_factory=list)
     problem: str | None = None

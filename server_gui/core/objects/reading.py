@@ -1,4 +1,4 @@
-"""What devices' objects hold: asked for while somebody looks, a few at a time, the oldest first.
+"""Reads of devices' objects while they are visible: a few at a time, the oldest first.
 
 Nothing is asked that nobody wants, one question is under way at a time, and `PERIOD_S` lies between two of
 them, so that a page full of rows costs a node a fraction of its SDO channel.
@@ -24,7 +24,7 @@ Object = tuple[str, str]  # component, and address such as 0x6041:0
 
 @dataclass(frozen=True, slots=True)
 class ReadValue:
-    """What the device said; as old as the question (our monotonic clock, and UTC for files)."""
+    """A device's answer, with the time of the request (our monotonic clock, and UTC for files)."""
 
     told: ObjectValue
     at_ns: int

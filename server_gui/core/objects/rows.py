@@ -1,4 +1,4 @@
-"""Which objects of a device are shown, what each is compared with, and all that was read as a table."""
+"""Rows of a device's objects, the values to compare with, and all read values as a table."""
 
 import datetime
 import re
@@ -39,7 +39,7 @@ BY_EDS: Final = "EDS default"
 
 
 class RowKind(Enum):
-    """What of a device is shown."""
+    """Filter of a device's objects."""
 
     ALL = "All"
     PARAMETERS = "Parameters"

@@ -1,4 +1,4 @@
-"""What becomes of a wearer's own model: the table of its states, and what is told of it.
+"""Life of a wearer's own model: the table of its states, and their reports.
 
 One walk is learned from, tried beside the general model, offered, and taken back with a word. It belongs to a
 `Context`: the wearer who is named, the recording, the robot's boot, its link and the model that serves.
@@ -24,7 +24,7 @@ UNRECORDED: Final = "nothing is learned from a walk that is not recorded"
 
 
 class AdaptationState(Enum):
-    """Where it stands."""
+    """State of the adaptation."""
 
     OFF = "off"
     UNNAMED = "unnamed"
@@ -40,7 +40,7 @@ class AdaptationState(Enum):
 
 
 class Happening(Enum):
-    """What leads from one to another, but for a change of the context; those in capitals a person says."""
+    """Event of the adaptation, other than a change of context; those in capitals come from a person."""
 
     ENOUGH = "enough"
     LEARNED = "learned"
@@ -97,7 +97,7 @@ BY_PERSON: Final = (Happening.ACCEPT, Happening.DECLINE, Happening.TAKE_BACK, Ha
 
 @dataclass(frozen=True, slots=True)
 class Wearing:
-    """Whose walk a robot's recording is of; "" where nobody is named, or nothing is recorded."""
+    """Wearer of a robot's recording; "" if nobody is named, or nothing is recorded."""
 
     session: str = ""
     wearer: str = ""
@@ -105,7 +105,7 @@ class Wearing:
 
 @dataclass(frozen=True, slots=True)
 class Context:
-    """What all of it belongs to. `model` is the general one, None where none serves.
+    """Context of an adaptation. `model` is the general one, None if none serves.
 
     `links` counts how often the link came or went, `silences` how often nothing came for long. `bar` says why
     no unproven model may serve this robot.
@@ -159,7 +159,7 @@ class Tried:
 
 @dataclass(frozen=True, slots=True)
 class Adapting:
-    """How it goes with one robot. `number` names the attempt: what a person says is about that one alone."""
+    """Progress of one robot's adaptation. `number` identifies the attempt, in a person's answers too."""
 
     robot: str
     number: int

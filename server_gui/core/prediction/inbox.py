@@ -1,4 +1,4 @@
-"""What robots' feeds tell, on its way to the thread that predicts: in order, and bounded."""
+"""Queue from robots' feeds to the predicting thread: in order, and bounded."""
 
 import collections
 import threading
@@ -12,7 +12,7 @@ MOST_NS: Final = 10_000_000_000  # of rows that may wait, robot by robot
 
 
 class Inbox(Generic[Thing]):
-    """Of events, and of what belongs between them.
+    """Queue of events, and of marks between them.
 
     `put` from any thread; where nobody takes, a robot's oldest rows go, and are counted in `lost`.
     """

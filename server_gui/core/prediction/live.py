@@ -15,7 +15,7 @@ from server_gui.core.follow.feed import ONCE, Feed, FollowSettings, Tell
 from server_gui.core.follow.mailbox import Mailbox
 from server_gui.core.follow.network import Network
 from server_gui.core.follow.robot import Robot
-from server_gui.core.prediction.current import StationPredictions
+from server_gui.core.prediction.newest_predictions import StationPredictions
 from server_gui.core.prediction.news import PredictionNews
 from server_gui.core.prediction.service import PredictionService
 from server_gui.core.settings.server_file import ServerSettings

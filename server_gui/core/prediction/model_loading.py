@@ -1,4 +1,4 @@
-"""Which models serve: a thread that looks into the registry again and again, and loads what is new there.
+"""Loading of the serving models: a thread that checks the registry for new ones.
 
 It waits for the store, so that nobody else does. A model that cannot be loaded changes nothing: the one that
 serves stays, and `problems` says why.

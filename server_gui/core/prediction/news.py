@@ -1,4 +1,4 @@
-"""What prediction tells of a robot: small frozen facts, handed to whoever shows or keeps them."""
+"""News of predictions about a robot: small frozen facts, to be shown or recorded."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from server_gui.core.settings.prediction import Action, RuleSettings
 
 @dataclass(frozen=True, slots=True)
 class Predicted:
-    """What a model says of a robot now.
+    """A model's prediction for a robot now.
 
     `utc_ns` is when the window ended; `took_ns` how long after that the prediction was there, None where the
     robot's clock is not known. `quality` is how right the model was on this robot within the last days, None
@@ -36,7 +36,7 @@ class Predicted:
 
 @dataclass(frozen=True, slots=True)
 class Endangered:
-    """What is foreseen of a robot now; times as in `Predicted`. Rules take the verdict as `prediction`."""
+    """A robot's danger now; times as in `Predicted`. Rules take the verdict as `prediction`."""
 
     robot: str
     verdict: DangerVerdict
@@ -98,7 +98,7 @@ class Ruled:
 
 @dataclass(frozen=True, slots=True)
 class Serves:
-    """Which models serve a robot from now on, by task.
+    """Models that serve a robot from now on, by task.
 
     `why` says of each task without a model, or whose newest one was refused, why, and what to do.
     """

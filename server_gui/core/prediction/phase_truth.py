@@ -1,4 +1,4 @@
-"""Where in the stride both legs were: known with hindsight, from one heel strike of a foot to its next."""
+"""True gait phases of both legs, in hindsight, from heel strike to heel strike."""
 
 import collections
 import statistics
@@ -29,7 +29,7 @@ class Instant:
 
 
 class PhaseTruth:
-    """Of one robot; strides that are not plausible tell nothing."""
+    """True phases of one robot; implausible strides are ignored."""
 
     def __init__(self) -> None:
         self._processing = ComponentProcessing()

@@ -16,7 +16,7 @@ HOUR_NS: Final = 3_600_000_000_000
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """What was predicted of one recording, in time's order; `length_ns` of it were watched.
+    """Predictions of one recording, in time's order; `length_ns` of it were watched.
 
     `causes` are the times (ns, of the same clock) in which a rule is right to hold; None where nobody knows.
     """
@@ -27,7 +27,7 @@ class Stretch:
 
 
 class Rehearsed(Struct, frozen=True):
-    """What came of a rule: `began` times in `hours`; `false` times of these without cause, as far as known.
+    """Result of a rule: `began` times in `hours`; `false` times of these without cause, as far as known.
 
     `known` says whether anybody knows when there was cause; where nobody does, every time counts as false.
     """

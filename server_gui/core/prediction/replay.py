@@ -27,7 +27,7 @@ from server_gui.core.settings.prediction import PredictionSettings
 
 
 class Live(Struct, frozen=True):
-    """How a replay compares with what the same model said live."""
+    """Comparison of a replay with the same model's live predictions."""
 
     decisions: int  # that were made live
     same: int  # with the same label

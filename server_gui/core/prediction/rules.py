@@ -1,4 +1,4 @@
-"""When a rule on predictions begins and ends to hold, with a time to begin and a threshold to end."""
+"""Rules on predictions: a time until they hold, and a threshold at which they end."""
 
 from dataclasses import dataclass
 from typing import Final

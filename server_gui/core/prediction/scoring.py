@@ -1,4 +1,4 @@
-"""What was said against what labels say was so: the one way in which predictions are right or wrong."""
+"""Comparison of predictions with labels: the only measure of right and wrong."""
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -23,7 +23,7 @@ Counts = Counter[tuple[str, str]]  # what it was, what was said → decisions
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Decisions:
-    """What was said at stamps (n,), in time's order: labels, and of gait_phase the phases (n, 2)."""
+    """Predictions at stamps (n,), in time's order: labels, and of gait_phase the phases (n, 2)."""
 
     stamps_ns: Stamps
     labels: Sequence[str]

@@ -1,4 +1,4 @@
-"""How prediction goes, for `gwrms collect --status` and whoever shows it; needs no scikit-learn."""
+"""Report on prediction, for `gwrms collect --status` and others; needs no scikit-learn."""
 
 from datetime import datetime
 from typing import Final
@@ -9,7 +9,7 @@ WITHIN_DAYS: Final = 7  # of predictions that are compared with labels
 
 
 class Quality(Struct, frozen=True):
-    """How predictions compare with labels: of `labelled` decisions, what was right, wrong, and not said."""
+    """Accuracy by labels: of `labelled` decisions, the right, the wrong, and the abstentions."""
 
     labelled: int
     right: int
@@ -36,7 +36,7 @@ Figures = dict[str, dict[str, dict[str, Quality]]]  # by robot, task and model
 
 
 class TaskReport(Struct, frozen=True):
-    """What is predicted of one task of a robot now; seconds, UTC. `took_s` is from sample to prediction."""
+    """Present prediction of one task of a robot; seconds, UTC. `took_s` is from sample to prediction."""
 
     model: str
     made: datetime
@@ -52,7 +52,7 @@ class TaskReport(Struct, frozen=True):
 
 
 class PredictingState(Struct, frozen=True):
-    """How prediction goes; what is predicted by robot and task, and what is wrong with models, in words."""
+    """State of prediction: predictions by robot and task, and problems of models, in words."""
 
     robots: dict[str, dict[str, TaskReport]] = {}
     problems: tuple[str, ...] = ()

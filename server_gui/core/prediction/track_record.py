@@ -1,4 +1,4 @@
-"""How right the predictions of the last days were, as labels say that have come into the store."""
+"""Accuracy of the last days' predictions, by labels in the store."""
 
 import itertools
 from collections import Counter
@@ -32,7 +32,7 @@ _field = pyarrow.dataset.field
 
 
 class Stretch(NamedTuple):
-    """What is labelled of a session, and the files of what was said then: while these stay, counts do."""
+    """A labelled part of a session, and the files of its predictions: while these stay, counts do."""
 
     labels: tuple[Label, ...]
     begin: datetime
@@ -41,7 +41,7 @@ class Stretch(NamedTuple):
 
 
 class TrackRecord:
-    """Of one store; for one thread at a time. It reads again only what has changed."""
+    """Track record in one store; for one thread at a time. It rereads only changed data."""
 
     def __init__(self, store_url: str) -> None:
         self._store = Store.existing(store_url)

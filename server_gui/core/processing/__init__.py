@@ -1,1 +1,1 @@
-"""What is made of a robot's values: gait, units, resources, the link. Live and over recordings alike."""
+"""Values derived from a robot's: gait, units, resources, the link. Live and over recordings alike."""

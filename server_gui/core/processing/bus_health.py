@@ -1,4 +1,4 @@
-"""How a robot's CAN buses are: what is an alarm, what a warning, and who talks how much."""
+"""Health of a robot's CAN buses: alarms, warnings, and the load of each sender."""
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
@@ -25,7 +25,7 @@ NUMBER: Final = re.compile(r"(?<![\w.])\d+(?:\.\d+)?(?![\w.])")
 
 
 class BusHealthLevel(Enum):
-    """How bad it is; what is not known is none of the others."""
+    """Severity; unknown is none of the others."""
 
     GOOD = "ok"
     UNKNOWN = "not known"

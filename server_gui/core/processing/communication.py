@@ -21,7 +21,7 @@ CALENDAR_NS = 60_000_000_000  # a robot whose calendar is further off than this 
 
 
 class Health(StrEnum):
-    """How far what comes over a link can be trusted to be all, and new."""
+    """Health of a link: whether its data are complete and new."""
 
     GOOD = "good"
     FAIR = "fair"
@@ -46,7 +46,7 @@ class LinkQuality:
 
 @dataclass(slots=True)
 class _Second:
-    """What one second brought."""
+    """Counts of one second."""
 
     second: int
     rows: int = 0

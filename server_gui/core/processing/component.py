@@ -22,7 +22,7 @@ Columns = Mapping[str, Sequence[float | None]]
 
 
 class GaitFindings(NamedTuple):
-    """What some rows brought."""
+    """Findings in some rows."""
 
     events: list[GaitEvent]
     strides: list[Stride]
@@ -30,7 +30,7 @@ class GaitFindings(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Derived:
-    """What is derived from a robot's samples, as it is now: times and angles in SI units."""
+    """Values derived from a robot's samples, as of now: times and angles in SI units."""
 
     stamp_ns: int = 0  # the newest row, on the robot's clock
     gait: Gait = field(default_factory=Gait)

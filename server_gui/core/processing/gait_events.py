@@ -9,7 +9,7 @@ NEW_CLOCK_NS: Final = 1_000_000_000  # a stamp so long before the last is of a r
 
 
 class Leg(StrEnum):
-    """Which leg."""
+    """Left or right leg."""
 
     LEFT = "left"
     RIGHT = "right"
@@ -27,7 +27,7 @@ class EventKind(StrEnum):
 
 
 class EventSource(StrEnum):
-    """What an event was seen by, best first."""
+    """Source of an event, best first."""
 
     PRESSURE = "pressure"
     FOOT_IMU = "foot_imu"
@@ -50,7 +50,7 @@ class GaitEvent:
 
 
 class Follows(Enum):
-    """How a sample follows the one before."""
+    """Relation of a sample to the one before."""
 
     OLD = 0  # not later: it was seen already, or came in the wrong order
     NEXT = 1

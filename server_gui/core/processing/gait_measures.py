@@ -1,4 +1,4 @@
-"""What gait events tell of the walk: cadence, times, shares, symmetry, variability."""
+"""Measures of the walk from gait events: cadence, times, shares, symmetry, variability."""
 
 import collections
 import statistics

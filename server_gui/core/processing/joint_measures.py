@@ -1,4 +1,4 @@
-"""What one joint does: how far it moves, and how well it follows its target."""
+"""Measures of one joint: its range of motion, and its tracking error."""
 
 import collections
 import math
@@ -29,7 +29,7 @@ class Extremes:
 
 @dataclass(frozen=True, slots=True)
 class Error:
-    """How well a joint follows its target, over the last two seconds (rad)."""
+    """Tracking error of a joint, over the last two seconds (rad)."""
 
     rms: float
     largest: float

@@ -1,4 +1,4 @@
-"""What a process is called: by its command, because of interpreters all have one name."""
+"""Names of processes, from their commands: all interpreters have one name."""
 
 from collections.abc import Sequence
 from typing import Final

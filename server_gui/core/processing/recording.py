@@ -19,7 +19,7 @@ ROWS = 8192  # at a time
 
 @dataclass(frozen=True, slots=True)
 class RecordedGait:
-    """What a recording shows: every event and stride, and the measures over all of them (SI units)."""
+    """Gait in a recording: every event and stride, and the measures over all of them (SI units)."""
 
     events: list[GaitEvent]
     strides: list[Stride]

@@ -18,7 +18,7 @@ BLOCK_S = 60.0  # samples of one minute are one value: they depend on each other
 
 @dataclass(frozen=True, slots=True)
 class SessionUse:
-    """What each process used in one session: per process and measure, a median a minute."""
+    """Use of each process in one session: per process and measure, a median a minute."""
 
     version: str
     processes: Mapping[str, Mapping[str, Floats]] = field(default_factory=dict)

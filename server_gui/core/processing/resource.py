@@ -144,7 +144,7 @@ class ResourceProcessing:
 
 
 class _Process:
-    """What is kept of one process: a minute of CPU, two hours of memory, a median a minute."""
+    """History of one process: a minute of CPU, two hours of memory, a median a minute."""
 
     def __init__(self, first: ProcessUse) -> None:
         self._pid, self._name, self._label = first.pid, first.name, short_name(first)

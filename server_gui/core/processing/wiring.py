@@ -1,4 +1,4 @@
-"""Which channel feeds what: found by the channels' names, once for each set of columns."""
+"""Inputs of the processing, found by the channels' names, once for each set of columns."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ class Fed(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Wiring:
-    """What a batch with these columns brings."""
+    """Inputs in a batch with these columns."""
 
     forces: tuple[tuple[Leg, Fed], ...]  # of the insoles
     pitch_rates: tuple[tuple[Leg, Fed], ...]  # of the feet's IMUs

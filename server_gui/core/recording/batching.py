@@ -1,4 +1,4 @@
-"""What comes from robots, gathered into runs and events: pure, for the recorder's thread."""
+"""Gathering of robots' data into runs and events: pure, for the recorder's thread."""
 
 import itertools
 import uuid
@@ -17,7 +17,7 @@ from server_gui.core.recording.rows import Floats, Layout, Record, Run
 
 
 class EventKind(Enum):
-    """What an event of a recording tells."""
+    """Kind of a recording's event."""
 
     GAP = "gap"  # something was not seen: the link dropped, or notifications never came
     DROPPED = "dropped"  # the robot threw rows away

@@ -34,7 +34,7 @@ class Moment(NamedTuple):
 
 
 class ClockReading(NamedTuple):
-    """How the clocks stood when a notification came."""
+    """Clocks at the arrival of a notification."""
 
     to_utc_ns: int  # this server's wall clock minus its monotonic one
     robot_ns: int  # the robot's monotonic clock minus ours

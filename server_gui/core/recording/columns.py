@@ -15,7 +15,7 @@ OWN: Final = frozenset(TELEMETRY.schema.names)
 
 
 class Columns:
-    """Where each channel of these layouts goes, in a table whose columns have these units already.
+    """Mapping of these layouts' channels to columns, in a table whose columns have these units already.
 
     A channel's column has its name. Where that column has another unit, because another robot means something
     else by the name, or none although this channel has one, it is `name@unit`: values in different units

@@ -1,4 +1,4 @@
-"""What can go wrong while recording.
+"""Errors of recording.
 
 RecordingError
 └── SpoolUnusable   the spool's folder or one of its files cannot be used; says what to do
@@ -25,4 +25,4 @@ class Contradicted(Damaged):
 
 
 class NotKept(SpoolUnusable):
-    """What was to be kept cannot be written into any file, whatever the disk does."""
+    """The data cannot be written into any file, whatever the disk does."""

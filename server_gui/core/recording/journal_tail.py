@@ -1,4 +1,4 @@
-"""Which entries of a robot's journal are new: its tail is asked again and again."""
+"""New entries in the tail of a robot's journal, which is read again and again."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What was to be kept and could not be, by name: whose rows, how many, from when to when."""
+"""Lost data, by name: whose rows, how many, from when to when."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator

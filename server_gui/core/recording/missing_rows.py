@@ -1,4 +1,4 @@
-"""What of a batch the store lacks, where it knows the batch's number already.
+"""Rows of a batch that are missing in a store which knows the batch's number.
 
 Usually nothing: a server was killed after the batch had arrived and before it knew. But a number may have
 been used by other rows, or by the same batch when parts of it were damaged: then what is not there is still

@@ -30,7 +30,7 @@ _TAIL_LINES: Final = 2  # one, and the one that it follows
 
 
 class Stream(msgspec.Struct, frozen=True):
-    """Whose rows of telemetry: all of a batch from notification `first` to `last` have this in common."""
+    """Stream of telemetry: the common part of a batch's rows from notification `first` to `last`."""
 
     robot: str
     session: str
@@ -68,7 +68,7 @@ class ReceiptPart(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class Receipt(msgspec.Struct, frozen=True):
-    """What of a batch is in the store `url`; `lost` is what its own damage has taken of it, in words."""
+    """Rows of a batch in the store `url`; `lost` is the loss by its own damage, in words."""
 
     writer: str
     batch: int
@@ -205,7 +205,7 @@ def units_told(receipts: Iterable[Receipt]) -> dict[str, dict[str, str | None]]:
 
 
 class _Known:
-    """What receipts have told of stores and tables, together."""
+    """Receipts' knowledge of stores and tables, together."""
 
     def __init__(self) -> None:
         self.tables: dict[str, dict[str, str]] = {}  # of a store: location → id

@@ -48,7 +48,7 @@ class Item(NamedTuple):
 
 
 class AlarmKind(Enum):
-    """What keeps the recorder from keeping everything."""
+    """Kind of trouble that keeps the recorder from recording everything."""
 
     OVERFLOW = "overflow"  # rows came faster than the disk takes them
     DISK_FULL = "disk_full"  # recording has stopped until there is room
@@ -70,7 +70,7 @@ class Alarm:
 
 @dataclass(frozen=True, slots=True)
 class RecorderState:
-    """How recording goes: rows since the start, and which alarms hold now."""
+    """State of recording: rows since the start, and the present alarms."""
 
     recorded: int
     waiting: int
@@ -81,7 +81,7 @@ class RecorderState:
 
 @dataclass(frozen=True, slots=True)
 class RecorderSettings:
-    """How the recorder behaves; a batch goes to the store when it is as old or as long as this."""
+    """Settings of the recorder; a batch goes to the store at this age or length."""
 
     capacity: int = 50_000  # rows that may wait for the disk: of 60 channels they take half a gigabyte
     batch_s: float = 60.0

@@ -17,7 +17,7 @@ MORE: Final = ("disk", "network", "thermal", "throttling", "kernel")  # of a sna
 
 
 class Worn(msgspec.Struct, frozen=True):
-    """Who wears the robot, by whatever name the study gives them, and what they have agreed to."""
+    """Wearer of the robot, by the study's name, and the consent."""
 
     wearer: str = ""
     consent: str = ""
@@ -27,7 +27,7 @@ NOBODY: Final = Worn()
 
 
 class Facts(msgspec.Struct, frozen=True):
-    """What was so when a session began.
+    """Facts at the start of a session.
 
     `parameters` are values by name, `units` each channel's unit, `versions` software by name. `setup` is
     what else was so, by section and name, as in `firmware/left_knee`; what is not in it was not told.

@@ -1,4 +1,4 @@
-"""What is known of every robot while recording: sessions, names, journals. For the recorder's thread."""
+"""State of every robot while recording: sessions, names, journals. For the recorder's thread."""
 
 import logging
 from collections.abc import Iterable, Mapping, Sequence

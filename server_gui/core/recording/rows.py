@@ -1,4 +1,4 @@
-"""What the spool keeps: runs of telemetry rows, and records of every other table."""
+"""Contents of the spool: runs of telemetry rows, and records of every other table."""
 
 from dataclasses import dataclass
 from typing import Any, Final

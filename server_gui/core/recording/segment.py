@@ -91,7 +91,7 @@ def translated(file: Path) -> Iterator[None]:
 
 
 class DamagedRun(NamedTuple):
-    """What a run that is not as it was written says of itself, which may be wrong too."""
+    """Header of a damaged run, which may be wrong too."""
 
     number: int  # in its segment
     robot: str

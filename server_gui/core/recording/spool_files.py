@@ -35,7 +35,7 @@ _NAME: Final = re.compile(r"(\d{8})(\.uploaded|\.damaged|\.cut)?\.db")
 
 
 class SegmentState(Enum):
-    """What has become of a segment; as its file's name says."""
+    """State of a segment, by its file's name."""
 
     WAITING = ""
     UPLOADED = ".uploaded"

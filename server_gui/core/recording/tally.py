@@ -39,7 +39,7 @@ def times_us(column: pa.Array | pa.ChunkedArray) -> npt.NDArray[np.int64]:
 
 @dataclass(slots=True)
 class _Times:
-    """How many rows there are, with which sum, in each of the finest widths."""
+    """Counts and sums of rows, in each of the finest widths."""
 
     _found: dict[int, tuple[int, int]] = field(default_factory=dict)
 
@@ -82,7 +82,7 @@ class _Counted:
 
 @dataclass(slots=True)
 class Tally:
-    """Of runs of telemetry, a stream at a time."""
+    """Tally of runs of telemetry, a stream at a time."""
 
     _streams: dict[_Name, _Counted] = field(default_factory=dict)
 

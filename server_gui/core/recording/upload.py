@@ -37,7 +37,7 @@ _PLACED: Final = 3  # times that columns are placed anew
 
 @dataclass(frozen=True, slots=True)
 class Sent:
-    """What of a segment is in the store now, by which writer; `lost` tells what its damage has taken."""
+    """Rows of a segment that are in the store now; `lost` is the loss by its damage."""
 
     writer: str
     parts: tuple[ReceiptPart, ...]

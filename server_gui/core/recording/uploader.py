@@ -29,7 +29,7 @@ LONGEST_S: Final = 60.0  # between attempts on a store that cannot be reached
 
 @dataclass(frozen=True, slots=True)
 class UploaderState:
-    """How uploading goes; `problem` says in words why it does not, and ends with the next success."""
+    """State of uploading; `problem` is the reason of a failure, and ends with the next success."""
 
     uploaded: int = 0  # segments since the start
     waiting: int = 0  # segments that are frozen and not in the store

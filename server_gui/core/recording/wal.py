@@ -1,4 +1,4 @@
-"""What SQLite would pass over in silence: commits in a write-ahead log behind a place that is damaged.
+"""Commits in a write-ahead log behind damage, which SQLite would skip silently.
 
 A log is read up to the first frame whose checksum is wrong, as if nothing had followed. Where frames of the
 same log follow, they were written, and all but the last commit of them had been synchronised. The last one
@@ -53,7 +53,7 @@ def lost_commits(log: Path, page_bytes: int) -> int:
 
 
 class _Place(NamedTuple):
-    """Where in a log a commit ends: with which of its frames, counted from 1."""
+    """Place of a commit's end in a log: the frame, counted from 1."""
 
     frame: int
     salts: Pair

@@ -19,12 +19,12 @@ RELEASE: Final = 0.8  # of `at_least`, where a rule does not say it
 
 
 class PredictionSettings(Struct, frozen=True, forbid_unknown_fields=True):
-    """`[prediction]`: whether robots' status is predicted live, and how often."""
+    """`[prediction]`: live predictions of robots' status."""
 
-    enabled: bool = True
-    danger: bool = False  # whether danger is foreseen too: docs explanation/danger
-    every_ms: dict[str, Annotated[int, Meta(ge=STEP_MS, le=10_000, multiple_of=STEP_MS)]] = {}
-    poll_s: Annotated[float, Meta(ge=1, le=3600)] = 10.0  # between looks which models serve
+    enabled: bool = True  # predict live
+    danger: bool = False  # detect danger, too: docs explanation/danger
+    every_ms: dict[str, Annotated[int, Meta(ge=STEP_MS, le=10_000, multiple_of=STEP_MS)]] = {}  # by task
+    poll_s: Annotated[float, Meta(ge=1, le=3600)] = 10.0  # period of looking for newly promoted models
 
     def __post_init__(self) -> None:
         _refuse(_strange("every_ms", self.every_ms, CLASSES))
@@ -35,26 +35,26 @@ class PredictionSettings(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Action(Enum):
-    """What a rule does."""
+    """Action of a rule."""
 
     ALARM = "alarm"  # says so, and records it
     STOP = "stop"  # also asks the robot's gateway to stop every drive
 
 
 class RuleSettings(Struct, frozen=True, forbid_unknown_fields=True):
-    """One of `[[rules]]`: it holds once `label` was as probable as `at_least` for `for_ms`.
+    """One of `[[rules]]`: it triggers once the probability of `label` is at least `at_least` for `for_ms`.
 
-    It holds until that falls below `release` (default: four fifths of `at_least`), and acts once each time.
-    The label "abnormal" has the probability 1 where it is said.
+    It acts once, and again only after the probability was below `release`. A prediction "abnormal" counts
+    with the probability 1.
     """
 
-    task: str
-    label: str
-    at_least: Annotated[float, Meta(gt=0, le=1, extra={"unit": ""})]
-    for_ms: Annotated[int, Meta(ge=0, le=60_000)] = 0
-    release: Annotated[float, Meta(ge=0, le=1)] | None = None
+    task: str  # such as "falling", or "danger"
+    label: str  # a class of the task
+    at_least: Annotated[float, Meta(gt=0, le=1, extra={"unit": ""})]  # threshold of the probability
+    for_ms: Annotated[int, Meta(ge=0, le=60_000)] = 0  # time above the threshold
+    release: Annotated[float, Meta(ge=0, le=1)] | None = None  # None: four fifths of `at_least`
     robot: str = "*"  # a name or glob
-    action: Action = Action.ALARM
+    action: Action = Action.ALARM  # "stop" also stops every drive of the robot
 
     def __post_init__(self) -> None:
         classes = {**{task: (*labels, ABNORMAL) for task, labels in CLASSES.items()}, DANGER: DANGER_LEVELS}

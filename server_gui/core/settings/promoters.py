@@ -1,4 +1,4 @@
-"""Who has promoted a model: a desk signs what it promotes, and stop rules believe whom they are told to."""
+"""Signatures of promotions: a desk signs its promotions, and stop rules accept trusted desks only."""
 
 import base64
 from collections.abc import Mapping

@@ -47,7 +47,7 @@ class SettingsError(ValueError):
 
 
 class Upload(Enum):
-    """When what is recorded goes to the store."""
+    """Time of uploads."""
 
     ALWAYS = "always"  # a batch at a time, as soon as each is full
     IDLE = "idle"  # while no robot sends, or before the spool takes too much of the disk
@@ -70,10 +70,10 @@ def exports_folder() -> Path:
 
 
 class RobotSettings(Struct, frozen=True, forbid_unknown_fields=True):
-    """An entry of `[robots]`, which may be just the address; `gwrms pair` adds the pin of the robot's key."""
+    """An entry of `[robots]`: a table, or just the address."""
 
-    address: str
-    pin: str | None = None
+    address: str  # HOST:PORT
+    pin: str | None = None  # of the robot's key; `gwrms pair` adds it
 
     def __post_init__(self) -> None:
         if self.pin is not None:
@@ -91,15 +91,12 @@ class RobotSettings(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class StoreSettings(Struct, frozen=True, forbid_unknown_fields=True):
-    """`[store]`; `shards` and `several_writers` count when the store is first used.
+    """`[store]`: the store; `shards` and `several_writers` take effect when it is created."""
 
-    `compact_h` is how often a collector puts its small files together; 0 leaves that to others.
-    """
-
-    url: str = field(default_factory=default_url)
-    shards: Annotated[int, Meta(ge=1, le=1000)] = 1
-    several_writers: bool = True
-    compact_h: Annotated[float, Meta(ge=0, le=8760)] = 1.0
+    url: str = field(default_factory=default_url)  # `file:///FOLDER` or `s3://BUCKET/PREFIX`
+    shards: Annotated[int, Meta(ge=1, le=1000)] = 1  # number of telemetry tables
+    several_writers: bool = True  # several collectors, or a collector and its compaction, write to it
+    compact_h: Annotated[float, Meta(ge=0, le=8760)] = 1.0  # period of merging small files; 0: never
 
     @property
     def compact_s(self) -> float | None:
@@ -108,17 +105,14 @@ class StoreSettings(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class RecordingSettings(Struct, frozen=True, forbid_unknown_fields=True):
-    """`[recorder]`: where data is safe until it is in the store, what is asked of each robot, and how often.
+    """`[recorder]`: the spool, the recorded data, and the uploads."""
 
-    `rate_hz` 0 records every sample of every source as it comes, instead of a row a tick.
-    """
-
-    spool: Path = field(default_factory=default_spool)
-    upload: Upload = Upload.ALWAYS
-    rate_hz: Annotated[float, Meta(ge=0, le=1000)] = 100.0
+    spool: Path = field(default_factory=default_spool)  # folder of data that is not in the store yet
+    upload: Upload = Upload.ALWAYS  # time of uploads
+    rate_hz: Annotated[float, Meta(ge=0, le=1000)] = 100.0  # rows a second; 0: every sample as it comes
     channels: Annotated[tuple[str, ...], Meta(min_length=1)] = ("*",)  # names or globs
-    resources_s: Annotated[float, Meta(ge=0.1, le=3600)] = 5.0  # between looks at a robot's computer
-    batch_s: Annotated[float, Meta(ge=1, le=3600)] = 60.0  # of recording that go to the store together
+    resources_s: Annotated[float, Meta(ge=0.1, le=3600)] = 5.0  # period of measuring a robot's computer
+    batch_s: Annotated[float, Meta(ge=1, le=3600)] = 60.0  # length of recording in one upload
 
 
 class ServerSettings(Struct, frozen=True):

@@ -1,4 +1,4 @@
-"""How an answer of the network's thread comes back to the window's."""
+"""Delivery of answers from the network's thread to the window's."""
 
 import concurrent.futures
 from collections.abc import Callable

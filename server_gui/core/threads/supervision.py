@@ -22,7 +22,7 @@ HELD_S: Final = 60.0  # that a death stays an alarm after the thread was begun a
 
 
 class Trouble(Struct, frozen=True):
-    """What is wrong with a thread; `works` says whether what it is for goes on all the same."""
+    """Trouble of a thread; `works` is whether its task continues all the same."""
 
     thread: str
     text: str

@@ -1,4 +1,4 @@
-"""What a window can ask of one robot; tests bring their own."""
+"""Requests of a window to one robot; tests bring their own."""
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future
@@ -11,7 +11,7 @@ from gateway.wire.stop import Reset, Stopped
 
 
 class ReadBack(NamedTuple):
-    """What a device holds of a parameter now, None where it cannot be read; and whether it is on trial."""
+    """A device's present value of a parameter, None if unreadable; and whether it is on trial."""
 
     value: float | None
     problem: str | None

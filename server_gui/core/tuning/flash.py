@@ -1,4 +1,4 @@
-"""Whether a value is in a device's flash: only where the journal shows it; a drive cannot be asked."""
+"""Presence of a value in a device's flash: by the journal only; a drive cannot be asked."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -99,7 +99,7 @@ _EFFECTS: Final[Mapping[str, Callable[[_Reading, Entry], None]]] = {
 
 
 class Flash:
-    """What of a robot's parameters is known to be stored.
+    """Stored parameters of a robot, as far as known.
 
     Looks at its components tell since when, on our clock, each device is seen without a boot-up; one that is
     not seen may have had one.

@@ -1,4 +1,4 @@
-"""Who may write: our lease, and how long it lasts."""
+"""The right to write: our lease, and its remaining time."""
 
 import time
 from dataclasses import dataclass

@@ -15,7 +15,7 @@ OTHERS: Final = "taken back, but other values are held: look at them"
 
 
 class RevertedTrials:
-    """Of one robot; `tell` notes what came of it."""
+    """Reverted trials of one robot; `tell` reports their results."""
 
     def __init__(self, robot: Robot, writing: WriteProgress, tell: Callable[[NewsKind, str], None]) -> None:
         self._robot = robot

@@ -1,4 +1,4 @@
-"""What is offered for several joints at once: what would be staged, what they hold now, why not."""
+"""Offers for several joints at once: the new values, the present ones, and obstacles."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

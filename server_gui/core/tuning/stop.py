@@ -1,4 +1,4 @@
-"""What became of a STOP: sent, then confirmed by every drive, or NOT CONFIRMED. Silence is never success."""
+"""Progress of a STOP: sent, then confirmed by every drive, or NOT CONFIRMED. Silence is never success."""
 
 import time
 from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -15,7 +15,7 @@ HELD_BY = frozenset({"stop", "stop still held"})  # entries of the journal
 
 
 class StopState(Enum):
-    """Where the latest STOP stands."""
+    """State of the latest STOP."""
 
     IDLE = "no stop was sent"
     SENT = "sent"

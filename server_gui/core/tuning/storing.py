@@ -1,4 +1,4 @@
-"""What can be stored to flash: devices, what they would keep, why it cannot be now; and storing them."""
+"""Storing to flash: the devices, the values they would keep, obstacles, and the storing itself."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

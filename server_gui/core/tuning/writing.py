@@ -23,7 +23,7 @@ OUTCOMES: Final = "outcome"  # what a refusal says became of each parameter
 
 
 class WriteState(Enum):
-    """Where the latest write stands."""
+    """State of the latest write."""
 
     IDLE = "nothing was written"
     WRITING = "writing"

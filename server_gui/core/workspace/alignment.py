@@ -1,4 +1,4 @@
-"""How two robots, or a robot and a recording, come onto one axis of time."""
+"""Alignment of two robots, or a robot and a recording, on one axis of time."""
 
 from enum import Enum
 from typing import Final
@@ -11,7 +11,7 @@ HOLD_NS: Final = 100_000_000  # what is measured anew differs a little each time
 
 
 class Align(Enum):
-    """What of both is at one place."""
+    """Instant at which both are aligned."""
 
     NOW = "now"
     START = "first row"

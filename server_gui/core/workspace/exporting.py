@@ -1,4 +1,4 @@
-"""What is in sight as CSV: SI units, every digit, a row a time."""
+"""Export of the visible signals as CSV: SI units, every digit, a row for each time."""
 
 import csv
 from collections.abc import Sequence

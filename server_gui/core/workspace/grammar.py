@@ -28,7 +28,7 @@ _TOKEN: Final = re.compile(
 
 
 class ExpressionError(ValueError):
-    """What an expression cannot say; `place` and `length` mark where in the text."""
+    """Error in an expression; `place` and `length` mark it in the text."""
 
     def __init__(self, problem: str, text: str, place: int, length: int = 1) -> None:
         super().__init__(problem)
@@ -66,7 +66,7 @@ class ExpressionNode:
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """What somebody has written as a curve: its name, and the tree of what follows."""
+    """A written curve: its name, and its expression tree."""
 
     name: str
     tree: ExpressionNode

@@ -37,7 +37,7 @@ class PlotLayout(Struct, forbid_unknown_fields=True, omit_defaults=True):
 
 
 class TriggerLayout(Struct, forbid_unknown_fields=True, omit_defaults=True):
-    """What is waited for; levels are SI."""
+    """Condition of a trigger; levels are SI."""
 
     on: On
     of: str

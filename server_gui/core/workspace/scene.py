@@ -1,4 +1,4 @@
-"""What the signals show of one robot now: the rows that come, or those that were kept; beside another's."""
+"""The signals of one robot as shown: live or frozen rows, beside another robot's."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -32,7 +32,7 @@ FAULT: Final = "fault"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frozen:
-    """What a view that stands still goes on showing; `columns` by the texts of curves."""
+    """Frozen contents of a view; `columns` by the texts of curves."""
 
     times: Floats
     columns: Mapping[str, Floats]

@@ -14,7 +14,7 @@ LONGEST_HOLD_S: Final = 60.0
 
 
 class On(Enum):
-    """What is waited for."""
+    """Condition of a trigger."""
 
     RISE = "rises through"
     FALL = "falls through"
@@ -30,7 +30,7 @@ EDGES: Final = (On.RISE, On.FALL, On.ENTERS, On.LEAVES)
 
 
 class Mode(Enum):
-    """What comes after."""
+    """Mode after a trigger."""
 
     AUTO = "auto"  # shows what comes where nothing triggers
     NORMAL = "normal"  # keeps the last until the next
@@ -38,7 +38,7 @@ class Mode(Enum):
 
 
 class TriggerState(Enum):
-    """How it is."""
+    """State of a trigger."""
 
     OFF = "off"
     ARMED = "armed"

@@ -1,4 +1,4 @@
-"""Which curves are in which plot; what cannot share an axis is refused, and says why."""
+"""Assignment of curves to plots; curves that cannot share an axis are refused, with the reason."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
@@ -12,7 +12,7 @@ MOST_PLOTS: Final = 12
 
 
 class Refused(Exception):
-    """What cannot be put there; the message says why, and what can be done."""
+    """A curve cannot be placed there; with the reason, and the alternatives."""
 
 
 @dataclass(slots=True)

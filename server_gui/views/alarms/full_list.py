@@ -35,7 +35,7 @@ OVER: Final = Mark("ring", "dim", "over")
 
 
 class Deeds(Protocol):
-    """What is told, and what may be done about it."""
+    """Actions on an alarm."""
 
     told: tuple[Told, ...]
 
@@ -163,7 +163,7 @@ def _high(label: WrappingLabel, text: str) -> int:
 
 
 class AlarmButtons(QWidget):
-    """What may be done about an alarm; what does not concern it is not there."""
+    """Buttons for the actions on an alarm; those that do not concern it are hidden."""
 
     def __init__(self) -> None:
         super().__init__()

@@ -229,7 +229,7 @@ class AlarmStrip(ClickableFrame):
 
 
 class _Words(QScrollArea):
-    """What has no room is scrolled, and changes the size of nothing around."""
+    """Text that scrolls if there is no room, and never resizes its surroundings."""
 
     resized = Signal()
 

@@ -1,4 +1,4 @@
-"""What is in the store: tables and whose, opened to sessions and files."""
+"""Browser of the store: tables and robots, with their sessions and files."""
 
 from collections.abc import Sequence
 from typing import Final

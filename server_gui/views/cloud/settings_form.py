@@ -23,7 +23,7 @@ NO_KEYS: Final = "keys are never written: they come from the AWS environment or 
 
 
 class SettingsForm(Card):
-    """Of this file. What nobody has edited is not written."""
+    """Form of this file. Unedited values are not written."""
 
     def __init__(self, settings: ServerSettings, file: Path) -> None:
         super().__init__("Store settings")

@@ -1,4 +1,4 @@
-"""How commissioning is, in words, with STOP beside it: always in sight on the page."""
+"""State of commissioning in words, with STOP beside it: always visible on the page."""
 
 from pathlib import Path
 from typing import Final

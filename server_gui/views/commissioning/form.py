@@ -1,4 +1,4 @@
-"""What is to be commissioned, typed or chosen: file, bus, EDS files, serial ports, on which computer."""
+"""Form for commissioning: file, bus, EDS files, serial ports, computer."""
 
 import shlex
 from collections.abc import Callable

@@ -110,7 +110,7 @@ class CommissionPage(QWidget):
 
 
 class Log(Card):
-    """What was said, asked and answered; it can be chosen and copied."""
+    """Log of the dialogue; its text can be selected and copied."""
 
     def __init__(self, commissioning: Commissioning, theme: Theme) -> None:
         super().__init__("What was said")

@@ -152,7 +152,7 @@ class Question(Card):
 
 
 class Live(QWidget):
-    """What devices tell while a joint is moved by hand, a line each; what is old is not there."""
+    """Live values while a joint is moved by hand, a line each; old ones are hidden."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()

@@ -24,9 +24,9 @@ from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.evidence.comparison import Measured, Word
 from server_gui.core.evidence.cycles import DRAWN
+from server_gui.core.evidence.display_units import in_units, symbols
 from server_gui.core.evidence.edits import EditState
 from server_gui.core.evidence.file import EditEvidence
-from server_gui.core.evidence.shown import in_units, symbols
 from server_gui.core.evidence.wording import changes, from_to, interval, number, share, strides, word
 from server_gui.core.experiments.plan import ExperimentKind
 from server_gui.core.experiments.wording import record, what, whole

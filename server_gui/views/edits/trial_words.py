@@ -1,4 +1,4 @@
-"""What is on trial, in words: the same wherever a trial is shown."""
+"""A trial in words: the same wherever it is shown."""
 
 import operator
 from typing import Final

@@ -1,4 +1,4 @@
-"""What is to be tried: a parameter, its values, how long each is held; said whole before it begins."""
+"""Form for an experiment: a parameter, its values and dwell times; the plan is shown before it begins."""
 
 import random
 from typing import Final, NamedTuple
@@ -49,7 +49,7 @@ USUAL: Final = "twice what is usual"
 
 
 class Tried(NamedTuple):
-    """What was on trial: a parameter, the value from before, and the one that was tried (SI)."""
+    """A trial: a parameter, the value before, and the one on trial (SI)."""
 
     parameter: str
     before: float

@@ -16,7 +16,7 @@ DOT: Final = 3.0
 
 
 class ResponsePlot(QWidget):
-    """Of the metric that is judged; empty where none was."""
+    """Plot of the judged metric; empty without one."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()

@@ -1,4 +1,4 @@
-"""What can be done with the simulated robot: let it walk, break something, mend it, look around."""
+"""Bar of the demo: let the simulated robot walk, break something, repair it, look around."""
 
 from collections.abc import Callable
 from typing import Final

@@ -1,4 +1,4 @@
-"""What can be broken in the simulated robot, by what it can be on, each with what it looks like."""
+"""Menu of the simulated robot's faults, by their targets, each with its symptoms."""
 
 from collections.abc import Callable, Iterator, Mapping
 from typing import Final

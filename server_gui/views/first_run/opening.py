@@ -1,4 +1,4 @@
-"""What the window does until the simulated robot walks: it counts the steps, and ends the splash."""
+"""Start of the window until the simulated robot walks: it counts the steps, and ends the splash."""
 
 from typing import TYPE_CHECKING, Final
 

@@ -1,4 +1,4 @@
-"""What stands on the screen until the simulated robot walks: which step is done, which is under way.
+"""Splash screen until the simulated robot walks: the finished and the present step.
 
 It imports nothing but Qt and the theme, so that it is there before the rest of the window is.
 """

@@ -19,7 +19,7 @@ LEAST: Final = 84  # wide, at text of 100 %: a chip with less says nothing
 
 @dataclass(frozen=True, slots=True)
 class Words:
-    """What a chip says: of its detail as many parts as there is room for, and in its tip all."""
+    """Texts of a chip: as many parts of its detail as there is room for; its tip has all."""
 
     mark: Mark
     main: str

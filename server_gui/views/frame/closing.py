@@ -1,4 +1,4 @@
-"""What the window says while it closes: what it waits for, and how to wait no longer."""
+"""Dialog while the window closes: the reason for waiting, and a way to wait no longer."""
 
 import time
 from typing import Final

@@ -22,7 +22,7 @@ Area = Qt.DockWidgetArea
 
 
 class Docks(QObject):
-    """Of a window, whose `fit` is called whenever its size, or that of the text, has changed.
+    """Docks of a window, whose `fit` is called whenever its size, or that of the text, has changed.
 
     The last panel is seen only when it is asked for. What people have arranged in a roomy window is kept
     while it is narrow, and over the end of the program. However they are arranged, they are scrolled rather

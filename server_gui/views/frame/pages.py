@@ -29,7 +29,7 @@ OF_A_ROBOT: Final = 7  # pages, which come first
 
 
 class View(Protocol):
-    """What a page holds."""
+    """Contents of a page."""
 
     def refresh(self) -> None:
         """Show how it is now; called each frame while the page is visible."""

@@ -25,7 +25,7 @@ TONES: Final = {
 
 
 class RecordingChip(Chip):
-    """Of the robot that is looked at; start and stop are for all that this window records."""
+    """Recording of the shown robot; start and stop are for all that this window records."""
 
     def __init__(self, desk: Desk, theme: Theme) -> None:
         self.turn = QPushButton("Stop")

@@ -1,4 +1,4 @@
-"""How far probabilities can be believed: what was said against how often it was right, of two models."""
+"""Calibration plot of two models: predicted probability against observed accuracy."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

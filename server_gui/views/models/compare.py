@@ -49,7 +49,7 @@ NARROW_ROW: Final = 480  # likewise, for the choice beside the words
 
 
 class Compare(Card):
-    """Of the model that is chosen."""
+    """Comparison of the chosen model."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__("Compare")

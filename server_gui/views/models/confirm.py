@@ -1,4 +1,4 @@
-"""What a promotion or a way back would change, to be confirmed; it stands in the way of nothing."""
+"""Confirmation of a promotion or rollback, with its effect; it blocks nothing."""
 
 from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QPushButton
 

@@ -1,4 +1,4 @@
-"""What is to be trained, and the trainings under way with how far they are."""
+"""Form for a training, and the running trainings with their progress."""
 
 from collections.abc import Iterable
 from typing import Final

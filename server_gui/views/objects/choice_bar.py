@@ -1,4 +1,4 @@
-"""What of which device is looked at: device, what it is compared with, words, kind; read all, save."""
+"""Choice of the shown objects: device, comparison, search, kind; read all, save."""
 
 from collections.abc import Mapping, Sequence
 from typing import Final

@@ -16,6 +16,7 @@ from PySide6.QtWidgets import (
 
 from gateway.units import Unit, rounded
 from server_gui.core.alarms.marks import GLYPHS
+from server_gui.core.alarms.severity import colour_of
 from server_gui.core.alarms.texts import error_text
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
@@ -126,6 +127,11 @@ class JointModel(QAbstractTableModel):
     def errors(self) -> list[tuple[str, str]]:
         """Each joint with which something is wrong, and what."""
         return [(row[JOINT].text, row[ERROR].text) for row in self._cells if row[ERROR].tip]
+
+    @property
+    def tone(self) -> str:
+        """How bad the worst of it is."""
+        return "bad" if any(row[ERROR].colour == "bad" for row in self._cells if row[ERROR].tip) else "warn"
 
     def empty(self) -> set[int]:
         """Return the columns that say nothing yet: no stop was sent."""
@@ -238,6 +244,11 @@ class JointTable(QTableView):
         return self._model.errors if self._bars.is_short else []
 
     @property
+    def tone(self) -> str:
+        """How bad the worst of that is."""
+        return self._model.tone
+
+    @property
     def bars(self) -> frozenset[int]:
         """The columns with bars that are shown."""
         return frozenset(column for column in (ANGLE, TORQUE) if not self.isColumnHidden(column))
@@ -327,12 +338,13 @@ def _row(station: Station, joint: str, desk: Desk) -> list[Cell]:
     word = part.state if gone else robot.word(f"{joint}.state")
     unproven = word == ENABLED and station.stopping.is_unproven
     mark = STILL_ENABLED if unproven else state_mark(word)
+    colour = colour_of(joint, station.alarms, mark.colour) if gone else mark.colour
     age = "" if not gone or part.age_ms is None else f" {part.age_ms / 1000:.1f} s"
     side = joint.partition("_")[0]
     state = f"{GLYPHS.get(mark.shape, '◆')} {mark.word}{age}"
     return [
         Cell(joint.replace("_", " "), side if side in ("left", "right") else "text"),
-        Cell(state, "old" if not station.is_live else mark.colour),
+        Cell(state, "old" if not station.is_live else colour),
         _angle(station, joint, desk, stale=stale),
         *(_value(station, joint, "velocity", desk, stale=stale),),
         _torque(station, joint, desk, stale=stale),
@@ -401,15 +413,15 @@ def _error(station: Station, part: FollowedComponent, *, stale: bool) -> Cell:
     Nothing known is no dash.
     """
     code = station.robot.values.get(f"{part.name}.error_code")
-    problem = part.problem or ""
+    problem, colour = part.problem or "", colour_of(part.name, station.alarms)
     if code:
         number = f"0x{int(code):04X}"
         found = CODE.search(problem)
         words = (found["words"] or "").strip() if found and found[0].startswith(number) else ""
         said = f"{number} {words}" if words else error_text(int(code))
-        return Cell(said, "old" if stale else "bad", None, "\n".join(filter(None, (problem, said))))
+        return Cell(said, "old" if stale else colour, None, "\n".join(filter(None, (problem, said))))
     if part.state != "ok" and problem:
-        return Cell(problem, "old" if not station.is_live else "bad", None, problem)
+        return Cell(problem, "old" if not station.is_live else colour, None, problem)
     if stale:
         return Cell("not known", "old")
     return Cell("–", "dim")

@@ -35,6 +35,7 @@ class JointWords(PlainLabel):
         super().__init__()
         self._theme = theme
         self._errors: Sequence[tuple[str, str]] = ()
+        self._tone = "bad"
         self._bars: frozenset[int] = frozenset()
         self.setAccessibleName("What is wrong with joints")
         self.setWordWrap(True)
@@ -44,10 +45,13 @@ class JointWords(PlainLabel):
         theme.changed.connect(self._fit)
         self._fit()
 
-    def say(self, errors: Sequence[tuple[str, str]], bars: frozenset[int]) -> None:
-        """Say what is wrong, by joints, in the order of the table; else what the bars of columns mean."""
-        if (list(errors), bars) != (list(self._errors), self._bars):
-            self._errors, self._bars = errors, bars
+    def say(self, errors: Sequence[tuple[str, str]], bars: frozenset[int], tone: str = "bad") -> None:
+        """Say what is wrong, by joints, in the order of the table; else what the bars of columns mean.
+
+        `tone` is how bad the worst is.
+        """
+        if (list(errors), bars, tone) != (list(self._errors), self._bars, self._tone):
+            self._errors, self._bars, self._tone = errors, bars, tone
             self._fit()
 
     def sizeHint(self) -> QSize:
@@ -75,7 +79,7 @@ class JointWords(PlainLabel):
         fits = (text for text in texts if self._has_room(text))
         last = whole_words(texts[-1], self.fontMetrics(), self.width())
         set_text(self, next(fits, last))
-        set_tone(self, "bad" if said else "")
+        set_tone(self, self._tone if said else "")
         set_tip(self, texts[0])
         if self.height() != self._high:
             self.setFixedHeight(self._high)

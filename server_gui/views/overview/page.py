@@ -185,7 +185,7 @@ class Overview(QWidget):
             plot.refresh(station, flags, slow=slow)
         if slow:
             self._model.refresh()
-            self._wrong.say(self._table.unsaid, self._table.bars)
+            self._wrong.say(self._table.unsaid, self._table.bars, self._table.tone)
             self._joints.set_note(*_age(station))
 
     # --- one time for all plots

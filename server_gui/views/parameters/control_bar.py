@@ -1,4 +1,4 @@
-"""Who may write: take control or release it, and how long it lasts."""
+"""Control of the robot: take or release it, and its remaining time."""
 
 from typing import Final
 

@@ -1,4 +1,4 @@
-"""Which parameters are shown: by words, and by what they are."""
+"""Filter of the parameters: by words, and by kind."""
 
 from collections.abc import Callable, Iterable, Mapping
 from typing import Final

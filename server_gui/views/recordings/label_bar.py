@@ -28,7 +28,7 @@ LABEL_ROLE: Final = Qt.ItemDataRole.UserRole + 1
 
 
 class LabelBar(QWidget):
-    """Of the span that is chosen on the timeline."""
+    """Bar for labelling the chosen span of the timeline."""
 
     def __init__(self, labels: SessionLabels, timeline: Timeline, theme: Theme) -> None:
         super().__init__()

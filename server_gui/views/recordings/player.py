@@ -48,7 +48,7 @@ AROUND_NS: Final = round(AROUND_S * SECOND_NS)
 
 
 class Player(QWidget):
-    """Of the archive's playback; `left` when somebody wants back to the list."""
+    """Player of the archive's playback; `left` is emitted to return to the list."""
 
     left = Signal()
 

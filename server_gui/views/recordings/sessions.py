@@ -75,7 +75,7 @@ class SessionModel(RowsModel[Session]):
 
 
 class SessionsTable(RowsTable):
-    """Notes stand in lines. What has no room is told of the chosen one beside it."""
+    """Table of sessions, with notes in lines; columns without room are shown for the chosen one beside it."""
 
     def __init__(self, model: Filtered, theme: Theme) -> None:
         super().__init__(model, "Recordings", BEGAN)

@@ -68,7 +68,7 @@ NOT_NOW: Final = "How the buses are is not known now."
 
 
 class LoadBar(QWidget):
-    """How much of a bus's time is taken, with the marks from which that is much, and full."""
+    """Bar of a bus's load, with marks for high and full load."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()

@@ -1,4 +1,4 @@
-"""What is drawn above a plot's curves: limits, flags of what happened, hover line, cursors, a box."""
+"""Overlay of a plot: limits, flags of events, hover line, cursors, a box."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -38,7 +38,7 @@ FIRST: Final = (
 
 @dataclass(frozen=True, slots=True)
 class CursorLayout:
-    """Where things are, as shares of the field's width from the left, and of its height from the top."""
+    """Positions in the overlay, as shares of the width from the left, and of the height from the top."""
 
     at: tuple[float, ...] = ()  # the cursors
     active: int = 0

@@ -29,7 +29,7 @@ class ElidedLabel(PlainLabel):
 
 
 class PathLabel(ElidedLabel):
-    """What a folder is for and where it is: a name, however many digits it has; its tip has all of it."""
+    """Label of a folder: purpose and path, shortened to any width; its tip has all of it."""
 
     def say(self, what: str, path: str) -> None:
         """Show this."""

@@ -22,7 +22,7 @@ class PlainLabel(QLabel):
 
 
 class Tipped(Protocol):
-    """What can have a tool tip: a widget, an action, an item."""
+    """Objects with a tool tip: a widget, an action, an item."""
 
     def toolTip(self) -> str:
         """Return what is shown where the pointer rests."""

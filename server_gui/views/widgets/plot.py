@@ -29,7 +29,7 @@ NO_DATA: Final = "no data"
 
 
 class Mouse(Enum):
-    """What the mouse does in a plot."""
+    """Effect of the mouse in a plot."""
 
     NOTHING = "nothing"
     TIME = "time"  # the wheel zooms time alone, a double click shows all of it again, a click is told
@@ -47,7 +47,7 @@ class Curve:
 
 @dataclass(frozen=True, slots=True)
 class PlacedFlag:
-    """What happened at a time, s until the newest row."""
+    """Event at a time, s until the newest row."""
 
     at: float
     kind: FlagKind

@@ -22,7 +22,7 @@ DASH: Final = 5  # columns on, columns off
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """What the picture shows: `seconds` until the newest row, values from `low` to `high`; its pixels."""
+    """Section in the picture: `seconds` until the newest row, values from `low` to `high`; its pixels."""
 
     seconds: float
     low: float

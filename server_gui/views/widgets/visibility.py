@@ -1,4 +1,4 @@
-"""Whether a widget is visible, and whether it has the keyboard focus."""
+"""Visibility and keyboard focus of a widget."""
 
 from PySide6.QtWidgets import QApplication, QWidget
 

@@ -43,7 +43,7 @@ class WrappingHeight(QLabel):
 
 
 class WrappingLabel(WrappingHeight, PlainLabel):
-    """Of plain text."""
+    """Label of plain text that wraps."""
 
     def __init__(self, name: str = "") -> None:
         super().__init__()

@@ -1,4 +1,4 @@
-"""What is shown beside the robot that is looked at: another one, or the recording that is played."""
+"""Menu of companions beside the shown robot: another robot, or the recording that is played."""
 
 from collections.abc import Callable, Sequence
 

@@ -1,4 +1,4 @@
-"""What is measured in the signals: two cursors and their difference, each curve over what is in sight."""
+"""Measurements in the signals: two cursors and their difference, statistics of each visible curve."""
 
 from collections.abc import Sequence
 from typing import Final

@@ -1,4 +1,4 @@
-"""Why something was not done, in full, where a line beside the tools would have no room for it."""
+"""Reason of a refusal, in full, where a line beside the tools would have no room for it."""
 
 from typing import Final
 

@@ -4,10 +4,10 @@ from collections.abc import Callable
 
 import pytest
 
-from drivers.bus.asking import SILENT_S
 from drivers.bus.bus import CanBus
 from drivers.bus.device import CanDevice
-from drivers.bus.life import NodeLife
+from drivers.bus.liveness import NodeLife
+from drivers.bus.node_polling import SILENT_S
 from drivers.bus.settings import DeviceSettings
 from drivers.samples import ComponentState
 from eds import Description

@@ -8,7 +8,7 @@ import pytest
 
 from drivers.bus.bus import CanBus
 from drivers.bus.device import CanDevice
-from drivers.bus.life import EMCY_HISTORY
+from drivers.bus.liveness import EMCY_HISTORY
 from drivers.bus.node import shared_node
 from drivers.bus.sdo.channel import SdoChannel
 from drivers.bus.settings import CanSettings, DeviceSettings

@@ -10,8 +10,8 @@ import eds
 from drivers.bus.bus import CanBus
 from drivers.bus.frame_losses import FrameLosses
 from drivers.bus.interfaces.socketcand import server_ns, waited_stamps
-from drivers.bus.life import NodeLife
-from drivers.joint.watching import JointWatch
+from drivers.bus.liveness import NodeLife
+from drivers.joint.supervision import JointWatch
 from drivers.latest import Latest
 from drivers.reader_stalls import MANY, SHOWN_S, STOOD_NS, ReaderStalls
 from drivers.samples import Channel

@@ -75,6 +75,7 @@ def test_describe_says_who_one_is_and_what_that_one_may_not(
     ("arguments", "key"),
     [
         (("describe",), "components"),
+        (("describe",), "controllers_held"),
         (("snapshot", "resource"), "cpu"),
         (("snapshot", "component"), "values"),
         (("snapshot", "status"), "quality"),

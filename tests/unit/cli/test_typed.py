@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import pytest
 
 from gateway.cli.commission_faces import Terminal
-from gateway.cli.typed import Typed
+from gateway.cli.line_input import Typed
 
 
 @pytest.fixture

@@ -16,7 +16,7 @@ from ml.store.errors import StoreError, StoreRefused, StoreUnreachable
 from ml.store.files import filesystem
 from ml.store.tables import TELEMETRY
 from ml.store.upkeep import compact, retain
-from server_gui.core.cloud import counting
+from server_gui.core.cloud import row_counting
 from server_gui.core.recording.receipts import RECEIPTS
 from tests.unit.cloud.damages import Place, altered, fill, of_file, rewrite
 from tests.unit.cloud.recordings import record
@@ -61,7 +61,7 @@ def test_what_one_way_of_reading_alone_does_not_find_stays(
 @pytest.mark.parametrize("error", LATER)
 @pytest.mark.parametrize(
     ("module", "function", "how"),
-    [(damage, "footer", ""), (damage, "_decoded", "--deep"), (counting, "_rows", "")],
+    [(damage, "footer", ""), (damage, "_decoded", "--deep"), (row_counting, "_rows", "")],
 )
 def test_a_store_that_fails_for_a_moment_is_not_called_damaged(
     place: Place,

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from drivers.bus.interfaces.controller_state import BusState
 from drivers.errors import DeviceTimeout
 from drivers.joint.settings import JointSettings
-from drivers.scan.asking import Axis as ToldAxis
-from drivers.scan.asking import NodeAnswers
+from drivers.scan.identification import Axis as ToldAxis
+from drivers.scan.identification import NodeAnswers
 from drivers.scan.scan import ScanResult
 from drivers.scan.traffic import Traffic
 from eds import Description

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from drivers.errors import SettingsError
-from drivers.scan.asking import NodeAnswers
+from drivers.scan.identification import NodeAnswers
 from drivers.scan.products import Library
 from gateway.cli.commission import main
 from gateway.commission.controller import controller

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from drivers.bus.settings import CanSettings
-from drivers.scan.asking import Axis as ToldAxis
-from drivers.scan.asking import NodeAnswers
+from drivers.scan.identification import Axis as ToldAxis
+from drivers.scan.identification import NodeAnswers
 from gateway.commission import nodes
 from gateway.commission.axes import Axis
 from gateway.commission.bench import CanBench

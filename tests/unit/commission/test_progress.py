@@ -9,7 +9,7 @@ from eds.shipped import SHIPPED
 from gateway.commission.axes import Axis
 from gateway.commission.dialogue import Ask, At, run
 from gateway.commission.draft import Draft
-from gateway.commission.live import watched
+from gateway.commission.live_values import watched
 from gateway.commission.progress import END, CommissionStep, Progress, StepState
 from gateway.commission.serial_bench import SerialPorts
 from gateway.commission.steps import commission

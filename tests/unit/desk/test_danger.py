@@ -31,7 +31,7 @@ KINDS: Final = {Kind.DANGER, Kind.DANGER_ADVICE}
 def station(monkeypatch: pytest.MonkeyPatch) -> Station:
     """A robot that walks, whose data and whose danger stay new within a test."""
     monkeypatch.setattr("server_gui.core.follow.robot.STALE_NS", 60_000_000_000)
-    monkeypatch.setattr("server_gui.core.prediction.current.STALE_S", 60.0)
+    monkeypatch.setattr("server_gui.core.prediction.newest_predictions.STALE_S", 60.0)
     bench = Bench(Desk())
     made = bench.add("exo-01")
     made.predictions.foresees = True

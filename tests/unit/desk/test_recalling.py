@@ -14,7 +14,7 @@ from server_gui.core.archive.recorded_predictions import said
 from server_gui.core.cloud.tape import Tape
 from server_gui.core.desk.desk import Shown
 from server_gui.core.fleet.live_prediction import record as record_of
-from server_gui.core.prediction import current as module
+from server_gui.core.prediction import newest_predictions as module
 from server_gui.core.prediction.news import Predicted
 from server_gui.core.recording.recorder import Recorder
 from server_gui.core.recording.spool import Spool

@@ -11,7 +11,7 @@ import eds
 from drivers.bus.interfaces.controller_state import BusState
 from drivers.imu import rotation
 from drivers.joint.scaling import scalings
-from drivers.scan.asking import NodeAnswers
+from drivers.scan.identification import NodeAnswers
 from drivers.scan.products import Library, files
 from gateway.config.reading import examined
 from gateway.config.robot import RobotConfig

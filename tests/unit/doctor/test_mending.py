@@ -13,7 +13,7 @@ import pytest
 from gateway.client import ClientError, LinkLost, NotConnected, RemoteError, Robot
 from gateway.config.reading import load
 from gateway.doctor.file_edit import NotMended
-from gateway.doctor.mending import RECORD, Mender
+from gateway.doctor.fixing import RECORD, Mender
 from gateway.doctor.verdicts import Advice, Edit, Finding, Fix, Run, Together, Write
 from gateway.wire.dictionary import ObjectValue, ObjectValues
 from gateway.wire.parameter import ParameterInfo, TrialInfo, Written

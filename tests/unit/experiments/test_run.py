@@ -13,7 +13,7 @@ from server_gui.core.alarms.texts import Kind
 from server_gui.core.experiments.machine import ENDS, TABLE, Action, ExperimentState
 from server_gui.core.experiments.machine import Event as Step
 from server_gui.core.experiments.plan import Bounds
-from server_gui.core.experiments.watch import ExperimentWatch
+from server_gui.core.experiments.stop_rules import StopRules
 from server_gui.core.follow.events import Journalled
 from tests.support.desk import telemetry
 from tests.unit.experiments.world import NAME, ORIGINAL, World
@@ -223,7 +223,7 @@ def test_the_journal_ends_it_by_what_others_do_now(entry: dict[str, Any], why: s
 
 
 def test_a_journal_that_was_begun_anew_tells_of_a_stop_all_the_same() -> None:
-    watch = ExperimentWatch(NAME, ("left_knee",), Bounds())
+    watch = StopRules(NAME, ("left_knee",), Bounds())
     watch.take(Journalled(JournalEntries([{"n": 500, "who": "anna", "what": "note", "monotonic_ns": 1}])))
     watch.begin((), 2)
     watch.take(Journalled(JournalEntries([{"n": 1, "who": "anna", "what": "stop", "monotonic_ns": 3}])))
@@ -233,7 +233,7 @@ def test_a_journal_that_was_begun_anew_tells_of_a_stop_all_the_same() -> None:
 @pytest.mark.parametrize(("bounds", "is_usual"), [(Bounds(), True), (Bounds(error=0.015), False)])
 def test_a_bound_that_nobody_chose_says_what_to_do(bounds: Bounds, is_usual: bool) -> None:
     """The larger the effect of a value, the sooner twice the usual ends its trial."""
-    watch = ExperimentWatch(NAME, ("left_knee",), bounds)
+    watch = StopRules(NAME, ("left_knee",), bounds)
     watch.take(telemetry([1], {"left_knee.following_error": [-0.01]}))
     watch.begin((), 2)
     watch.take(telemetry([3], {"left_knee.following_error": [0.03]}))

@@ -17,7 +17,7 @@ from typing import Any, Self
 import pytest
 
 import eds
-from drivers.bus.life import NodeLife
+from drivers.bus.liveness import NodeLife
 from drivers.component import Component, ComponentKind
 from drivers.errors import DeviceAbort, NotPermitted
 from drivers.joint.cia402 import DriveState, drive_state

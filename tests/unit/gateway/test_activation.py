@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from gateway.connections.listeners import HandoverError, inherited
-from gateway.process import notify
+from gateway.process import systemd_notify
 from tests.support.waiting import WAIT_S
 from tests.unit.gateway import processes
 from tests.unit.gateway.harness import Client
@@ -159,10 +159,10 @@ def test_the_abstract_name_of_a_manager_is_met_and_none_is_no_trouble() -> None:
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
         manager.bind(f"\0gwrms-test-{os.getpid()}")
         manager.settimeout(WAIT_S)
-        notify.tell("READY=1", {"NOTIFY_SOCKET": f"@gwrms-test-{os.getpid()}"})
+        systemd_notify.tell("READY=1", {"NOTIFY_SOCKET": f"@gwrms-test-{os.getpid()}"})
         assert manager.recv(100) == b"READY=1"
-    notify.tell("READY=1", {"NOTIFY_SOCKET": f"@gwrms-test-{os.getpid()}"})
-    notify.tell("READY=1", {})
+    systemd_notify.tell("READY=1", {"NOTIFY_SOCKET": f"@gwrms-test-{os.getpid()}"})
+    systemd_notify.tell("READY=1", {})
 
 
 @pytest.mark.parametrize(
@@ -177,4 +177,4 @@ def test_the_abstract_name_of_a_manager_is_met_and_none_is_no_trouble() -> None:
     ],
 )
 def test_the_watchdog_s_period_is_for_us_or_not(environ: dict[str, str], period_s: float | None) -> None:
-    assert notify.watchdog_s(environ) == period_s
+    assert systemd_notify.watchdog_s(environ) == period_s

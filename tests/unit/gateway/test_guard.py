@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from drivers.bus.life import NodeLife
+from drivers.bus.liveness import NodeLife
 from drivers.component import ComponentKind
 from gateway.cli.describe import main as describe
 from gateway.connections.listeners import listen

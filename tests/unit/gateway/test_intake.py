@@ -14,7 +14,8 @@ from typing import Any
 import pytest
 
 from gateway.access.identity import ANYBODY
-from gateway.connections import incoming_bytes, intake, pace, stop_lines
+from gateway.connections import incoming_bytes, intake, rate_limit, stop_lines
+from gateway.connections.fair_share import FairShare
 from gateway.connections.incoming_bytes import (
     ON_THE_WAY,
     RECEIVE_BYTES,
@@ -23,9 +24,8 @@ from gateway.connections.incoming_bytes import (
     ReceivedBytes,
 )
 from gateway.connections.listeners import listen
-from gateway.connections.pace import Pace
+from gateway.connections.rate_limit import RateLimit
 from gateway.connections.session import Session
-from gateway.connections.sharing import Sharing
 from gateway.connections.stop_lines import stop_in
 from gateway.process.loop import HANGUP, READ, Loop
 from gateway.wire import framing
@@ -66,7 +66,7 @@ class Turned:
             lambda: stop_now,
             lambda: self.spent.pop() if self.spent else 0,
             lambda _inlet: None,
-            Pace(self.front),
+            RateLimit(self.front),
         )
         self.inlet.receiver = self.heard.append
 
@@ -127,9 +127,9 @@ def test_stops_that_come_together_are_one_and_each_is_answered(turned: Turned) -
 
 
 def test_who_floods_with_stops_is_left_alone_and_who_stops_is_not(turned: Turned) -> None:
-    turned.says(STOP % b"a few" * pace.FLOOD)
+    turned.says(STOP % b"a few" * rate_limit.FLOOD)
     assert not turned.inlet._rests
-    turned.says(STOP % b"many" * (pace.FLOOD + 1))
+    turned.says(STOP % b"many" * (rate_limit.FLOOD + 1))
     assert turned.inlet._rests
     assert turned.asked == ["a few", "many"]
 
@@ -141,17 +141,17 @@ def test_single_stops_by_the_dozen_are_a_flood_too_and_its_rest_is_short(turned:
     turned.front.call_later = lambda delay_s, callback: rests.append(delay_s)  # type: ignore[method-assign, assignment, return-value]
     while not rests:
         turned.says(STOP % b"one")
-        assert len(turned.asked) < 10 * pace.FLOOD
-    assert len(turned.asked) > pace.FLOOD
-    assert rests == [pace.FLOOD_S]
+        assert len(turned.asked) < 10 * rate_limit.FLOOD
+    assert len(turned.asked) > rate_limit.FLOOD
+    assert rests == [rate_limit.FLOOD_S]
 
 
 def test_a_flood_of_stops_that_costs_much_rests_no_less(turned: Turned) -> None:
     rests: list[float] = []
     turned.front.call_later = lambda delay_s, callback: rests.append(delay_s)  # type: ignore[method-assign, assignment, return-value]
-    turned.spent = [2 * pace.COSTLY_NS, 0]
-    turned.says(STOP % b"many" * (pace.FLOOD + 1))
-    assert rests == [pace.FLOOD_S]
+    turned.spent = [2 * rate_limit.COSTLY_NS, 0]
+    turned.says(STOP % b"many" * (rate_limit.FLOOD + 1))
+    assert rests == [rate_limit.FLOOD_S]
 
 
 def test_of_what_a_closed_connection_still_holds_only_so_much_is_looked_through(
@@ -187,7 +187,9 @@ def test_what_others_take_of_the_processor_is_no_time_of_the_last_look(
 def test_stops_beyond_what_may_wait_act_and_are_not_answered(
     turned: Turned, caplog: pytest.LogCaptureFixture
 ) -> None:
-    session = Session(turned.loop, turned.inlet, lambda _session, _request: None, 30.0, Sharing(turned.loop))
+    session = Session(
+        turned.loop, turned.inlet, lambda _session, _request: None, 30.0, FairShare(turned.loop)
+    )
     heard = ReceivedBytes()
     heard.stops = [framing.StopRequest("x", number) for number in range(MOST_STOPS + 5)]
     heard.stop, heard.stopped = heard.stops[-1], Future()
@@ -205,10 +207,10 @@ def test_an_id_without_end_is_not_kept() -> None:
 
 def test_small_costs_add_up(turned: Turned, monkeypatch: pytest.MonkeyPatch) -> None:
     """No single read is dear, and yet they are all that the thread does."""
-    monkeypatch.setattr(pace, "PACE_FACTOR", 1 << 60)  # nothing is forgotten
+    monkeypatch.setattr(rate_limit, "PACE_FACTOR", 1 << 60)  # nothing is forgotten
     reads = 0
     while not turned.inlet._rests:
-        turned.spent = [pace.COSTLY_NS // 5, 0]
+        turned.spent = [rate_limit.COSTLY_NS // 5, 0]
         turned.says(CLOCK % 1)
         reads += 1
         assert reads < 100
@@ -218,7 +220,9 @@ def test_small_costs_add_up(turned: Turned, monkeypatch: pytest.MonkeyPatch) -> 
 def test_what_ends_with_a_client_ends_though_something_else_cannot(turned: Turned) -> None:
     """What came last goes first: a lease is given back before the module that knows it stops."""
     ended: list[str] = []
-    session = Session(turned.loop, turned.inlet, lambda _session, _request: None, 30.0, Sharing(turned.loop))
+    session = Session(
+        turned.loop, turned.inlet, lambda _session, _request: None, 30.0, FairShare(turned.loop)
+    )
     session.on_close(lambda: ended.append("module"))
     session.on_close(lambda: ended.remove("nothing"))
     session.on_close(lambda: ended.append("lease"))
@@ -270,7 +274,7 @@ def test_who_has_cost_nothing_does_not_rest_for_others(turned: Turned) -> None:
 
 def test_no_rest_is_long(turned: Turned) -> None:
     turned.inlet._pace.resting = 100
-    assert turned.inlet._pace.rest_s(50_000_000) == pace.LONGEST_REST_S
+    assert turned.inlet._pace.rest_s(50_000_000) == rate_limit.LONGEST_REST_S
 
 
 def test_who_has_just_come_is_read_in_turn_and_only_a_little(turned: Turned) -> None:
@@ -287,7 +291,7 @@ def test_beyond_a_turns_time_also_those_that_are_known_take_turns(
 ) -> None:
     """Fifty that each send a little at the same moment would keep the next one's stop waiting for all."""
     turned.says(CLOCK % 1)
-    monkeypatch.setattr(pace, "TURN_NS", 0)
+    monkeypatch.setattr(rate_limit, "TURN_NS", 0)
     turned.client.sendall(STOP % b"in turn")
     turned.inlet._on_ready(READ)
     assert turned.asked == []
@@ -316,7 +320,7 @@ def test_a_rest_is_the_last_one_that_was_said(turned: Turned) -> None:
 def test_who_costs_something_takes_turns_again(turned: Turned) -> None:
     turned.says(CLOCK % 1)
     assert turned.inlet._is_known
-    turned.spent = [pace.COSTLY_NS // 2, 0]
+    turned.spent = [rate_limit.COSTLY_NS // 2, 0]
     turned.says(CLOCK % 1)
     assert not turned.inlet._is_known
 

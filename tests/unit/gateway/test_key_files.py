@@ -17,7 +17,7 @@ import pytest
 from gateway import key_making
 from gateway.access import changes
 from gateway.access.folder import AccessFolder
-from gateway.access.known import known_in
+from gateway.access.known_clients import known_in
 from gateway.certificates import KeyProblem, der_of
 from gateway.client import Address, ClientError, NotPaired, WrongRobot
 from gateway.client import pairing as desk

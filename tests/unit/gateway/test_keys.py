@@ -17,7 +17,7 @@ import pytest
 
 from gateway.access.folder import AccessFolder
 from gateway.access.identity import ANYBODY, Identity, Peer
-from gateway.access.known import known_in
+from gateway.access.known_clients import known_in
 from gateway.certificates import KeyProblem, der_of, fingerprint
 from gateway.connections import handshakes
 from gateway.connections.listeners import listen
@@ -327,7 +327,7 @@ def test_without_keys_nothing_of_tls_is_loaded(tmp_path: Path) -> None:
         "import sys; from gateway.cli.serve import *; from gateway.daemon import Daemon\n"
         "from gateway.config import load; from pathlib import Path\n"
         f"Daemon(load(Path({str(tmp_path / 'robot.toml')!r})), listen('127.0.0.1', 0))\n"
-        "names = ('ssl', '_ssl', 'subprocess', 'gateway.connections.tls', 'gateway.access.known')\n"
+        "names = ('ssl', '_ssl', 'subprocess', 'gateway.connections.tls', 'gateway.access.known_clients')\n"
         "print([one for one in names if one in sys.modules])"
     )
     ran = subprocess.run([sys.executable, "-P", "-c", script], capture_output=True, text=True, check=True)

@@ -12,7 +12,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from gateway.access.known import known_in
+from gateway.access.known_clients import known_in
 from gateway.access.pairing import Pairing, PairingEnded
 from gateway.certificates import der_of
 from gateway.client import Address, NotPaired, Unreachable, WrongRobot

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from gateway.access.folder import AccessFolder
-from gateway.access.known import known_in
+from gateway.access.known_clients import known_in
 from gateway.certificates import der_of, fingerprint
 from gateway.client import Address
 from gateway.client.keys import keys_folder, pin_of, server_file

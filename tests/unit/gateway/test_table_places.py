@@ -5,7 +5,7 @@ import tomllib
 import pytest
 
 from gateway.tables.finding import Finding
-from gateway.tables.places import Places
+from gateway.tables.line_numbers import Places
 
 TEXT = '''\
 # a robot

@@ -17,7 +17,7 @@ from typing import Self
 import pytest
 
 from gateway.access.folder import AccessFolder
-from gateway.access.known import known_in
+from gateway.access.known_clients import known_in
 from gateway.connections.tls import PIECE, TlsStream, context_of
 from tests.support.waiting import until
 from tests.unit.gateway import keyed as keys

@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 
 from drivers.bus.bus import CanBus
-from drivers.bus.life import NodeLife
+from drivers.bus.liveness import NodeLife
 from drivers.bus.settings import CanSettings
 from drivers.component import Component, ComponentKind
 from drivers.latest import Latest

@@ -17,7 +17,7 @@ from gateway.guard.inputs import (
     SilenceWatcher,
     UnseenWatcher,
 )
-from gateway.guard.judging import Beside, judging
+from gateway.guard.thresholds import Beside, judging
 from gateway.guard.watcher import GRACE_NS, RuleState, RuleTransition, Watcher
 
 WATCHING, CLEARED, BLIND, TRIPPED = RuleState.WATCHING, RuleState.CLEARED, RuleState.BLIND, RuleState.TRIPPED

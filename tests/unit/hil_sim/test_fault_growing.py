@@ -7,7 +7,7 @@ import pytest
 
 from hil_sim.exoskeleton import Scenario
 from hil_sim.faults.injector import Faults
-from hil_sim.gait.mishaps import FallState
+from hil_sim.gait.stumble_and_fall import FallState
 from hil_sim.without_bus import BareExoskeleton
 
 SECOND = 1_000_000_000

@@ -7,7 +7,7 @@ import pytest
 
 from hil_sim.clock import SECOND_NS, Clock
 from hil_sim.loop import Loop
-from hil_sim.pace import Pace
+from hil_sim.real_time import RealTimeCheck
 
 
 class Slow:
@@ -17,7 +17,7 @@ class Slow:
         self.said: list[str] = []
         self.now_ns = self.cpu_ns = 0
         self.loop = Loop(Clock(), speed)
-        self.pace = Pace(self.loop, self.said.append, lambda: self.now_ns, lambda: self.cpu_ns)
+        self.pace = RealTimeCheck(self.loop, self.said.append, lambda: self.now_ns, lambda: self.cpu_ns)
 
     def runs(self, seconds: int, lost: float = 0.0, busy: float = 0.5) -> None:
         for _ in range(seconds):

@@ -2,9 +2,9 @@
 
 import pytest
 
-from drivers.losses import Losses
 from drivers.parsing import Counters
 from drivers.reader_stalls import ReaderStalls
+from drivers.sensor_losses import Losses
 
 SECOND_NS = 1_000_000_000
 

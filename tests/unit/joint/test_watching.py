@@ -2,7 +2,7 @@
 
 import pytest
 
-from drivers.joint.watching import beside
+from drivers.joint.supervision import beside
 from drivers.latest import Latest
 from drivers.samples import Channel
 

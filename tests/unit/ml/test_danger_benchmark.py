@@ -2,6 +2,7 @@
 
 import json
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from threadpoolctl import threadpool_limits
 from ml.benchmarks import danger
 from ml.benchmarks.danger import LEAD_S, PERIOD_S, Judged, cross_judged, events, false_alarms, outcome
 from ml.benchmarks.danger_data import HEALTHY, LEARNED_S, OVER, Seen, read
+from ml.benchmarks.outcome import Outcome
 from ml.benchmarks.reliability import drawn
 from ml.danger.detector import DETECTORS
 from ml.danger.levels import Level
@@ -123,6 +125,65 @@ def test_a_recording_cut_anywhere_is_read_or_refused(length: int, tmp_path: Path
     file.write_bytes(whole[:length])
     with pytest.raises(UnusableData):
         read(file)
+
+
+def begun(path: Path, *subjects: int) -> None:
+    """Append wearers of whom nothing was recorded yet."""
+    with path.open("a") as file:
+        for subject in subjects:
+            head = {"session": "s", "subject": subject, "columns": ["stamp_ns", "label", "danger", *CHANNELS]}
+            file.write(json.dumps(head | {"dangers": ["slip"]}) + "\n")
+
+
+EVALUATIONS = pytest.mark.parametrize("evaluate", [danger.evaluate, danger.evaluate_shipped])
+
+
+@EVALUATIONS
+def test_recordings_that_end_before_anybody_is_known_are_refused(
+    evaluate: Callable[[Path, bool], Outcome], tmp_path: Path
+) -> None:
+    file = recording(tmp_path / "dangers.jsonl", 1)
+    begun(file, 2)
+    assert [len(one.at_s) for one in read(file)] == [2, 0]
+    with pytest.raises(UnusableData, match=r"dangers\.jsonl holds fewer than two wearers .* beyond"):
+        evaluate(file, False)
+
+
+@EVALUATIONS
+def test_a_wearer_without_a_row_is_left_out_with_a_word(
+    evaluate: Callable[[Path, bool], Outcome], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "dangers.jsonl"
+    begun(file, 7, 9)
+    people = [seen("1"), seen("2"), *read(file)]
+    monkeypatch.setattr(danger, "read", lambda _path: people)
+    found = evaluate(file, False)
+    assert (found.subjects, found.figures["events"]) == (2, 2.0)
+    assert found.notes[-1].endswith("wearers 7, 9")
+
+
+@EVALUATIONS
+def test_where_nobody_walks_on_level_ground_nothing_is_said_of_false_alarms(
+    evaluate: Callable[[Path, bool], Outcome], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    people = [replace(one, label=np.full(len(one.label), "stairs_up")) for one in (seen("1"), seen("2"))]
+    monkeypatch.setattr(danger, "read", lambda _path: people)
+    if evaluate is danger.evaluate:
+        with pytest.raises(UnusableData, match="level ground"):
+            evaluate(Path("stairs.jsonl"), False)
+        return
+    found = evaluate(Path("stairs.jsonl"), False)
+    assert found.figures["foreseen"] == 1.0
+    assert (found.figures["healthy_hours"], found.figures["stops"]) == (0.0, 0.0)
+    assert math.isnan(found.figures["stops_per_100_h_upper"])
+    assert math.isnan(found.figures["advice_high"])
+
+
+def test_weights_are_not_learned_where_nobody_is_in_danger(monkeypatch: pytest.MonkeyPatch) -> None:
+    calm = [replace(one, danger=np.zeros_like(one.danger)) for one in (seen("1"), seen("2"))]
+    monkeypatch.setattr(danger, "read", lambda _path: calm)
+    with pytest.raises(UnusableData, match="meets a danger"):
+        danger.evaluate(Path("healthy.jsonl"), search=False)
 
 
 def test_what_is_no_such_recording_is_refused_with_its_name(tmp_path: Path) -> None:

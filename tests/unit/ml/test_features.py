@@ -48,6 +48,12 @@ def test_quick_moments_and_lengths_have_the_bits_of_numpys_own() -> None:
     assert along(signals, vertical).tobytes() == (signals * vertical).sum(axis=1).tobytes()
 
 
+def test_moments_of_several_lengths_are_those_of_each() -> None:
+    signals = np.random.default_rng(9).normal(1.0, 3.0, (9, 3, 200))
+    each = [moments(signals, length) for length in (20, 50, 200)]
+    assert moments(signals, 20, 50, 200).tobytes() == np.concatenate(each, axis=1).tobytes()
+
+
 @pytest.mark.parametrize("recipe", RECIPES, ids=lambda recipe: recipe.name)
 def test_what_is_missing_is_mended_and_without_a_gap_nothing_changes(recipe: Recipe) -> None:
     whole = walk(recipe, recipe.look_back).T[None]
@@ -78,6 +84,26 @@ def test_robots_in_one_batch_get_what_each_gets_alone(recipe: Recipe) -> None:
     together = features(recipe, samples, ends)
     for row, end in enumerate(ends):
         assert np.array_equal(features(recipe, samples, np.array([end]))[0], together[row])
+
+
+@pytest.mark.parametrize("recipe", RECIPES, ids=lambda recipe: recipe.name)
+def test_more_robots_than_are_computed_together_get_what_each_gets_alone(recipe: Recipe) -> None:
+    random = np.random.default_rng(5)
+    windows = list(random.normal(3.0, 1.0, (60, 1, len(recipe.channels), recipe.look_back)))
+    found = recipe.of_each(windows)
+    for window, row in zip(windows, found, strict=True):
+        assert recipe.compute(window)[0].tobytes() == row.tobytes()
+
+
+def test_a_streams_window_stays_what_it_was() -> None:
+    samples = walk(TERRAIN, 40)
+    stream = FeatureStream(TERRAIN)
+    windows = []
+    for sample in samples:
+        stream.push(sample)
+        windows.append(stream.window())
+    for end in range(TERRAIN.look_back, 40):
+        assert np.array_equal(windows[end][0].T, samples[end + 1 - TERRAIN.look_back : end + 1])
 
 
 @pytest.mark.parametrize("recipe", RECIPES, ids=lambda recipe: recipe.name)

@@ -145,6 +145,18 @@ def test_no_recording_of_any_length_crashes_what_is_learned(rows: list[int], lat
     assert ((taught.phase >= 0.0) & (taught.phase < 1.0)).all()
 
 
+def test_packets_are_lost_foot_by_foot_and_never_the_first(tmp_path: Path) -> None:
+    walks = impaired.read(saved(tmp_path / "p.npz", recordings.patients(2, 1, trials=1, seconds=30.0)))
+    for share in (0.05, 0.2):
+        for walk, whole in zip(impaired.lossy(walks, share), walks, strict=True):
+            gone = np.isnan(walk.rates)
+            assert not gone[0].any()
+            assert (gone[:, :3].all(axis=1) == gone[:, :3].any(axis=1)).all()
+            assert gone.mean() == pytest.approx(share, abs=0.03)
+            assert (gone[:, 0] != gone[:, 3]).any()
+            assert np.array_equal(walk.rates[~gone], whole.rates[~gone])
+
+
 # --- groups
 
 
@@ -242,6 +254,9 @@ def test_limping_people_are_followed_worse_by_models_of_healthy_ones(
     assert found["mixed_gain_points"] > 0.0
     assert found["healthy_worst_third_adapted_rmse_percent"] < found["healthy_worst_third_later_rmse_percent"]
     assert groups["limping"]["healthy_covered"] < groups["healthy"]["healthy_covered"]
+    whole = found["worst_group_healthy_rmse_percent"]
+    assert 0.9 * whole < found["worst_group_healthy_rmse_percent_5_percent_lost"] < 1.5 * whole
+    assert found["worst_group_healthy_rmse_percent_20_percent_lost"] != whole
 
 
 def test_a_step_is_found_by_one_swing_and_a_swing_finds_one_step() -> None:

@@ -4,10 +4,10 @@ import pytest
 
 from drivers.insole.device import Insole, layout_of, line_for
 from drivers.insole.settings import InsoleSettings
-from drivers.losses import Losses
 from drivers.parsing import Counters
 from drivers.reader_stalls import ReaderStalls
 from drivers.samples import ComponentState
+from drivers.sensor_losses import Losses
 from tests.unit.insole.encode import Sender
 
 MS = 1_000_000

@@ -15,8 +15,8 @@ from ml.danger.observation import CHANNELS
 from ml.errors import UnusableModel
 from server_gui.core.follow.events import Telemetry
 from server_gui.core.prediction import service as module
-from server_gui.core.prediction.current import STALE_S, StationPredictions
 from server_gui.core.prediction.danger import EVERY_NS, prediction
+from server_gui.core.prediction.newest_predictions import STALE_S, StationPredictions
 from server_gui.core.prediction.news import Endangered
 from server_gui.core.prediction.robot_predictor import RobotPredictor
 from server_gui.core.prediction.rules import PredictionRule

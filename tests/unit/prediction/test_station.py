@@ -6,7 +6,7 @@ import pytest
 
 from ml.serving.predictor import Prediction
 from ml.serving.trust import Trust
-from server_gui.core.prediction.current import NOT_YET, OFF, STALE_S, StationPredictions
+from server_gui.core.prediction.newest_predictions import NOT_YET, OFF, STALE_S, StationPredictions
 from server_gui.core.prediction.news import Predicted, Ruled, Serves
 from server_gui.core.settings.prediction import RuleSettings
 from tests.unit.ml.serving.small import learned

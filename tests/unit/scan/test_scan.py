@@ -12,7 +12,7 @@ import pytest
 from drivers.bus.settings import CanSettings
 from drivers.cli.scan import main
 from drivers.errors import Unavailable
-from drivers.scan.asking import NodeAnswers
+from drivers.scan.identification import NodeAnswers
 from drivers.scan.products import Library, files
 from drivers.scan.report import as_text
 from drivers.scan.scan import ScanResult, scan

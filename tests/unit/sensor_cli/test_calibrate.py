@@ -17,7 +17,7 @@ from drivers.imu import zero
 from drivers.imu.device import Imu
 from drivers.insole import layout as layouts
 from drivers.insole.calibration import CellCalibration, Cells, load
-from drivers.insole.fit import BadFit, Load, fit, text
+from drivers.insole.calibration_fit import BadFit, Load, fit, text
 from drivers.insole.foot import Foot
 from drivers.samples import ComponentState
 from tests.support.waiting import until

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from gateway.cli.shown import Channels
+from gateway.cli.value_display import Channels
 from gateway.main import main
 from gateway.wire.component import ChannelInfo
 from gateway.wire.robot import Clock, Description, GuardInfo

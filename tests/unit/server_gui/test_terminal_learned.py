@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from server_gui.core.fleet.control_socket import NobodyCollects
-from server_gui.terminal.learned import Learned
+from server_gui.terminal.adapted_models import Learned
 from tests.support.terminal_robot import a_station, screen
 from tests.support.waiting import until
 

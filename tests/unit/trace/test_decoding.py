@@ -8,8 +8,8 @@ from drivers.errors import SettingsError
 from drivers.trace.decoding import DecodedFrame, Decoder, FrameKind
 from drivers.trace.devices import Device, Devices
 from drivers.trace.files import Captured
+from drivers.trace.filters import by_kind, by_node, by_object
 from drivers.trace.load import Meter
-from drivers.trace.wanted import by_kind, by_node, by_object
 from tests.unit.trace.test_sdo import SEGMENTED
 
 KNEE = Device(2, "left_knee", eds.load(eds.locate("joint_drive.eds", None), 2))

@@ -10,8 +10,8 @@ from gateway import main
 from ml.progress import Tell
 from ml.registry.registry import Registry
 from ml.training import training
-from ml.training.material import Wish
 from ml.training.training import Trained
+from ml.training.training_sessions import Wish
 from tests.unit.training.walkers import day, put
 
 pytestmark = pytest.mark.usefixtures("small_models")

@@ -9,7 +9,7 @@ from ml.errors import UnusableData
 from ml.registry.card import ClassScore, Metrics
 from ml.robot.task import TASKS
 from ml.store.labels import person
-from ml.training.choosing import held_out, recipe_for
+from ml.training.data_split import held_out, recipe_for
 from ml.training.judging import Judged, Verdict, decide
 
 ACTIVITY, PHASE = TASKS["activity"], TASKS["gait_phase"]

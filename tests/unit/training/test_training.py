@@ -12,8 +12,8 @@ from ml.registry.card import DataSource
 from ml.registry.registry import Registry
 from ml.store.labels import REGRESSION, LabelSource
 from ml.training.judging import Verdict
-from ml.training.material import Wish
 from ml.training.training import Trained, train
+from ml.training.training_sessions import Wish
 from tests.unit.training.walkers import CHANNELS, MOTIONS, Made, day, late_walk, put
 
 pytestmark = pytest.mark.usefixtures("small_models")

@@ -1,4 +1,4 @@
-"""Which lines of a trace somebody wants to see: by node, by service, by object."""
+"""Filters of a trace's lines: by node, by service, by object."""
 
 import fnmatch
 import functools
@@ -9,11 +9,11 @@ from drivers.errors import SettingsError
 from drivers.trace.decoding import DecodedFrame, FrameKind
 from drivers.trace.devices import Device
 
-Wanted = Callable[[DecodedFrame], bool]
+Filter = Callable[[DecodedFrame], bool]
 _OBJECT = re.compile(r"(?:0x([0-9a-f]{4})|([0-9a-f]{4})h)(?::(?:0x)?([0-9a-f]{1,2}))?", re.IGNORECASE)
 
 
-def by_node(words: Sequence[str], all_: Sequence[Device], on: Callable[[str], Sequence[Device]]) -> Wanted:
+def by_node(words: Sequence[str], all_: Sequence[Device], on: Callable[[str], Sequence[Device]]) -> Filter:
     """Lines of these nodes, by number or name, and NMT commands to them; raises `SettingsError`.
 
     `all_` are the devices that may be named, `on` tells those of an interface.
@@ -47,7 +47,7 @@ def _check(word: str, devices: Sequence[Device]) -> None:
         raise SettingsError(f"--node {word}: no device has that name; known are {names}")
 
 
-def by_kind(words: Sequence[str]) -> Wanted:
+def by_kind(words: Sequence[str]) -> Filter:
     """Lines of these services; raises `SettingsError`."""
     names = [name.strip().lower() for word in words for name in word.split(",")]
     unknown = [name for name in names if name not in tuple(FrameKind)]
@@ -57,7 +57,7 @@ def by_kind(words: Sequence[str]) -> Wanted:
     return lambda line: line.kind in kinds
 
 
-def by_object(words: Sequence[str]) -> Wanted:
+def by_object(words: Sequence[str]) -> Filter:
     """Lines about these objects: 0x6041, 6041h:00, or a pattern of their names, as *position*."""
     matches = [_matching(word) for word in words]
 

@@ -81,7 +81,7 @@ class Stumble:
 
 
 class FallState(Enum):
-    """Where the body is."""
+    """State of the body."""
 
     UPRIGHT = 0
     FALLING = 1

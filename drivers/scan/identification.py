@@ -32,7 +32,7 @@ class Axis:
 
 @dataclass(frozen=True, slots=True)
 class NodeAnswers:
-    """What a node said when it was asked; `None`, or empty, is what it does not have."""
+    """A node's answers; `None`, or empty, for those it does not have."""
 
     device_type: int
     error_register: int | None

@@ -21,7 +21,7 @@ from ml.training.extract import extract
 
 
 class Wish(Struct, frozen=True):
-    """What is to be trained.
+    """The requested training.
 
     `sessions` are names, or how these alone begin; none: all with labels. `held_out` are wearers or
     sessions. `pseudo` is the probability from which on the serving model's own word is learned from.

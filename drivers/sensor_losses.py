@@ -1,4 +1,4 @@
-"""Whether a sensor's frames go missing on their way: by its own numbers, else by how many come."""
+"""Lost frames of a sensor: by its sequence numbers, else by its rate."""
 
 from drivers.findings import active_findings
 from drivers.frame_rate import FrameRate

@@ -1,4 +1,4 @@
-"""What the program that records on this computer has learned from a robot's wearer, asked now and then."""
+"""Models that this computer's collector has adapted to a robot's wearer, polled now and then."""
 
 import time
 from collections.abc import Callable
@@ -25,7 +25,7 @@ class _Predicting(msgspec.Struct, frozen=True):
 
 
 class _Report(msgspec.Struct, frozen=True):
-    """Of what a collector tells, what matters here."""
+    """The needed part of a collector's report."""
 
     robots: dict[str, _Link] = {}
     prediction: _Predicting | None = None

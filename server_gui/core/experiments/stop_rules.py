@@ -1,4 +1,4 @@
-"""The stop rules: what ends an experiment, each in words. Nothing here asks the robot anything."""
+"""Stop rules of an experiment: the conditions that end it, in words. Nothing here queries the robot."""
 
 import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
@@ -44,7 +44,7 @@ OF_OTHERS: Final = {"write": "a write", "restore": "a restore", "store": "a stor
 
 
 @dataclass(slots=True)
-class ExperimentWatch:
+class StopRules:
     """Takes what the robot tells; `why` is the first rule that was broken, None while none is.
 
     `name` is the parameter, `joints` those whose tracking error and current count. Before `begin` it only

@@ -1,4 +1,4 @@
-"""Whether the simulator keeps the pace that it was asked for; where not, it says so, once and then seldom."""
+"""Check of real time: if the simulator falls behind, it reports this once, and then seldom."""
 
 import time
 from collections.abc import Callable
@@ -15,7 +15,7 @@ _BUSY = 0.8  # of a core: then it is the simulator itself that is too much, else
 _LOOKS_LIKE = "Silent drives (SDO time-outs) and missing samples may be only this."
 
 
-class Pace:
+class RealTimeCheck:
     """Looks each turn of `loop`, in its thread; `now_ns` and `cpu_ns` are real time and what was computed."""
 
     def __init__(

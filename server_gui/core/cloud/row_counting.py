@@ -1,4 +1,4 @@
-"""What of the rows that receipts claim is in a store's files: how many, their sum, the sum of their names."""
+"""Counts and sums of the rows in a store's files that receipts claim."""
 
 import itertools
 from collections import defaultdict
@@ -55,7 +55,7 @@ class Count:
 
 @dataclass(slots=True)
 class Claim:
-    """What a receipt says of rows in a table, and what is found of them.
+    """A receipt's claim of rows in a table, and the rows found.
 
     Where it `is_old` rows may have been removed because they were; from `rest` on all are expected, which
     `is_all` that retention has left of it.
@@ -198,7 +198,7 @@ def _plain(batch: pa.RecordBatch) -> pa.RecordBatch:
 
 @dataclass(slots=True)
 class _Rows:
-    """Of some rows, each one's sum, sum of its name, and time; what nobody asks for is None."""
+    """Sum, identity sum and time of some rows; unneeded ones are None."""
 
     each: checksums.Sums | None
     names: checksums.Sums | None

@@ -1,4 +1,4 @@
-"""What a service manager is told (sd_notify(3)): that the gateway serves, and that it still turns."""
+"""Messages to a service manager (sd_notify(3)): that the gateway serves, and is alive."""
 
 import contextlib
 import os

@@ -15,7 +15,7 @@ _LONGEST: Final = 400  # lines of one value
 
 
 class Places:
-    """Of a file that is TOML; of another one nothing is known."""
+    """Line numbers in a TOML file; of other files nothing is known."""
 
     def __init__(self, text: str) -> None:
         self._lines: dict[Path, int] = {}

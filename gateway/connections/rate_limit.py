@@ -1,8 +1,8 @@
-"""What clients cost the thread that reads them, and how long each is left alone for that."""
+"""Rate limit of clients: the CPU time that reading them costs, and the pause that follows for each."""
 
 import time
 
-from gateway.connections.sharing import TimeSharing
+from gateway.connections.fair_share import TimeSharing
 from gateway.process.loop import Loop
 
 TURN_NS = 500_000  # what those may take together that are not known, before the others are read
@@ -14,8 +14,8 @@ FLOOD = 8  # stops at once, of a client; who sends more floods the drives with t
 FLOOD_S = 0.05  # … and is read again so much later: as many more are given to it in twice that time
 
 
-class Pace(TimeSharing):
-    """What the clients of an intake share of its thread; those that are not known yet take turns."""
+class RateLimit(TimeSharing):
+    """Shares of an intake's thread; clients that are not known yet take turns."""
 
     def __init__(self, front: Loop) -> None:
         super().__init__(front, TURN_NS)
@@ -35,7 +35,7 @@ class Pace(TimeSharing):
 
 
 class Account:
-    """What one client has cost of the thread just now, and which of its stops are not forgotten yet."""
+    """One client's recent cost for the thread, and its stops that still count."""
 
     def __init__(self) -> None:
         self.owed_ns = 0  # of the thread's time

@@ -1,4 +1,4 @@
-"""What models say of one robot, as the window shows it: the newest of each task, and the rules that hold."""
+"""Newest predictions about one robot for the window, by task, and the rules that hold."""
 
 import time
 from collections.abc import Mapping
@@ -42,7 +42,7 @@ class NewestPrediction:
 
 @dataclass(frozen=True, slots=True)
 class ShownDanger:
-    """What was foreseen last, and when that came; `known` is the newest verdict whose level is known."""
+    """The newest danger prediction and its time; `known` is the newest verdict with a known level."""
 
     said: Endangered
     came_ns: int  # our monotonic clock
@@ -66,7 +66,7 @@ class ShownDanger:
 
 @dataclass(frozen=True, slots=True)
 class Recalled:
-    """What a model said when a recording was made, so long before the instant of it that is shown."""
+    """A prediction from the time of a recording, so long before the instant that is shown."""
 
     prediction: Prediction
     old_s: float

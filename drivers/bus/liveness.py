@@ -1,4 +1,4 @@
-"""What a node tells about itself unasked: boot-up, heartbeat (or answers to node guarding), EMCY."""
+"""Signs of life of a node: boot-up, heartbeat (or answers to node guarding), EMCY."""
 
 from collections import deque
 from collections.abc import Callable
@@ -16,7 +16,7 @@ SHORTEST_S = 0.02  # that is learned
 
 
 class LifeListener(Protocol):
-    """Who is told at once what a node says; in the bus's thread: returns at once, never raises."""
+    """Listener to a node's messages; in the bus's thread: returns at once, never raises."""
 
     def on_emcy(self, emcy: Emcy) -> None: ...
 

@@ -1,4 +1,4 @@
-"""What the clients of a gateway share: the loop's time, and the memory for what they have not taken yet.
+"""Fair shares of a gateway's clients: the loop's time, and the memory for output that they have not read yet.
 
 Requests are handled in turn: one of each address, one of each connection of an address, for as long as a
 turn of the loop has time for that. So nobody waits for all that another one asks, however many times it has
@@ -87,7 +87,7 @@ class TimeSharing:
         return now_ns < self._until_ns
 
 
-class Sharing(TimeSharing):
+class FairShare(TimeSharing):
     """One gateway's. It belongs to the loop's thread."""
 
     def __init__(self, loop: Loop) -> None:

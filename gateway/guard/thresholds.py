@@ -1,4 +1,4 @@
-"""How each kind of rule judges a number: where it may lie, for how long it may not, what is said of it."""
+"""Thresholds of each kind of rule: the allowed range, the allowed time outside of it, and the words."""
 
 import math
 from collections.abc import Callable
@@ -32,7 +32,7 @@ def as_it_is(_stamp_ns: int, value: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Judging:
-    """How numbers are judged. `joined` stands in for `measure` where several channels make one number."""
+    """Judgement of numbers. `joined` replaces `measure` if several channels make one number."""
 
     band: Band
     says: Callable[[float], str]
@@ -43,7 +43,7 @@ class Judging:
 
 @dataclass(frozen=True, slots=True)
 class Beside:
-    """What is not the rule's own: a value is old after `stale_s`; whether a stop is held."""
+    """Context of a rule: a value is old after `stale_s`; whether a stop is held."""
 
     stale_s: float
     held: Callable[[], bool] = lambda: False

@@ -1,4 +1,4 @@
-"""How values are shown to people: angles in degrees where asked, and the robot's clock as UTC."""
+"""Display of values: angles in degrees on request, and the robot's clock as UTC."""
 
 import argparse
 from datetime import UTC, datetime, timedelta

@@ -1,4 +1,4 @@
-"""Which sessions a model learns from, by which it is judged, and which sensors it takes."""
+"""Split of sessions into training and judging, and the choice of sensors."""
 
 import hashlib
 from collections.abc import Iterable, Sequence, Set

@@ -13,7 +13,7 @@ _NODE_IDS = range(1, 128)
 
 
 class TraceContext:
-    """What `--robot` and `--eds` say; `buses` are the interfaces that are listened to, if any."""
+    """The devices named by `--robot` and `--eds`; `buses` are the interfaces to listen to, if any."""
 
     def __init__(self, robot: Path | None, words: Sequence[str], buses: Mapping[str, CanSettings]) -> None:
         """Read all of it, so that what is wrong is said first; raises `SettingsError`."""

@@ -1,4 +1,4 @@
-"""What is told of an edit in the units that people have chosen; the files, and what is told, stay SI."""
+"""Edits in the display units; files and evidence stay in SI."""
 
 from collections.abc import Callable
 

@@ -1,4 +1,4 @@
-"""What is typed, or comes by a pipe: lines, and whether there is something to read without waiting for it."""
+"""Input from a terminal or pipe: lines, and whether some can be read without waiting."""
 
 import os
 import select

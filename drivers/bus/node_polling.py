@@ -1,4 +1,4 @@
-"""What a node is asked by itself while it is up: whether it lives, and whether two devices still answer.
+"""Polling of a node that is up: node guarding, and a check for two devices with one node id.
 
 One with a guard time is guarded (CiA 301 §7.2.8); one without a heartbeat, whose user gets no PDOs either, is
 probed by SDO where it says nothing.
@@ -6,7 +6,7 @@ probed by SDO where it says nothing.
 
 from drivers.bus.bus import CanBus
 from drivers.bus.frames import REMOTE
-from drivers.bus.life import NodeLife
+from drivers.bus.liveness import NodeLife
 from drivers.bus.nmt import HEARTBEAT
 from drivers.bus.sdo.channel import SdoChannel
 from drivers.bus.sdo.worker import SdoWorker
@@ -22,7 +22,7 @@ def _ask_type(sdo: SdoChannel) -> None:
 
 
 class Asking:
-    """Of one node, by `tick` of the bus's thread; node guarding where `guard_s`, its period, is given."""
+    """Polling of one node, by `tick` of the bus's thread; node guarding if `guard_s`, its period, is set."""
 
     def __init__(
         self, bus: CanBus, node_id: int, life: NodeLife, worker: SdoWorker, guard_s: float | None

@@ -1,4 +1,4 @@
-"""What the drives tell while a joint is moved by hand: power, counts, and what they mean by then."""
+"""Live values of the drives while a joint is moved by hand: power, counts, and their meaning so far."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
