@@ -12,7 +12,7 @@ from server_gui.core.alarms.robot_alarms import remedy
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.tuning.stop import StopState
-from server_gui.views.frame.chip import LEAST, Chip, Words
+from server_gui.views.frame.chip import Chip, Words
 from server_gui.views.frame.recording_chip import NAME, RecordingChip
 from server_gui.views.marks import Mark, age_text, drives_mark, enabled_text
 from server_gui.views.predictions import OLD, by_steps, status
@@ -29,6 +29,7 @@ STOP_SHARE: Final = 0.4  # of the width, which STOP may take at most
 RESETTING: Final = "Ends a held stop. Every drive stays switched off: nothing is enabled."
 # Left out in this order where there is less room; alarms stand below the header.
 SPARE: Final = ("status", "recording", "link", "drives", "robot")
+LEAST_NAME: Final = 100  # wide, at text of 100 %: room for the state STOPPED
 A_NAME: Final = 130  # wide, at text of 100 %: a longer name of a robot is elided in its middle
 
 
@@ -122,7 +123,7 @@ class Header(QWidget):
         wide = dict(needs)
         for name in SPARE:
             if name == "link":  # before that the name of the robot gives way
-                needs["robot"] = min(needs["robot"], self._theme.px(LEAST))
+                needs["robot"] = min(needs["robot"], self._theme.px(LEAST_NAME))
             if sum(needs[one] + self._row.spacing() for one in shown) > room and name in shown:
                 shown.remove(name)
         if sum(wide[one] + self._row.spacing() for one in shown) <= room:
