@@ -18,9 +18,7 @@ from server_gui.core.recording.errors import SpoolUnusable
 from server_gui.core.recording.spool import Spool
 from server_gui.core.settings.server_file import load
 
-WHAT = (
-    "Take missing or damaged files out of the store, and restore their rows from the spool."
-)
+WHAT = "Take missing or damaged files out of the store, and restore their rows from the spool."
 EPILOG = """End the collector first. A missing or unreadable file is taken out of its table, which can then be
 read, compacted and uploaded to; its remains go to mended/ in the store, with a note of its contents. Then
 each batch with missing rows, or without a receipt, is restored from the spool's second copy; existing
