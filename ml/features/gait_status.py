@@ -65,7 +65,7 @@ def headed(yaw: Samples, newest: int) -> Samples:
 
 
 def _motion(acceleration: Samples, spin: Samples, lift: Samples, yaw: Samples) -> Samples:
-    """How much moves, whichever way: (n, 10, samples). `lift` and `yaw` are the trunk's."""
+    """Return the amount of motion, in any direction: (n, 10, samples). `lift` and `yaw` are the trunk's."""
     weight, rate = length(acceleration), length(spin)
     left, right = rate[:, 1], rate[:, 2]
     jolt = np.abs(weight[:, 1:] - GRAVITY)

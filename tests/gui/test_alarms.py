@@ -20,7 +20,6 @@ from gateway.wire.component import QualityInfo, Snapshot
 from gateway.wire.stop import Reset, Stopped
 from server_gui.core.alarms.texts import Kind
 from server_gui.core.follow.events import LinkChanged, Looked
-from server_gui.core.follow.news import NewsKind
 from server_gui.core.tuning.stop import StopProgress
 from server_gui.views.alarms.full_list import AlarmRow
 from server_gui.views.alarms.words import fewer
@@ -30,29 +29,11 @@ from server_gui.views.overview.joint_table import JointTable
 from server_gui.views.theme import Theme
 from tests.gui import rules
 from tests.gui.fakes import Around, Bench, stop_is_whole
+from tests.gui.faulty import CAUSE, fault, settle
 from tests.gui.foreseen import predicted
 from tests.support.desk import JOINTS, looked, telemetry, walking
 
-CAUSE = "0x2310 continuous overcurrent at the output (register: generic, current)"
 WHY = "there is no link to 127.0.0.1:7420 now (127.0.0.1:7420 did not answer hello within 5 s)"
-
-
-def fault(bench: Bench) -> None:
-    """The left knee's drive in fault; the others stopped."""
-    now_ns = time.monotonic_ns() + 60_000_000_000  # not stale while the test lasts
-    columns: dict[str, list[float | None]] = {f"{joint}.state": [5.0] for joint in JOINTS}
-    columns["left_knee.state"] = [7.0]
-    columns["left_knee.current"] = [9.0]
-    bench.station.take([walking(100, -60.0)])
-    found = looked(state="fault", problem=f"the drive is in fault: {CAUSE}")
-    bench.look_again([telemetry([now_ns + 1], columns, now_ns), found])
-
-
-def settle(window: MainWindow | Around, bench: Bench) -> None:
-    """Frames, and Qt's layouts within layouts."""
-    bench.draw(window)
-    for _ in range(10):
-        QApplication.processEvents()
 
 
 def question(window: MainWindow) -> Question:
@@ -316,47 +297,6 @@ def test_a_fault_is_the_same_on_strip_card_header_and_events(around: Around, ben
     assert around.robots.cards[0].texts[1] == f"fault: left knee: {CAUSE}"
     assert CAUSE in around.alarms.headline.text()
     assert around.events.pinned[0].mark == mark
-
-
-def test_an_active_alarm_stays_above_whatever_else_happens_and_is_chosen(
-    around: Around, bench: Bench
-) -> None:
-    fault(bench)
-    for number in range(600):
-        bench.desk.news.add(NewsKind.STALE, "exo-01", f"right_insole {number} stale")
-    around.events.words.setText("nothing that there is")
-    bench.draw(around)
-    assert around.events.lines == around.events.pinned
-    assert f"left knee: {CAUSE}" in [line.text for line in around.events.lines]
-
-
-def test_events_are_chosen_by_kind_and_word(around: Around, bench: Bench) -> None:
-    bench.desk.news.add(NewsKind.STALE, "exo-01", "right_insole stale")
-    bench.desk.news.add(NewsKind.STOP, "exo-01", "STOP confirmed")
-    bench.draw(around)
-    around.events.kinds.setCurrentText("Faults and stops")
-    assert [line.text for line in around.events.lines[len(around.events.pinned) :]] == ["STOP confirmed"]
-    around.events.kinds.setCurrentText("Everything")
-    around.events.words.setText("insole")
-    assert [line.text for line in around.events.lines[len(around.events.pinned) :]] == ["right_insole stale"]
-
-
-def test_events_of_the_only_robot_do_not_spend_their_room_on_its_name(around: Around, bench: Bench) -> None:
-    def said(row: int = 0) -> object:
-        return around.events.table.model().index(row, 3).data()
-
-    while len(bench.desk.stations) > 1:
-        bench.desk.remove(bench.desk.stations[-1])
-    bench.desk.news.add(NewsKind.WARNING, "recording", "the disk is full")
-    bench.desk.news.add(NewsKind.STOP, bench.desk.stations[0].title, "STOP confirmed")
-    bench.draw(around)
-    first = len(around.events.pinned)
-    assert around.events.table.isColumnHidden(2)
-    assert (said(first), said(first + 1)) == ("STOP confirmed", "recording: the disk is full")
-    bench.add("exo-02")
-    bench.draw(around)
-    assert not around.events.table.isColumnHidden(2)
-    assert said(len(around.events.pinned) + 1) != "recording: the disk is full"
 
 
 def test_the_signal_of_a_fault_is_shown_and_it_is_cleared_after_a_question_that_says_who_loses_torque(

@@ -1,4 +1,4 @@
-"""Where an event leads to: the signals of its robot at its instant."""
+"""Events: which are shown, what stays above them, and where one leads to."""
 
 from types import SimpleNamespace
 
@@ -6,7 +6,8 @@ import pytest
 
 from server_gui.core.follow.news import NewsKind
 from server_gui.views.frame.main_window import MainWindow
-from tests.gui.fakes import Bench
+from tests.gui.fakes import Around, Bench
+from tests.gui.faulty import CAUSE, fault
 from tests.support.desk import walking
 
 
@@ -35,3 +36,44 @@ def test_an_event_leads_to_its_instant_in_the_signals_that_are_shown(
     assert signals.chosen == before
     left, right = signals.plots[0].plot.window_s
     assert left <= -2.0 <= right
+
+
+def test_an_active_alarm_stays_above_whatever_else_happens_and_is_chosen(
+    around: Around, bench: Bench
+) -> None:
+    fault(bench)
+    for number in range(600):
+        bench.desk.news.add(NewsKind.STALE, "exo-01", f"right_insole {number} stale")
+    around.events.words.setText("nothing that there is")
+    bench.draw(around)
+    assert around.events.lines == around.events.pinned
+    assert f"left knee: {CAUSE}" in [line.text for line in around.events.lines]
+
+
+def test_events_are_chosen_by_kind_and_word(around: Around, bench: Bench) -> None:
+    bench.desk.news.add(NewsKind.STALE, "exo-01", "right_insole stale")
+    bench.desk.news.add(NewsKind.STOP, "exo-01", "STOP confirmed")
+    bench.draw(around)
+    around.events.kinds.setCurrentText("Faults and stops")
+    assert [line.text for line in around.events.lines[len(around.events.pinned) :]] == ["STOP confirmed"]
+    around.events.kinds.setCurrentText("Everything")
+    around.events.words.setText("insole")
+    assert [line.text for line in around.events.lines[len(around.events.pinned) :]] == ["right_insole stale"]
+
+
+def test_events_of_the_only_robot_do_not_spend_their_room_on_its_name(around: Around, bench: Bench) -> None:
+    def said(row: int = 0) -> object:
+        return around.events.table.model().index(row, 3).data()
+
+    while len(bench.desk.stations) > 1:
+        bench.desk.remove(bench.desk.stations[-1])
+    bench.desk.news.add(NewsKind.WARNING, "recording", "the disk is full")
+    bench.desk.news.add(NewsKind.STOP, bench.desk.stations[0].title, "STOP confirmed")
+    bench.draw(around)
+    first = len(around.events.pinned)
+    assert around.events.table.isColumnHidden(2)
+    assert (said(first), said(first + 1)) == ("STOP confirmed", "recording: the disk is full")
+    bench.add("exo-02")
+    bench.draw(around)
+    assert not around.events.table.isColumnHidden(2)
+    assert said(len(around.events.pinned) + 1) != "recording: the disk is full"

@@ -22,8 +22,8 @@ from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.robots.pairing import PairingDialog
 from server_gui.views.theme import Theme
 from tests.gui.fakes import Bench, destroy, stop_is_whole
+from tests.gui.faulty import fault
 from tests.gui.running import wait
-from tests.gui.test_alarms import fault
 from tests.support.desk import walking
 
 LEGS = ("left_knee", "right_knee")

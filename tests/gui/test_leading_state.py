@@ -6,7 +6,7 @@ import pytest
 
 from server_gui.core.alarms.texts import Kind
 from tests.gui.fakes import Around, Bench
-from tests.gui.test_alarms import settle
+from tests.gui.faulty import settle
 from tests.support.desk import JOINTS, looked, telemetry
 
 

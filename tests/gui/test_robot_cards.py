@@ -6,7 +6,7 @@ from gateway.client import ConnectionState, NotConnected
 from server_gui.core.follow.events import LinkChanged
 from server_gui.views.frame.main_window import MainWindow
 from tests.gui.fakes import Around, Bench
-from tests.gui.test_alarms import fault, settle
+from tests.gui.faulty import fault, settle
 from tests.support.desk import described, looked, walking
 
 

@@ -133,7 +133,7 @@ def _one_sided(spans: dict[str, float]) -> str:
 
 
 def _stride(pairs: list[Pair | str], but: str) -> float:
-    """How far the other joints go, by how far they do at the usual pace."""
+    """Return the stride as a share of the usual one, by the range of the other joints."""
     others = [pair for pair in pairs if isinstance(pair, Pair) and pair.kind != but]
     shares = [span(pair.of(side)) / normal_span(pair.kind) for pair in others for side in SIDES]
     return median(shares) if shares else 1.0

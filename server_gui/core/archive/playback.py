@@ -130,7 +130,7 @@ Recall = Callable[
 
 
 def nothing_said(_begin_ns: int, _end_ns: int) -> Sequence[PastPrediction]:
-    """Of a recording without predictions."""
+    """Return the predictions of a recording without any."""
     return ()
 
 
