@@ -38,7 +38,7 @@ COLUMNS: Final = (
     ("Current", "current"),
     ("Temp.", "temperature"),
     ("Error", "error_code"),
-    ("Off after", ""),
+    ("Off after STOP", ""),
 )
 JOINT, STATE, ANGLE, VELOCITY, TORQUE, CURRENT, TEMPERATURE, ERROR, STOP = range(len(COLUMNS))
 SI: Final = {
@@ -58,6 +58,10 @@ NEAR_LIMIT: Final = 0.8  # of a limit
 CODE: Final = re.compile(r"0x[0-9A-Fa-f]{4}(?P<words> [^(;:]+)?")
 ENABLED: Final = "operation enabled"  # only then it is to be where its target is
 NONE: Final = "–"
+HINT: Final = (
+    "Time from the latest STOP to the first state without torque that this drive reported. "
+    "“already off”: it had no torque before that STOP. “no proof”: it has not reported such a state since"
+)
 MOST_ERROR: Final = 280  # wide, in words
 # A drive's states where there is little room; in alarms and on cards they stand in full.
 FEW_WORDS: Final = {
@@ -147,6 +151,8 @@ class JointModel(QAbstractTableModel):
         if orientation is Qt.Orientation.Horizontal and role == Qt.ItemDataRole.DisplayRole:
             title, quantity = COLUMNS[section]
             return f"{title} {_unit(self._desk, quantity).symbol}" if quantity in SI else title
+        if section == STOP and role == Qt.ItemDataRole.ToolTipRole:
+            return HINT
         if role == Qt.ItemDataRole.TextAlignmentRole and ANGLE <= section <= TEMPERATURE:
             return Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
         return None
@@ -442,7 +448,7 @@ def _stop(station: Station, joint: str) -> Cell:
     proof = stopping.proofs.get(joint)
     if proof is not None:
         if station.robot.word(f"{joint}.state") == ENABLED:
-            return Cell("no more", "dim", None, f"{proof.text}; enabled again since")
+            return Cell("enabled again", "dim", None, f"{proof.text}; enabled again since")
         colour = "dim" if proof.was_so else "good"
         return Cell(proof.when, colour if station.is_live else "old", None, proof.text)
     if stopping.state is StopState.IDLE:
