@@ -11,6 +11,7 @@ import msgspec
 from gateway.amounts import NONE
 from gateway.cli import describe_buses
 from gateway.cli.connect import connect, parser
+from gateway.cli.describe_problems import summary
 from gateway.cli.text import budget, exact, say, say_json, table
 from gateway.client.blocking import Robot
 from gateway.client.held_controllers import HELD, held_channels, holding_channels
@@ -30,17 +31,18 @@ def main(argv: list[str]) -> int:
         "describe",
         "Show a robot's components and buses with their problems, since when and what\n"
         "to check, its channels and their units, its parameters and their limits, and what each drive does\n"
-        "on a stop.",
+        "on a stop. The last line counts the problems and names their places.",
     ).parse_args(argv)
     with connect(arguments, "describe") as robot:
         description, hello = _measured(robot), robot.hello
         names = holding_channels(description)
         values = robot.components(*names).values if names else {}
+    controllers = list(held_channels(description, values))
     if arguments.json:
-        controllers = list(held_channels(description, values))
         say_json(msgspec.to_builtins(description) | {"controllers_held": controllers})
     else:
-        say("\n".join([*_you(hello), *held(description, values), *_chapters(description)]))
+        chapters = [*_you(hello), *held(description, values), *_chapters(description)]
+        say("\n".join([*chapters, summary(description, controllers)]))
     return 0
 
 

@@ -35,13 +35,13 @@ def _which(draft: Draft, others: Mapping[int, NodeAnswers]) -> Talk[int | None]:
     names = ", ".join(f"{node} ({one.name or 'without a name'})" for node, one in sorted(others.items()))
     choice = yield from choose(
         "Which node commands the drives, so that a STOP can tell it too? "
-        f"Beside the drives here are: {names or 'no others'}. {NONE}: it is no node, or not here now",
+        f"Beside the drives here are: {names or 'no others'}. {NONE}: not a CAN node, or not connected",
         (*map(str, sorted(others)), NONE),
         NONE,
     )
     if choice == NONE:
         yield Say(
-            "A STOP will tell the drives only, and what commands them goes on: gwrms check warns of it."
+            "A STOP will reach the drives only, and what commands them goes on: gwrms check warns of it."
         )
         draft.put(CONTROLLER, "value", None, "nobody named one")
         return None

@@ -74,7 +74,7 @@ def without_keys(where: str) -> str:
     """Return why a robot without keys is not served to other computers, and the remedy."""
     return (
         f"this robot has no keys, and {where} is open to other computers: without keys it is served on "
-        "127.0.0.1 and its Unix socket only. Two commands lead on: `gwrms keys pair ROBOT.toml` here, which "
+        "127.0.0.1 and its Unix socket only. Run these two commands: `gwrms keys pair ROBOT.toml` here, which "
         "shows a code, then `gwrms pair HOST:PORT` on the desk; the first desk gives it its key"
     )
 

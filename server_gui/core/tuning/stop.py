@@ -51,7 +51,7 @@ class Proof:
     @property
     def when(self) -> str:
         """After the STOP."""
-        return "before" if self.was_so else f"{max(self.after_ms, 1.0):.0f} ms"
+        return "already off" if self.was_so else f"{max(self.after_ms, 1.0):.0f} ms"
 
     @property
     def text(self) -> str:

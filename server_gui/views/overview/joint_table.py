@@ -38,7 +38,7 @@ COLUMNS: Final = (
     ("Current", "current"),
     ("Temp.", "temperature"),
     ("Error", "error_code"),
-    ("Off after", ""),
+    ("Off after STOP", ""),
 )
 JOINT, STATE, ANGLE, VELOCITY, TORQUE, CURRENT, TEMPERATURE, ERROR, STOP = range(len(COLUMNS))
 SI: Final = {
@@ -61,6 +61,10 @@ NONE: Final = "–"
 NOT_KNOWN: Final = "not known"
 IN_FAULT: Final = "the drive is in fault: "  # with which what a robot says of it begins
 BELOW: Final = "↓"  # its words stand there
+HINT: Final = (
+    "Time from the latest STOP to the first state without torque that this drive reported. "
+    "“already off”: it had no torque before that STOP. “no proof”: it has not reported such a state since"
+)
 MOST_ERROR: Final = 280  # wide, in words
 # A drive's states where there is little room; in alarms and on cards they stand in full.
 FEW_WORDS: Final = {
@@ -150,6 +154,8 @@ class JointModel(QAbstractTableModel):
         if orientation is Qt.Orientation.Horizontal and role == Qt.ItemDataRole.DisplayRole:
             title, quantity = COLUMNS[section]
             return f"{title} {_unit(self._desk, quantity).symbol}" if quantity in SI else title
+        if section == STOP and role == Qt.ItemDataRole.ToolTipRole:
+            return HINT
         if role == Qt.ItemDataRole.TextAlignmentRole and ANGLE <= section <= TEMPERATURE:
             return Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
         return None
@@ -447,7 +453,7 @@ def _stop(station: Station, joint: str) -> Cell:
     proof = stopping.proofs.get(joint)
     if proof is not None:
         if station.robot.word(f"{joint}.state") == ENABLED:
-            return Cell("no more", "dim", None, f"{proof.text}; enabled again since")
+            return Cell("enabled again", "dim", None, f"{proof.text}; enabled again since")
         colour = "dim" if proof.was_so else "good"
         return Cell(proof.when, colour if station.is_live else "old", None, proof.text)
     if stopping.state is StopState.IDLE:
