@@ -106,12 +106,13 @@ def test_an_object_that_is_no_answer_is_not_taken_for_enter(pipe: Pipe) -> None:
 )
 def test_whatever_could_be_meant_as_a_stop_is_one(pipe: Pipe, line: str) -> None:
     with ending(), Lines(pipe.source) as lines, pytest.raises(MotionEnded):
-        pipe.write(line)
-        JsonFace(lines).ask(Ask("?"))
+        stopped_in(pipe, lines, lambda lines: JsonFace(lines).ask(Ask("?")), line)
 
 
-def stopped_in(pipe: Pipe, lines: Lines, busy: Callable[[Lines], object]) -> None:
-    pipe.write('{"stop": true}', '{"stop": true}')
+def stopped_in(
+    pipe: Pipe, lines: Lines, busy: Callable[[Lines], object], line: str = '{"stop": true}'
+) -> None:
+    pipe.write(line, line)
     busy(lines)
 
 
