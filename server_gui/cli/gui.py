@@ -9,7 +9,7 @@ from server_gui.core.settings.server_file import add_robots, default_file, load,
 from server_gui.qt_needs import check, prefer_x
 
 EPILOG = """keys
-  F12, Ctrl+Space   STOP the robot that is looked at: quick stop on every drive. It is software over a
+  F12, Ctrl+Space   STOP the selected robot: quick stop on every drive. It is software over a
                     network, not a safety-rated emergency stop
   Ctrl+F            find a parameter
   Alt+O, S, R, C, L overview, signals, resources, recordings, cloud

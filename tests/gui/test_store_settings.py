@@ -66,7 +66,7 @@ def test_only_what_was_edited_is_written_and_every_comment_stays(form: SettingsF
         ("ftp://lab", "60", "is no store: use file:///folder or s3://bucket/prefix"),
         ("s3://key:secret@lab", "60", "has no keys in it"),
         ("s3://lab/old", "0", "[recorder] batch_s: must be a number, at least 1"),
-        ("s3://lab/old", "soon", "'soon' is no number"),
+        ("s3://lab/old", "soon", "'soon' is not a number"),
         ("s3://lab/old", "nan", "no number that can be meant"),
     ],
 )
