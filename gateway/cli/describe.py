@@ -58,7 +58,7 @@ def _measured(robot: Robot) -> Description:
 
 
 def _you(hello: Hello | None) -> Iterator[str]:
-    """Who asks, and what that one may not."""
+    """Yield the client's identity, and its forbidden methods."""
     if hello is not None:
         not_for_you = f"; not for you: {', '.join(hello.refused)}" if hello.refused else ""
         yield textwrap.fill(f"you are {hello.who}{not_for_you}", PAGE, subsequent_indent="  ") + "\n"
@@ -97,7 +97,7 @@ def _chapters(robot: Description) -> Iterator[str]:
 
 
 def _profiles(components: list[ComponentInfo]) -> Iterator[str]:
-    """Which of them are known beside their EDS, and as what."""
+    """Yield the components with a product profile, and its name."""
     known: dict[str, list[str]] = {}
     for part in components:
         profile = part.device.get("profile") if isinstance(part.device, dict) else None
@@ -137,7 +137,7 @@ def _parameter(info: ParameterInfo) -> tuple[str, ...]:
 
 
 def _read_only(parameters: list[ParameterInfo]) -> Iterator[str]:
-    """How many more there are to be read."""
+    """Yield the numbers of further parameters, which can only be read."""
     more = Counter(parameter.component for parameter in parameters if parameter.read_only is not None)
     for component, count in more.items():
         yield f"{component}: {count} more, read-only (gwrms get '{component}.*')\n"

@@ -23,9 +23,9 @@ from gateway.doctor.verdicts import Finding
 from gateway.tables.finding import lines, mistakes
 
 DESCRIPTION = """\
-Finds what is wrong with a robot: by its file, its buses, its sensors and its computer, through its gateway
-where one runs. Each finding is listed with its evidence and its fix, the likeliest first; what could not be
-judged is listed with the reason. Nothing is ever enabled or moved.
+Find mistakes of a robot: in its file, on its buses, of its sensors and its computer, through its gateway if
+one runs. Each finding has its figures and its remedies, the likeliest first; checks without data are listed,
+with the reason. Nothing is ever enabled or moved.
 """
 EPILOG = """\
 If the robot walks for the 20 s, joints and insoles are judged too: one leg is compared with the other, and
@@ -116,7 +116,7 @@ def _is_here(options: argparse.Namespace) -> bool:
 
 
 def _gateway(config: RobotConfig, options: argparse.Namespace) -> Address | None:
-    """Whom to ask: the gateway that is named, else the file's own."""
+    """Return the gateway to ask: the one that is named, else the file's own."""
     if options.silent:
         return None
     return options.robot or Address("127.0.0.1", config.gateway.port)

@@ -19,7 +19,7 @@ _OBJECT = re.compile(r"0x[0-9A-Fa-f]{4}:(0x[0-9A-Fa-f]{1,2}|[0-9]{1,3})")
 
 
 def controller(draft: Draft, library: Library, told: Mapping[int, NodeAnswers]) -> Talk[None]:
-    """Which node it is, by which object it is stopped; without one a stop tells the drives only."""
+    """Ask for the controller's node and stopping object; without one, a stop reaches only the drives."""
     if draft.value("gateway", "role") != OBSERVER or draft.has(CONTROLLER, "value"):
         return
     others = {node: one for node, one in told.items() if not one.axes}

@@ -291,7 +291,7 @@ def _runner_up(shown: Told) -> str:
 
 
 def _tip(shown: Told) -> str:
-    """Which model, which nobody reads at arm's length."""
+    """Return the model's name for the tool tip."""
     if isinstance(shown, Recalled):
         return f"{told_name(shown.prediction.model)}, {shown.prediction.model}"
     predicted = shown.predicted

@@ -189,7 +189,7 @@ class Robot:
 
     @property
     def state_words(self) -> Mapping[str, Mapping[str, str]]:
-        """What the numbers of each channel that is a state mean."""
+        """Words for the numbers of each channel that is a state."""
         return self._words
 
     # --- what events do

@@ -83,7 +83,7 @@ class StopProgress:
 
     @property
     def stage(self) -> tuple[StopState, bool]:
-        """How far it has gone, and whether one is held."""
+        """State of the latest STOP, and whether one is held."""
         return self.state, self.held
 
     @property
@@ -177,7 +177,7 @@ class StopProgress:
 
     @property
     def proof(self) -> str:
-        """What drives themselves have shown since: `6 drives confirmed in quick stop active within 3 ms`."""
+        """Proof from the drives' own states: `6 drives confirmed in quick stop active within 3 ms`."""
         if not self.proofs:
             return ""
         slowest = max(1.0, *(proof.after_ms for proof in self.proofs.values()))

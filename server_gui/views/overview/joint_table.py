@@ -58,6 +58,9 @@ NEAR_LIMIT: Final = 0.8  # of a limit
 CODE: Final = re.compile(r"0x[0-9A-Fa-f]{4}(?P<words> [^(;:]+)?")
 ENABLED: Final = "operation enabled"  # only then it is to be where its target is
 NONE: Final = "–"
+NOT_KNOWN: Final = "not known"
+IN_FAULT: Final = "the drive is in fault: "  # with which what a robot says of it begins
+BELOW: Final = "↓"  # its words stand there
 HINT: Final = (
     "Time from the latest STOP to the first state without torque that this drive reported. "
     "“already off”: it had no torque before that STOP. “no proof”: it has not reported such a state since"
@@ -189,8 +192,8 @@ class BarDelegate(SentenceDelegate):
     def initStyleOption(self, option: QStyleOptionViewItem, index: Index) -> None:
         super().initStyleOption(option, index)
         text = str(index.data())
-        if self.is_short and index.column() == ERROR and text.startswith("0x"):
-            option.text = text.partition(" ")[0]
+        if self.is_short and index.column() == ERROR and text not in (NONE, NOT_KNOWN):
+            option.text = text.partition(" ")[0] if text.startswith("0x") else BELOW
         elif self.is_tight and index.column() == STATE:
             option.text = in_few_words(text)
 
@@ -427,9 +430,11 @@ def _error(station: Station, part: FollowedComponent, *, stale: bool) -> Cell:
         said = f"{number} {words}" if words else error_text(int(code))
         return Cell(said, "old" if stale else colour, None, "\n".join(filter(None, (problem, said))))
     if part.state != "ok" and problem:
-        return Cell(problem, "old" if not station.is_live else colour, None, problem)
+        told = CODE.match(problem.removeprefix(IN_FAULT))  # also where the code is not among what is sent
+        said = told[0].strip() if told else problem
+        return Cell(said, "old" if not station.is_live else colour, None, problem)
     if stale:
-        return Cell("not known", "old")
+        return Cell(NOT_KNOWN, "old")
     return Cell("–", "dim")
 
 

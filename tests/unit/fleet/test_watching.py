@@ -162,7 +162,9 @@ def test_a_dead_thread_of_a_collector_is_an_alarm_everywhere_and_works_again(
         monkeypatch.setattr(owner, {"_recorder": "_turn", "_uploader": "_empty"}[name], die)
     until(lambda: troubles(collector))
     recording, status = said(collector)
-    assert f"ALARM  the part “{owner.worker.name}” stopped unexpectedly and was restarted (SystemExit" in status
+    assert (
+        f"ALARM  the part “{owner.worker.name}” stopped unexpectedly and was restarted (SystemExit" in status
+    )
     assert recording.said(None).tone is Tone.WARNING
     assert any(owner.worker.name in news.text for news in recording._news.items)
     before = collector.report().result(WAIT_S).recorder.recorded
