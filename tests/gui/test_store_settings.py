@@ -52,7 +52,7 @@ def test_only_what_was_edited_is_written_and_every_comment_stays(form: SettingsF
     form.batch.setText("30")
     assert "[store] url, [recorder] batch_s is to be written" in form.said.text()
     form.save.click()
-    assert form.said.text().startswith(f"Saved in {file}; in force when")
+    assert form.said.text().startswith(f"Saved in {file}; takes effect when")
     wanted = FILE.replace('"s3://lab/old"', '"s3://lab/new"')
     assert file.read_text() == wanted.replace("upload = 'idle'\n", "upload = 'idle'\nbatch_s = 30.0\n")
     assert file.stat().st_mode & 0o777 == 0o600
