@@ -15,8 +15,8 @@ is on trial, and where the device does not say that it can (1010h). All of its p
 has changed them, and compared before and after. A write never stores by itself.
 
 With --all every device that can store is asked, one after another, and the outcome of each is printed:
-stored, refused, or not confirmed (the contents of its flash are then unknown). If the link drops, the remaining
-devices are not asked. Exit status 1 unless all have stored.
+stored, refused, or not confirmed (the contents of its flash are then unknown). If the link drops, the
+remaining devices are not asked. Exit status 1 unless all have stored.
 
 examples:
   gwrms store left_knee

@@ -16,8 +16,8 @@ RESOURCES_EPILOG = """A program that had no memory and no CPU in any look, as mo
 left out and counted; --all shows it, and --json always has it."""
 COMPARE_EPILOG = """Several sessions a side are separated by commas: with only one, the effect of a version
 cannot be separated from that of the day. A process is named if its median over the minutes is a tenth more,
-and at least 1 % of a core or 2 MiB, if three quarters of the sessions after lie above three quarters of those before, and if chance is
-ruled out (rank-sum test, p < 0.01 over all comparisons together).
+and at least 1 % of a core or 2 MiB, if three quarters of the sessions after lie above three quarters of
+those before, and if chance is ruled out (rank-sum test, p < 0.01 over all comparisons together).
 
 example
   gwrms sessions compare 20261119T09,20261120T09 20261121T09,20261122T09

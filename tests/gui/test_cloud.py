@@ -87,7 +87,7 @@ def test_upload_now_asks_who_records_and_does_it_itself_where_nobody_does(
     cloud._recording.look()
     shown.draw()
     assert "2 batches wait" in cloud.waiting.text()
-    assert "It is tried again by itself: the store cannot be reached" in cloud.waiting.text()
+    assert "Retried automatically: the store cannot be reached" in cloud.waiting.text()
     cloud.upload.click()
     assert keeper.asked == ["upload"]
 

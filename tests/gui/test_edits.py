@@ -119,7 +119,7 @@ def test_a_trial_that_counts_down_says_what_it_does_so_far(
     said = {
         Word.FEW: "too early to judge it: 49 gait cycles before, 3 since; it takes 8 of each leg",
         Word.WORSE: "so far worse: left knee tracking error RMS +19.2 %",
-        None: "once somebody",
+        None: "once the wearer walks",
     }
     bench.station.writing.trial = Trial(
         1, {"gait.step_length": 0.4}, {"gait.step_length": 0.3}, time.monotonic_ns() + 10**10

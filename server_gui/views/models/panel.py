@@ -28,7 +28,7 @@ EMPTY: Final = (
 )
 
 
-AWAY: Final = "▲ The store cannot be reached; retrying; models promoted there are not shown: {why}"
+AWAY: Final = "▲ The store is not reached; retrying; models promoted there are not shown: {why}"
 
 
 class ModelsPage(QWidget):

@@ -213,7 +213,7 @@ class SessionsPage(QWidget):
     def _state(self) -> str:
         library = self._archive.library
         if library.reach.problem is not None:
-            return f"The store cannot be reached; retrying: {library.reach.problem}"
+            return f"The store is not reached; retrying: {library.reach.problem}"
         return EMPTY if library.revision and not library.found.sessions else ""
 
     def _refresh_details(self) -> None:
