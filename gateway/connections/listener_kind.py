@@ -73,9 +73,9 @@ def check_classic(listener: socket.socket) -> None:
 def without_keys(where: str) -> str:
     """Return why a robot without keys is not served to other computers, and the remedy."""
     return (
-        f"this robot has no keys, and {where} is open to other computers: without keys it is served on "
-        "127.0.0.1 and its Unix socket only. Run these two commands: `gwrms keys pair ROBOT.toml` here, which "
-        "shows a code, then `gwrms pair HOST:PORT` on the desk; the first desk gives it its key"
+        f"this robot has no keys, and {where} is open to other computers: nothing is served now. To admit a "
+        "desk, run `gwrms keys pair ROBOT.toml` here, which shows a code, and `gwrms pair HOST:PORT` on the "
+        'desk; then start the gateway again. To serve this computer alone, set host = "127.0.0.1"'
     )
 
 
