@@ -57,7 +57,7 @@ def kind_of(listener: socket.socket, *, has_keys: bool) -> ListenerKind:
     if has_keys:
         return ListenerKind.TLS
     if not is_loopback(listener.getsockname()):
-        raise UnsafeListener(without_keys(_said(listener.getsockname())))
+        raise UnsafeListener(without_keys(said(listener.getsockname())))
     return ListenerKind.PLAIN
 
 
@@ -65,7 +65,7 @@ def check_classic(listener: socket.socket) -> None:
     """Refuse the paper's protocol, which has no keys, beyond this computer; raises `UnsafeListener`."""
     if not is_loopback(listener.getsockname()):
         raise UnsafeListener(
-            f"classic_port would be served at {_said(listener.getsockname())}: it has no keys, and is for "
+            f"classic_port would be served at {said(listener.getsockname())}: it has no keys, and is for "
             "this computer only; listen on 127.0.0.1, or leave it out"
         )
 
@@ -73,9 +73,9 @@ def check_classic(listener: socket.socket) -> None:
 def without_keys(where: str) -> str:
     """Return why a robot without keys is not served to other computers, and the remedy."""
     return (
-        f"this robot has no keys, and {where} is open to other computers: without keys it is served on "
-        "127.0.0.1 and its Unix socket only. Two commands lead on: `gwrms keys pair ROBOT.toml` here, which "
-        "shows a code, then `gwrms pair HOST:PORT` on the desk; the first desk gives it its key"
+        f"this robot has no keys, and {where} is open to other computers: nothing is served now. To admit a "
+        "desk, run `gwrms keys pair ROBOT.toml` here, which shows a code, and `gwrms pair HOST:PORT` on the "
+        'desk; then start the gateway again. To serve this computer alone, set host = "127.0.0.1"'
     )
 
 
@@ -85,6 +85,7 @@ def is_loopback(address: Any) -> bool:
     return host.startswith(_LOOPBACK) or host.partition("%")[0] == "::1"
 
 
-def _said(address: Any) -> str:
+def said(address: Any) -> str:
+    """Return a TCP address, as `getsockname` gives it, as HOST:PORT."""
     host, port = address[:2]
     return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"

@@ -101,7 +101,7 @@ class Mender:
     def _edit(self, edits: tuple[Edit, ...]) -> str:
         change(self._config.path, edits)
         self._edited |= {edit.name for edit in edits}
-        return f"{self._config.path} changed: a gateway takes it at its next start"
+        return f"{self._config.path} changed: a gateway takes it when it is started again, or wakes from rest"
 
     def _write(self, fix: Write) -> str:
         if self._robot is None:
