@@ -94,13 +94,19 @@ def _of_stop(robot: Robot, stopping: StopProgress) -> Iterator[Alarm]:
             "",
             what,
             did=_after_stop(robot, stopping),
-            check=check_of(Kind.STOPPED),
+            check=check_of(Kind.STOPPED, role=_role(robot)),
             since_s=stopping.since_s,
             aside=by,
         )
     elif stopping.was_ended and not any_enabled(robot):
         what = EVERY_OFF if set(_words(robot).values()) <= OFF else _drives_did(robot) or EVERY_OFF
-        yield Alarm(Kind.RESET, "", what, check=check_of(Kind.RESET), since_s=stopping.since_s)
+        yield Alarm(
+            Kind.RESET, "", what, check=check_of(Kind.RESET, role=_role(robot)), since_s=stopping.since_s
+        )
+
+
+def _role(robot: Robot) -> str | None:
+    return None if robot.description is None else robot.description.role
 
 
 def remedy(robot: Robot) -> str:

@@ -125,6 +125,11 @@ class Station:
         return any(self.called == (other.name if other.is_named else other.called) for other in others)
 
     @property
+    def bus_role(self) -> str | None:
+        """Role of the robot's gateway on its buses."""
+        return None if self.robot.description is None else self.robot.description.role
+
+    @property
     def title(self) -> str:
         """The user's name for it; else what it calls itself, and where it is, where another is called so."""
         if self.is_named:
@@ -356,7 +361,7 @@ class Station:
                 self.tell(NewsKind.STOP, "reset: a STOP was sent meanwhile, which counts")
                 return
             self.stopping.was_reset(reset.held)
-            said, stays = after_reset(reset)
+            said, stays = after_reset(reset, self.bus_role)
             self.tell(NewsKind.STOP, said)
             if stays:
                 self.tell(NewsKind.FAULT, stays)

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from gateway.cli import connect
+from gateway.cli.watch import Row, _from_first_value
 from gateway.client import Address
 from gateway.main import main
 from tests.fake_robot import JOINTS, FakeRobot, Refusal
@@ -126,6 +127,26 @@ def test_watch_prints_the_number_of_rows_asked_for(
     assert robot.called("stream.start")[0]["rate_hz"] == 100.0
 
 
+def test_another_object_s_address_is_never_proposed(
+    robot: FakeRobot, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(robot, "set", "left_knee.0x6073:0=1") == 1
+    said = capsys.readouterr().err
+    assert "did you mean" not in said
+    assert "releases no object 0x6073:0 of left_knee" in said
+
+
+def test_watch_begins_with_the_first_value(capsys: pytest.CaptureFixture[str]) -> None:
+    def rows(*values: float | None) -> list[Row]:
+        return [(10**9 * at, None, {"left_knee.state": one}) for at, one in enumerate(values)]
+
+    assert list(_from_first_value(iter(rows(None, None, 5.0, None)))) == rows(None, None, 5.0, None)[2:]
+    assert capsys.readouterr().err == "gwrms watch: no value has come yet; waiting for 3 s at most\n"
+    nothing = rows(*[None] * 6)
+    assert list(_from_first_value(iter(nothing))) == nothing[3:]
+    assert list(_from_first_value(iter(rows(1.0, None)))) == rows(1.0, None)
+
+
 def test_watch_gives_null_for_what_is_lost(robot: FakeRobot, capsys: pytest.CaptureFixture[str]) -> None:
     robot.lost.add("left_knee")
     assert run(robot, "watch", "left_knee.position", "--json", "--count", "1", "--rate", "50") == 0
@@ -197,6 +218,10 @@ def test_parameter_that_no_device_answers_for_fails(
         (("snapshot", "component", "left_nee.position"), "did you mean left_knee.position"),
         (("snapshot", "component", "resource"), "ask gwrms snapshot resource"),
         (("set", "gait.step_length=9"), "above 0.6 m"),
+        (
+            ("set", "right_knee.0x6065:0=22755"),
+            '[parameter."right_knee.object_6065"] and below it object = "0x6065:0"',
+        ),
     ],
 )
 def test_refusal_is_a_sentence_and_changes_nothing(
