@@ -33,7 +33,8 @@ def ask_clear(parent: QWidget, station: Station) -> Question:
     else:
         more = ""
     held = "\n\nThe STOP that is held ends with it." if station.stopping.held else ""
-    text = f"Clear the fault of {station.title}?\n\n{DOES}{more}{held}\n\nAfterwards, {check_of(Kind.RESET, role=station.bus_role)}."
+    check = check_of(Kind.RESET, role=station.bus_role)
+    text = f"Clear the fault of {station.title}?\n\n{DOES}{more}{held}\n\nAfterwards, {check}."
     title = f"Clear the fault of {station.title}"
     return _asked(parent, title, text, "Clear fault", station, lambda why: _ask_again(parent, station, why))
 

@@ -87,7 +87,8 @@ def test_a_bus_that_has_just_been_opened_is_measured_first(monkeypatch: pytest.M
 
 
 def test_an_overloaded_bus_says_so_in_its_own_row() -> None:
-    row = next(chapter for chapter in chapters(robot(replace(BUS, load_percent=101.0))) if "LOAD" in chapter)
+    busy = msgspec.structs.replace(BUS, load_percent=101.0)
+    row = next(chapter for chapter in chapters(described(busy)) if "LOAD" in chapter)
     assert "the bus is overloaded: 101 % of its time is taken" in row
-    other = next(chapter for chapter in chapters(robot(BUS)) if "LOAD" in chapter)
+    other = next(chapter for chapter in chapters(described(BUS)) if "LOAD" in chapter)
     assert "overloaded" not in other

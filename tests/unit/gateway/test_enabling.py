@@ -38,7 +38,7 @@ def test_an_observer_never_enables(connect: Callable[[], Client], bench: Bench) 
     client.call("control.acquire", ttl_s=60)
     refusal = client.refused("robot.enable")
     assert refusal.kind == "not_allowed"
-    assert "only the controller that owns the bus may enable drives: start it there" in refusal.message
+    assert "only the controller that owns the bus may enable drives: start it there" in str(refusal)
     assert bench.left.steps == []
 
 

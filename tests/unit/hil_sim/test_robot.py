@@ -10,9 +10,9 @@ import pytest
 import serial
 
 import eds
-from hil_sim.kept_file import disagreements
 from hil_sim.errors import SimulatorError
 from hil_sim.exoskeleton import Scenario
+from hil_sim.kept_file import disagreements
 from hil_sim.robot import SimulatedRobot
 
 

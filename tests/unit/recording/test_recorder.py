@@ -116,8 +116,10 @@ def test_a_name_that_a_robot_has_given_up_is_free(spool: Spool) -> None:
         for robot, name in (("exo-01", "exo-02"), ("exo-01", "exo-01"), ("exo-02", "exo-02")):
             recorder.describe(robot, description(name))
     assert [event["text"] for event in events(spool, "name")] == [
-        "exo-01 calls itself exo-02 in its own file: give it one name, in [robot] there or here "
-        "(exo-02=HOST:PORT)"
+        (
+            "exo-01 calls itself exo-02 in its own file: give it one name, in [robot] there or here "
+            "(exo-02=HOST:PORT)"
+        )
     ]
 
 
