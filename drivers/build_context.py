@@ -27,7 +27,7 @@ class BuildContext:
 
     @property
     def standstill(self) -> "ReaderStalls | None":
-        """Of a bus, by which serial ports know it too; `None` where there is no bus."""
+        """The stalls of a bus's reader, for serial ports too; `None` without a bus."""
         return next((bus.standstill for bus in self.buses.values()), None)
 
     @property

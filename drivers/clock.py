@@ -36,12 +36,12 @@ class DeviceClock:
 
     @property
     def drift(self) -> float:
-        """How much slower than nominal the device counts (1e-6: 1 µs in each of its seconds)."""
+        """The device's clock error (1e-6: it loses 1 µs a second)."""
         return self._drift
 
     @property
     def uncertainty_ns(self) -> int | None:
-        """How far a sample's time may be off, the constant delay aside; `None` before a second has passed."""
+        """Uncertainty of a sample's time, without the constant delay; `None` before a second has passed."""
         return self._uncertainty_ns
 
     def stamp(self, ticks: int, received_ns: int) -> int | None:

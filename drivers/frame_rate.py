@@ -27,7 +27,7 @@ class FrameRate(FindingState):
         self._before = now_ns, frames
 
     def update(self, now_ns: int, frames: int) -> None:
-        """How many have come since the line is there."""
+        """Take the number of frames since the line was opened."""
         if self._before is None:
             self._before = now_ns, frames
         began_ns, frames_before = self._before

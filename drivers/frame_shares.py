@@ -28,7 +28,7 @@ class FrameShare(FindingState):
         self._before = now_ns, part, whole
 
     def update(self, now_ns: int, part: int, whole: int) -> None:
-        """How many of how many frames, since the counters began."""
+        """Take the part and the whole of all frames since the counters began."""
         if self._before is None:
             self._before = now_ns, part, whole
         began_ns, part_before, whole_before = self._before
@@ -43,7 +43,7 @@ class FrameShare(FindingState):
 
 
 def missing_frames() -> FrameShare:
-    """Of frames whose own numbers show that others are missing."""
+    """Make the share of frames whose own numbers show missing ones."""
     return FrameShare(
         0.05,
         "of its frames are missing",
@@ -52,7 +52,7 @@ def missing_frames() -> FrameShare:
 
 
 def saturated_frames() -> FrameShare:
-    """Of frames in which a value is at the end of its range: a hard step now and then is none of them."""
+    """Make the share of frames with a value at the end of its range; hard steps now and then do not count."""
     return FrameShare(
         0.10,
         "of its frames have a cell at the end of its range, so that force reads too low",

@@ -52,5 +52,5 @@ class Inbox(Generic[T]):
         return not self._items
 
     def qsize(self) -> int:
-        """How many are in it."""
+        """Return the number of items."""
         return len(self._items)

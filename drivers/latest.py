@@ -48,7 +48,7 @@ class Latest:
         return (value if now_ns - stamp_ns <= self.stale_after_ns else None), stamp_ns
 
     def stamp_ns(self, index: int) -> int | None:
-        """Of one channel's value, fresh or not."""
+        """Return the time of a channel's value, fresh or not."""
         slot = self._slots[index]
         return None if slot is None else slot[0]
 

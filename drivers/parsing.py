@@ -117,7 +117,7 @@ class FrameScanner(Generic[F]):
         raise NotImplementedError
 
     def _looks_behind(self, start: int) -> int:  # noqa: ARG002 - most do not
-        """How many bytes behind its end the length of the frame at `start` depends on."""
+        """Return the bytes after its end on which the length of the frame at `start` depends."""
         return 0
 
     def _decode(self, raw: bytes) -> F | None:
@@ -187,7 +187,7 @@ class FrameScanner(Generic[F]):
         return True
 
     def _ask(self, start: int) -> None:
-        """How long the frame is that begins at `start`."""
+        """Determine the length of the frame at `start`."""
         length = self._length(self._buffer, start - self._cut)
         if length == IMPOSSIBLE:
             self._close(start)
@@ -276,7 +276,7 @@ class Sequence:
         return False
 
     def _step(self, before: int, number: int) -> int:
-        """How far `number` is ahead of `before`; 0 or negative for a repeated or older one."""
+        """Return the steps from `before` to `number`; 0 or negative for a repeated or older one."""
         step = (number - before) % self._modulus
         return step if step <= self._modulus // 2 else step - self._modulus
 

@@ -60,7 +60,7 @@ class ReaderStalls(FindingState):
         return max(0, listened_ns, now_ns - since_ns - EXCUSED_NS)
 
     def until(self, now_ns: int) -> int:
-        """How often it has stood still, also when it does just now."""
+        """Return the number of stalls, including a present one."""
         passed_ns = self._passed_ns
         return self.times + (passed_ns is not None and now_ns - passed_ns > STOOD_NS)
 

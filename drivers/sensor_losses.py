@@ -35,5 +35,5 @@ class Losses:
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """What is missing."""
+        """Problems of missing frames."""
         return active_findings([self._missing, self._pace])

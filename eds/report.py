@@ -82,7 +82,7 @@ def pdo_rows(description: Description) -> Iterator[PdoRow]:
 
 
 def axes(description: Description) -> int:
-    """How many joints the device can be: axes with the objects that a joint needs."""
+    """Return the number of joints that the device can be: axes with all objects that a joint needs."""
     return sum(
         all(description.has(index + axis * AXIS_OFFSET) for index, _ in JOINT_OBJECTS)
         for axis in range(MAX_AXES)
@@ -122,7 +122,7 @@ def file_value(description: Description, index: int, subindex: int) -> int | Non
 
 
 def ratio(description: Description, index: int, read: Objects | None = None) -> float | None:
-    """Of an object's first entry to its second, as in 608Fh and 6091h; what was `read` of the device counts.
+    """Return the ratio of an object's first two entries, as in 608Fh and 6091h; `read` values come first.
 
     `None` where nobody knows: 1:1 is what drives hold that were never told.
     """

@@ -23,7 +23,7 @@ def size(count: float) -> str:
 
 
 def age(seconds: float | None) -> str:
-    """How old something is."""
+    """Return an age in words."""
     if seconds is None:
         return NONE
     seconds = max(0.0, seconds)  # what came while it was asked for is new

@@ -119,7 +119,7 @@ def _new_key() -> bytes:
 
 
 def _certificate(name: str, key: bytes) -> bytes:
-    """Of a key; both as PEM."""
+    """Make the certificate of a key; both as PEM."""
     settings = _EXTENSIONS.format(name=name).encode("ascii")
     with piped(settings) as read_settings:
         command = ["req", "-x509", "-new", "-key", "/dev/stdin", "-sha256", "-days", str(DAYS)]

@@ -118,7 +118,7 @@ class Service:
         return RecordsFolder(self._config.records).unfinished
 
     def who_is_known(self, known: "KnownClients") -> None:
-        """Who may come in, or what they may, is now this."""
+        """Take the known clients and their permissions after a change."""
         control = cast("ControlModule | None", self.registry.running("control"))
         if control is not None:  # else it looks itself when it starts
             control.who_is_known(known)

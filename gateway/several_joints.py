@@ -144,7 +144,7 @@ class _Spreading:
         self._held = held
 
     def carried(self, source: ParameterInfo, value: Number, joint: str) -> tuple[ParameterInfo, Number]:
-        """Which parameter of the joint takes which value; raises `_Refused`."""
+        """Return the joint's parameter and its value; raises `_Refused`."""
         if joint == source.component:
             self._check(source, value)
             return source, value

@@ -1,4 +1,4 @@
-"""The front door for scripts: `from gwrms import Robot`; `python -m gwrms` is the command.
+"""The public API for scripts: `from gwrms import Robot`; `python -m gwrms` is the command.
 
 The parts of GWRMS have plain names, and Python looks beside a script first: a `gateway.py` there would be
 imported in the place of ours. So ours is imported from beside this package, whatever lies beside the script.

@@ -47,7 +47,7 @@ class DangerContext:
 
     @property
     def astray(self) -> float:
-        """How far the true joint is from where the gait wants it (rad)."""
+        """Deviation of the true joint from the gait (rad)."""
         left, right = self.robot.controller.generator.legs()
         return abs(self.robot.drives[self.on].joint.position - (*left, *right)[self.joint])
 

@@ -47,7 +47,7 @@ class SimulationHost:
 
     @property
     def loop(self) -> Loop:
-        """What runs it, between `open` and `close`."""
+        """The loop that runs it, between `open` and `close`."""
         if self._loop is None:
             raise RuntimeError("open() comes first")
         return self._loop

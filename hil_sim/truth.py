@@ -119,7 +119,7 @@ class TruthFile:
 
 
 def phases(generator: Generator) -> tuple[float | None, float | None]:
-    """Of the left and the right stride; None where nobody steps."""
+    """Return the phases of the left and the right stride; None without steps."""
     if generator.walking == 0.0:
         return None, None
     return generator.leg_phase(LEFT), generator.leg_phase(RIGHT)

@@ -22,6 +22,7 @@ from server_gui.core.archive.archive import Archive
 from server_gui.core.commissioning.commissioning import Commissioning
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.feeds import Feeds, Record
+from server_gui.core.desk.own_load import OwnLoad
 from server_gui.core.desk.shutdown import Shutdown
 from server_gui.core.desk.station import Station
 from server_gui.core.desk.ticks import Ticks
@@ -115,6 +116,7 @@ class App:
         theme: Theme | None = None,
     ) -> None:
         self._garbage = Garbage()
+        self._own_load = OwnLoad()
         self.desk = Desk()
         self._qt = qt
         self._followed: list[Followed] = []
@@ -206,6 +208,7 @@ class App:
         link = CommandLink(network, address, mailbox.put, lambda: self._poster.deliver(station.lost_control))
         is_named = name not in (name_of(str(address)), OWN)
         station = Station(name, str(address), link, self._poster.deliver, self.desk.news, is_named=is_named)
+        station.is_overloaded = self._own_load.is_overloaded
         station.predictions.off = not self._predicts
         station.predictions.foresees = self._foresees
         self._mailboxes[name], self._stations[name] = mailbox, station

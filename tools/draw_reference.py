@@ -37,7 +37,7 @@ def main(argv: list[str]) -> int:
     check = argv == ["--check"]
     found = stale() if check else write()
     for name in found:
-        said = "is not up to date; run ./dev docs" if check else "is drawn anew"
+        said = "is not up to date; run ./dev docs" if check else "is regenerated"
         sys.stderr.write(f"{name} {said}\n")
     return int(check and bool(found))
 

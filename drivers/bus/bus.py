@@ -101,7 +101,7 @@ class CanBus:
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """What is wrong with it, or with who reads it."""
+        """Problems of the bus, or of its reader."""
         return (*self.health.findings, *active_findings((self.standstill,)))
 
     @property
@@ -121,7 +121,7 @@ class CanBus:
 
     @property
     def sent_bytes(self) -> int:
-        """What those frames carried."""
+        """Bytes of those frames."""
         return self._sender.sent_bytes
 
     def start(self) -> None:

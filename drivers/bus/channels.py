@@ -136,7 +136,7 @@ class ObjectChannels:
             self._notes = ()
 
     def problems(self, now_ns: int) -> Iterator[str]:
-        """Which have no value and why, in words with what to check."""
+        """Yield the channels without a value and the reasons, in words with what to check."""
         yield from self._unusable
         yield from self._notes
         with self._lock:

@@ -50,7 +50,7 @@ class BusHealth:
 
     @property
     def state_text(self) -> str | None:
-        """What its controller says about the wire, and what to check; `None` when nothing is wrong."""
+        """The controller's report on the wire, and what to check; `None` if nothing is wrong."""
         words = STATE_WORDS.get(self.state)
         return None if words is None else f"{words}: {_WIRE}"
 

@@ -118,20 +118,20 @@ class Node(BusUser):
 
     @property
     def findings(self) -> tuple[str, ...]:
-        """What an integrator should know about it, in words."""
+        """Notes for the integrator, in words."""
         distrust = self.distrust
         return self._findings if distrust in (None, _NOT_ASKED) else (*self._findings, distrust)
 
     @property
     def trouble(self) -> tuple[Finding, ...]:
-        """What is wrong with its answers and its PDOs, each since when, and what to check."""
+        """Problems of its answers and PDOs, with their start, and what to check."""
         if not self.ready:
             return ()
         return (*self.channel.round_trips.findings, *active_findings(self.arrivals))
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of those who live on it."""
+        """Names of the components on it."""
         return tuple(name for _, name in self._users)
 
     # What users ask.

@@ -52,7 +52,7 @@ class Tpdo:
 
     @property
     def trigger(self) -> str:
-        """What makes the device send it, in words."""
+        """The trigger of its sending, in words."""
         if self.transmission_type <= 240:
             return "on SYNC"
         if self.transmission_type in (252, 253):

@@ -53,7 +53,7 @@ class _Frame:
 
     @property
     def key(self) -> Key:
-        """What a newer urgent frame must share with this one to stand for it."""
+        """The part that a newer urgent frame must share to replace this one."""
         return self.can_id, self.data[:_SDO_HEAD]
 
     def settle(self, taken: bool | Unavailable) -> None:
@@ -241,7 +241,7 @@ class Sender:
         return taken
 
     def _take(self, transport: Transport, *, only_urgent: bool) -> _Frame | None:
-        """Whose turn it is, out of its queue; what is over, or not wanted any more, is not sent."""
+        """Take the next frame out of its queue; frames that are over or unwanted are dropped."""
         with self._lock:
             while self._transport is transport and (self._urgent or (self._normal and not only_urgent)):
                 key = next(iter(self._urgent), None)

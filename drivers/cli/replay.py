@@ -173,7 +173,7 @@ def _beside(file: Path) -> Path:
 
 
 def _seconds(file: Path, size: int, baudrate: int) -> float:
-    """How long the capture took; without its description, as long as a busy line takes."""
+    """Return the length of the capture; without its description, the time that a busy line takes."""
     try:
         return msgspec.json.decode(_beside(file).read_bytes(), type=About).seconds
     except FileNotFoundError:

@@ -95,7 +95,7 @@ class FootCheck:
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """What is wrong, with what to check."""
+        """Problems, with what to check."""
         return active_findings((self._frozen, self._stepped))
 
     def _judge_frozen(self, stamp_ns: int) -> None:
@@ -176,7 +176,7 @@ class FeetCheck(FindingState):
         self._since_ns = 0
 
     def update(self, stamp_ns: int, own_landings: int, others_landings: int) -> None:
-        """How often each foot has landed by `stamp_ns`."""
+        """Take the numbers of both feet's landings by `stamp_ns`."""
         if own_landings != self._own or stamp_ns - self._since_ns > ALONE_S * 1e9:
             if own_landings != self._own:
                 self.clear()

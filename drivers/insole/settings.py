@@ -28,5 +28,5 @@ class InsoleSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw
             raise ValueError(not_a_format(self.format, FORMATS))
 
     def side(self, name: str) -> Foot | None:
-        """Which foot a component of that name is; `None` where nothing says it."""
+        """Return the foot of a component with that name; `None` if it is unknown."""
         return self.foot or foot_in(name)

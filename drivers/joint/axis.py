@@ -25,7 +25,7 @@ class Axis:
         return drive_state(unsigned(self.read(STATUSWORD, 2, timeout_s=timeout_s)))
 
     def error_code(self) -> int:
-        """Of the latest error (603Fh); 0: it tells none."""
+        """Return the code of the latest error (603Fh); 0 if there is none."""
         return unsigned(self.read(ERROR_CODE, 2))
 
     def position(self) -> int:

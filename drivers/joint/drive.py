@@ -114,7 +114,7 @@ class JointDrive(PowerDrive):
         self._watch.compare_with(other.latest)
 
     def quality(self, now_ns: int) -> Quality:
-        """How far the joint's position can be trusted now, and what is wrong in words."""
+        """Return the joint's trust in its position, and its problems in words."""
         state, age_ms = self._freshness.state(now_ns)
         problem = self.node.problem(now_ns)
         implausible: tuple[Finding, ...] = ()

@@ -143,7 +143,7 @@ def _listed(number: Number) -> frozenset[int] | None:
 
 
 def _signed(number: int) -> int:
-    """Of an INTEGER8: some devices answer with four bytes, whatever the object has."""
+    """Return the number of an INTEGER8: some devices answer with four bytes."""
     return (number & 0xFF ^ 0x80) - 0x80
 
 

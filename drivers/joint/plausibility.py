@@ -161,7 +161,7 @@ class JumpCheck(FindingState):
 
 
 def _explained(before: Motion, now: Motion, way: float, step_s: float) -> float:
-    """How far the joint can have gone between two samples by their speeds; `way` is where its position went.
+    """Return the longest way between two samples by their speeds; `way` is the change of the position.
 
     Less than nothing where it went the other way: a drive pulls back what only its encoder has done.
     """
@@ -253,5 +253,5 @@ class JointCheck:
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """What is wrong, with what to check."""
+        """Problems, with what to check."""
         return active_findings(self._own if self.mirror is None else (*self._own, self.mirror))

@@ -40,5 +40,5 @@ class JointSettings(NodeTimes, frozen=True, forbid_unknown_fields=True, kw_only=
 
     @property
     def rad_per_count(self) -> float:
-        """Of the joint; negative where counts fall when it bends."""
+        """Angle of the joint per count; negative if counts fall when it flexes."""
         return self.direction * math.tau / (self.counts_per_revolution * self.gear_ratio)

@@ -137,7 +137,7 @@ def _as_text(description: Description, *, brief: bool) -> Iterator[str]:
 
 
 def _profile_text(description: Description) -> Iterator[str]:
-    """Which profile fits, what this device has of it, and where that stands."""
+    """Yield the matching profile, the device's part of it, and its source."""
     profile = profile_of(description)
     if profile is None:
         yield "  profile     none fits: it is read by its EDS and CiA 402 alone"

@@ -141,7 +141,9 @@ def remove(folder: AccessFolder, name: str) -> None:
             for one in names:
                 _edit(folder, partial(without_entry, table="clients", key=one))
     except KeyProblem as error:
-        raise KeyProblem(f"{name} is let in no more, but its role still stands there: {error}") from error
+        raise KeyProblem(
+            f"{name} is no longer admitted, but its role is still in the file: {error}"
+        ) from error
 
 
 def _without_certificates(folder: AccessFolder, name: str) -> list[str]:

@@ -36,7 +36,7 @@ class Identity(Struct, frozen=True):
         return f"{self.name} [{known}]"
 
     def called(self, peer: str, client: str = "") -> str:
-        """Who that is, in the journal: `client` is only what it says of itself, and spells no identity."""
+        """Return the client's name for the journal: `client` is its own claim, and spells no identity."""
         said = client.replace("[", "(")
         if self.spelled is None:
             return f"{said} ({peer})" if said else peer

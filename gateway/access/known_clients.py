@@ -52,7 +52,7 @@ class Access:
 
 
 def known_in(folder: AccessFolder) -> KnownClients:
-    """Who cannot be read is nobody. Without a role, a client's certificate is a viewer's."""
+    """Read the known clients; unreadable ones are left out. A client without a role is a viewer."""
     table, problems = table_of(folder)
     by_key: dict[str, Identity] = {}
     found: list[bytes] = []

@@ -15,7 +15,7 @@ def number(text: str) -> float:
 
 
 def seconds(text: str) -> float:
-    """How long something is looked at."""
+    """Parse a duration."""
     value = number(text)
     if not 0.1 <= value <= MOST_S:
         raise argparse.ArgumentTypeError(f"{text!r} is no time from 0.1 to {MOST_S:.0f} s")
@@ -23,7 +23,7 @@ def seconds(text: str) -> float:
 
 
 def lines(text: str) -> int:
-    """How many lines are shown."""
+    """Parse a number of lines."""
     if not (text.isascii() and text.isdigit() and int(text) > 0):
         raise argparse.ArgumentTypeError(f"{text!r} is not a number of lines")
     return int(text)

@@ -66,7 +66,7 @@ def line(one: Overrun) -> str:
 
 
 def summary(told: Overruns, seen: list[Overrun]) -> str:
-    """Who was named first, how often, and for how long in all."""
+    """Return the processes most often named, with counts and total times."""
     control = ", ".join(f"{name} ({pid})" for pid, name in told.control.items()) or "none is there"
     head = f"\ncontrol loop: {control}; {told.missed} of {told.cycles} cycles late\n"
     first = Counter(one.instead[0].name for one in seen if one.reason == "others_ran" and one.instead)

@@ -140,7 +140,7 @@ def _check(file: Path, kind: str | None, text: str, tables: Mapping[str, Any], *
 
 
 def recognised(file: Path, tables: Mapping[str, Any]) -> str:
-    """Which kind of file it is: the one that has most of its tables; where none is known, by its name."""
+    """Return the kind of file: the one with most of its tables, else by its name."""
     robot = tables.get("robot")
     keys = {*tables, *(f"robot.{key}" for key in (robot if isinstance(robot, dict) else ()))}
 

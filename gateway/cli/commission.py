@@ -30,13 +30,13 @@ _EPILOG = """\
 example
   gwrms commission exo-01.toml can0 --eds ~/eds --serial /dev/serial/by-id/usb-left --serial …
 
-The joints are moved by hand, without power. What is to be written to a drive is asked for, and read back.
-Only homing, where it is wanted, puts one drive under power: it is told in words before, begins when its
-phrase is typed, and Enter, Ctrl-C or the end of the input stop and disable it. Ctrl-C interrupts; the same
-command goes on where it was, and what is known is kept in FILE.commission until FILE is written.
+You move the joints by hand, without power. Every write to a drive is confirmed by you, and read back. Only
+homing, if you want it, powers a drive: its plan is shown first, it begins with a typed phrase, and Enter,
+Ctrl-C or the end of the input stop and disable it. Ctrl-C interrupts; the same command continues, from
+FILE.commission, which is kept until FILE is written.
 
-With --json, {"moving": …} says that a joint is under power: any line is a STOP then. {"moving": null} comes
-when that is over.
+With --json, {"moving": …} means that a joint is under power: any line is then a STOP. {"moving": null} marks
+the end.
 
 exit status
   0 written, 1 not (interrupted, or something failed), 2 usage

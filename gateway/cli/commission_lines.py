@@ -158,7 +158,7 @@ class JsonFace:
         say_json({"say": written.words})
 
     def steps(self, steps: tuple[CommissionStep, ...]) -> None:
-        """How far it is, where that is another than before."""
+        """Report the progress, if it has changed."""
         if steps != self._steps:
             self._steps = steps
             say_json({"steps": steps})

@@ -11,6 +11,7 @@ import msgspec
 from gateway.amounts import NONE
 from gateway.cli import describe_buses
 from gateway.cli.connect import connect, parser
+from gateway.cli.describe_problems import summary
 from gateway.cli.text import budget, exact, say, say_json, table
 from gateway.client.blocking import Robot
 from gateway.client.held_controllers import HELD, held_channels, holding_channels
@@ -30,17 +31,18 @@ def main(argv: list[str]) -> int:
         "describe",
         "Show a robot's components and buses with their problems, since when and what\n"
         "to check, its channels and their units, its parameters and their limits, and what each drive does\n"
-        "on a stop.",
+        "on a stop. The last line counts the problems and names their places.",
     ).parse_args(argv)
     with connect(arguments, "describe") as robot:
         description, hello = _measured(robot), robot.hello
         names = holding_channels(description)
         values = robot.components(*names).values if names else {}
+    controllers = list(held_channels(description, values))
     if arguments.json:
-        controllers = list(held_channels(description, values))
         say_json(msgspec.to_builtins(description) | {"controllers_held": controllers})
     else:
-        say("\n".join([*_you(hello), *held(description, values), *_chapters(description)]))
+        chapters = [*_you(hello), *held(description, values), *_chapters(description)]
+        say("\n".join([*chapters, summary(description, controllers)]))
     return 0
 
 
@@ -56,7 +58,7 @@ def _measured(robot: Robot) -> Description:
 
 
 def _you(hello: Hello | None) -> Iterator[str]:
-    """Who asks, and what that one may not."""
+    """Yield the client's identity, and its forbidden methods."""
     if hello is not None:
         not_for_you = f"; not for you: {', '.join(hello.refused)}" if hello.refused else ""
         yield textwrap.fill(f"you are {hello.who}{not_for_you}", PAGE, subsequent_indent="  ") + "\n"
@@ -95,7 +97,7 @@ def _chapters(robot: Description) -> Iterator[str]:
 
 
 def _profiles(components: list[ComponentInfo]) -> Iterator[str]:
-    """Which of them are known beside their EDS, and as what."""
+    """Yield the components with a product profile, and its name."""
     known: dict[str, list[str]] = {}
     for part in components:
         profile = part.device.get("profile") if isinstance(part.device, dict) else None
@@ -135,7 +137,7 @@ def _parameter(info: ParameterInfo) -> tuple[str, ...]:
 
 
 def _read_only(parameters: list[ParameterInfo]) -> Iterator[str]:
-    """How many more there are to be read."""
+    """Yield the numbers of further parameters, which can only be read."""
     more = Counter(parameter.component for parameter in parameters if parameter.read_only is not None)
     for component, count in more.items():
         yield f"{component}: {count} more, read-only (gwrms get '{component}.*')\n"

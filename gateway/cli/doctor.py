@@ -1,4 +1,4 @@
-"""`gwrms doctor`: what is wrong with a robot, by which figures, and what mends it."""
+"""`gwrms doctor`: what is wrong with a robot, with evidence and fixes."""
 
 import argparse
 import sys
@@ -23,26 +23,26 @@ from gateway.doctor.verdicts import Finding
 from gateway.tables.finding import lines, mistakes
 
 DESCRIPTION = """\
-Finds what is wrong with a robot: by its file, its buses, its sensors and its computer, through its gateway
-where one runs. Each finding is named with the figures that it goes by and with what mends it, the likeliest
-first; what could not be judged is said too, with why. Nothing is ever enabled or moved.
+Find mistakes of a robot: in its file, on its buses, of its sensors and its computer, through its gateway if
+one runs. Each finding has its figures and its remedies, the likeliest first; checks without data are listed,
+with the reason. Nothing is ever enabled or moved.
 """
 EPILOG = """\
-While the robot walks for 20 s, joints and insoles are judged too: one leg beside the other, and both beside
-how people walk. Standing still, only what devices, bus and computer say is judged.
+If the robot walks for the 20 s, joints and insoles are judged too: one leg is compared with the other, and
+both with normal gait. Standing still, only devices, bus and computer are judged.
 
-Where no gateway answers, the robot is looked at as a silent one: buses and sensors are listened to, and not
-one frame is sent. With --active, devices that nobody else asks are asked by SDO; nothing is written.
+If no gateway answers, the command only listens to buses and sensors, and sends no frame. With --active, it
+also queries by SDO the devices that no other client uses; nothing is written.
 
-exit status: 0 nothing wrong was found; 1 findings, mended or not (ask again); 2 nothing could be judged, or
+exit status: 0 nothing wrong was found; 1 findings, fixed or not (run it again); 2 nothing could be judged, or
 wrong usage
 
 examples
-  gwrms doctor /etc/gwrms/robot.toml                   through its gateway, else as a silent robot
+  gwrms doctor /etc/gwrms/robot.toml                   through its gateway; without one, only listen
   gwrms doctor robot.toml --seconds 40 --json
-  gwrms doctor robot.toml --active                     no gateway runs: ask the devices too
+  gwrms doctor robot.toml --active                     no gateway runs: query the devices too
   gwrms doctor robot.toml --robot exo:7420             from a desk: without its buses and its computer
-  gwrms doctor robot.toml --fix                        ask for each thing that is safe to mend, and mend it
+  gwrms doctor robot.toml --fix                        apply safe fixes, asking for each
 """
 NOTHING = 2
 LOOPBACK = ("127.0.0.1", "::1", "localhost")
@@ -80,7 +80,7 @@ def _asked(options: argparse.Namespace) -> int:
     if found.config is None:
         warn(
             "doctor",
-            f"the file must be mended first (gwrms check):\n{lines(options.file, mistakes(found.findings))}",
+            f"correct the file first (gwrms check):\n{lines(options.file, mistakes(found.findings))}",
         )
         return NOTHING
     return _examined(found.config, options)
@@ -116,7 +116,7 @@ def _is_here(options: argparse.Namespace) -> bool:
 
 
 def _gateway(config: RobotConfig, options: argparse.Namespace) -> Address | None:
-    """Whom to ask: the gateway that is named, else the file's own."""
+    """Return the gateway to ask: the one that is named, else the file's own."""
     if options.silent:
         return None
     return options.robot or Address("127.0.0.1", config.gateway.port)
@@ -126,29 +126,29 @@ def _mend(
     config: RobotConfig, gateway: Address | None, found: Sequence[Finding], options: argparse.Namespace
 ) -> None:
     """Ask for each finding's likeliest fix, where it is ours to do, and do it."""
-    mended = 0
+    fixed = 0
     with ExitStack() as ending:
         mender = Mender(config, _robot(gateway, ending), here=_is_here(options))
         for finding in found:
-            mended += _mended(mender, finding, found, yes=options.yes)
+            fixed += _fixed(mender, finding, found, yes=options.yes)
     if found:
-        say(f"{mended} of {counted(len(found), 'finding')} mended\n")
+        say(f"{fixed} of {counted(len(found), 'finding')} fixed\n")
 
 
-def _mended(mender: Mender, finding: Finding, others: Sequence[Finding], *, yes: bool) -> bool:
+def _fixed(mender: Mender, finding: Finding, others: Sequence[Finding], *, yes: bool) -> bool:
     fix = finding.fixes[0]
     if not mender.can(fix):
         return False
     why_not = mender.objection(finding, fix, [one for one in others if one is not finding])
     if why_not is not None:
-        warn("doctor", f"not mended: {finding.about}: {finding.words}: {why_not}")
+        warn("doctor", f"not fixed: {finding.about}: {finding.words}: {why_not}")
         return False
-    if not ask(f"{finding.about}: {finding.words}\n{fix.words}\nmend it?", yes=yes):
+    if not ask(f"{finding.about}: {finding.words}\n{fix.words}\napply this fix?", yes=yes):
         return False
     try:
         say(f"{mender.mend(finding, fix)}\n")
     except NotMended as error:
-        warn("doctor", f"not mended: {finding.about}: {error}")
+        warn("doctor", f"not fixed: {finding.about}: {error}")
         return False
     return True
 

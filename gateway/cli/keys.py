@@ -158,7 +158,7 @@ def _name(folder: AccessFolder, wished: str) -> str:
 
 def _role() -> Role:
     """Asked for until it is one, or nothing."""
-    while said := _asked(f"Its role ({', '.join(Role)}; nothing: it is not let in): "):
+    while said := _asked(f"Its role ({', '.join(Role)}; leave empty to refuse): "):
         if said in list(Role):
             return Role(said)
         warn("keys", f"{said!r} is no role")
@@ -202,7 +202,7 @@ def revoke(argv: list[str]) -> int:
     arguments = made.parse_args(argv)
     _, folder = _robot(arguments)
     changes.remove(folder, arguments.name)
-    say(f"{arguments.name} is let in no more; what it had on trial is taken back.\n")
+    say(f"{arguments.name} is no longer admitted; its trials are reverted.\n")
     return 0
 
 

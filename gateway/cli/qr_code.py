@@ -93,7 +93,7 @@ def format_bits(mask: int) -> int:
 
 
 def penalty(code: Modules) -> int:
-    """How much there is in it that looks like something else (§7.8.3.1)."""
+    """Return the penalty of patterns that look like something else (§7.8.3.1)."""
     rows = ["".join("01"[module] for module in row) for row in code]
     rows += ["".join(column) for column in zip(*rows, strict=True)]
     runs = sum(map(_run_penalty, rows))
@@ -160,7 +160,7 @@ def _drawn(version: int, codewords: bytes, mask: int) -> Modules:
 
 
 def _format_places(size: int) -> Iterator[tuple[int, int]]:
-    """Of both copies, the highest bit first (figure 25)."""
+    """Yield the places of both copies, the highest bit first (figure 25)."""
     beside = (0, 1, 2, 3, 4, 5, 7, 8)
     yield from ((8, column) for column in beside)
     yield from ((row, 8) for row in reversed(beside[:-1]))

@@ -22,7 +22,7 @@ class Address:
 
     @property
     def path(self) -> str | None:
-        """Of its Unix socket."""
+        """The path of its Unix socket."""
         return self.host if "/" in self.host else None
 
     @classmethod

@@ -23,7 +23,7 @@ class Backoff:
         self._next_s = self._first_s
 
     def next_s(self) -> float:
-        """How long to wait now, in seconds."""
+        """Return the next pause in seconds."""
         wait_s = self._next_s
         self._next_s = min(2 * wait_s, self._longest_s)
         return wait_s * (1.0 - 0.5 * self._jitter())

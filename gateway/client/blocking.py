@@ -78,7 +78,7 @@ class Robot:
 
     @property
     def hello(self) -> Hello | None:
-        """Who this program is on the robot, and what it may not; None before the first greeting."""
+        """Identity and permissions of this program on the robot; None before the first greeting."""
         return self._client.link.hello
 
     def describe(self) -> Description:

@@ -67,7 +67,7 @@ def pin_of(address: Address) -> str | None:
 
 
 def pins() -> set[str]:
-    """Of all robots that this desk has paired with; raises `OSError` or `ValueError` as the file is."""
+    """Return the pins of all paired robots; raises `OSError` or `ValueError` on a bad file."""
     return {pin for pin, _ in _robots(server_file())}
 
 

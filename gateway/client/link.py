@@ -138,7 +138,7 @@ class Link:
 
     @property
     def received_bytes(self) -> int:
-        """What the robot has sent over all connections, whatever became of it."""
+        """Bytes received over all connections."""
         return self._received_bytes + (self._connection.received_bytes if self._connection else 0)
 
     async def call(self, method: Method[P, R], params: P, timeout_s: float | None = None) -> R:

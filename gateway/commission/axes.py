@@ -39,7 +39,7 @@ def axes_of(told: Mapping[int, NodeAnswers]) -> tuple[Axis, ...]:
 
 
 def state(bench: Bench, axis: Axis) -> DriveState | None:
-    """Of its state machine; `None` where nobody knows. Raises `DriverError`."""
+    """Return the axis's state; `None` if unknown. Raises `DriverError`."""
     data = bench.read(axis.node, axis.index(STATUSWORD))
     return None if data is None else drive_state(unsigned(data))
 
@@ -50,7 +50,7 @@ def powered(bench: Bench, axes: Sequence[Axis]) -> tuple[Axis, ...]:
 
 
 def counts(bench: Bench, axis: Axis) -> int | None:
-    """Of its encoder, now; `None` where it has no position. Raises `DriverError`."""
+    """Return the encoder's count; `None` if the axis has no position. Raises `DriverError`."""
     data = bench.read(axis.node, axis.index(POSITION))
     return None if data is None else int.from_bytes(data[:4], "little", signed=True)
 

@@ -19,7 +19,7 @@ _OBJECT = re.compile(r"0x[0-9A-Fa-f]{4}:(0x[0-9A-Fa-f]{1,2}|[0-9]{1,3})")
 
 
 def controller(draft: Draft, library: Library, told: Mapping[int, NodeAnswers]) -> Talk[None]:
-    """Which node it is, by which object it is stopped; without one a stop tells the drives only."""
+    """Ask for the controller's node and stopping object; without one, a stop reaches only the drives."""
     if draft.value("gateway", "role") != OBSERVER or draft.has(CONTROLLER, "value"):
         return
     others = {node: one for node, one in told.items() if not one.axes}
@@ -35,13 +35,13 @@ def _which(draft: Draft, others: Mapping[int, NodeAnswers]) -> Talk[int | None]:
     names = ", ".join(f"{node} ({one.name or 'without a name'})" for node, one in sorted(others.items()))
     choice = yield from choose(
         "Which node commands the drives, so that a STOP can tell it too? "
-        f"Beside the drives here are: {names or 'no others'}. {NONE}: it is no node, or not here now",
+        f"Beside the drives here are: {names or 'no others'}. {NONE}: not a CAN node, or not connected",
         (*map(str, sorted(others)), NONE),
         NONE,
     )
     if choice == NONE:
         yield Say(
-            "A STOP will tell the drives only, and what commands them goes on: gwrms check warns of it."
+            "A STOP will reach the drives only, and what commands them goes on: gwrms check warns of it."
         )
         draft.put(CONTROLLER, "value", None, "nobody named one")
         return None

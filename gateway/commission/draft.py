@@ -63,7 +63,7 @@ class Draft:
     """Values by table and key, as `("joint.left_knee", "node_id")`; any that is there is not asked again."""
 
     def __init__(self, file: Path, *, go_on: bool = True) -> None:
-        """Of the robot's file `file`, from where it was left; without `go_on` from nothing.
+        """Open the draft of the robot's file `file`, to continue it; without `go_on` a new one.
 
         Raises:
             SettingsError: what was left cannot be read.

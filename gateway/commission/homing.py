@@ -181,7 +181,7 @@ def _settings(draft: Draft, known: HomingBasis) -> JointSettings:
 def _new_zero(
     draft: Draft, bench: Bench, known: HomingBasis, method: int, outcome: PoweredRunResult
 ) -> Talk[Scale]:
-    """Of the joint where the drive counts 0: as it stood, or by a known angle where it may have moved."""
+    """Determine the joint's zero: as the drive counted, or by a known angle if it may have moved."""
     joint, scale = known.joint, known.scale
     offset = yield from answered(lambda: option(bench, known.axis, HOME_OFFSET, 4))
     if _is_there(known, method, outcome, offset) and outcome.before is not None and outcome.after is not None:

@@ -125,7 +125,7 @@ def _position(bench: Bench, axis: Axis) -> int:
 
 
 def planned(bench: Bench, known: HomingBasis, method: int) -> Talk[HomingLimits | None]:
-    """How far, how fast; `None` where its speed cannot be set."""
+    """Plan the limits; `None` if the speed cannot be set."""
     lag = LAG * known.counts_per_turn / math.tau
     if not METHODS[method].moves:
         ends = [known.counts_at(known.angle + by) for by in (-STILL, STILL)]

@@ -113,7 +113,7 @@ def which_drive(draft: Draft, bench: Bench, joint: str, axes: Sequence[Axis]) ->
 
 
 def _moved(before: Mapping[Axis, int | None], after: Mapping[Axis, int | None]) -> dict[Axis, int]:
-    """How far each has counted that has a position."""
+    """Return the counted way of each axis with a position."""
     return {
         axis: abs(nearest(now, was) - was)
         for axis, was in before.items()
@@ -245,7 +245,7 @@ def _keep(draft: Draft, joint: str, found: Scale, first: HeldPose, second: HeldP
 
 
 def limits(draft: Draft, bench: Bench, joint: str, axis: Axis, scale: Scale) -> Talk[None]:
-    """How far it goes by hand, less a margin, as a rule of the guard."""
+    """Ask for the joint's limits by hand; they become a rule of the guard, less a margin."""
     rule = f"guard.rule.{joint}_range"
     if draft.has(rule, "max"):
         return
@@ -316,7 +316,7 @@ def ratings(draft: Draft, bench: Bench, joint: str, axis: Axis, gear: float) -> 
 
 
 def _rated_torque_nm(draft: Draft, node: int) -> float:
-    """Of one count of 6076h: 1 mN·m (CiA 402-2), where the device's profile knows no other."""
+    """Return the torque of one count of 6076h: 1 mN·m (CiA 402-2), unless the product's profile differs."""
     file = draft.value(f"node.{node}", "eds")
     profile = None if file is None else profile_of(eds.load(eds.locate(file, draft.file), node))
     return 0.001 if profile is None else profile.rated_torque_nm

@@ -62,7 +62,7 @@ def _line(node: int, told: NodeAnswers | str) -> str:
 
 
 def role(draft: Draft, found: ScanResult) -> Talk[None]:
-    """Who leads the bus; who was heard to lead it counts more than what was chosen before."""
+    """Ask for the bus's master; an observed master takes precedence over an earlier choice."""
     reasons = list(found.traffic.master())
     if reasons and draft.value("gateway", "role") != OBSERVER:
         draft.put("gateway", "role", OBSERVER, f"another controller leads the bus: {', '.join(reasons)}")

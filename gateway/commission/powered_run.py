@@ -43,7 +43,7 @@ class PoweredRunResult:
 
     @property
     def text(self) -> str:
-        """Of the drive now."""
+        """State of the drive in words."""
         if self.off:
             return f"the drive is stopped and disabled, as its statusword says ({self.state})"
         return f"the drive has NOT confirmed that it is disabled ({self.state}): press the emergency stop"

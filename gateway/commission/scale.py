@@ -48,12 +48,12 @@ def problem(first: HeldPose, second: HeldPose) -> str | None:
 
 
 def counts_per_turn(first: HeldPose, second: HeldPose) -> float:
-    """Of the joint, as measured; negative where counts fall while the angle rises."""
+    """Return the joint's measured counts per turn; negative if counts fall while the angle rises."""
     return (second.counts - first.counts) / (second.angle - first.angle) * math.tau
 
 
 def disagreement(measured: float, nominal: Nominal) -> float | None:
-    """How many times what the drive says was measured; `None` where both agree, or it says nothing."""
+    """Return the ratio of measured to nominal counts; `None` if both agree, or none are known."""
     if nominal.counts_per_revolution is None or nominal.gear_ratio is None:
         return None
     ratio = abs(measured) / (nominal.counts_per_revolution * nominal.gear_ratio)
@@ -92,6 +92,6 @@ def with_zero(scale: Scale, angle_there: float, counts: int) -> Scale:
 
 
 def angle(scale: Scale, counts: int) -> float:
-    """Of the joint (rad) where its encoder counts so."""
+    """Return the joint's angle (rad) at a count of its encoder."""
     turns = counts / (scale.counts_per_revolution * scale.gear_ratio)
     return scale.direction * turns * math.tau + scale.zero_offset

@@ -34,7 +34,7 @@ class SerialBench(Protocol):
     def sensor(self, port: str) -> Sensor: ...
 
     def loads(self, insoles: Sequence[Sensor]) -> dict[str, float]:
-        """How far the load on each has moved in a second or two, by port; no unit is promised."""
+        """Return the change of each insole's load in a second or two, by port; in any unit."""
         ...
 
     def up(self, imu: Sensor) -> Vector:

@@ -1,6 +1,6 @@
 """STOP while a robot is commissioned: quick stop to every drive that is known, and what each confirms.
 
-Like every stop it can enable nothing (`drivers.joint.commands`). It is software, no emergency stop.
+Like every stop it can enable nothing (`drivers.joint.commands`). It is software, not an emergency stop.
 """
 
 from collections.abc import Iterable, Iterator, Mapping

@@ -78,7 +78,7 @@ def _tables(draft: Draft) -> Iterator[str]:
 
 
 def _controller(draft: Draft) -> Iterator[str]:
-    """Who commands the drives, and what stops it."""
+    """Yield the table of the controller that commands the drives, and of its stop."""
     if draft.value(CONTROLLER, "value") is not None:
         node = draft.value(CONTROLLER, "node_id")
         device = {

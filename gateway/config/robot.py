@@ -133,7 +133,7 @@ class RobotConfig(Struct, frozen=True, kw_only=True):
     digest: str = ""  # of all that the file says, whatever its comments and order
 
     def names(self, *tables: str) -> list[str]:
-        """Of the tables of these kinds, also those that could not be read."""
+        """Return the names in tables of these kinds, including unreadable ones."""
         return [name for table in tables for name in (*getattr(self, table), *self.lost.get(table, ()))]
 
     def node_of(self, component: str) -> Node:

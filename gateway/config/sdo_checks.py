@@ -79,7 +79,7 @@ class _Bus:
             self._users[cob_id] = where
 
     def _why_not(self, cob_id: int) -> str | None:
-        """Whose it is already, in words."""
+        """Return the present use of an identifier, in words."""
         user = self._users.get(cob_id)
         if user is not None:
             return f"is used by {user}"

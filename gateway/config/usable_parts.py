@@ -31,7 +31,7 @@ def remains(config: RobotConfig, mistakes: Iterable[Finding]) -> RobotConfig:
 
 
 def _right(config: RobotConfig, table: str, wrong: set[str]) -> dict[str, Any]:
-    """Of the tables of a kind those in which nothing is wrong, nor in a table within."""
+    """Return the tables of a kind without mistakes, in nested tables too."""
     names = {name: header(table, name).strip("[]") for name in getattr(config, table)}
     return {
         name: getattr(config, table)[name]

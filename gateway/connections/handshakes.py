@@ -116,7 +116,7 @@ class Handshakes:
             self._running.append(_Handshake(self, self._loop, connection, peer, self._context))
 
     def _drop_silent(self) -> bool:
-        """Of those that wait, one that says nothing goes; false where each does."""
+        """Drop one silent connection of those that wait; return false if there is none."""
         for address, came in self._waiting.items():
             if _is_silent(came[0][0]):
                 came.popleft()[0].close()

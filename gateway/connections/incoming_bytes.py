@@ -175,7 +175,7 @@ class IncomingBytes:
         return not self._account.settle() and self._began
 
     def _take_turn(self) -> None:
-        """Of those that are not known, or had no time: together they keep nobody else waiting."""
+        """Read as an unknown client, or one without time left: together they delay nobody else."""
         self._waits = False
         if not (self._ended or self._closed):
             self._front.watch(self.socket, READ, self._on_ready)

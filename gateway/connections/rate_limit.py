@@ -23,14 +23,14 @@ class RateLimit(TimeSharing):
         self._known_turn, self._known_until_ns = -1, 0
 
     def has_time_for_known(self) -> bool:
-        """Of this turn: of its own, so that neither takes it from the others."""
+        """Return whether this turn's own time for known clients is left."""
         now_ns = time.monotonic_ns()
         if self._known_turn != self._loop.turns:
             self._known_turn, self._known_until_ns = self._loop.turns, now_ns + TURN_NS
         return now_ns < self._known_until_ns
 
     def rest_s(self, spent_ns: int) -> float:
-        """How long who has cost so much is left alone."""
+        """Return the pause of a client with such a cost."""
         return min(LONGEST_REST_S, max(PACE_S, PACE_FACTOR * (self.resting + 1) * spent_ns / 1e9))
 
 

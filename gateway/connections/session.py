@@ -140,7 +140,7 @@ class Session:
 
     @property
     def waiting_bytes(self) -> int:
-        """Of answers and streams that the client has not taken."""
+        """Bytes of answers and streams that the client has not read."""
         return self._output_bytes
 
     @property

@@ -1,4 +1,4 @@
-"""Mending, one thing at a time: a line of the robot's file, or an object through the gateway's own writes.
+"""Fixing, one thing at a time: a line of the robot's file, or an object through the gateway's own writes.
 
 What is begun, and what came of it, is written down beside the robot's journal.
 """
@@ -52,7 +52,7 @@ class Mender:
         if about & self._edited:
             return "it was judged by a line that has changed since: start the gateway again, then ask again"
         if (cause := self._cause(finding, fix, about, others)) is not None:
-            return f"mend that first, then ask again: {cause.about}: {cause.words} ({cause.rule})"
+            return f"fix that first, then run gwrms doctor again: {cause.about}: {cause.words} ({cause.rule})"
         if isinstance(fix, Write):
             return self._objection_to_writing()
         return None if self._here else "this file is a copy: change the robot's own, on its computer"
@@ -101,7 +101,7 @@ class Mender:
     def _edit(self, edits: tuple[Edit, ...]) -> str:
         change(self._config.path, edits)
         self._edited |= {edit.name for edit in edits}
-        return f"{self._config.path} changed: a gateway takes it when it is started again, or wakes from rest"
+        return f"{self._config.path} changed: takes effect when the gateway restarts, or wakes from rest"
 
     def _write(self, fix: Write) -> str:
         if self._robot is None:

@@ -145,7 +145,7 @@ def percentile(values: Sequence[float], share: float) -> float:
 
 
 def span(values: Sequence[float]) -> float:
-    """How far it goes, without its outliers."""
+    """Return the range of the values, without outliers."""
     return percentile(values, 0.95) - percentile(values, 0.05)
 
 

@@ -55,7 +55,7 @@ class Samples:
 
     @property
     def seconds(self) -> float:
-        """How long they are."""
+        """Length of the observation."""
         return self.period_s * max((len(column) for column in self.columns.values()), default=0)
 
 

@@ -1,4 +1,4 @@
-"""The doctor's bill: for people in a page, for machines as an object."""
+"""The doctor's report: for people as a page, for machines as an object."""
 
 import textwrap
 from collections.abc import Iterator, Sequence
@@ -35,7 +35,7 @@ def as_text(verdicts: Sequence[Verdict]) -> Iterator[str]:
         yield f"{number}. {finding.about}: {finding.words} ({finding.rule})"
         yield from (f"{INDENT}{text}" for text in finding.evidence)
         for place, fix in enumerate(finding.fixes):
-            yield f"{INDENT}{'mend:' if not place else 'or:  '} {fix.words}"
+            yield f"{INDENT}{'fix:' if not place else 'or: '} {fix.words}"
         yield ""
     grouped: dict[tuple[str, str], list[str]] = {}
     for one in unknowns(verdicts):
@@ -46,7 +46,7 @@ def as_text(verdicts: Sequence[Verdict]) -> Iterator[str]:
             yield from _wrapped(f"{rule}, {', '.join(about)}: {why}")
         yield ""
     if names := well(verdicts):
-        yield "well:"
+        yield "no problem found:"
         yield from _wrapped(", ".join(names))
         yield ""
     yield summary(verdicts)
@@ -55,7 +55,8 @@ def as_text(verdicts: Sequence[Verdict]) -> Iterator[str]:
 def summary(verdicts: Sequence[Verdict]) -> str:
     wrong, unknown = findings(verdicts), {one.rule for one in unknowns(verdicts)}
     told = counted(len(wrong), "finding") if wrong else "nothing wrong was found"
-    return f"{told}, {len(well(verdicts))} of {len(RULES)} well, {len(unknown)} not judged everywhere"
+    passed = f"{len(well(verdicts))} of {counted(len(RULES), 'check')} passed"
+    return f"{told}; {passed}, {len(unknown)} could not be completed"
 
 
 def as_json(verdicts: Sequence[Verdict]) -> dict[str, Any]:

@@ -110,7 +110,7 @@ Fix = Edit | Together | Write | Run | Advice
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing that is wrong: with what, by which figures, and what mends it, the likeliest first."""
+    """A problem: where it is, its evidence and its fixes, the likeliest first."""
 
     rule: str
     about: str

@@ -200,7 +200,7 @@ def _joined(rule: GuardRule, wire: Wire, parts: Sequence[Part], coming_ns: int =
 
 
 def _ask(node: "Node", watcher: LevelWatcher, sdo: "SdoChannel") -> None:
-    """How long an answer takes; a refusal is one too. In the worker of a node, whose coming up goes first."""
+    """Measure the time of an answer, refusals included. In a node's worker, after its boot-up."""
     if not node.ready:
         return
     asked_ns = time.monotonic_ns()

@@ -51,7 +51,7 @@ class Wiring:
         yield from made or [self._wire.unseen(self.rule, NOBODY, f"has no {missing}")]
 
     def _names(self) -> list[str]:
-        """Of what this rule watches each, there or not."""
+        """Return the names of this rule's inputs, there or not."""
         kinds, wanted = WATCHES[self.rule.watch].kinds, self.rule.on or ("*",)
         if isinstance(self.rule, SymmetryRule):
             wanted = (self.rule.left,)

@@ -82,7 +82,7 @@ class Test:
 
     @property
     def left(self) -> Path:
-        """What is to be put back where it is cut off."""
+        """File of the values to be restored after an interruption."""
         return self.records.folder.joint_test
 
     def tell(self, what: str, **details: object) -> None:
@@ -91,7 +91,7 @@ class Test:
 
     @property
     def phrase(self) -> str:
-        """What is to be typed."""
+        """The phrase to be typed."""
         wide = f"{self.joint} by {math.degrees(self.wish.amplitude):g} deg"
         return f"move {wide} with {self.wish.torque:g} Nm" if self.wish.kind.by_torque else f"move {wide}"
 

@@ -81,5 +81,5 @@ def _value(data: bytes, kind: DataType | None) -> int | str:
 
 
 def name_of(index: int, subindex: int) -> str:
-    """Of an object, as in `Parameters`."""
+    """Return the name of an object, as in `Parameters`."""
     return f"0x{index:04X}:{subindex}"

@@ -51,7 +51,7 @@ class Unfinished(msgspec.Struct, frozen=True):
 
     @property
     def words(self) -> str:
-        """What it may have left, where it was cut off."""
+        """The changes that an interrupted test may have left, in words."""
         left = ", ".join(f"{one.name} {one.written} instead of {one.before}" for one in self.changes)
         return (
             f"the test of the {words(self.joint)} that {self.who} began at {self.began} was cut off, and may "

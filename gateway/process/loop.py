@@ -114,7 +114,7 @@ class Loop:
         return timer
 
     def _forget_cancelled(self) -> None:
-        """Who sets a timer anew again and again leaves no more of them than there are others."""
+        """Remove cancelled timers, so that they never outnumber the others."""
         self._timers = [one for one in self._timers if one[2].callback is not None]
         heapq.heapify(self._timers)
         self._many = max(FEW_TIMERS, 2 * len(self._timers))

@@ -28,7 +28,7 @@ class RecordsFolder:
 
     @property
     def joint_test(self) -> Path:
-        """What a test of a joint changes in its drive, while it is under way or after it was cut off."""
+        """File of a joint test's changes to its drive."""
         return self.path / "joint-test.json"
 
     @property

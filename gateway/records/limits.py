@@ -73,7 +73,7 @@ class _Account:
         self.size -= size
 
     def wait_s(self, size: int) -> float:
-        """How long until there is room."""
+        """Return the time until there is room."""
         return max((1 - self.entries) / ENTRIES_A_SECOND, (size - self.size) / BYTES_A_SECOND, 0.0)
 
 
@@ -123,7 +123,7 @@ class Limits:
         return [self._left_out.pop(whose).entry(whose) for whose in due]
 
     def patience_s(self, now_ns: int) -> float | None:
-        """How long until something is to be summed up; `None` where there is nothing."""
+        """Return the time until the next summary; `None` without one."""
         due = min((left.due_ns for left in self._left_out.values()), default=None)
         return None if due is None else max(0, due - now_ns) / 1e9
 
@@ -163,7 +163,7 @@ class Limits:
 
 
 def client(who: str) -> str:
-    """Who it is without its port: the same program has another one with each connection."""
+    """Return the client without its port, which changes with each connection."""
     return _PORT.sub(r"\1", who)
 
 

@@ -112,7 +112,7 @@ class UndoFile:
             log.error("the undo file cannot be written: %s", error)
 
     def leave(self, write: int, left: Iterable[UndoChange]) -> None:
-        """Of a write, only these are still to be taken back, as far as they were; its trial has ended."""
+        """Keep only these of a write to be reverted; its trial has ended."""
         undo = self._undos.get(write)
         names = {change.parameter for change in left}
         rest = tuple(one for one in undo.changes if one.parameter in names) if undo is not None else ()

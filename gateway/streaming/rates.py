@@ -29,6 +29,6 @@ class Rates:
         return None if rate is None else round(rate, 1)
 
     def percent(self, counter: Hashable, spent_ns: int) -> float | None:
-        """Of a counter of nanoseconds: its share of the time."""
+        """Return a counter of nanoseconds as a share of the time."""
         rate = self(counter, spent_ns)
         return None if rate is None else round(rate / 1e7, 3)

@@ -210,7 +210,7 @@ def _parts(value: Any, kind: Any) -> Iterator[tuple[str, Any, Any]]:
 
 
 def _struct_of(kind: Any) -> type[Struct] | None:
-    """Of which structs it is a list."""
+    """Return the struct of a list of structs."""
     for one in _leaves(kind):
         if typing.get_origin(one) in (tuple, list):
             entry = typing.get_args(one)[0]

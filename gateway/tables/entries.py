@@ -82,7 +82,7 @@ def _parsed(text: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except (ValueError, RecursionError) as error:
-        raise NoSuchLine(f"it is no TOML ({error}): mend it first") from error
+        raise NoSuchLine(f"it is not TOML ({error}): correct it first") from error
 
 
 def _value(value: str | dict[str, str]) -> str:

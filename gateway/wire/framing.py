@@ -139,7 +139,7 @@ Line = bytes | BadLine | StopRequest
 
 
 def size(line: Line) -> int:
-    """How many bytes of it are kept."""
+    """Return the number of its bytes in memory."""
     return len(line) if isinstance(line, bytes) else 0
 
 

@@ -11,7 +11,7 @@ Fits = Callable[[int, int, str], bool]  # index, sub-index, name
 
 
 def fitting(search: str) -> Fits:
-    """Which objects a search means: see `ObjectListParams`."""
+    """Return the function that tells which objects a search selects: see `ObjectListParams`."""
     text = search.strip().lower()
     if text.startswith("0x") and text.endswith("*"):
         prefix = text[2:-1]

@@ -40,7 +40,7 @@ class Hello(Struct, frozen=True):
 
     @property
     def who(self) -> str:
-        """Who the client is there, and as what."""
+        """The client's identity and role there, in words."""
         return f"{self.identity or 'whoever is on its computer'}, as {self.role}"
 
 

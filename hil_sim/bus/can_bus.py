@@ -189,7 +189,7 @@ class CanBus:
                 receive(frame, sender)
 
     def _route(self, key: int) -> tuple[tuple[object, Receiver], ...]:
-        """Who takes frames of an identifier; found once, until somebody comes, goes or filters otherwise."""
+        """Find the receivers of an identifier; once, until a participant or filter changes."""
         filters = self._filters
         route = self._routes[key] = tuple(
             (participant, receive)

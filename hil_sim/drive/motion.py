@@ -121,7 +121,7 @@ class _Track:
         return self._left_s <= 0.0
 
     def _share(self, dt: float) -> float:
-        """How much of the way that is left belongs to this step."""
+        """Return this step's share of the remaining way."""
         share = dt / self._left_s if self._left_s > 1.5 * dt else 1.0
         self._left_s = self._left_s - dt if share < 1.0 else 0.0
         return share

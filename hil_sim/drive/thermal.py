@@ -20,7 +20,7 @@ class Thermal:
 
     @property
     def peak_share(self) -> float:
-        """How much of the current above the rated one is allowed (0 … 1)."""
+        """Allowed share of the current above the rated one (0 … 1)."""
         return min(max((1.0 - self.load) / (1.0 - _FULL_PEAK_UNTIL), 0.0), 1.0)
 
     @property

@@ -69,7 +69,7 @@ class Number:
 
     @property
     def facts(self) -> dict[str, Value]:
-        """What a program has to know to write it."""
+        """Facts that a program needs to set it."""
         bounds: dict[str, Value] = {"default": self.default, "min": self.low, "max": self.high}
         return bounds | {"unit": self.unit, "what": self.what}
 
@@ -94,7 +94,7 @@ class FolderName:
 
     @property
     def facts(self) -> dict[str, Value]:
-        """What a program has to know to write it."""
+        """Facts that a program needs to set it."""
         return {"default": self.default, "what": self.what}
 
     def show(self, value: Value) -> str:
@@ -152,7 +152,7 @@ class Fault:
 
     @property
     def facts(self) -> dict[str, object]:
-        """What a program has to know to ask for it."""
+        """Facts that a program needs to inject it."""
         params = {key: parameter.facts for key, parameter in self.parameters.items()}
         return {"on": self.on.value, "looks": self.looks, "momentary": self.momentary, "params": params}
 

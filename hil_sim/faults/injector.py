@@ -49,7 +49,7 @@ class Faults:
 
     @property
     def active(self) -> list[Active]:
-        """What is on, oldest first."""
+        """Active faults, oldest first."""
         return [running.shown for running in self._running.values()]
 
     def begin(

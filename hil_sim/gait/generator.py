@@ -144,7 +144,7 @@ class Generator:
 
     @property
     def phase(self) -> float:
-        """Of the left stride, 0 … 1, heel strike is 0."""
+        """Phase of the left stride, 0 … 1, heel strike is 0."""
         return self._rhythm.phase
 
     @property
@@ -159,7 +159,7 @@ class Generator:
 
     @property
     def label(self) -> Label:
-        """What is being done; on the way between two gaits or from standing to one, the greater part."""
+        """The present activity; between two gaits, the greater part."""
         if self.fall.state is not FallState.UPRIGHT:
             return _FALLEN[self.fall.state]
         if self.stumble.active:
@@ -180,21 +180,21 @@ class Generator:
         return Activity.SIT if self._sit.share == 1.0 else Activity.STAND
 
     def leg_phase(self, side: int) -> float:
-        """Of one leg's own stride."""
+        """Return the phase of one leg's own stride."""
         phase = self._rhythm.phase + (self._half_way if side == RIGHT else 0.0)
         if self.stumble.active and self.stumble.side == side:
             phase -= self.stumble.lag
         return phase % 1.0
 
     def stance_share(self, side: int) -> float:
-        """Of one leg's stride; an impaired leg hands some of it to the other."""
+        """Return the stance share of one leg's stride; an impaired leg hands some of it to the other."""
         impaired = self.impairment
         share = stance_share(self.shape.speed) + 0.03 * (impaired[1 - side] - impaired[side])
         return share if self.walk is None else self.walk.stance_share(side, share)
 
     @property
     def yaw_rate(self) -> float:
-        """Of the way (rad/s, to the left); a turn is made step by step."""
+        """Yaw rate of the path (rad/s, to the left); a turn is made step by step."""
         turn = sum(share * gait.turn for gait, share in self.gaits)
         with_steps = 1.0 + _TURN_SWING * math.cos(2.0 * math.tau * self.phase)
         return turn * with_steps * self.walking * (1.0 - self.fall.share) / self.shape.cycle_time
@@ -210,7 +210,7 @@ class Generator:
 
     @property
     def acceleration(self) -> tuple[float, float]:
-        """Of the trunk, forward and up (m/s²), but for what the gait's own forces give."""
+        """Acceleration of the trunk, forward and up (m/s²), without the gait's own forces."""
         forward, up = posture.acceleration(self.seating, self._sit.rate, self.wearer.leg_length)
         return (
             forward + self.stumble.acceleration + self.fall.acceleration,

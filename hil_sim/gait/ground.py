@@ -71,14 +71,14 @@ class Transfer(NamedTuple):
         return humps.at(_FIRST_AT + (stance - self.coming) / alone * (_SECOND_AT - _FIRST_AT))
 
     def mean(self, humps: Humps) -> float:
-        """Of `force` over stance."""
+        """Return the mean of `force` over stance."""
         first, down, up, last = humps.parts()
         alone = (1.0 - self.coming - self.leaving) / (_SECOND_AT - _FIRST_AT)
         return first * self.coming / _FIRST_AT + (down + up) * alone + last * self.leaving / (1 - _SECOND_AT)
 
 
 def level_humps(speed: float) -> Humps:
-    """Of level walking at `speed` (m/s): the body is an inverted pendulum, whose valley deepens with v²."""
+    """Return the humps of level walking at `speed` (m/s): a pendulum, whose valley deepens with v²."""
     return Humps(
         first=1.0,
         valley=1.0 - min(0.19 * speed * speed, 0.67),

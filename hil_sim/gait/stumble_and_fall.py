@@ -66,17 +66,17 @@ class Stumble:
 
     @property
     def pitch(self) -> float:
-        """Of the trunk (rad, forward)."""
+        """Pitch of the trunk (rad, forward)."""
         return _PITCH * self._bump(0.05, 0.35, 1.30)
 
     @property
     def acceleration(self) -> float:
-        """Of the trunk, forward (m/s²): the trip brakes, the recovery pushes on by as much."""
+        """Acceleration of the trunk, forward (m/s²): the trip brakes, the recovery pushes on by as much."""
         return -8.0 * self._bump(0.0, 0.06, 0.15) + 3.0 * self._bump(0.45, 0.60, 0.85)
 
     @property
     def load(self) -> float:
-        """What the feet's load is multiplied with: the body drops a little, then is caught."""
+        """Factor of the feet's load: the body drops a little, then is caught."""
         return 1.0 - 0.35 * self._bump(0.10, 0.25, 0.40) + 0.70 * self._bump(0.40, 0.46, 0.55)
 
 
@@ -114,7 +114,7 @@ class Fall:
 
     @property
     def load(self) -> float:
-        """What the feet's load is multiplied with: a foot that slips bears less for a moment."""
+        """Factor of the feet's load: a slipping foot bears less for a moment."""
         slips = self._slipping and self.state is FallState.FALLING
         return 1.0 - 0.4 * bump(self._since, 0.0, 0.10, 0.30) if slips else 1.0
 
@@ -137,12 +137,12 @@ class Fall:
 
     @property
     def height_acceleration(self) -> float:
-        """Of the trunk (m/s², up)."""
+        """Vertical acceleration of the trunk (m/s², up)."""
         return -_DROP * self._motion()[1]
 
     @property
     def acceleration(self) -> float:
-        """Of the trunk, forward (m/s²); getting up is slow and takes nobody back."""
+        """Acceleration of the trunk, forward (m/s²); getting up is slow and takes nobody back."""
         ahead = _AHEAD * self.pitch / LYING_PITCH
         return ahead * self._motion()[1] if self.state is FallState.FALLING else 0.0
 

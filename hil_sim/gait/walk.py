@@ -27,7 +27,7 @@ class Shape:
 
     @property
     def speed(self) -> float:
-        """Of walking (m/s): two steps a cycle."""
+        """Walking speed (m/s): two steps a cycle."""
         return 2.0 * self.step_length / self.cycle_time
 
 

@@ -156,7 +156,7 @@ class OwnWalk:
     variability: float
 
     def stance_share(self, side: int, ordinary: float) -> float:
-        """Of this leg's stride, where an ordinary wearer's is `ordinary`."""
+        """Return the stance share of this leg's stride, where an ordinary wearer's is `ordinary`."""
         return min(ordinary + self.limbs[side].stance, _LONGEST_STANCE)
 
     def transfer(self, side: int, shares: tuple[float, float]) -> Transfer:

@@ -157,7 +157,7 @@ class Wearer:
         return _Contact(load, shear(stance, speed), place, outward(stance))
 
     def _force(self, side: int, stance: float, share: float, humps: Humps) -> float:
-        """Of a foot, crutch and all, in body weights, at a share of its stance."""
+        """Return the force on a foot with its crutch, in body weights, at a share of its stance."""
         generator = self._generator
         if generator.walk is None:
             return vertical_grf(stance, humps, share)
@@ -185,7 +185,7 @@ class Wearer:
         )
 
     def _hike(self) -> float:
-        """How far the trunk is tilted so that a leg can swing (rad, right side down)."""
+        """Return the tilt of the trunk that lets a leg swing (rad, right side down)."""
         generator = self._generator
         if generator.walk is None:
             return 0.0

@@ -72,7 +72,7 @@ class GatewayProcess:
 
     @property
     def pid(self) -> int:
-        """Of the process that runs."""
+        """Process id of the gateway."""
         if self._process is None:
             raise RuntimeError("it is entered first")
         return self._process.pid

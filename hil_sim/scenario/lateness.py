@@ -60,7 +60,7 @@ class Lateness:
 
 
 def margin(timing: Timing) -> float:
-    """How much time may be lost before a verdict of this timing is in doubt (s)."""
+    """Return the time that may be lost before a verdict of this timing is in doubt (s)."""
     if timing.when is When.WITHIN:
         return max(_LEAST_MARGIN_S, _SHARE * (timing.end_s - timing.begin_s))
     return _LEAST_MARGIN_S

@@ -42,7 +42,7 @@ class ScriptStep:
 
     @property
     def for_gateway(self) -> str | None:
-        """Which of the things it is that a gateway is asked for; `None` where the robot itself is meant."""
+        """The gateway's part of the request; `None` if it is for the robot itself."""
         return next((key for key in GATEWAY_LINES if key in self.request), None)
 
 

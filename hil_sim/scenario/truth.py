@@ -30,7 +30,7 @@ _FEET = ("left", "right")
 
 
 def names() -> tuple[str, ...]:
-    """Of everything that is told, on a robot whose drives are all simulated."""
+    """Return the names of all true values, for a robot with simulated drives only."""
     drives = [f"{joint}.{quantity}" for joint in JOINTS for quantity in (*_MOVING, *_DRIVE)]
     feet = [f"{side}_foot.force" for side in _FEET]
     return ("wearer.activity", "gait.state", *(f"gait.{name}" for name in _SHAPE), *feet, *drives)

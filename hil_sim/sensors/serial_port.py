@@ -31,7 +31,7 @@ class SerialPort:
 
     @property
     def baudrate(self) -> int:
-        """What its reader has set; the device's own until then, and where it is no standard rate."""
+        """The reader's baud rate; the device's own until one is set, or if it is no standard rate."""
         speed = termios.tcgetattr(self._slave)[_OUTPUT_SPEED]
         return _BAUDRATE_OF.get(speed, self._own_baudrate)
 

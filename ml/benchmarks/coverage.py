@@ -38,7 +38,7 @@ def of_intervals(error: Floats, subject: Subjects) -> tuple[Flags, Floats]:
 
 
 def figures(by_subject: Groups) -> dict[str, float]:
-    """Of what each subject has as `covered`: the worst one's, and how many subjects it was kept to."""
+    """Return the worst subject's `covered`, and the number of subjects for whom the promise was kept."""
     covered = [one["covered"] for one in by_subject.values()]
     kept = [one >= conformal.COVERED for one in covered]
     return {

@@ -119,7 +119,7 @@ def _fit(seen: Sequence[Seen]) -> Parts:
 
 
 def _counts(one: Seen) -> Floats:
-    """How much each moment of a danger counts: its later half, one in all."""
+    """Return the weight of each moment of a danger: its later half, one in total."""
     counts = np.zeros(len(one.danger))
     for begin, end in _spans(one.danger):
         if one.coming[begin] and one.danger[begin] in _foreseeable(one):
@@ -194,7 +194,7 @@ def events(judged: Judged, least: Level) -> Iterator[Event]:
 
 
 def false_alarms(judged: Judged, least: Level, rows: Flags) -> int:
-    """How often a level was reached anew in these moments; several within a block are one."""
+    """Return the number of new rises to a level in these moments; several within a block are one."""
     rises = np.flatnonzero((judged.level >= least) & (np.roll(judged.level, 1) < least) & rows)
     count, last = 0, -np.inf
     for at in judged.seen.at_s[rises]:
@@ -295,7 +295,7 @@ def _rates(judged: Sequence[Judged]) -> dict[str, float]:
 
 
 def per_hour(judged: Sequence[Judged], level: Level, name: str, rows: Sequence[Flags]) -> dict[str, float]:
-    """How often a level was reached anew in an hour of these moments, with its interval."""
+    """Return the rate of new rises to a level in these moments, with its interval."""
     hours = sum(float(own.sum()) for own in rows) * PERIOD_S / 3600.0
     count = sum(false_alarms(one, level, own) for one, own in zip(judged, rows, strict=True))
     low, high = rate_interval(count, hours)

@@ -123,7 +123,7 @@ Alarms = dict[float, npt.NDArray[np.bool_]]  # by the share of packets that are 
 def _fold(
     recordings: list[sisfall.Recording], data: Decisions, split: folds.Split, search: Search
 ) -> tuple[Alarms, FallSettings]:
-    """Which of the held-out decisions are alarms."""
+    """Return the held-out decisions that are alarms, and the settings."""
     train, held_out = split
     train = train[~data.stumble[train]]
     settings = chosen(

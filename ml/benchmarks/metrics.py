@@ -33,7 +33,7 @@ def accuracy(truth: Integers, predicted: Integers) -> float:
 
 
 def matches(true: Integers, found: Integers, within: int) -> int:
-    """How many found events (sorted) are within so many samples of a true one (sorted), one to one."""
+    """Count found events (sorted) within so many samples of a true one (sorted), one to one."""
     place = other = hits = 0
     while place < len(true) and other < len(found):
         apart = found[other] - true[place]

@@ -33,7 +33,7 @@ def chosen(
 
 
 def told(settings: Sequence[S], search: Search) -> str:
-    """Which settings the folds took, for the report."""
+    """Return the settings that the folds chose, for the report."""
     if not search:
         return f"fixed: {settings[0]}"
     counts = Counter(map(str, settings)).most_common()

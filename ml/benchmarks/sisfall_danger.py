@@ -135,14 +135,14 @@ def _daily(own: Sequence[Watched]) -> dict[str, float]:
 
 
 def _fall(own: Sequence[Watched]) -> dict[str, float]:
-    """Of a kind of fall; `told` is the share that was foreseen."""
+    """Return the figures of a kind of fall; `told` is the share that was detected."""
     said: list[Event] = [event for one in own for event in events(one.judged, Level.ADVICE)]
     found = of_danger(said)
     return {"told": found.pop("foreseen"), "advice_per_hour": np.nan} | found
 
 
 def _activity(own: Sequence[Watched]) -> dict[str, float]:
-    """Of a kind of daily activity; `told` is the share of recordings with advice."""
+    """Return the figures of a daily activity; `told` is the share of recordings with advice."""
     found = shares("told", [one.advised for one in own])
     return {
         "told": found["told"],

@@ -18,7 +18,7 @@ Floats = npt.NDArray[np.float64]
 
 BUDGETS: Final[Mapping[Level, float]] = {
     Level.EARLY: 6.0,
-    Level.ADVICE: 1.0,
+    Level.ADVICE: 0.5,  # the goal is 1: chance in few hours is not to exceed it
     Level.ALARM: 0.1,
     Level.STOP: 0.01,
 }

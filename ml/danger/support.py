@@ -58,7 +58,7 @@ class Support:
         return np.where(self._count[at] >= FEWEST, apart, np.nan)
 
     def _bearing(self, force: float, *, learn: bool) -> Floats:
-        """How much less, and more, than the weight both feet bear."""
+        """Return by how much less, and more, than the weight both feet bear."""
         if math.isnan(force):
             return np.full(2, np.nan)
         self._borne = force if math.isnan(self._borne) else self._borne + 0.5 * (force - self._borne)

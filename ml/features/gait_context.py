@@ -24,6 +24,8 @@ TURNED: Final = range(50, LOOK_BACK // COARSE + 1, 10)  # of these, over which a
 
 def _compute(windows: Samples) -> Features:
     filled = mended(windows)
+    # First, while little else is held: memory that is let go of at the end is not asked for anew next time.
+    newest = GAIT_STATUS.compute(filled[..., -GAIT_STATUS.look_back :])
     acceleration, spin = by_part(filled[..., ::COARSE])
     vertical = up(acceleration)
     heading = headed(along(spin, vertical), SECOND)
@@ -33,7 +35,7 @@ def _compute(windows: Samples) -> Features:
     motion = np.stack([rate[:, 0], left + right, np.minimum(left, right), jolt]).swapaxes(0, 1)
     stretches = LOOK_BACK // COARSE // STRETCH
     columns: list[npt.NDArray[Any]] = [
-        GAIT_STATUS.compute(filled[..., -GAIT_STATUS.look_back :]),
+        newest,
         bins(heading, STRETCH, stretches),
         bins(np.log(SOFTEN + motion), STRETCH, stretches),
         _turned(heading),

@@ -64,7 +64,7 @@ def timing(this: Samples, other: Samples) -> Samples:
 
 
 def _events(pitch_rate: Samples) -> Samples:
-    """How many samples ago: the last three heel strikes, three ends of push-off, and rest on the ground."""
+    """Return the samples since the last three heel strikes, three push-offs' ends, and rest on the ground."""
     smooth = (pitch_rate[:, 2:] + pitch_rate[:, 1:-1] + pitch_rate[:, :-2]) / 3.0
     return np.concatenate(
         [falls(smooth > SWING, 3), falls(smooth < PUSH_OFF, 3), falls(smooth < FLAT, 1)], axis=1

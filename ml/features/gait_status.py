@@ -65,7 +65,7 @@ def headed(yaw: Samples, newest: int) -> Samples:
 
 
 def _motion(acceleration: Samples, spin: Samples, lift: Samples, yaw: Samples) -> Samples:
-    """How much moves, whichever way: (n, 10, samples). `lift` and `yaw` are the trunk's."""
+    """Return the amount of motion, in any direction: (n, 10, samples). `lift` and `yaw` are the trunk's."""
     weight, rate = length(acceleration), length(spin)
     left, right = rate[:, 1], rate[:, 2]
     jolt = np.abs(weight[:, 1:] - GRAVITY)
@@ -97,7 +97,7 @@ def _turning(heading: Samples) -> Samples:
     """Return how unsteadily and how fast, at most, it turned over every length, whichever way."""
     found = moments(heading, *LENGTHS).reshape(len(heading), len(LENGTHS), 4, -1)
     _, spread, most, least = np.moveaxis(found, 2, 0)
-    return flat(np.stack([spread, np.maximum(most, -least)], axis=2))
+    return flat(np.stack([spread, np.maximum(np.abs(most), np.abs(least))], axis=2))
 
 
 def _rest(feet: Samples) -> Samples:

@@ -1,6 +1,6 @@
 """A recipe: which channels a model reads, how far back it looks, and how its features are computed."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
@@ -11,7 +11,6 @@ from ml.features.windows import Samples, windows
 
 Features = npt.NDArray[np.float32]
 CHUNK: Final = 256  # windows computed together: they stay in the processor's cache
-TOGETHER: Final = 200_000  # samples of robots' windows: what is computed of them finds its memory again
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,14 +31,6 @@ class Recipe:
     def offered(self, channels: set[str]) -> bool:
         """Whether a robot with these channels has every sensor that this needs."""
         return channels.issuperset(self.channels)
-
-    def of_each(self, windows: Sequence[Samples]) -> Features:
-        """Return the features (n, features) of windows (1, channels, look-back) of several robots."""
-        count = max(TOGETHER // (len(self.channels) * self.look_back), 1)
-        parts = [
-            self.compute(np.concatenate(windows[at : at + count])) for at in range(0, len(windows), count)
-        ]
-        return np.concatenate(parts)
 
 
 def features(recipe: Recipe, samples: Samples, ends: npt.NDArray[np.intp]) -> Features:

@@ -32,7 +32,7 @@ class FeatureStream:
         return room
 
     def window(self) -> Samples:
-        """Return the window (1, channels, look-back) as it is now.
+        """Return the window (1, channels, look-back) as it is now; those of several robots can be stacked.
 
         It is not copied, as what has come is never overwritten.
 
@@ -48,4 +48,4 @@ class FeatureStream:
 
     def features(self) -> Features:
         """(1, features) of the window that ends with the newest sample."""
-        return self._recipe.of_each([self.window()])
+        return self._recipe.compute(self.window())

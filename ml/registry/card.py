@@ -149,7 +149,7 @@ def check_robot(card: Card, robot: str, units: Mapping[str, str]) -> None:
 
 
 def age_days(card: Card, now: datetime | None = None) -> float:
-    """How long ago it was made."""
+    """Return the age of a model."""
     return ((now or datetime.now(UTC)) - card.made).total_seconds() / 86_400
 
 

@@ -18,7 +18,7 @@ _LIBRARIES: Final = ("scikit-learn", "numpy", "skops")
 
 
 def features_hash(recipe: Recipe) -> str:
-    """Of the recipe's numbers and of every module of ours that computes its features.
+    """Return the hash of the recipe's numbers and of all our modules that compute its features.
 
     Comments, docstrings and layout do not count.
     """
@@ -32,7 +32,7 @@ def features_hash(recipe: Recipe) -> str:
 
 
 def versions() -> dict[str, str]:
-    """Of Python and the libraries that learn."""
+    """Return the versions of Python and the training libraries."""
     return {"python": ".".join(map(str, sys.version_info[:3]))} | {name: version(name) for name in _LIBRARIES}
 
 

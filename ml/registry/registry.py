@@ -315,7 +315,7 @@ class Registry:
 
 
 def _ids(objects: Objects | None) -> list[str]:
-    """Of the models that have a card."""
+    """Return the ids of the models with a card."""
     if objects is None:
         return []
     paths = [name.split("/") for name in objects.names(FOLDER)]

@@ -88,5 +88,5 @@ def _quantile(values: Floats) -> float:
 
 
 def _rank(people: int) -> int:
-    """Which one's values count, from the best one on: 1 up to `people`."""
+    """Return the rank of the person whose values count, from the best one on: 1 up to `people`."""
     return min(math.ceil((people + 1) * WEARERS), people)

@@ -82,8 +82,10 @@ def judged(model: str, learned: Learned, windows: Sequence[Window]) -> list[Pred
     """Return a prediction for each window, of whichever robot; judged together."""
     if not windows:
         return []
-    rows = learned.recipe.of_each([window.samples for window in windows])
-    return _predictions(model, learned, [window.stamp_ns for window in windows], rows)
+    samples = np.concatenate([window.samples for window in windows])
+    return _predictions(
+        model, learned, [window.stamp_ns for window in windows], learned.recipe.compute(samples)
+    )
 
 
 def replayed(

@@ -55,7 +55,7 @@ class Trust:
 
     @property
     def level(self) -> TrustLevel:
-        """How far to believe it."""
+        """Level of trust."""
         if self.decisions < FEWEST:
             return TrustLevel.UNSEEN
         if self.abnormal > ABNORMAL_SHARE or self.drifted:

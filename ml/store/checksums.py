@@ -60,7 +60,7 @@ def _of_texts(fields: Mapping[str, str]) -> np.uint64:
 
 
 def _bits(column: pa.Array) -> Sums:
-    """Of a number or time its 64 bits, of a text those of its digest."""
+    """Return the 64 bits of a number or time, of a text those of its digest."""
     if pa.types.is_string(column.type) or pa.types.is_large_string(column.type):
         coded = column.dictionary_encode()
         known = np.array([_digest(each.encode()) for each in coded.dictionary.to_pylist()], np.uint64)

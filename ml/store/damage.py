@@ -70,7 +70,7 @@ def _size_bytes(store: Store, file: DataFile) -> int | None:
 
 
 def _decoded(store: Store, file: DataFile) -> int:
-    """How many rows it has, each of which was read."""
+    """Read every row of a file, and return their number."""
     name = f"{file.location}/{file.path}"
     with translated(f"{store.url}/{name} cannot be read"), store.files.open_input_file(name) as opened:
         return sum(batch.num_rows for batch in pq.ParquetFile(opened).iter_batches())

@@ -101,7 +101,7 @@ def _source(row: Mapping[str, Any]) -> LabelSource:
 
 
 def wearer(label: str) -> str | None:
-    """Whom the label names as the wearer, if it does."""
+    """Return the wearer that the label names, if any."""
     return label.removeprefix(WEARER) if label.startswith(WEARER) else None
 
 
@@ -128,12 +128,12 @@ def person(name: str) -> str:
 
 
 def _kind(sign: str) -> str:
-    """Of a letter (with its marks), a number, or anything else."""
+    """Return the kind of a sign: a letter (with its marks), a number, or another."""
     return {"L": "L", "M": "L", "N": "N"}.get(unicodedata.category(sign)[0], "-")
 
 
 def holding(rows: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Of rows of the table `labels` those that hold, in time's order; each label once."""
+    """Return the valid rows of the table `labels`, in time's order; each label once."""
     said = last(rows, _key, _written)
     return sorted((dict(row) for row in said if not row.get("removed")), key=_order)
 

@@ -94,7 +94,7 @@ def _move(store: Store, path: str) -> None:
 
 
 def _let_go(store: Store, location: str, paths: Set[str]) -> None:
-    """Of these files alone: others of the table may be gone too, and are to stay in its log."""
+    """Remove these files from the log; other missing files stay in it."""
     there = [path for path in paths if store.objects.find(f"{location}/{path}") is not None]
     if there:
         raise StoreError(

@@ -17,7 +17,7 @@ Row = Mapping[str, Any]
 
 
 def last(rows: Iterable[Row], about: Callable[[Row], Hashable], time: Callable[[Row], Any]) -> list[Row]:
-    """Of the rows that are `about` the same the last one; `time` orders those of several spools."""
+    """Return the last of the rows that are `about` the same; `time` orders those of several spools."""
     of_spools: dict[Hashable, Row] = {}
     for row in sorted(rows, key=lambda row: (*_place(row), time(row))):
         of_spools[about(row), spool(row)] = row

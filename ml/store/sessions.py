@@ -152,7 +152,7 @@ def among(known: Sequence[Session], name: str, where: str) -> Session:
 
 
 def newest(rows: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
-    """Of the rows of each session the one that holds: the last."""
+    """Return the valid row of each session: the last."""
     return last(rows, _name, lambda row: row["utc"])
 
 
@@ -324,7 +324,7 @@ def _files(store: Store, session: Session) -> list[DataFile]:
 
 
 def _samples(metadata: pq.FileMetaData) -> dict[str, int]:
-    """How many values of each column are not null."""
+    """Return the number of values of each column that are not null."""
     found: dict[str, int] = {}
     for group in range(metadata.num_row_groups):
         for number in range(metadata.num_columns):

@@ -164,7 +164,7 @@ def _unsure(table: Path) -> Iterator[Torn]:
 
 
 def _hint(table: Path) -> Iterator[Torn]:
-    """Which checkpoint is the newest; where that is not there, or nobody can say which."""
+    """Yield a hint to the newest checkpoint that is missing or unreadable."""
     hint = table / durable.LOG / HINT
     if hint.exists():
         try:
@@ -218,7 +218,7 @@ def _entries(table: Path) -> list[Path]:
 
 
 def _version(file: Path) -> int:
-    """Of an entry or a checkpoint, by its name."""
+    """Return the version of an entry or a checkpoint, by its name."""
     return int(file.name[:20])
 
 

@@ -88,7 +88,7 @@ def _check_whole(store: Store, location: str, delta: DeltaTable) -> None:
 
 
 def _gone(location: str, delta: DeltaTable, there: Set[str]) -> int:
-    """How many of the version's files are not there."""
+    """Return the number of the version's files that are missing."""
     paths = delta.get_add_actions(flatten=True).column("path").to_pylist()
     return sum(
         f"{location}/{path}" not in there and f"{location}/{unquote(path)}" not in there for path in paths
@@ -186,7 +186,7 @@ def remove(store: Store, location: str, condition: str) -> int:
 
 
 def _remove(store: Store, location: str, condition: str) -> tuple[int, Sequence[ParquetFileFragment]]:
-    """How many went, and the files that were made of those that had some."""
+    """Remove rows; return their number, and the files rewritten without them."""
     delta = store.table(location)
     before = set(delta.file_uris())
     with store.unfinished(location):
@@ -285,7 +285,7 @@ def _vacuum(
 
 
 def _compactable(store: Store, table: Table) -> Iterator[Compacted]:
-    """How many files each of the table's locations has, and would have."""
+    """Yield the number of files of each of the table's locations, before and after."""
     small: dict[str, dict[tuple[str | None, str | None], list[int]]] = {}
     counts: Counter[str] = Counter()
     for file in reading.files(store, table):

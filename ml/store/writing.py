@@ -101,7 +101,7 @@ def _encoded(rows: pa.Table) -> pa.Buffer:
 
 
 def _statistics(rows: pa.Table) -> str:
-    """Of the columns that name a row: what readers leave out files by."""
+    """Return statistics of the identifying columns, by which readers skip files."""
     extremes = {
         name: pc.min_max(column).as_py()
         for name, column in zip(rows.column_names, rows.columns, strict=True)

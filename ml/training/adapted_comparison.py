@@ -66,7 +66,7 @@ def beside(
 
 
 def _squares(learned: Learned, features: Features, truth: Floats) -> tuple[Floats, Flags, Flags]:
-    """Of each decision (n,): the squared error over both legs; whether it is unsaid, or said and wrong."""
+    """Return for each decision (n,) the squared error over both legs, and whether it abstains or errs."""
     found = learned.judge(features)
     phases = np.stack([found.values[side] for side in SIDES], axis=1)
     error = (phases - truth + 0.5) % 1.0 - 0.5
@@ -75,7 +75,7 @@ def _squares(learned: Learned, features: Features, truth: Floats) -> tuple[Float
 
 
 def _blocks(strides: int, seed: int) -> npt.NDArray[np.intp]:
-    """Which strides are drawn (DRAWS, about strides): moving blocks, round the end."""
+    """Draw strides (DRAWS, about strides): moving blocks, round the end."""
     count = -(-strides // BLOCK)
     begins = np.random.default_rng(seed).integers(0, strides, (DRAWS, count, 1))
     return ((begins + np.arange(min(BLOCK, strides))) % strides).reshape(DRAWS, -1)

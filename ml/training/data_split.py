@@ -75,7 +75,7 @@ def _remedy(there: int) -> str:
 
 
 def _known(name: str, known: Sequence[str], others: int) -> str:
-    """Whom somebody means who spells it so."""
+    """Return the known person of this spelling."""
     for each in (name, person(name)):
         if each in known:
             return each

@@ -211,12 +211,12 @@ def _truth(recipe: Recipe, said: Sequence[LabelSpan], stamps_ns: Instants) -> tu
 
 
 def _recorded_wearer(store: Store, ask: Ask) -> str:
-    """Who was said to wear the robot when it was recorded."""
+    """Return the wearer as named in the recording."""
     return "".join(row.get("wearer") or "" for row in newest(_rows(store, SESSIONS, ask)))
 
 
 def _wearer(labels: Sequence[Label], recorded: str) -> str:
-    """Who it is, however that was spelled; "" where nobody says."""
+    """Return the wearer, however spelled; "" without a name."""
     names = sorted({name for each in labels if (name := wearer(each.label))} | ({recorded} - {""}))
     people = {who for name in names if (who := person(name))}
     if len(people) > 1:

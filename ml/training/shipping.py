@@ -61,7 +61,7 @@ def ship(recording: Path, folder: Path = SHIPPED) -> list[Shipped]:
 
 
 def held_out(sessions: Sequence[SimulatedSession]) -> set[str]:
-    """Whom no model learns from; whoever also walks in another way is left out of that, too."""
+    """Return the people kept for judging; those who also walk in another way are left out of that, too."""
     by_walks: dict[str, set[str]] = {}
     for session in sessions:
         by_walks.setdefault(session.walks, set()).add(session.subject)

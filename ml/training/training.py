@@ -214,7 +214,7 @@ def _unnamed(sessions: int) -> list[str]:
 
 
 def _rows(lessons: Sequence[SessionDecisions]) -> Mapping[str, int]:
-    """How many were labelled by whom."""
+    """Return the number of labelled rows by source."""
     return Counter(np.concatenate([each.source for each in lessons]).tolist())
 
 

@@ -69,7 +69,7 @@ class Material:
         return replace(self, sessions=chosen)
 
     def channels(self) -> list[Set[str]]:
-        """Of each session those that the robot said it has, or else those with values."""
+        """Return each session's channels: those described by the robot, or else those with values."""
         return [
             set(each.units) or {channel.name for channel in stored.channels(self.store, each)}
             for each in self.sessions

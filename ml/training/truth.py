@@ -36,7 +36,7 @@ class LabelSpan:
 
 
 def activities(said: Sequence[LabelSpan], at_ns: Instants) -> tuple[Names, Names]:
-    """Of instants (n,) in their order: the activity, and which source says so; NOBODY where none does."""
+    """Return the activity of instants (n,) in order, and its label's source; NOBODY without a label."""
     names, sources = np.full(len(at_ns), NOBODY, _NAME), np.full(len(at_ns), NOBODY, "U16")
     for source in LabelSource:
         own, told = _of_source([each for each in said if each.source is source], at_ns)
@@ -59,7 +59,7 @@ def _of_source(said: Iterable[LabelSpan], at_ns: Instants) -> tuple[Names, npt.N
 
 
 def phases(said: Sequence[LabelSpan], at_ns: Instants) -> tuple[Samples, Names]:
-    """Of instants (n,): the phases (n, 2) of the left and the right leg, and which source says so.
+    """Return the phases (n, 2) of the left and the right leg at instants (n,), and the labels' source.
 
     NaN, NaN where no leg steps; the source is NOBODY where that is not known, or of one leg alone.
     """

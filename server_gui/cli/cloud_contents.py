@@ -121,7 +121,7 @@ def _verdict(
 
 
 def _counts(found: Verdict | None) -> dict[str, object]:
-    """How much was looked at, and how much of that is proven."""
+    """Return the numbers of checks, and of proofs."""
     if found is None:
         return {"files": 0, "rows": 0, "rows_proven": 0, "batches": 0, "receipts": 0, "notes": ()}
     return {

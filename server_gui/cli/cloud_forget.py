@@ -96,7 +96,7 @@ def _check_pins(arguments: argparse.Namespace, known: ErasurePlan) -> None:
 
 
 def _learned(store: Store, sessions: Sequence[Name]) -> Sequence[str]:
-    """Which models have learned from, or were judged by, one of these."""
+    """Return the models that have learned from, or were judged by, one of these."""
     names = {session for _, session in sessions}
     return [card.id for card in Registry(store.url).entries() if names & {*card.learned, *card.held_out}]
 

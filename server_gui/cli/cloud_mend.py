@@ -1,4 +1,4 @@
-"""`gwrms cloud mend`: files that are gone taken out of the store, what they held brought again."""
+"""`gwrms cloud mend`: take missing files out of the store, and restore their rows."""
 
 import argparse
 import functools
@@ -18,24 +18,22 @@ from server_gui.core.recording.errors import SpoolUnusable
 from server_gui.core.recording.spool import Spool
 from server_gui.core.settings.server_file import load
 
-WHAT = (
-    "Take files that are gone or damaged out of the store, and bring again what the spool still has of them."
-)
+WHAT = "Take missing or damaged files out of the store, and restore their rows from the spool."
 EPILOG = """End the collector first. A missing or unreadable file is taken out of its table, which can then be
-read, compacted and uploaded to; what is still there of it goes to mended/ in the store, with a note of what
-it held. Then each batch of which rows are missing, or that has no receipt, is brought from the spool's second
-copy; what is there already stays as it is, and what gwrms cloud retain removed does not come back. Where the
-whole store is gone, it is made anew. Interrupted, the same command goes on.
+read, compacted and uploaded to; its remains go to mended/ in the store, with a note of its contents. Then
+each batch with missing rows, or without a receipt, is restored from the spool's second copy; existing
+rows stay, and rows removed by gwrms cloud retain do not return. If the whole store is gone, it is
+rebuilt. After an interruption, the same command continues.
 
-A file stays, and is named, where not all of its rows are in second copies here: those of another collector,
-or of batches whose second copy went to make room. Bring it back from a copy of the store.
+A file stays, and is named, if some of its rows have no second copy here: rows of another collector, or of
+batches whose second copy was deleted to make room. Restore it from a copy of the store.
 
-With --accept-loss such files are taken out too, and what then is still missing, doubled or altered is told no
-more: new receipts say what is there. The old ones stay.
+With --accept-loss such files are taken out, too, and missing, duplicate or altered rows are no longer
+reported: new receipts describe the present contents. The old ones stay.
 
-Exit status 0: all of it done, gwrms cloud verify tells whether the store is whole then. 1: rows are still
-missing, and it says of which batches. 2: nobody could say or do it: no store there, not reached, not to be
-read, or a collector runs; what was proven damaged before is done, and the same command goes on."""
+Exit status 0: done; gwrms cloud verify then checks whether the store is complete. 1: rows are still
+missing, and their batches are listed. 2: it could not check or repair: no store, unreachable, unreadable,
+or a collector runs; repairs of proven damage are done, and the same command continues."""
 FAILED = 2
 
 

@@ -54,19 +54,19 @@ RATE_HZ: Final = 100.0
 NEGATIVE: Final = re.compile(r"-[\d.]")
 NOT_CONFIRMED: Final = 3  # exit status
 RULES: Final = """
-Each value is a trial: the robot takes it back by itself when its time is over, when this command, its
-terminal or its computer dies, and when a rule of its guard says so. It ends at once, and the first value
-comes back and is read to be so, with any new alarm, a STOP, a trial that is refused or reverted, a write of
-others, a lost link, values that are stale, when nobody walks any more, beyond --most-error or --most-current
-(twice what was usual before, where not given), and with Enter or Ctrl-C. Nothing is ever kept by it.
+Each value is a trial: the robot reverts it by itself when its time is over, when this command, its
+terminal or its computer dies, and when a rule of its guard trips. The experiment ends at once, and the
+original value is restored and read back, on any new alarm, a STOP, a refused or reverted trial, a write
+by others, a lost link, stale values, the end of walking, an excess of --most-error or --most-current (by
+default twice the usual value), and Enter or Ctrl-C. No value is ever kept.
 """
 EXIT: Final = """
 exit status
   0 all of it was done; 1 it ended early, or could not begin; 2 wrong usage;
   3 NOT CONFIRMED that the value from before is back: look at the robot"""
 AB: Final = f"""{RULES}
-Which of a pair comes first is drawn (--seed draws the same again), so that no drift is taken for an effect.
-gwrms edits show ID tells all of it again.
+The order of each pair is random (--seed repeats it), so that drift is not taken for an effect.
+gwrms edits show ID prints the results again.
 
 example:
   gwrms ab left_knee.position_gain 3000 2400

@@ -8,9 +8,9 @@ usage: gwrms joint-test step|chirp|friction|relay ROBOT.toml:JOINT …
        gwrms joint-test stop ROBOT.toml:JOINT
        gwrms joint-test show FILE …
 
-On the robot's computer the first four move one joint, free on a bench, after a typed phrase, and record what
-it does; stop stops it from another terminal. On the desk show says what was measured, beside the joint's last
-test. Each has its own --help.
+On the robot's computer, the first four move one joint, free on a bench, after a typed phrase, and record its
+motion; stop stops it from another terminal. On the desk, show prints the results beside those of the joint's
+last test. Each has its own --help.
 """
 
 

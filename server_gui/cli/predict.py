@@ -96,7 +96,7 @@ def _addresses(settings: ServerSettings, asked: list[str]) -> dict[str, Address]
 
 
 def _name(settings: ServerSettings, text: str) -> str:
-    """Of a robot that the server's file names, or that is given with its address."""
+    """Return the name of a robot in the server's file, or given with its address."""
     name, equals, _ = text.partition("=")
     if equals or text in settings.robots:
         return name

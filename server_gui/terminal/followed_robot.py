@@ -11,6 +11,7 @@ from msgspec.structs import replace
 from gateway.client import Address
 from gateway.wire.resource import ResourceSnapshotParams
 from ml.danger.observation import CHANNELS
+from server_gui.core.desk.own_load import OwnLoad
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.events import Event, Looked, Telemetry
 from server_gui.core.follow.feed import Feed, FollowSettings
@@ -52,6 +53,7 @@ class FollowedRobot:
             PROCESSES,
         )
         self.station = Station(str(address), str(address), self._link, self._posted.append, News())
+        self.station.is_overloaded = OwnLoad().is_overloaded
         self.station.predictions.foresees = foresees
         self._foreseeing: DangerPrediction | None = None
         if foresees:

@@ -88,7 +88,7 @@ def _cell(value: float, low: float, high: float, width: int) -> int:
 
 
 def _share(value: float, low: float, high: float) -> float:
-    """How far on the way between the ends it is, 0 to 1; whatever numbers a robot sends."""
+    """Return the position between the ends, 0 to 1, for any numbers of a robot."""
     if value <= low:
         return 0.0
     return 1.0 if value >= high else (value / 2 - low / 2) / (high / 2 - low / 2)

@@ -65,8 +65,8 @@ class PredictionRow:
 def said(shown: Told, *, stopped: str = "", unseen: str = "") -> PredictionRow:
     """Return the row of a prediction: the label and its probability, or *unknown*.
 
-    Of a robot that does not drive its wearer, by what `stopped` says, nothing is called unlike what is known,
-    nor is it where the model does not see all, by what `unseen` says.
+    Of a robot that does not drive its wearer, by what `stopped` says, no task is judged, but a fall stays a
+    warning; where the model does not see all, by what `unseen` says, nothing is called abnormal.
     """
     prediction = shown.prediction
     if shown.is_stale():
@@ -74,7 +74,7 @@ def said(shown: Told, *, stopped: str = "", unseen: str = "") -> PredictionRow:
             Mark("ring", "old", OLD), "No prediction now", f"the last {shown.age_s():.0f} s ago"
         )
     falls = prediction.task == FALLING and prediction.label not in (STEADY, ABNORMAL, UNKNOWN)
-    if stopped and not falls and (prediction.task == ACTIVITY or not _knows(shown)):
+    if stopped and not falls:
         return unjudged(stopped)
     word, worth = label_text(prediction.label), belief(shown)
     details = (" · ".join(filter(None, (worth.wordings[0], _runner_up(shown)))), worth.wordings[-1])
@@ -93,7 +93,7 @@ def said(shown: Told, *, stopped: str = "", unseen: str = "") -> PredictionRow:
 
 
 def unjudged(why: str) -> PredictionRow:
-    """Return the row of an activity that is not judged, and the reason."""
+    """Return the row of a task that is not judged, and the reason."""
     return PredictionRow(Mark("ring", "dim", STOPPED), NOT_JUDGED, why, why)
 
 
@@ -291,7 +291,7 @@ def _runner_up(shown: Told) -> str:
 
 
 def _tip(shown: Told) -> str:
-    """Which model, which nobody reads at arm's length."""
+    """Return the model's name for the tool tip."""
     if isinstance(shown, Recalled):
         return f"{told_name(shown.prediction.model)}, {shown.prediction.model}"
     predicted = shown.predicted

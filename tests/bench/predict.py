@@ -168,7 +168,7 @@ def _times(recipe: Recipe, predict: Predict, robots: int) -> list[float]:
         began = time.thread_time()
         for stream, own in zip(streams, samples, strict=True):
             stream.push(own[row])
-        predict(recipe.of_each([stream.window() for stream in streams]))
+        predict(recipe.compute(np.concatenate([stream.window() for stream in streams])))
         times.append(1e3 * (time.thread_time() - began))
     return times[WARM:]
 

@@ -14,6 +14,12 @@ def test_they_are_numbered_without_a_gap() -> None:
     assert len(numbers) >= 22
 
 
+def test_each_change_has_tests_to_check_it_with() -> None:
+    rows = [line.strip("| ").split(" | ") for line in TABLE.splitlines() if re.match(r"\| \d+\. ", line)]
+    without = [row[0] for row in rows if len(row) != 3 or not re.search(r"`(tests/|\./dev bench)", row[2])]
+    assert without == []
+
+
 def test_every_place_is_there() -> None:
     paths = re.findall(r"`([a-z_0-9]+/[^`*]*)`", TABLE)
     assert len(paths) > 20

@@ -131,6 +131,12 @@ def test_walking_is_offered_where_it_is_over_and_no_stop_is_held_and_the_simulat
     assert demo.control.active == ()
     words = "Simulated robot. Tripped: left knee. Clear fault, then Start walking"
     assert demo.bar.said.text() == words, "called whole once the cause is over"
+    bench.station.stopping.held = True
+    demo.draw()
+    held = "Clear fault (which also ends the stop that is held), then Start walking"
+    assert demo.bar.said.text() == f"Simulated robot. Tripped: left knee. {held}"
+    bench.station.stopping.held = False
+    demo.draw()
     click(demo.bar.walk)
     demo.until(lambda: demo.control.asked == ["walk"], "told it to walk")
     demo.own.runs, demo.own.problem = False, "the simulator has ended (killed by SIGKILL)"

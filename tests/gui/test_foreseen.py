@@ -178,6 +178,11 @@ def test_a_robot_that_does_not_drive_its_wearer_is_not_judged(
     ring = window.overview._ring
     assert (ring._word, ring._below) == ("Stopped", "not judged")
     assert not any((*ring._phases.values(), *ring._modelled.values())), "a share of a stride is shown"
+    station.take_prediction(predicted("steady", {"steady": 1.0, "fall": 0.0}, "falling"))
+    station.take_prediction(predicted("stride", {"stride": 1.0}, "gait_phase"))
+    judged = [one for one in lines(station) if one.text.startswith(("Balance", "Stride"))]
+    words = [(one.text, one.mark.colour, one.detail) for one in judged]
+    assert words == [("Balance: Not judged while stopped", "dim", why)], "a prediction is shown as current"
     station.take_prediction(predicted("fall", {"steady": 0.03, "fall": 0.97}, "falling"))
     line = status(station)
     assert line is not None

@@ -17,7 +17,7 @@ def test_the_sections_are_the_documents_own_without_pictures_and_links() -> None
     assert [f"## {title}" for title in sections] == [
         line for line in document.splitlines() if line.startswith("## ") and line != "## How it is made"
     ]
-    assert "quick stop on every drive of the robot shown" in sections["Always in sight"]
+    assert "quick stop on every drive of the robot shown" in sections["Always visible"]
     assert all("](" not in text for text in sections.values())
 
 

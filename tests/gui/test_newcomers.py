@@ -133,4 +133,4 @@ def test_a_drive_that_is_enabled_again_has_no_proof_of_an_old_stop(theme: Theme,
     words = {str(bench.station.robot.word(f"{joint}.state")) for joint in JOINTS}
     assert words == {"operation enabled"}
     shown = [model.index(row, STOP).data() for row in range(model.rowCount())]
-    assert set(shown) == {"no more"}
+    assert set(shown) == {"enabled again"}

@@ -290,6 +290,14 @@ def test_a_joint_in_trouble_is_in_words_with_its_code_and_no_zero_is_negative(
     assert cells(JointModel(bench.desk, theme), 0)[ERROR] == "–"
 
 
+def test_an_error_code_that_only_the_robot_names_is_told_as_one_that_is_sent(
+    theme: Theme, bench: Bench
+) -> None:
+    why = "the drive is in fault: 0x2310 continuous overcurrent at the output (register: generic)"
+    bench.station.take([walking(10), looked(state="fault", problem=why)])
+    assert cells(JointModel(bench.desk, theme), 1)[ERROR] == "0x2310 continuous overcurrent at the output"
+
+
 def test_proof_of_a_stop_stands_at_each_joint(theme: Theme, bench: Bench) -> None:
     received_ns = time.monotonic_ns()
     bench.station.take([telemetry([received_ns], {"left_knee.state": [5.0]}, received_ns)])

@@ -1,5 +1,6 @@
 """STOP: always there, at once, and never taken for done before the drives say so."""
 
+import re
 import time
 from collections.abc import Iterator
 from concurrent.futures import Future
@@ -10,8 +11,9 @@ from PySide6.QtGui import QFontMetrics
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QPushButton
 
-from gateway.client import LinkLost, NotConnected
+from gateway.client import ConnectionState, LinkLost, NotConnected
 from gateway.wire.stop import Reset, Stopped
+from server_gui.core.follow.events import LinkChanged
 from server_gui.core.tuning.stop import Sent, StopProgress, StopState
 from server_gui.views.confirmation import Question
 from server_gui.views.frame.header import Header
@@ -169,6 +171,22 @@ def test_a_fault_that_stays_after_it_was_cleared_is_shown_and_can_be_cleared_aga
     assert [one.words.text() for one in shown] == [f"left_knee DID NOT LEAVE FAULT: {stays}."]
     shown[0].act.click()
     assert any(one.windowTitle().startswith("Clear the fault") for one in header.findChildren(Question))
+
+
+def test_what_is_known_of_the_drives_is_said_before_a_fault_is_cleared(header: Header, bench: Bench) -> None:
+    def said() -> str:
+        asked = ask_clear(header, bench.station)
+        words = asked.words.text()
+        destroy(asked)
+        return words
+
+    assert "What its drives do now is not known" in said(), "nothing has come yet"
+    bench.station.take([walking(10, age_s=90.04)])
+    assert re.search(r"states were 9\d\.\d s old: enabled then: left hip", said())
+    bench.station.take([walking(10)])
+    assert "STILL ENABLED, and without torque then: left hip" in said()
+    bench.station.take([LinkChanged(ConnectionState.WAITING, "no gateway", time.monotonic_ns())])
+    assert "What its drives do now is not known" in said()
 
 
 def test_the_robot_is_named_on_the_button_and_so_is_another(header: Header, bench: Bench) -> None:

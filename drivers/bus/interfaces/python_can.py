@@ -102,7 +102,7 @@ class PythonCanTransport:
             self.dropped += 1
 
     def _serial_ports(self) -> Iterator[Any]:
-        """Of an adapter on one; pyserial would write to it for ever."""
+        """Yield the serial ports of an adapter; pyserial would write to them for ever."""
         serial = sys.modules.get("serial")
         if serial is not None:
             yield from (one for one in vars(self._bus).values() if isinstance(one, serial.Serial))

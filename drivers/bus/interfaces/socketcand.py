@@ -204,7 +204,7 @@ class SocketcandTransport:
         self._socket.close()
 
     def _write(self, line: bytes) -> int:
-        """How much of it the connection took."""
+        """Write a line, and return the number of bytes that the connection took."""
         try:
             return self._out.send(line)
         except BlockingIOError:

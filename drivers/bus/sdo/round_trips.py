@@ -66,7 +66,7 @@ class RoundTrips:
             self._lateness.clear()
 
     def median_and_longest_ms(self, now_ns: int) -> tuple[float, float] | None:
-        """Of the last minute; `None` where nothing was answered."""
+        """Return median and longest of the last minute; `None` if nothing was answered."""
         with self._lock:
             trips = sorted(trip for stamp, trip in self._recent if now_ns - stamp <= RECENT_S * 1e9)
         return None if not trips else (trips[len(trips) // 2] / 1e6, trips[-1] / 1e6)

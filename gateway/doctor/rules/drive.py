@@ -48,7 +48,7 @@ def figures(seen: Observations) -> Iterator[Verdict]:
                 yield Finding(
                     "gear",
                     place.header,
-                    f"{key} is not what the drive says: angles are wrong by {device / ours:.3g}",
+                    f"{key} is not what the drive says: angles are wrong by a factor of {device / ours:.3g}",
                     (f"{key} = {ours:g}, {index:04X}h makes {device:g}",),
                     (Edit(place.kind, place.name, key, device, ours),),
                 )

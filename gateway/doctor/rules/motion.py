@@ -133,7 +133,7 @@ def _one_sided(spans: dict[str, float]) -> str:
 
 
 def _stride(pairs: list[Pair | str], but: str) -> float:
-    """How far the other joints go, by how far they do at the usual pace."""
+    """Return the stride as a share of the usual one, by the range of the other joints."""
     others = [pair for pair in pairs if isinstance(pair, Pair) and pair.kind != but]
     shares = [span(pair.of(side)) / normal_span(pair.kind) for pair in others for side in SIDES]
     return median(shares) if shares else 1.0
@@ -264,16 +264,18 @@ def zero(seen: Observations) -> Iterator[Verdict]:
             yield _unjudged(seen, "zero", pair)
             continue
         if not scaled.isdisjoint(_place(seen, side, pair.kind).header for side in SIDES):
-            yield Unknown("zero", f"{pair.kind}s", "counts or gear ratio are off: mend that first")
+            yield Unknown("zero", f"{pair.kind}s", "counts or gear ratio are off: fix that first")
             continue
         spans = [span(pair.of(side)) for side in SIDES]
         means = {side: fmean(pair.of(side)) for side in SIDES}
         if not walks or min(spans) < LEAST_SPAN or max(spans) / min(spans) > SCALE_DIFFERS:
             yield Unknown(
-                "zero", f"{pair.kind}s", HOW if not walks else "left and right go not alike: mend that first"
+                "zero",
+                f"{pair.kind}s",
+                HOW if not walks else "left and right move differently: fix that first",
             )
         elif any((pair.kind, side) in flipped for side in SIDES) and pair.kind not in swapped:
-            yield Unknown("zero", f"{pair.kind}s", "a sign is flipped: mend that first")
+            yield Unknown("zero", f"{pair.kind}s", "a sign is flipped: fix that first")
         elif abs(means["left"] - means["right"]) > ZERO_DIFFERS:
             yield _off(seen, pair.kind, means)
 

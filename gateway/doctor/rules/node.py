@@ -160,7 +160,7 @@ def _waits_for_sync(seen: Observations, place: Place) -> bool:
 
 
 def _producers(seen: Observations, bus: str) -> Iterator[tuple[Place, int]]:
-    """Who has a SYNC period (1006h), and which."""
+    """Yield the nodes with a SYNC period (1006h), and the period."""
     for place in seen.nodes():
         period = seen.whole(place, 0x1006)
         if place.table.bus == bus and period is not None:

@@ -68,7 +68,7 @@ def _largest(values: list[float]) -> Signed:
 
 
 def _left(seen: Observations, columns: list[list[float]], up: Signed) -> Signed | None:
-    """Which axis is left: the body falls to the right while the left foot carries it."""
+    """Return the axis to the left: the body leans to the right while the left foot carries it."""
     found = gait(seen)
     if isinstance(found, str) or any(len(column) != len(found.load) for column in columns):
         return None

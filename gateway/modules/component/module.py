@@ -162,7 +162,7 @@ class ComponentModule:
         return [self._info(name, now_ns) for name in self._names()]
 
     def _names(self) -> list[str]:
-        """Of every component of the file, there or not, in the file's order."""
+        """Return the names of all components of the file, there or not, in the file's order."""
         return self._context.config.names(*BUILDERS)
 
     def _info(self, name: str, now_ns: int) -> ComponentInfo:

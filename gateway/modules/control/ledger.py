@@ -46,7 +46,7 @@ class WriteLedger:
 
     @property
     def kept(self) -> Undo | None:
-        """What is in the undo file: on trial, or what a failed roll-back has left."""
+        """The entry in the undo file: on trial, or left by a failed roll-back."""
         return self.undos.get(self.number)
 
     def replaced(self, changes: Sequence[ObjectWrite]) -> tuple[Undo, ...]:

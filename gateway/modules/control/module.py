@@ -183,7 +183,7 @@ class ControlModule:
         self._tuning.trials.revert_all(why)
 
     def who_is_known(self, known: "KnownClients") -> None:
-        """Who is let in, or what they may, has changed. In the loop's thread."""
+        """Take the known clients after a change. In the loop's thread."""
         self._admissions.tell(known)
 
     def _look_who_is_known(self) -> None:
@@ -278,7 +278,7 @@ class ControlModule:
 
     @property
     def authority(self) -> Authority:
-        """Who knows whether anything may move."""
+        """The authority over motion."""
         return self._stop.authority
 
     def stop_robot(self, who: str, reason: str) -> "Future[Stopped]":

@@ -31,7 +31,7 @@ class Lock(Enum):
 
     @property
     def remedy(self) -> str:
-        """What to do about it, where there is no parameter to be named."""
+        """The remedy, without the name of a parameter."""
         return _REMEDIES[self]
 
 

@@ -103,7 +103,7 @@ class BlameModule:
         return new
 
     def _older(self, new: Collection[Id], looked_ns: int) -> Look:
-        """Of the threads just met, those that began before the last look: what they had is not new."""
+        """Return new threads that began before the last measurement: their earlier use is not new."""
         booted_ns = time.clock_gettime_ns(time.CLOCK_BOOTTIME) - time.monotonic_ns()
         found: Look = {}
         for task in new:
@@ -126,7 +126,7 @@ class BlameModule:
         )
 
     def _named(self, blame: Blame) -> list[RanInstead]:
-        """Who ran on a core that the control loop may use; first those that it cannot run ahead of."""
+        """Return the processes on the control loop's cores; those that it cannot preempt come first."""
         cores = {core for pid in self._control for core in self._tasks.cores(pid)}
         own = [self._tasks.schedule((pid, tid)) for pid in self._control for tid in self._tasks.threads(pid)]
         urgency = max((one.urgency for one in own if one is not None), default=0)

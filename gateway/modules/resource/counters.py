@@ -35,7 +35,7 @@ class Counters(Protocol):
         """Each core that is online."""
 
     def memory(self) -> MemoryUse:
-        """Of the whole computer."""
+        """Return the memory of the whole computer."""
 
     def own_rss_bytes(self) -> int:
         """Return the resident memory of this process."""

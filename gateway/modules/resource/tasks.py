@@ -46,7 +46,7 @@ class Schedule(NamedTuple):
 
     @property
     def urgency(self) -> int:
-        """Who has less waits for who has more: a deadline, a real-time priority, or 0 for all the rest."""
+        """Urgency of a thread: a deadline, a real-time priority, or 0; the lower waits for the higher."""
         if self.policy == "deadline":
             return URGENT
         return self.priority if self.policy in ("fifo", "rr") else 0

@@ -21,7 +21,7 @@ class Drive(Protocol):
 
     @property
     def node(self) -> Any:
-        """What the axes of one drive share."""
+        """The node that the axes of one drive share."""
 
     @property
     def channels(self) -> tuple[Channel, ...]: ...

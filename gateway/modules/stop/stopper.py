@@ -30,7 +30,7 @@ class Stopper:
 
     @property
     def idle_s(self) -> float:
-        """How long no stop of it has been under way; 0 while one is."""
+        """Time since its last stop ended; 0 during one."""
         return 0.0 if self.running else time.monotonic() - self._stops.ended
 
     def stop(self, *, wake: bool = True) -> "Future[Report]":

@@ -65,7 +65,7 @@ class StopWatch:
 
     @property
     def again(self) -> dict[str, int]:
-        """How often each drive was enabled by somebody else and stopped again, while this stop is held."""
+        """Number of times that each drive was enabled by others and stopped again during this stop."""
         return {name: self._times.get(name, 0) for name in self._stoppers} if self._authority.held else {}
 
     def begin(self) -> None:

@@ -93,7 +93,7 @@ class FallDetector(ClassifierMixin, BaseEstimator):  # type: ignore[misc]  # sci
         return trailing_mean(falls, recording[rows], self.settings.decisions) >= self.threshold_
 
     def _lessons(self, to_impact: Integers, somebody_moves: Flags) -> tuple[Flags, Flags]:
-        """Which rows are falling, and which rows are learned from."""
+        """Return the rows that are falling, and the rows for training."""
         tuned = self.settings
         falling = to_impact <= tuned.falling
         share = np.where(somebody_moves, tuned.moving_share, tuned.still_share)

@@ -42,7 +42,7 @@ class EventModel:
         self.settings = settings or EventSettings()
 
     def learned(self, apart: Integers) -> npt.NDArray[np.bool_]:
-        """Which moments to learn from, by how far `apart` (n, kinds) the nearest event of each kind is.
+        """Return the moments for training, by the distance `apart` (n, kinds) of the nearest events.
 
         Raises:
             UnusableData: none of them is near an event.

@@ -38,7 +38,7 @@ class QuickTrees:
         ]
 
     def predict_proba(self, x: Features) -> list[Floats]:
-        """Of each model (rows, classes), each row's sum is 1. `x` is finite."""
+        """Return the probabilities of each model (rows, classes). `x` is finite."""
         values = self._value.take(self._leaves(x)).reshape(len(x), -1)
         return [
             _probabilities(start + values[:, own].reshape(len(x), -1, start.shape[1]).sum(axis=1))

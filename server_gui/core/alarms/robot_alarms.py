@@ -13,6 +13,7 @@ from ml.danger.levels import Level
 from server_gui.core.alarms.alarm import Alarm
 from server_gui.core.alarms.causes import Stall, stood_still
 from server_gui.core.alarms.marks import ENABLED, age_text
+from server_gui.core.alarms.overload import load_first, overloaded
 from server_gui.core.alarms.texts import Kind, check_of, error_check, error_text
 from server_gui.core.follow.robot import FollowedComponent, Robot
 from server_gui.core.prediction.newest_predictions import ShownDanger
@@ -57,10 +58,15 @@ class Facts:
     journal: Iterable[Mapping[str, Any]] = ()
     stalls: Sequence[Stall] = ()
     danger: ShownDanger | None = None
+    is_overloaded: bool = False  # this computer
 
 
 def alarms(facts: Facts) -> Iterator[Alarm]:
     """Yield what is wrong now, in no order."""
+    return load_first(_found(facts), overloaded(facts.robot, is_ours=facts.is_overloaded))
+
+
+def _found(facts: Facts) -> Iterator[Alarm]:
     robot = facts.robot
     yield from _of_stop(robot, facts.stopping)
     if not robot.is_recording:

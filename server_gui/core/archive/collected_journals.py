@@ -143,7 +143,7 @@ def _parts(rows: pa.Table) -> list[pa.Table]:
 
 
 def _newest(rows: pa.Table) -> pyarrow.dataset.Expression:
-    """Which of these are read: those that came last, whatever the robot's clock said."""
+    """Return the condition for the newest of these rows, whatever the robot's clock said."""
     column = pyarrow.dataset.field
     wanted = (column("robot") == rows["robot"][0]) & column("spool").isin(rows["spool"].unique())
     if len(rows) > KEPT:

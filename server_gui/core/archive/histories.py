@@ -46,7 +46,7 @@ class History:
 
     @cached_property
     def acts(self) -> Sequence[tuple[Act, str]]:
-        """What was done, oldest first, and who tells of it."""
+        """Acts, oldest first, with their sources."""
         by_robot = {entry["hash"] for entry in self._live}
         found = itertools.chain.from_iterable(map(acts, chains.journals(self._stretches)))
         return [(act, ROBOT if act.hash in by_robot else STORE) for act in found]

@@ -153,7 +153,7 @@ def _waiting(settings: ServerSettings) -> list[Session]:
 
 
 def _completed(stored: Session, told: Mapping[tuple[str, str], Session]) -> Session:
-    """Of a session of which the store has only the rows, what the spool says."""
+    """Complete a session of which the store has only the rows, from the spool."""
     found = told.get((stored.robot, stored.session))
     if found is None or stored.notes != UNTOLD:
         return stored

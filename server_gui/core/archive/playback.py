@@ -11,6 +11,7 @@ from typing import Any, Final, cast
 import numpy as np
 from msgspec import UNSET
 
+from drivers.error_codes import error_text
 from gateway.client import Batch, ConnectionState
 from gateway.wire.component import ChannelInfo, ComponentInfo
 from gateway.wire.robot import Clock, Description, GuardInfo
@@ -104,7 +105,8 @@ class PlayedRobot(Robot):
             state, problem = "ok", None
             if self.word(f"{part.name}.state") in FAULTS:
                 code = self.values.get(f"{part.name}.error_code")
-                state, problem = "fault", "" if code is None else f"error code 0x{int(code):04X}"
+                state = "fault"
+                problem = "" if code is None else f"the drive is in fault: {error_text(int(code))}"
             elif part.name not in held and part.kind != "device":
                 state, problem = "lost", "the recording has no value of it here"
             self.parts[part.name] = replace(part, state=state, problem=problem)
@@ -130,7 +132,7 @@ Recall = Callable[
 
 
 def nothing_said(_begin_ns: int, _end_ns: int) -> Sequence[PastPrediction]:
-    """Of a recording without predictions."""
+    """Return the predictions of a recording without any."""
     return ()
 
 

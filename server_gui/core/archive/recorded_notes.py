@@ -45,7 +45,7 @@ class RecordedNotes:
         return [Flag(one.began_utc_ns + behind_ns, one.label, FlagKind.MARK) for one in short]
 
     def _behind_ns(self) -> int | None:
-        """How much more the robot's clock says than UTC, by the newest row that is shown."""
+        """Return the robot's clock minus UTC, at the newest shown row."""
         station = self._playback.desk.selected
         robot = None if station is None else station.robot
         if not isinstance(robot, PlayedRobot) or robot.row_ns is None or robot.stamp_ns is None:

@@ -133,7 +133,7 @@ def _looked(note: _Note, wanted: Sequence[Name]) -> Exported | None:
 
 
 def _state(file: Path, sha256: str) -> ExportState:
-    """Of a file; a link in its place is none. Raises `OSError`."""
+    """Return the state of a file; a link in its place is none. Raises `OSError`."""
     found = file.lstat()
     if not (sha256 and stat.S_ISREG(found.st_mode) and _sha256(file) == sha256):
         return ExportState.CHANGED

@@ -210,7 +210,7 @@ def _look(
     *,
     values: bool,
 ) -> tuple[list[DataFile], Proof]:
-    """Which files are damaged or gone, and what the others prove; with `values` whether it is as sent."""
+    """Return damaged and missing files, and the proof of the others; with `values` every value."""
     store = Snapshot.existing(store.url)  # each table is opened once
     found = verify.files(store)
     with expect(2 * len(found)) as advance:

@@ -187,7 +187,7 @@ def _units_wrong(
 def _columns_gone(
     store: Store, wrong: Iterable[Claim], told: Mapping[str, Units], units: Mapping[str, Units]
 ) -> Iterator[str]:
-    """Which columns these claims' tables have no more."""
+    """Yield the columns that these claims' tables lack."""
     for location, table in {claim.part.location: claim.part.table for claim in wrong}.items():
         if gone := [name for name in told.get(table, {}) if name not in units.get(location, told[table])]:
             yield (

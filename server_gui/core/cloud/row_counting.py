@@ -70,7 +70,7 @@ class Claim:
 
     @property
     def expected(self) -> tuple[int, str]:
-        """How many rows, and their sum, of what `there` counts."""
+        """Number of rows, and their sum, that `there` should have."""
         return (self.rest.rows, self.rest.sum) if self.rest and self.went else (self.part.rows, self.part.sum)
 
     @property
@@ -268,13 +268,13 @@ def _shared(
 
 
 def _told(batch: pa.RecordBatch, same: Mapping[str, str], values: bool) -> _Rows:
-    """Of rows of telemetry."""
+    """Sum rows of telemetry."""
     each, names = (_sums(batch, same), None) if values else (None, named(batch, NAMING))
     return _Rows(each, names, times_us(batch[TIME]))
 
 
 def _sums(batch: pa.RecordBatch, same: Mapping[str, str]) -> checksums.Sums:
-    """Of rows of telemetry, whatever types somebody may have given them."""
+    """Return the sums of telemetry rows, whatever their types have become."""
     names = [name for name in batch.schema.names if name not in same]
     columns = [batch[name].cast(_OWN.get(name, pa.float64()), safe=False) for name in names]
     return checksums.of_numbers(pa.record_batch(columns, names=names), same)

@@ -124,7 +124,7 @@ def layouts(spool: Path, batch: int) -> list[tuple[str, Layout]]:
 
 
 def writer(spool: Path, number: int) -> str:
-    """Who brings a batch to the store, by name."""
+    """Return the name of a batch's writer at the store."""
     found = _read(spool, number, "SELECT value FROM meta WHERE key = 'writer'")
     return str(found[0][0]) if found else identity(spool)
 

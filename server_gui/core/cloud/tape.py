@@ -139,7 +139,7 @@ def _rows(table: pa.Table) -> Rows:
 
 
 def _again(stamps_ns: Ints, columns: Mapping[str, Floats], order: Ints) -> Bools:
-    """Which rows are there before already. Samples of two sources may have one stamp, and are two rows."""
+    """Return the rows that repeat earlier ones. Two sources' samples may share a stamp, and are two rows."""
     same = np.append(False, np.diff(stamps_ns) == 0)
     again = np.zeros(len(stamps_ns), np.bool_)
     rows = np.flatnonzero(same | np.append(same[1:], False))

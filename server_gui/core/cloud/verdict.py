@@ -25,13 +25,13 @@ class Verdict:
 
     @property
     def unproven(self) -> str:
-        """How many rows no receipt speaks of, in words; nothing where there is none."""
+        """Number of rows without a receipt, in words; empty without any."""
         rows = self.rows_unproven
         return f"{rows} of {self.rows} rows are proven by no receipt here" if rows > 0 else ""
 
     @property
     def text(self) -> str:
-        """What is whole, and how far that is proven."""
+        """The intact parts, and the extent of their proof, in words."""
         rows = self.rows
         size_bytes = sum(file.size_bytes for file in self.files)
         told = [f"{len(self.files)} files with {rows} rows, {size(size_bytes)}"]

@@ -140,7 +140,7 @@ class Commissioning:
 
     @property
     def live(self) -> tuple[ReadingMessage, ...]:
-        """What devices tell now; nothing where that is old, or does not come."""
+        """The devices' present values; empty if they are old, or missing."""
         return self._live if self._clock() - self._live_s < OLD_S else ()
 
     @property

@@ -81,7 +81,7 @@ class Message(msgspec.Struct, frozen=True):
 
     @property
     def question(self) -> str:
-        """What is asked, without what only a terminal needs."""
+        """The question, without the parts for terminals."""
         return (self.ask or "").removesuffix(ENTER)
 
     @property

@@ -23,7 +23,7 @@ class CommissioningRequest:
 
     @property
     def problem(self) -> str:
-        """What is missing, in words; "" where it can begin."""
+        """The missing part, in words; "" if it can begin."""
         if not self.file.strip():
             return "name the robot's file that is to be written, as exo-01.toml"
         if not self.file.endswith(".toml"):
@@ -38,7 +38,7 @@ class CommissioningRequest:
 
     @property
     def left(self) -> Path | None:
-        """What an earlier dialogue has left to go on with, on this computer."""
+        """The draft of an earlier dialogue, on this computer."""
         kept = Path(self.file + SUFFIX)
         return kept if not self.computer and self.file and kept.is_file() else None
 
@@ -48,7 +48,7 @@ class CommissioningRequest:
         return shlex.join(["gwrms", *self.arguments("--json")]).replace(" --json", "").replace(" -- ", " ")
 
     def arguments(self, *more: str) -> list[str]:
-        """Of `gwrms`."""
+        """Return the arguments of `gwrms`."""
         options = {
             "--bitrate": [self.bitrate],
             "--eds": self.eds,
@@ -60,5 +60,5 @@ class CommissioningRequest:
 
     @property
     def stopping(self) -> list[str]:
-        """Of `gwrms`: quick stop to every drive that was found until now."""
+        """Arguments of `gwrms` for a quick stop of every drive found so far."""
         return self.arguments("--json", "--stop")

@@ -81,6 +81,7 @@ class Station:
         self.name = name
         self.is_named = is_named  # by the user, who is to find that name everywhere
         self.address = address
+        self.is_overloaded: Callable[[], bool] = lambda: False  # this computer
         self.neighbours: Sequence[Station] = ()  # the robots of the desk, this one among them
         self.robot = Robot()
         self.rings = Rings()
@@ -168,7 +169,8 @@ class Station:
         if (moment := this_moment()) is not None and moment is self._judged:
             return self._alarms
         stalls, now_s, danger = self._stalls.latest, self.robot.now_s(), self.predictions.danger
-        facts = Facts(self.robot, self.stopping, self.address, self.audit.entries, stalls, danger)
+        is_busy, entries = self.is_overloaded(), self.audit.entries
+        facts = Facts(self.robot, self.stopping, self.address, entries, stalls, danger, is_busy)
         if self.stopping.was_ended and any_enabled(self.robot) and self.is_live:
             self.stopping.was_ended = False
         self._alarms.look(

@@ -116,7 +116,7 @@ class _Sided:
 
     @property
     def counts(self) -> tuple[int, int]:
-        """How many before and after."""
+        """Numbers of cycles before and after."""
         behind = int(np.count_nonzero(self.after))
         return len(self.cycles) - behind, behind
 
@@ -205,7 +205,7 @@ def _sorted_out(cycles: Iterable[Cycle], spell: Spell) -> tuple[list[Cycle], dic
 
 
 def _since_back(sided: _Sided, spell: Spell) -> int:
-    """How many have the old values because these are in force again."""
+    """Return the number of cycles with the old values since the revert."""
     ended_ns = max((until_ns for _, until_ns in spell.after), default=None)
     return 0 if ended_ns is None else sum(cycle.began_ns >= ended_ns for cycle in sided.cycles)
 
@@ -294,7 +294,7 @@ def _estimate(found: Sequence[_Found], values: Floats, sided: _Sided, is_slope: 
 
 
 def _time_after(sided: _Sided) -> Floats:
-    """How long the new values had been in force at each cycle (s)."""
+    """Return the time that the new values had been in force at each cycle (s)."""
     steps_s = np.diff(sided.at_s, prepend=sided.at_s[0])
     return np.cumsum(np.where(sided.after, steps_s, 0.0))
 
@@ -379,6 +379,6 @@ def _notes(sided: _Sided, there: _Sided) -> Iterator[str]:
 
 
 def _activities(sided: _Sided, side: Bools) -> Iterator[str]:
-    """How many cycles of each, the most first."""
+    """Yield the number of cycles of each activity, the largest first."""
     for name, count in collections.Counter(sided.where(side).activities).most_common():
         yield f"{count} {name or 'not known'}"

@@ -68,7 +68,7 @@ class Edit(Struct, frozen=True):
 
     @property
     def became(self) -> str:
-        """What became of it, in words."""
+        """Its result, in words."""
         return f"{self.state}, NOT all of it" if self.not_back else str(self.state)
 
     @property
@@ -82,7 +82,7 @@ class Edit(Struct, frozen=True):
 
     @property
     def components(self) -> frozenset[str]:
-        """What it is of."""
+        """The edited components."""
         return frozenset(change.name.partition(".")[0] for change in self.changes)
 
     @property
@@ -111,7 +111,7 @@ class JournalEdits:
         self.all = [edit for edit in self.all if _last_ns(edit, before_ns) >= before_ns]
 
     def lose_sight(self, at_ns: int) -> None:
-        """Of trials that go on nobody hears from now on how they end."""
+        """Mark open trials as lost from sight: their end is unknown."""
         self.all = [
             replace(edit, state=EditState.ASKED, ended_ns=at_ns) if edit.state is EditState.ON_TRIAL else edit
             for edit in self.all

@@ -50,7 +50,7 @@ class Effects:
 
     @property
     def p(self) -> Floats:
-        """How often a difference at least so large comes by chance."""
+        """Probability of a difference at least so large by chance."""
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio = np.nan_to_num(np.abs(self.difference) / self.error, posinf=np.inf)
         from scipy.special import stdtr  # as above
@@ -125,7 +125,7 @@ def _alike(columns: Floats, kept: float) -> Floats:
 
 
 def _correlation(residuals: Floats, after: Bools) -> Floats:
-    """Of neighbours on the same side; 0 where nothing varies."""
+    """Return the correlation of neighbours on the same side; 0 for constant columns."""
     pairs = after[1:] == after[:-1]
     power = np.sum(residuals**2, axis=0)
     with np.errstate(divide="ignore", invalid="ignore"):

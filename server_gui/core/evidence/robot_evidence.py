@@ -152,7 +152,7 @@ class RobotEvidence:
             del self._recordings[0]
 
     def _place(self, edit: Edit) -> int:
-        """Which of the recordings the edit was made in."""
+        """Return the index of the recording in which the edit was made."""
         later = (place for place, (since, _) in enumerate(self._recordings) if since > edit.began_ns)
         return max(next(later, len(self._recordings)) - 1, 0)
 

@@ -68,7 +68,7 @@ def word(told: EditEvidence) -> str:
 
 
 def strides(evidence: Evidence) -> str:
-    """How many were compared; those since it was taken back have the old values, too."""
+    """Return the numbers of compared strides; those since the revert have the old values, too."""
     before, after, back = evidence.cycles_before, evidence.cycles_after, evidence.cycles_back
     if not back:
         return f"{counted(before, 'gait cycle')} before, {after} after"

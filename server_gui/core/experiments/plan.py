@@ -102,7 +102,7 @@ class ExperimentPlan:
         return f"{self.unit.brief(value)} {self.unit.symbol}".rstrip()
 
     def expected_s(self, stride_s: float) -> float:
-        """How long it takes at strides of so long."""
+        """Return the expected duration, for this stride time."""
         held = self.dwell
         measured_s = held.cycles * stride_s if held.seconds is None else held.seconds
         return sum((held.transient + 1) * stride_s + measured_s * step.is_measured for step in self.steps)

@@ -68,7 +68,7 @@ def _response(one: Series, periods: Sequence[HeldPeriod]) -> Response | None:
 
 
 def _alike(periods: Iterable[Sequence[float]]) -> float:
-    """How much neighbours resemble each other, all periods together (lag 1)."""
+    """Return the lag-1 correlation over all periods together."""
     together = power = 0.0
     for values in periods:
         level = np.asarray(values) - np.mean(values)

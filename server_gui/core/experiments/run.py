@@ -110,7 +110,7 @@ class Run:
 
     @property
     def cycles(self) -> int:
-        """Of this step, of the leg that has least, without those that are left out."""
+        """Number of cycles of this step, by the leg with the fewest, without the transient ones."""
         return max(0, self._least() - self.plan.dwell.transient)
 
     @property
@@ -314,7 +314,7 @@ class Run:
                 self._cycles[cycle.leg].append(cycle)
 
     def _least(self) -> int:
-        """Of the legs that have stepped at all since the beginning, of the one that has least."""
+        """Return the number of cycles of the leg with the fewest, among legs that have stepped at all."""
         return min((len(self._cycles[leg]) for leg in self._legs), default=0)
 
     def _is_enough(self) -> bool:

@@ -46,7 +46,7 @@ class Series:
 
     @property
     def component(self) -> str:
-        """Whose it is; empty: the robot's."""
+        """The metric's component; empty: the robot."""
         return self.key.rpartition(".")[0]
 
     @property
@@ -106,7 +106,7 @@ def judge(
 
 
 def _strides(sides: Sequence[Sequence[HeldPeriod]]) -> list[float]:
-    """How long strides lasted with either value (s)."""
+    """Return the mean stride times with both values (s)."""
     lengths = [[cycle.seconds for held in side for cycle in held.cycles] for side in sides]
     return [float(np.mean(side)) if side else 1.0 for side in lengths]
 

@@ -172,7 +172,7 @@ class Collector:
 
     @property
     def untold(self) -> int:
-        """How many rows are lost that no event tells; for when it has ended."""
+        """Number of lost rows without an event; for its end."""
         return self._recorder.untold
 
     def wait(self, within_s: float) -> None:

@@ -61,7 +61,7 @@ class Member:
 
     @property
     def session(self) -> str:
-        """What the recording that goes on is called; for any thread."""
+        """Name of the present recording; for any thread."""
         return self.keeping.session
 
     def report(self) -> LinkReport:

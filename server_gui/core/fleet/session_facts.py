@@ -43,7 +43,7 @@ def facts(description: Description, operator: str, notes: str, worn: Worn = NOBO
 
 
 def versions(description: Description) -> dict[str, str]:
-    """Of the software that takes part, as far as it is known."""
+    """Return the versions of the software that takes part, as far as they are known."""
     known = {"gwrms collect": importlib.metadata.version("gwrms"), "protocol": str(PROTOCOL)}
     return known if description.version is None else known | {"gateway": description.version}
 

@@ -46,7 +46,7 @@ class Telemetry:
 
     @property
     def age_ns(self) -> int | None:
-        """How old the newest row was on arrival, None where nobody knows."""
+        """Age of the newest row on arrival, None if unknown."""
         if self.clock is None or not self.batch.stamps_ns:
             return None
         return max(0, self.batch.received_ns + self.clock.offset_ns - self.batch.stamps_ns[-1])

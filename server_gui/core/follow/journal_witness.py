@@ -29,7 +29,7 @@ async def signed_head(client: Client, address: Address) -> SignedHead | None:
 
 
 def _objection(head: SignedHead, address: Address) -> str | None:
-    """Of a robot on this computer that is not paired, the key is whichever it shows."""
+    """Return the objection to a robot's key; an unpaired robot on this computer may have any."""
     try:
         key = pin_of(address) or fingerprint(der_of(head.certificate.encode("ascii", "replace")))
     except KeyProblem as error:

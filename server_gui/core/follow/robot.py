@@ -115,9 +115,7 @@ class Robot:
                 self.last_failure = event
 
     def _judged(self, buses: Sequence[BusInfo], at_ns: int) -> tuple[BusInfo, ...]:
-        is_new = self.resources_at_ns is not None and at_ns - self.resources_at_ns < BUSY_NS
-        cpu_percent = None if self.resources is None or not is_new else self.resources.cpu.percent
-        return self._missing.take(buses, at_ns, cpu_percent)
+        return self._missing.take(buses, at_ns, self.cpu_percent(at_ns))
 
     def hold(self, values: Mapping[str, float]) -> None:
         """Take values just read from devices."""
@@ -131,6 +129,13 @@ class Robot:
         return all(name in held and held[name].value == value for name, value in values.items())
 
     # --- what views ask
+
+    def cpu_percent(self, now_ns: int | None = None) -> float | None:
+        """Return how busy the robot's computer is; None where that was not seen of late."""
+        now_ns = frame_time.now_ns() if now_ns is None else now_ns
+        if self.resources is None or self.resources_at_ns is None or now_ns - self.resources_at_ns >= BUSY_NS:
+            return None
+        return self.resources.cpu.percent
 
     def age_s(self, now_ns: int | None = None) -> float | None:
         """Seconds since the newest row was taken; None before the first."""
@@ -184,7 +189,7 @@ class Robot:
 
     @property
     def state_words(self) -> Mapping[str, Mapping[str, str]]:
-        """What the numbers of each channel that is a state mean."""
+        """Words for the numbers of each channel that is a state."""
         return self._words
 
     # --- what events do

@@ -2,6 +2,7 @@
 
 from typing import Final, Protocol
 
+from drivers.error_codes import error_text
 from gateway.client import ConnectionState
 from server_gui.core.follow.news import NewsKind
 from server_gui.core.follow.robot import Robot
@@ -91,7 +92,7 @@ class RobotNews:
                 continue
             self._errors[joint] = code
             if code:
-                self._tell(NewsKind.FAULT, f"{_spoken(joint)}: error code 0x{int(code):04X}", joint)
+                self._tell(NewsKind.FAULT, f"{_spoken(joint)}: {error_text(int(code))}", joint)
 
 
 def _spoken(name: str) -> str:

@@ -37,7 +37,7 @@ class Run:
 
 
 def friction(test: Test) -> JointTestResult:
-    """Of a friction test."""
+    """Analyse a friction test."""
     runs = _runs(test)
     pairs = [found for there, back in pairwise(runs) if (found := _pair(there, back)) is not None]
     if not pairs:

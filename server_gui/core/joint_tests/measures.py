@@ -42,7 +42,7 @@ class JointTestResult(Struct, frozen=True):
     notes: list[str] = []
 
     def value(self, name: str) -> float | None:
-        """Of the measure of that name."""
+        """Return the value of the measure of that name."""
         return next((one.value for one in self.measures if one.name == name), None)
 
 

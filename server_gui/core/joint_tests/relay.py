@@ -24,7 +24,7 @@ RULES: Final = {
 
 
 def relay(test: Test) -> JointTestResult:
-    """Of a relay test."""
+    """Analyse a relay test."""
     times, target, position = test.times, test["target"], test["position"]
     curves = [
         Curve("position", times.tolist(), np.degrees(position).tolist(), "s", "°"),

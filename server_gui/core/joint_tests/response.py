@@ -33,7 +33,7 @@ class Response:
 
 
 def frequency_response(test: Test) -> JointTestResult:
-    """Of a chirp."""
+    """Analyse a chirp."""
     response = measured(test)
     if response is None:
         why = "the test has too few samples"

@@ -27,7 +27,7 @@ _UNITS: Final = {
 
 
 def step_response(test: Test) -> JointTestResult:
-    """Of every step of a test."""
+    """Analyse every step of a test."""
     times, target, position = test.times, test["target"], test["position"]
     steps = [_one(times[a:b], target[a:b], position[a:b]) for a, b in _bounds(target)]
     steps = [one for one in steps if one is not None]

@@ -150,7 +150,7 @@ class Tried:
 
     @property
     def wrong(self) -> str:
-        """How often what was said was wrong; nothing where that is not known."""
+        """Share of wrong predictions, in words; empty if unknown."""
         if self.missed is None:
             return ""
         before, after = (100.0 * each for each in self.missed)
@@ -173,7 +173,7 @@ class Adapting:
 
     @property
     def choices(self) -> tuple[Happening, ...]:
-        """What a person may say now."""
+        """The possible decisions of a person."""
         return tuple(one for one in BY_PERSON if one in NEXT[self.state])
 
     @property
@@ -228,5 +228,5 @@ class Adapting:
 
 
 def _time_of_day(utc_s: float) -> str:
-    """Of this place."""
+    """Return the local time of day."""
     return f"{datetime.fromtimestamp(utc_s, UTC).astimezone():%H:%M}"

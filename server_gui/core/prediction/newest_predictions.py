@@ -27,7 +27,7 @@ class NewestPrediction:
 
     @property
     def prediction(self) -> Prediction:
-        """What the model says."""
+        """The model's prediction."""
         return self.predicted.prediction
 
     def age_s(self, now_ns: int | None = None) -> float:
@@ -114,7 +114,7 @@ class StationPredictions:
 
     @property
     def told(self) -> Mapping[str, Told]:
-        """What is shown of each task: of a robot what is said live, of a recording what was said then."""
+        """The shown predictions by task: of a robot live, of a recording those of its time."""
         return {**self.by_task, **self.recalled}
 
     @property

@@ -40,7 +40,7 @@ class Rehearsed(Struct, frozen=True):
 
     @property
     def false_per_hour(self) -> float:
-        """How often it would have acted without cause."""
+        """Rate of actions without cause."""
         return self.false / self.hours if self.hours else 0.0
 
 

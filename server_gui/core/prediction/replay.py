@@ -104,7 +104,7 @@ def _replayed(store: Store, session: Session, model: Model, every_ns: int) -> Re
 
 
 def _live(store: Store, session: Session, model: Model, found: Sequence[Prediction]) -> Live:
-    """Of a session that goes on, only up to here: by now there may be more in the store."""
+    """Compare with the live predictions of the session up to here; the store may have more by now."""
     try:
         rows = sessions.rows_of(store, session, PREDICTIONS)
     except NoSuchTable:

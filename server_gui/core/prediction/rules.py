@@ -39,7 +39,7 @@ class PredictionRule:
         return True if self.holds else None
 
     def _probability(self, prediction: Prediction) -> float:
-        """Of the rule's label; a model knows nothing of what is abnormal."""
+        """Return the probability of the rule's label; "abnormal" is never a model's class."""
         if prediction.label == ABNORMAL or self.settings.label == ABNORMAL:
             return float(prediction.label == self.settings.label)
         return prediction.probabilities.get(self.settings.label, 0.0)

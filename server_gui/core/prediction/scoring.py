@@ -31,7 +31,7 @@ class Decisions:
 
     @property
     def phases(self) -> Samples:
-        """Of the left and the right leg, NaN where none was said."""
+        """Phases of the left and the right leg, NaN without a prediction."""
         return np.array([[one.get(side, np.nan) for side in SIDES] for one in self.values]).reshape(-1, 2)
 
 

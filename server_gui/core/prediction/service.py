@@ -99,7 +99,7 @@ class PredictionService:
 
     @property
     def models(self) -> Mapping[tuple[str, str], Model]:
-        """What serves, by robot and task; from any thread."""
+        """Serving models, by robot and task; from any thread."""
         return self._serving.models
 
     @property

@@ -49,7 +49,7 @@ class TrainingData:
 
     @property
     def strides(self) -> int:
-        """How many strides of the left leg they are of."""
+        """Number of strides of the left leg in the data."""
         return len({row.instant.stride_ns for row in self.rows})
 
     def ask(self, windows: Sequence[Window]) -> None:
@@ -68,7 +68,7 @@ class TrainingData:
         self._add([one for one in known if one[0].stamp_ns >= self._after_ns])
 
     def _add(self, known: Sequence[tuple[Window, Instant]]) -> None:
-        """Of those alone, and of a stride's at once, features are made: who stands costs nothing."""
+        """Compute the features of these windows, a stride's at once: standing costs nothing."""
         if known:
             found = self.base.learned.recipe.compute(np.concatenate([one.samples for one, _ in known]))
             rows = zip(known, np.split(found, len(found)), strict=True)

@@ -107,7 +107,7 @@ class LinkMonitor:
         self._refused = at_ns, why
 
     def calendar(self, ahead_ns: int) -> None:
-        """How far the robot's calendar was ahead of ours when it was described."""
+        """Take the difference of the robot's calendar from ours at its description."""
         self._calendar_ns = ahead_ns
 
     def quality(self, now_ns: int) -> LinkQuality:

@@ -25,7 +25,7 @@ class SessionUse:
 
     @property
     def minutes(self) -> int:
-        """How many minutes were looked at."""
+        """Number of minutes measured."""
         series = (minutes for measures in self.processes.values() for minutes in measures.values())
         return max(map(len, series), default=0)
 

@@ -14,12 +14,12 @@ def of_layout(robot: str, description: bytes) -> int:
 
 
 def of_run(layout: int, name: tuple[object, ...], data: bytes) -> int:
-    """Of all that a run is: its layout (`of_layout`), its name and its rows."""
+    """Return the checksum of a run: its layout (`of_layout`), its name and its rows."""
     return zlib.crc32(data, zlib.crc32(repr(name).encode(), layout))
 
 
 def of_head(robot: str, head: JournalHead) -> int:
-    """Of up to where a robot's journal is recorded."""
+    """Return the checksum of the recorded head of a robot's journal."""
     return zlib.crc32(repr((robot, head.n, head.hash)).encode())
 
 

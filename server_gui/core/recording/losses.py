@@ -34,7 +34,7 @@ class Losses:
 
     @property
     def rows(self) -> int:
-        """How many."""
+        """Number of lost rows."""
         return sum(lost.rows for _, _, lost in self.each())
 
     def add(self, parts: Iterable[Part]) -> None:

@@ -83,7 +83,7 @@ def newer(rows: Sequence[pa.RecordBatch], store: Store, location: str) -> list[p
 
 
 def name(writer: str, batch: int, rows: Sequence[pa.RecordBatch]) -> str:
-    """Whom to bring these rows as, so that exactly they are brought once."""
+    """Return a name for these rows that lets them be added only once."""
     keys = ("connection", "stream", "seq", "row") if "connection" in rows[0].schema.names else ("number",)
     told = repr([[each[key].to_pylist() for key in keys if key in each.schema.names] for each in rows])
     return f"{writer}/{batch}.{hashlib.blake2b(told.encode(), digest_size=8).hexdigest()}"
@@ -114,7 +114,7 @@ def _lacking(rows: pyarrow.dataset.Dataset, batch: pa.RecordBatch, where: str, h
 
 
 def _like(batch: pa.RecordBatch) -> pc.Expression:
-    """Of the same robot, session, connection, stream and time as the rows of this run."""
+    """Return the condition for rows of the same robot, session, connection, stream and time as this run."""
     extent = pc.min_max(batch["utc"])
     found = (_column("utc") >= extent["min"]) & (_column("utc") <= extent["max"])
     for key in (*TEXTS, "stream"):

@@ -197,7 +197,7 @@ def went_to(receipts: Iterable[Receipt], url: str) -> list[Receipt]:
 
 
 def units_told(receipts: Iterable[Receipt]) -> dict[str, dict[str, str | None]]:
-    """Of each table, by its id, which units its columns had, as the newest receipt that tells it has it."""
+    """Return the units of each table's columns, by its id, from the newest receipt with them."""
     known = _Known()
     for receipt in receipts:
         known.add(receipt)

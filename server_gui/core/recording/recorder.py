@@ -247,7 +247,7 @@ class Recorder:
 
     @property
     def untold(self) -> int:
-        """How many rows are lost that no event tells; for when it is closed."""
+        """Number of lost rows without an event; for its end."""
         return self._untold.rows
 
     def flush(self, timeout_s: float) -> bool:
@@ -472,7 +472,7 @@ class Recorder:
 
 
 def _rows(part: Part) -> int:
-    """How many rows of a table a part makes."""
+    """Return the number of rows in a part."""
     return len(part) if isinstance(part, Run) else int(isinstance(part, Record))
 
 

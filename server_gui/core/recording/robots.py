@@ -86,7 +86,7 @@ class Robots:
         return self.end(robot, now)
 
     def sessions(self) -> list[Record]:
-        """Of every session that goes on what is known of it, once more."""
+        """Return the facts about every open session, once more."""
         return [session.record() for session in self._sessions.values()]
 
     def end_all(self) -> list[Record]:

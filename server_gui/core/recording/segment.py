@@ -174,7 +174,7 @@ class Segment:
 
     @property
     def cut_commits(self) -> int:
-        """How many commits may be missing at its end, because its log was damaged."""
+        """Number of commits that may be missing at its end, because its log was damaged."""
         return int(self._told("cut") or 0)
 
     def cut(self, commits: int) -> None:
@@ -331,7 +331,7 @@ class Segment:
         return {robot for robot, _ in self._layouts} | told | self._heads()[0].keys()
 
     def _whose(self, content: Any) -> tuple[str, ...]:
-        """Whose record it may have been: what it says itself, where that is a robot; else any."""
+        """Return the possible robots of a record: its own, if it is a robot; else all."""
         known = self.robots()
         with contextlib.suppress(msgspec.MsgspecError, TypeError):
             told = _record_decoder.decode(content).fields.get("robot")

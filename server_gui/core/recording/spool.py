@@ -135,7 +135,7 @@ class Spool:
 
     @property
     def age_s(self) -> float:
-        """How long the first row in the segment that is being written has been there."""
+        """Age of the first row in the segment that is being written."""
         return 0.0 if self._began_ns is None else (time.monotonic_ns() - self._began_ns) / 1e9
 
     @property

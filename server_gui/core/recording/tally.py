@@ -126,7 +126,7 @@ class Tally:
 
 
 def tallied(rows: pa.Table, location: str, table: str, units: Units) -> ReceiptPart:
-    """Of a batch's rows of another table."""
+    """Count a batch's rows of another table."""
     extent = pc.min_max(rows["utc"].cast(pa.int64())).as_py()
     each, timed, times = checksums.of_rows(rows), rows["utc"].is_valid().to_numpy(), _Times()
     times.add(times_us(rows["utc"])[timed], each[timed])

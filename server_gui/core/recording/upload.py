@@ -252,7 +252,7 @@ def _rows(table: Table, data: pa.Table, writer: str, batch: int, store: Store) -
 
 
 def _units(store: Store, location: str, schema: pa.Schema) -> dict[str, str | None]:
-    """Of these columns, as the table has them."""
+    """Return the units of these columns in the table."""
     found = store.units(location)
     return {name: found[name] for name in schema.names if name in found}
 

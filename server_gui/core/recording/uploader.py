@@ -172,7 +172,7 @@ class Uploader:
 
     @property
     def _problem(self) -> str | None:
-        """What could not be done this time, in words."""
+        """The failure of this attempt, in words."""
         if not self._left:
             return None
         others = len(self._left) - 1
@@ -230,7 +230,7 @@ class Uploader:
         self._compared = True
 
     def _tell(self) -> list[int]:
-        """How much waits now, and which batches."""
+        """Update the backlog, and return the pending batches."""
         waiting, backlog = self._spool.waiting(), self._spool.backlog_bytes()
         damaged = tuple(map(str, self._spool.damaged()))
         self.state = replace(self.state, waiting=len(waiting), backlog_bytes=backlog, damaged=damaged)

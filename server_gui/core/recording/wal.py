@@ -117,7 +117,7 @@ def _sum(before: Pair, data: bytes, order: str) -> Pair:
 
 @functools.lru_cache(4)
 def _weights(count: int) -> tuple[tuple[_Words, _Words], tuple[int, int, int]]:
-    """How much each word counts in a and in b, and what was there before: powers of ((1, 1), (1, 2))."""
+    """Return the weight of each word in a and b, and of the earlier sums: powers of ((1, 1), (1, 2))."""
     for_a, for_b = [], []
     aa, ab, bb = 1, 0, 1
     for _ in range(count):

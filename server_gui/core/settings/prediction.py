@@ -66,7 +66,7 @@ class RuleSettings(Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def name(self) -> str:
-        """What it is called where it acts."""
+        """Name of the rule in alarms."""
         return f"{self.task} {self.label} ≥ {self.at_least:g} for {self.for_ms} ms"
 
     @property

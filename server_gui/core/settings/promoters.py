@@ -54,7 +54,7 @@ def objection(
 
 
 def signer(pointer: Pointer, task: str, robot: str, card: Card, known: Mapping[str, str]) -> str:
-    """Who has signed what serves, for people; a signature that does not hold is none."""
+    """Return the signer of a promotion, for people; an invalid signature counts as none."""
     if not pointer.signature:
         return UNSIGNED
     try:

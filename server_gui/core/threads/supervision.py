@@ -90,25 +90,27 @@ class Worker:
             if self._died_s < self._began_s:
                 self._deaths, self._died_s = self._deaths + 1, now_s
             if self._deaths > 1 and now_s - self._began_s < AGAIN_S:
-                return Trouble(self.name, f"the part “{self.name}” has died: {self._why}", works=False)
+                text = f"the part “{self.name}” stopped unexpectedly, and stops again {self._why}"
+                return Trouble(self.name, text, works=False)
             self.start()
         if now_s - self._beat_s > self._still_s:
             still = f"the part “{self.name}” has not moved for {self._still_s:g} s"
             return Trouble(self.name, f"{still}; is this computer too busy?", works=False)
         if self._deaths and now_s - self._died_s < HELD_S:
-            text = f"the part “{self.name}” has died and was begun anew: {self._why}"
+            text = f"the part “{self.name}” stopped unexpectedly and was restarted {self._why}"
             return Trouble(self.name, text, works=True)
         return None
 
     @property
     def _why(self) -> str:
-        times = f"{self._deaths} times until now"
-        return f"{self._cause}, {times}; what it had in hand may be lost, the log says more"
+        times = "once" if self._deaths == 1 else f"{self._deaths} times"
+        cause = f"{self._cause}; " if self._cause else ""
+        return f"({cause}{times} so far); see the log"
 
     def _guarded(self) -> None:
         try:
             self._run()
-            self._cause = "it returned unasked"
+            self._cause = ""  # it returned unasked
         except BaseException as error:  # nothing may end a thread without a word
             self._cause = type(error).__name__
             log.exception("the thread %s has died", self.name)

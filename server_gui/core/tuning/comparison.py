@@ -38,7 +38,7 @@ class Comparison:
 
     @property
     def different(self) -> list[Row]:
-        """What the robot holds otherwise."""
+        """Rows with other values on the robot."""
         return [row for row in self.rows.values() if row.verdict is not ComparisonVerdict.SAME]
 
 

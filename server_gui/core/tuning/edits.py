@@ -38,7 +38,7 @@ class ReviewedEdit:
 
     @property
     def by(self) -> str:
-        """How far it goes, in its unit and as a share of what is there: `+30 (+7.5 %)`."""
+        """Size of the change, in its unit and as a share of the present value: `+30 (+7.5 %)`."""
         if self.old is None:
             return ""
         step = float(f"{self.new - self.old:.6g}")

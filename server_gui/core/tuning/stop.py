@@ -51,7 +51,7 @@ class Proof:
     @property
     def when(self) -> str:
         """After the STOP."""
-        return "before" if self.was_so else f"{max(self.after_ms, 1.0):.0f} ms"
+        return "already off" if self.was_so else f"{max(self.after_ms, 1.0):.0f} ms"
 
     @property
     def text(self) -> str:
@@ -83,7 +83,7 @@ class StopProgress:
 
     @property
     def stage(self) -> tuple[StopState, bool]:
-        """How far it has gone, and whether one is held."""
+        """State of the latest STOP, and whether one is held."""
         return self.state, self.held
 
     @property
@@ -177,7 +177,7 @@ class StopProgress:
 
     @property
     def proof(self) -> str:
-        """What drives themselves have shown since: `6 drives confirmed in quick stop active within 3 ms`."""
+        """Proof from the drives' own states: `6 drives confirmed in quick stop active within 3 ms`."""
         if not self.proofs:
             return ""
         slowest = max(1.0, *(proof.after_ms for proof in self.proofs.values()))

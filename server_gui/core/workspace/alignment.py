@@ -56,7 +56,7 @@ def instant_ns(station: Station, by: Align) -> int | None:
 
 
 def offset_text(here: Station, beside: Station, shift: int | None, nudge_s: float) -> str:
-    """How far `beside` was moved, by the age of its newest row on this robot's axis."""
+    """Return the shift of `beside`, by the age of its newest row on this robot's axis."""
     if shift is None:
         return "cannot be aligned so: one of the two has none"
     ours, theirs = here.rings.newest_ns, beside.rings.newest_ns

@@ -307,7 +307,7 @@ class Scene:
         self.beside.shift_ns = (self._shift_ns or 0) + round(self.nudge_s * 1e9)
 
     def beside_text(self) -> str:
-        """Who is beside, and how the two are aligned."""
+        """Return the companion's name, and the alignment of both."""
         if self.beside is None or self._station is None:
             return ""
         said = offset_text(self._station, self.beside.station, self._shift_ns, self.nudge_s)

@@ -107,7 +107,7 @@ class Series:
         self._computed = {key: known for key, known in self._computed.items() if key[0] in texts}
 
     def _over_both(self, meant: CurveBinding, count: int) -> Floats:
-        """Of two robots: what comes late from one belongs to rows that were there; all is computed anew."""
+        """Compute over two robots: late rows of one belong to older ones of the other, so all is anew."""
         rings = self.station.rings
         times = rings.times(ALL_S)
         times = times[len(times) - min(count, len(times)) :]

@@ -42,7 +42,7 @@ class Workspace:
 
     @property
     def room(self) -> int:
-        """How many curves may be added."""
+        """Number of curves that may be added."""
         return MOST_CURVES - sum(len(plot.curves) for plot in self.plots)
 
     def arrange(self, curves: Iterable[CurveBinding]) -> None:

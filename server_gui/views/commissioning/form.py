@@ -73,7 +73,7 @@ class Form(Card):
 
     @property
     def wish(self) -> CommissioningRequest:
-        """What is typed now."""
+        """The request as typed."""
         return CommissioningRequest(
             file=_home(self.file.text()),
             bus=_home(self.bus.currentText()),

@@ -167,7 +167,7 @@ class Live(QWidget):
 
     @property
     def texts(self) -> list[tuple[str, str]]:
-        """What it says."""
+        """The shown texts."""
         return [(name.text(), value.text()) for name, value in self._rows if not name.isHidden()]
 
     def show_readings(self, commissioning: Commissioning) -> None:

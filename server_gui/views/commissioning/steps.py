@@ -45,7 +45,7 @@ class Steps(Card):
 
     @property
     def texts(self) -> list[str]:
-        """What it says, part by part."""
+        """The shown texts, part by part."""
         return [f"{title.text()}: {words.text()}" for _, title, words in self._rows if not title.isHidden()]
 
     def show_steps(self, steps: tuple[StepMessage, ...], *, runs: bool) -> None:
@@ -93,7 +93,7 @@ def _parts(steps: tuple[StepMessage, ...]) -> list[tuple[str, list[StepMessage]]
 
 
 def _state(steps: list[StepMessage]) -> str:
-    """Of a part: done only where each step is, or was passed after one that is."""
+    """Return the state of a part: done only if each step is, or was passed after one that is."""
     states = {step.state for step in steps}
     if NOW in states:
         return NOW

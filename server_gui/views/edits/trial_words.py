@@ -82,7 +82,7 @@ def ends(trial: Trial) -> str:
 
 
 def _changes(station: Station, trial: Trial, units: Units) -> list[tuple[str, str]]:
-    """Of each a name to read, and its values before and now."""
+    """Return the name, and the values before and now, of each parameter."""
     found = []
     for name, value in trial.values.items():
         info = station.known.get(name)

@@ -121,7 +121,7 @@ class ExperimentForm(QDialog):
 
     @property
     def plan(self) -> ExperimentPlan:
-        """What is typed, as a plan; raises `BadPlan`."""
+        """The plan as typed; raises `BadPlan`."""
         info, held, unit = self._held()
         refused = self._station.refused(PARAMETER_WRITE)
         if refused:

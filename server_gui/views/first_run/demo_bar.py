@@ -21,6 +21,8 @@ from server_gui.views.widgets.wrapping_label import WrappingLabel
 
 TOURED: Final = "toured"  # kept: the tour begins by itself only until somebody has left it
 HELD: Final = "A stop is held: end it first with “Reset stop…” above. Then this lets the robot walk again."
+ENDS: Final = " (which also ends the stop that is held)"
+REPAIR: Final = "Repair all"
 WALKING: Final = "It walks, with every drive enabled"
 WALKS: Final = "Tells the simulated controller to start and the wearer to walk, as after a stop or a fault"
 
@@ -54,12 +56,10 @@ class DemoBar(QToolBar):
         self.setObjectName("Simulated robot")
         self.setMovable(False)
         self.setFloatable(False)
-        self.toggleViewAction().setEnabled(
-            False
-        )  # it can be closed by nobody: what is broken is to be mended
+        self.toggleViewAction().setEnabled(False)  # it cannot be closed: what is broken is to be repaired
         self.walk, self.mend, self.again = (
             QPushButton("Start walking"),
-            QPushButton("Mend all"),
+            QPushButton(REPAIR),
             QPushButton("Tour"),
         )
         self.breaking = QPushButton("Break something")
@@ -133,7 +133,8 @@ class DemoBar(QToolBar):
         tripped = ", ".join(map(words, self._tripped()))
         said = f"Broken: {broken}" if broken else "Simulated robot; nothing is broken"
         if tripped:
-            how = "Mend all, then Clear fault" if broken else "Clear fault"
+            clear = f"Clear fault{ENDS if held else ''}"
+            how = f"{REPAIR}, then {clear}" if broken else clear
             return f"{said if broken else 'Simulated robot'}. Tripped: {tripped}. {how}, then Start walking"
         return f"{said}. A stop is held: reset it, then Start walking" if held else said
 

@@ -26,9 +26,9 @@ class Stop:
 
 STOPS: Final = (
     Stop(
-        "one look",
-        "the robot's drives and link stand at the top beside STOP, alarms below, whatever tab is open. "
-        "What is not known now is grey.",
+        "at a glance",
+        "drives and link are at the top beside STOP, alarms below, whatever tab is open. What is not known "
+        "now is grey.",
         lambda window: window.header,
     ),
     Stop(
@@ -44,14 +44,14 @@ STOPS: Final = (
     ),
     Stop(
         "parameters",
-        "a new value is staged, not sent. Review shows old and new; a trial takes itself back unless you "
-        "keep it.",
+        "a new value is staged, not sent. Review shows old and new; the robot reverts a trial by itself "
+        "unless you keep it.",
         lambda window: window.parameters,
     ),
     Stop(
         "afterwards",
-        "everything is recorded: Recordings plays it, Edits tells what a change did to the walk, Audit who "
-        "changed what. F1 explains each tab.",
+        "everything is recorded: Recordings plays it, Edits shows the effect of each change on the walk, "
+        "Audit who changed what. F1 explains each tab.",
         lambda window: window.page_bar,
     ),
 )

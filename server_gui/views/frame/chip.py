@@ -101,7 +101,7 @@ class Chip(QFrame):
 
     @property
     def _around(self) -> int:
-        """What is beside the words."""
+        """Width beside the words."""
         button = self._button
         beside = 0 if button is None or button.isHidden() else button.sizeHint().width() + 6
         return self._theme.px(12) + 34 + beside

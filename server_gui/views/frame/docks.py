@@ -53,7 +53,7 @@ class Docks(QObject):
 
     @property
     def state(self) -> QByteArray:
-        """What is to be kept."""
+        """State to be saved."""
         return self._roomy if self.is_narrow else self._window.saveState(LAYOUT)
 
     def restore(self, state: QByteArray) -> None:

@@ -12,7 +12,7 @@ from server_gui.core.alarms.robot_alarms import remedy
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.tuning.stop import StopState
-from server_gui.views.frame.chip import LEAST, Chip, Words
+from server_gui.views.frame.chip import Chip, Words
 from server_gui.views.frame.recording_chip import NAME, RecordingChip
 from server_gui.views.marks import Mark, age_text, drives_mark, enabled_text
 from server_gui.views.predictions import OLD, by_steps, status
@@ -29,6 +29,7 @@ STOP_SHARE: Final = 0.4  # of the width, which STOP may take at most
 RESETTING: Final = "Ends a held stop. Every drive stays switched off: nothing is enabled."
 # Left out in this order where there is less room; alarms stand below the header.
 SPARE: Final = ("status", "recording", "link", "drives", "robot")
+LEAST_NAME: Final = 100  # wide, at text of 100 %: room for the state STOPPED
 A_NAME: Final = 130  # wide, at text of 100 %: a longer name of a robot is elided in its middle
 
 
@@ -71,11 +72,11 @@ class Header(QWidget):
 
     @property
     def outcome_text(self) -> str:
-        """What became of the STOP, as it is shown; empty while nothing is."""
+        """Result of the STOP as shown; empty without one."""
         return self._outcome.main_text if not self._outcome.isHidden() else ""
 
     def minimumSizeHint(self) -> QSize:
-        """Of what is never left out."""
+        """Size of the parts that are always shown."""
         return QSize(
             self.width() - self._room(has_outcome=self._has_outcome), super().minimumSizeHint().height()
         )
@@ -122,7 +123,7 @@ class Header(QWidget):
         wide = dict(needs)
         for name in SPARE:
             if name == "link":  # before that the name of the robot gives way
-                needs["robot"] = min(needs["robot"], self._theme.px(LEAST))
+                needs["robot"] = min(needs["robot"], self._theme.px(LEAST_NAME))
             if sum(needs[one] + self._row.spacing() for one in shown) > room and name in shown:
                 shown.remove(name)
         if sum(wide[one] + self._row.spacing() for one in shown) <= room:
@@ -143,7 +144,7 @@ class Header(QWidget):
         return stopping is not None and (stopping.state is not StopState.IDLE or stopping.held)
 
     def _room(self, *, has_outcome: bool) -> int:
-        """How much is left for the chips."""
+        """Return the width left for the chips."""
         margins, spacing = self._row.contentsMargins(), self._row.spacing()
         fixed = [self._brand, self.reset_button, self.menu, self.stop]
         taken = sum(one.sizeHint().width() + spacing for one in fixed if not one.isHidden())

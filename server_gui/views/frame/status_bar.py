@@ -24,7 +24,7 @@ from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 FRAMES: Final = 60
 STOP: Final = (
     "STOP: F12 or Ctrl+Space · software, not a safety-rated emergency stop",
-    "F12: software stop, no emergency stop",
+    "F12: software stop, not an emergency stop",
     "F12: software stop",
 )
 

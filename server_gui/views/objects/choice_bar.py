@@ -60,7 +60,7 @@ class ChoiceBar(QWidget):
 
     @property
     def kind(self) -> RowKind:
-        """What is to be shown."""
+        """The chosen kind."""
         return next(kind for kind, button in self.kinds.items() if button.isChecked())
 
     @property

@@ -125,7 +125,7 @@ class ObjectsModel(QAbstractTableModel):
 
 
 def age_text(seconds: float) -> str:
-    """How long ago, in the largest unit that says it in two digits or so."""
+    """Return an age in the largest unit that gives about two digits."""
     for unit, size in (("h", 3600.0), ("min", 60.0)):
         if seconds >= 2 * size:
             return f"{seconds / size:.0f} {unit}"

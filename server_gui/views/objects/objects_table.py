@@ -100,7 +100,7 @@ class ObjectsTable(QTableView):
 
     @property
     def rows(self) -> list[ObjectInfo]:
-        """What is shown."""
+        """The shown objects."""
         return list(self._model.rows)
 
     @property

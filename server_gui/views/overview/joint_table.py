@@ -38,7 +38,7 @@ COLUMNS: Final = (
     ("Current", "current"),
     ("Temp.", "temperature"),
     ("Error", "error_code"),
-    ("Off after", ""),
+    ("Off after STOP", ""),
 )
 JOINT, STATE, ANGLE, VELOCITY, TORQUE, CURRENT, TEMPERATURE, ERROR, STOP = range(len(COLUMNS))
 SI: Final = {
@@ -58,6 +58,13 @@ NEAR_LIMIT: Final = 0.8  # of a limit
 CODE: Final = re.compile(r"0x[0-9A-Fa-f]{4}(?P<words> [^(;:]+)?")
 ENABLED: Final = "operation enabled"  # only then it is to be where its target is
 NONE: Final = "–"
+NOT_KNOWN: Final = "not known"
+IN_FAULT: Final = "the drive is in fault: "  # with which what a robot says of it begins
+BELOW: Final = "↓"  # its words stand there
+HINT: Final = (
+    "Time from the latest STOP to the first state without torque that this drive reported. "
+    "“already off”: it had no torque before that STOP. “no proof”: it has not reported such a state since"
+)
 MOST_ERROR: Final = 280  # wide, in words
 # A drive's states where there is little room; in alarms and on cards they stand in full.
 FEW_WORDS: Final = {
@@ -147,6 +154,8 @@ class JointModel(QAbstractTableModel):
         if orientation is Qt.Orientation.Horizontal and role == Qt.ItemDataRole.DisplayRole:
             title, quantity = COLUMNS[section]
             return f"{title} {_unit(self._desk, quantity).symbol}" if quantity in SI else title
+        if section == STOP and role == Qt.ItemDataRole.ToolTipRole:
+            return HINT
         if role == Qt.ItemDataRole.TextAlignmentRole and ANGLE <= section <= TEMPERATURE:
             return Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
         return None
@@ -183,8 +192,8 @@ class BarDelegate(SentenceDelegate):
     def initStyleOption(self, option: QStyleOptionViewItem, index: Index) -> None:
         super().initStyleOption(option, index)
         text = str(index.data())
-        if self.is_short and index.column() == ERROR and text.startswith("0x"):
-            option.text = text.partition(" ")[0]
+        if self.is_short and index.column() == ERROR and text not in (NONE, NOT_KNOWN):
+            option.text = text.partition(" ")[0] if text.startswith("0x") else BELOW
         elif self.is_tight and index.column() == STATE:
             option.text = in_few_words(text)
 
@@ -421,9 +430,11 @@ def _error(station: Station, part: FollowedComponent, *, stale: bool) -> Cell:
         said = f"{number} {words}" if words else error_text(int(code))
         return Cell(said, "old" if stale else colour, None, "\n".join(filter(None, (problem, said))))
     if part.state != "ok" and problem:
-        return Cell(problem, "old" if not station.is_live else colour, None, problem)
+        told = CODE.match(problem.removeprefix(IN_FAULT))  # also where the code is not among what is sent
+        said = told[0].strip() if told else problem
+        return Cell(said, "old" if not station.is_live else colour, None, problem)
     if stale:
-        return Cell("not known", "old")
+        return Cell(NOT_KNOWN, "old")
     return Cell("–", "dim")
 
 
@@ -442,7 +453,7 @@ def _stop(station: Station, joint: str) -> Cell:
     proof = stopping.proofs.get(joint)
     if proof is not None:
         if station.robot.word(f"{joint}.state") == ENABLED:
-            return Cell("no more", "dim", None, f"{proof.text}; enabled again since")
+            return Cell("enabled again", "dim", None, f"{proof.text}; enabled again since")
         colour = "dim" if proof.was_so else "good"
         return Cell(proof.when, colour if station.is_live else "old", None, proof.text)
     if stopping.state is StopState.IDLE:

@@ -96,7 +96,7 @@ class FilterBar(QWidget):
         self.buttons["All"].setChecked(True)
 
     def minimumSizeHint(self) -> QSize:
-        """Of the kinds in two rows."""
+        """Size of the kinds in two rows."""
         wide = max(button.sizeHint().width() for button in self.buttons.values())
         return QSize(A_ROW * wide, super().minimumSizeHint().height())
 

@@ -287,7 +287,7 @@ class ParametersPanel(QWidget):
 
     @property
     def _title(self) -> str:
-        """What the robot is called."""
+        """The robot's name."""
         return "parameters" if self._desk.selected is None else self._desk.selected.title
 
     # --- what people do

@@ -22,7 +22,7 @@ class SeveralMenu(QMenu):
 
     @property
     def offers(self) -> list[Offer]:
-        """What can be done now."""
+        """The possible offers."""
         station = self._desk.selected
         if station is None or station.robot.description is None or self.name not in station.known:
             return []

@@ -74,7 +74,7 @@ class TrialBar(QFrame):
         set_text(self.words, f"{whose}on trial: {said}; {ends(trial)}; {seen}")
 
     def _whose(self, *, shown: bool) -> Station | None:
-        """Whose trial; where there are several, the next one when that is over."""
+        """Return the robot of the shown trial; of several, the next one when that is over."""
         selected = self._desk.selected
         found = [selected] if selected is not None and shown else []
         found += [one for one in self._desk if one is not selected] if self._of_all else []

@@ -42,7 +42,7 @@ def held_back(seen: ResourceSnapshot | None) -> str:
 
 
 def _costs(cost: GatewayCost | None) -> list[str]:
-    """Who causes what the gateway takes, the most first."""
+    """Return the gateway's cost by client, the largest first."""
     if cost is None or cost.wake_ups_per_s is None:
         return []
     lines = [f"Monitoring wakes the computer {cost.wake_ups_per_s:.0f} times a second; for"]

@@ -82,7 +82,7 @@ class RobotCard(ClickableFrame):
 
     @property
     def texts(self) -> tuple[str, str, str, str]:
-        """What it says: name, state, age, what the robot does."""
+        """The shown texts: name, state, age, activity of the robot."""
         return self.station.title, self._state.text(), self._link.text(), self._doing.text()
 
     def refresh(self, *, selected: bool) -> None:

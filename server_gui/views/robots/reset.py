@@ -23,20 +23,26 @@ def ask_reset(parent: QWidget, station: Station) -> Question:
 
 def ask_clear(parent: QWidget, station: Station) -> Question:
     """Ask whether faults are to be cleared: what is enabled loses its torque by it."""
-    joints = station.robot.names("joint")
-    enabled = [joint for joint in joints if station.robot.word(f"{joint}.state") == ENABLED]
-    if not station.is_live:
-        more = "\n\nWhat its drives do now is not known: any that is enabled loses its torque."
-    elif enabled:
-        names = ", ".join(joint.replace("_", " ") for joint in enabled)
-        more = f"\n\nSTILL ENABLED, and without torque then: {names}. Hold the wearer first."
-    else:
-        more = ""
+    more = f"\n\n{states}" if (states := _states(station)) else ""
     held = "\n\nThe STOP that is held ends with it." if station.stopping.held else ""
     check = check_of(Kind.RESET, role=station.bus_role)
     text = f"Clear the fault of {station.title}?\n\n{DOES}{more}{held}\n\nAfterwards, {check}."
     title = f"Clear the fault of {station.title}"
     return _asked(parent, title, text, "Clear fault", station, lambda why: _ask_again(parent, station, why))
+
+
+def _states(station: Station) -> str:
+    """Return which drives lose their torque, as far as is known; empty where all are known to be off."""
+    joints, age_s = station.robot.names("joint"), station.robot.age_s()
+    enabled = [joint for joint in joints if station.robot.word(f"{joint}.state") == ENABLED]
+    names = ", ".join(joint.replace("_", " ") for joint in enabled)
+    if station.is_live:
+        return f"STILL ENABLED, and without torque then: {names}. Hold the wearer first." if enabled else ""
+    if not station.is_linked or age_s is None:
+        return "What its drives do now is not known: any that is enabled loses its torque."
+    then = f"enabled then: {names}" if enabled else "none was enabled then"
+    old = f"When you asked, its drives' states were {age_s:.1f} s old"
+    return f"{old}: {then}. Any that is enabled loses its torque."
 
 
 def _ask_again(parent: QWidget, station: Station, why: str) -> None:

@@ -110,7 +110,7 @@ class StickFigure(QWidget):
         return any(joint.startswith(side) for joint in self._wrong)
 
     def _name_sides(self, painter: QPainter, toes: Mapping[str, QPointF]) -> None:
-        """Which leg it is, before its toes: colour alone says nothing to some."""
+        """Draw the sides' names before the toes: colour alone says nothing to some people."""
         painter.setFont(self._theme.text_font(bold=True))
         metrics = painter.fontMetrics()
         at = {side: toe + QPointF(6, 3) for side, toe in toes.items()}

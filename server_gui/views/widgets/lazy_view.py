@@ -24,7 +24,7 @@ class LazyView(QWidget, Generic[V]):
 
     @cached_property
     def view(self) -> V:
-        """What it is for; made now where it is not yet."""
+        """The view; made now if it does not exist yet."""
         view = self._make()
         if self._is_scrolled:
             room = ScrollArea()

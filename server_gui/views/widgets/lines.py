@@ -31,7 +31,7 @@ class Lines(QWidget):
 
     @property
     def texts(self) -> list[str]:
-        """What it says."""
+        """The shown texts."""
         return [label.text() for _, label in self._rows if not label.isHidden()]
 
     def show_lines(self, lines: Sequence[PredictionRow]) -> None:

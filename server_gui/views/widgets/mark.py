@@ -28,7 +28,7 @@ class MarkIcon(QWidget):
 
     @property
     def mark(self) -> Mark:
-        """What is shown."""
+        """The shown mark."""
         return self._mark
 
     def sizeHint(self) -> QSize:

@@ -167,7 +167,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc]  # pyqtgraph has no types
 
     @property
     def range_shown(self) -> float:
-        """How much of the other axis is shown; 0 while no value is."""
+        """Range of the other axis; 0 while no value is shown."""
         low, high = self.getViewBox().viewRange()[1]
         return 0.0 if self._is_blank else float(high - low)
 

@@ -37,7 +37,7 @@ class ShrinkingLabel(PlainLabel):
                 one.update()
 
     def speak_alike(self, *others: "ShrinkingLabel") -> None:
-        """Of all of them none is fuller than another: beside each other they are read as one."""
+        """Keep the wordings of all labels equally full: beside each other they are read as one."""
         for one in (self, *others):
             one.alike = (self, *others)
 
@@ -49,7 +49,7 @@ class ShrinkingLabel(PlainLabel):
 
     @property
     def fullest(self) -> int:
-        """Which of its wordings has room, the last where none has."""
+        """Index of the fullest wording with enough room, the last if none has."""
         room, last = self.contentsRect().width(), len(self._wordings) - 1
         same = zip(self._wordings, self._widest or self._wordings, strict=True)
         wide = [max(map(self._width, texts)) for texts in same]

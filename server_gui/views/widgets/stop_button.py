@@ -65,7 +65,7 @@ class StopButton(QPushButton):
         return "…" not in "".join(self.lines) and self.width() >= self.sizeHint().width()
 
     def minimumSizeHint(self) -> QSize:
-        """Of the word alone: a long name makes nothing wider."""
+        """Size of the word alone: a long name makes nothing wider."""
         whole = super().sizeHint()
         return QSize(min(whole.width(), self._word + self._around), whole.height())
 

@@ -47,7 +47,7 @@ class StrideCurves(QWidget):
 
     @property
     def title(self) -> str:
-        """What it is of, and in which unit."""
+        """The shown quantity, and its unit."""
         name = "" if self._curves is None else self._curves.channel.replace("_", " ").replace(".", " ")
         return f"{name} ({self._unit.symbol})" if self._unit.symbol else name
 
@@ -63,7 +63,7 @@ class StrideCurves(QWidget):
 
     @property
     def read(self) -> str:
-        """What the curves say where the pointer is: `42 %: 12.3 → 14.0 °`; empty where it is elsewhere."""
+        """Values of the curves at the pointer: `42 %: 12.3 → 14.0 °`; empty without a pointer."""
         if self._curves is None or self._hover is None:
             return ""
         sides = (self._curves.before, self._curves.after)

@@ -105,7 +105,7 @@ class ChannelTree(QTreeWidget):
         return dragged([str(item.data(0, NAME_ROLE)) for item in items if item.data(0, NAME_ROLE)])
 
     def contextMenuEvent(self, event: QContextMenuEvent) -> None:
-        """Of the channel under the mouse; by the keyboard, of the one that has it."""
+        """Open the menu of the channel under the mouse; by the keyboard, of the focused one."""
         by_mouse = event.reason() is QContextMenuEvent.Reason.Mouse
         item = self.itemAt(event.pos()) if by_mouse else self.currentItem()
         name = None if item is None else item.data(0, NAME_ROLE)

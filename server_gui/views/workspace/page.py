@@ -120,7 +120,7 @@ class Signals(QWidget):
 
     @property
     def empty(self) -> PlainLabel:
-        """What says what to do while there is none."""
+        """Label with instructions, while there are no plots."""
         return self.area.empty
 
     @property
@@ -292,7 +292,7 @@ class Signals(QWidget):
 
     @property
     def _window(self) -> tuple[float, float]:
-        """What part of the past is in sight, s until the newest row."""
+        """The visible part of the past, s until the newest row."""
         return self.plots[0].plot.window_s if self.plots else (-self._seconds, 0.0)
 
     def _look_wider(self, wider: float, later: float) -> None:

@@ -62,7 +62,7 @@ class TriggerBar(Card):
 
     @property
     def condition(self) -> Condition:
-        """What is asked for."""
+        """The chosen condition."""
         scale = self._unit.scale
         return Condition(
             On(self.on.currentText()),

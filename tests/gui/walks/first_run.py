@@ -6,7 +6,7 @@ from tests.gui.walks.robot import AGAIN_S, ENABLED, clear_fault
 from tests.gui.walks.walk import Bench
 from tests.support.waiting import until
 
-STEPS: Final = ("one look", "STOP", "overview", "parameters", "afterwards")
+STEPS: Final = ("at a glance", "STOP", "overview", "parameters", "afterwards")
 
 
 def starting(bench: Bench) -> None:

@@ -86,9 +86,13 @@ class Hand:
                 time.sleep(STILL_S)
                 if self.can_see(name):
                     return True
-            x, y, *_ = max(self.ask(where="page"), key=lambda one: one[2] * one[3])
-            self.xdotool("mousemove", str(x), str(y), "click", "5")
+            self.scroll()
         return False
+
+    def scroll(self, turns: int = 1) -> None:
+        """Turn the wheel over the tab."""
+        x, y, *_ = max(self.ask(where="page"), key=lambda one: one[2] * one[3])
+        self.xdotool("mousemove", str(x), str(y), "click", "--repeat", str(turns), "--delay", "60", "5")
 
     def reveal(self, name: str, panel: str) -> None:
         """Where a panel stands behind another, bring it to the front; where all are put away, show them."""

@@ -27,6 +27,7 @@ def one_glance(bench: Bench) -> None:
     hand = bench.hand
     if not hand.reach("Knee angle"):
         return
+    hand.scroll(3)  # not only its title
     hand.point("Knee angle")
     hand.sees("−", " s")
     hand.wheel("Knee angle")

@@ -68,7 +68,7 @@ def test_the_object_that_stops_it_is_in_the_file_and_the_check_warns_no_more(dra
 def test_who_names_none_is_told_what_that_means_and_not_asked_again(draft: Draft) -> None:
     hands = Hands(("Which node commands", lambda: "none"))
     run(controller(draft, LIBRARY, {}), hands)
-    assert hands.heard("A STOP will tell the drives only")
+    assert hands.heard("A STOP will reach the drives only")
     assert warned(draft)
     run(controller(Draft(draft.file), LIBRARY, {}), Hands())
 

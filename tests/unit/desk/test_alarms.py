@@ -272,7 +272,7 @@ def test_a_stop_that_never_went_out_has_stopped_no_drive_that_was_off(
     bench.station.take([states(5.0)])
     proofs = bench.station.stopping.proofs
     assert {joint for joint, proof in proofs.items() if not proof.was_so} == {"left_knee"}
-    assert proofs["left_hip"].when == "before"
+    assert proofs["left_hip"].when == "already off"
 
 
 def test_the_result_of_a_stop_does_not_hide_a_fault(bench: Bench) -> None:

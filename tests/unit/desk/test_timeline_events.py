@@ -7,6 +7,7 @@ from typing import Any, cast
 
 import numpy as np
 
+from drivers.error_codes import error_text
 from gateway.client import Batch
 from server_gui.core.archive.playback import DRIVE_STATES, PlayedRobot, _description, _words
 from server_gui.core.archive.timeline_events import PIECE_NS, TimelineEvents
@@ -111,7 +112,7 @@ def test_a_drive_in_fault_and_a_sensor_without_a_value_are_not_ok_in_a_recording
         assert {part.name: part.state for part in robot.not_ok()} == wrong
     robot.values["left_knee.state"] = 7.0
     robot.judge()
-    assert robot.parts["left_knee"].problem == "error code 0x2310"
+    assert robot.parts["left_knee"].problem == f"the drive is in fault: {error_text(0x2310)}"
 
 
 def test_the_same_recording_opened_twice_tells_each_fault_once() -> None:

@@ -44,8 +44,8 @@ def test_a_thread_that_dies_is_said_begun_anew_and_said_to_be_so(caplog: pytest.
     until(lambda: watch.look() and len(began) == 2)
     (trouble,) = watch.look()
     assert trouble.works
-    assert "has died and was begun anew: SystemExit" in trouble.text
-    assert sum("was begun anew" in record.getMessage() for record in caplog.records) == 1
+    assert "stopped unexpectedly and was restarted (SystemExit; once so far); see the log" in trouble.text
+    assert sum("was restarted" in record.getMessage() for record in caplog.records) == 1
     ending.set()
     assert worker.join(WAIT_S)
     assert watch.look() == ()
@@ -162,7 +162,9 @@ def test_a_dead_thread_of_a_collector_is_an_alarm_everywhere_and_works_again(
         monkeypatch.setattr(owner, {"_recorder": "_turn", "_uploader": "_empty"}[name], die)
     until(lambda: troubles(collector))
     recording, status = said(collector)
-    assert f"ALARM  the part “{owner.worker.name}” has died and was begun anew: SystemExit" in status
+    assert (
+        f"ALARM  the part “{owner.worker.name}” stopped unexpectedly and was restarted (SystemExit" in status
+    )
     assert recording.said(None).tone is Tone.WARNING
     assert any(owner.worker.name in news.text for news in recording._news.items)
     before = collector.report().result(WAIT_S).recorder.recorded
@@ -195,7 +197,7 @@ def test_what_was_in_hand_when_the_recorder_died_is_counted_as_lost(
         watch = ThreadWatch([recorder.worker])
         monkeypatch.setattr(recorder, "_turn", die)
         recorder.mark("exo-01", "now")
-        until(lambda: any("has died" in trouble.text for trouble in watch.look()))
+        until(lambda: any("stopped unexpectedly" in trouble.text for trouble in watch.look()))
         assert recorder.flush(WAIT_S)
         assert recorder.state.lost == 1
         recorder.mark("exo-01", "again")

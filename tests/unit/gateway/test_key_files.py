@@ -255,7 +255,7 @@ def test_a_folder_that_another_program_keeps_locked_keeps_nobody_in(
         fcntl.flock(descriptor, fcntl.LOCK_EX)
         with pytest.raises(KeyProblem, match=f"another program keeps {tmp_path} locked"):
             changes.ensure_keys(folder, "exo-01")
-        with pytest.raises(KeyProblem, match="anna is let in no more, but its role still stands there"):
+        with pytest.raises(KeyProblem, match="anna is no longer admitted, but its role is still in the file"):
             changes.remove(folder, "anna")
     finally:
         os.close(descriptor)

@@ -86,15 +86,6 @@ def test_robots_in_one_batch_get_what_each_gets_alone(recipe: Recipe) -> None:
         assert np.array_equal(features(recipe, samples, np.array([end]))[0], together[row])
 
 
-@pytest.mark.parametrize("recipe", RECIPES, ids=lambda recipe: recipe.name)
-def test_more_robots_than_are_computed_together_get_what_each_gets_alone(recipe: Recipe) -> None:
-    random = np.random.default_rng(5)
-    windows = list(random.normal(3.0, 1.0, (60, 1, len(recipe.channels), recipe.look_back)))
-    found = recipe.of_each(windows)
-    for window, row in zip(windows, found, strict=True):
-        assert recipe.compute(window)[0].tobytes() == row.tobytes()
-
-
 def test_a_streams_window_stays_what_it_was() -> None:
     samples = walk(TERRAIN, 40)
     stream = FeatureStream(TERRAIN)
