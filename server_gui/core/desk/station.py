@@ -21,7 +21,7 @@ from ml.danger.levels import Level
 from server_gui.core.alarms.alarm import Alarms
 from server_gui.core.alarms.causes import Stalls, gathered
 from server_gui.core.alarms.marks import Mark
-from server_gui.core.alarms.robot_alarms import Facts, any_enabled
+from server_gui.core.alarms.robot_alarms import Facts, any_enabled, role_of
 from server_gui.core.alarms.robot_alarms import alarms as found
 from server_gui.core.alarms.worst_state import worst
 from server_gui.core.audit.journal import Audit
@@ -127,8 +127,7 @@ class Station:
 
     @property
     def bus_role(self) -> str | None:
-        """Role of the robot's gateway on its buses."""
-        return None if self.robot.description is None else self.robot.description.role
+        return role_of(self.robot)
 
     @property
     def title(self) -> str:

@@ -11,7 +11,6 @@ from typing import Any
 import pytest
 
 from gateway.cli import connect
-from gateway.cli.watch import Row, _from_first_value
 from gateway.client import Address
 from gateway.main import main
 from tests.fake_robot import JOINTS, FakeRobot, Refusal
@@ -134,17 +133,6 @@ def test_another_object_s_address_is_never_proposed(
     said = capsys.readouterr().err
     assert "did you mean" not in said
     assert "releases no object 0x6073:0 of left_knee" in said
-
-
-def test_watch_begins_with_the_first_value(capsys: pytest.CaptureFixture[str]) -> None:
-    def rows(*values: float | None) -> list[Row]:
-        return [(10**9 * at, None, {"left_knee.state": one}) for at, one in enumerate(values)]
-
-    assert list(_from_first_value(iter(rows(None, None, 5.0, None)))) == rows(None, None, 5.0, None)[2:]
-    assert capsys.readouterr().err == "gwrms watch: no value has come yet; waiting for 3 s at most\n"
-    nothing = rows(*[None] * 6)
-    assert list(_from_first_value(iter(nothing))) == nothing[3:]
-    assert list(_from_first_value(iter(rows(1.0, None)))) == rows(1.0, None)
 
 
 def test_watch_gives_null_for_what_is_lost(robot: FakeRobot, capsys: pytest.CaptureFixture[str]) -> None:
