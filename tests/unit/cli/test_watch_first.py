@@ -1,4 +1,4 @@
-"""`gwrms watch` on a bus that is opened for it: the first row has a value, or nothing has come for seconds."""
+"""`gwrms watch` on a bus that is opened for it: the first row has a value, or nothing has come for long."""
 
 import pytest
 
