@@ -18,7 +18,7 @@ from gateway.connections.connection_slots import ConnectionSlots
 from gateway.connections.fair_share import FairShare
 from gateway.connections.incoming_bytes import IncomingBytes
 from gateway.connections.intake import Intake
-from gateway.connections.listener_kind import check_classic
+from gateway.connections.listener_kind import check_classic, said
 from gateway.connections.session import Session
 from gateway.process.loop import Loop, Timer
 from gateway.process.resting import ENDING
@@ -69,6 +69,7 @@ class Daemon:
         self._loop = Loop()
         self._service = Service(config, self._loop, specs)
         self._service.registry.when_off = self._look_whether_idle
+        self._service.listens = said(listener.getsockname())
         self._places = ConnectionSlots()
         self._sharing = FairShare(self._loop)
         self._ending = False

@@ -30,7 +30,9 @@ _BRINGS: Final = {  # all else that a robot does not need comes with `collect`
 _ENOUGH: Final = {
     "demo": "sim",
     "top": "sim",
-}  # commands that need less than what else needs the same package
+    "gui": "server",
+    "query": "query",
+}  # commands that need less, or more, than what else needs the same package
 
 
 class Argument(msgspec.Struct, frozen=True, omit_defaults=True):

@@ -74,6 +74,7 @@ class Service:
         self._config = config
         self._loop = loop
         self._boot_id = boot_id()
+        self.listens: str | None = None  # HOST:PORT
         self._first_stop = FirstStop(config)
         self._guard_problem = "it has not started yet"
         self.handlers = Handlers(
@@ -184,7 +185,14 @@ class Service:
         who, robot = session.identity, self._config.robot.name
         session.who = who.called(session.peer, params.client)
         return Hello(
-            framing.PROTOCOL, robot, who.role, self._boot_id, __version__, who.name, roles.refused(who)
+            framing.PROTOCOL,
+            robot,
+            who.role,
+            self._boot_id,
+            __version__,
+            who.name,
+            roles.refused(who),
+            self.listens,
         )
 
     def _read_clock(self, _session: Session, _params: Params) -> Clock:

@@ -11,6 +11,7 @@ from hil_sim import robot_file
 from hil_sim.bus.can_bus import CanBus
 from hil_sim.bus.hub import Hub
 from hil_sim.folder import Folder
+from hil_sim.kept_file import disagreements
 from hil_sim.loop import Loop
 
 
@@ -29,6 +30,7 @@ class SimulationHost:
         self.folder = Folder(folder)
         self.port: int | None = None
         self.config_is_ours = True
+        self.disagreements: list[str] = []  # of an existing robot.toml with what is simulated
         self._bus = bus
         self._virtual_channel = virtual_channel
         self._speed = speed
@@ -74,7 +76,9 @@ class SimulationHost:
             loop = Loop(self._bus.clock, self._speed)
             closing.callback(loop.close)
             table = self._open_bus(loop, closing)
-            self.config_is_ours = self.folder.write_config(self._config_text(table), self._companions())
+            text = self._config_text(table)
+            self.config_is_ours = self.folder.write_config(text, self._companions())
+            self.disagreements = [] if self.config_is_ours else disagreements(self.config, text)
             self._furnish(loop, closing)
             self._closing = closing.pop_all()
             self._loop = loop

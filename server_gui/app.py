@@ -62,7 +62,7 @@ FOLLOWING: Final = FollowSettings(
     journal_s=2.0,
     buses_s=1.0,
 )
-OWN: Final = "simulated"  # what the window's own robot is called before it has told its name
+OWN: Final = "simulated-exo"  # what the window's own robot is called before it has told its name
 MOST_PREDICTIONS: Final = 4096  # what may wait for a window that hangs
 
 

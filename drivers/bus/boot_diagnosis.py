@@ -5,11 +5,18 @@ from collections.abc import Collection
 from drivers.bus.liveness import NodeLife
 from drivers.bus.nmt import NmtState
 
+OVERLOAD_PERCENT = 95.0  # of the bus's time: higher identifiers hardly pass any more
 _PDO_BASES = (0x180, 0x280, 0x380, 0x480)  # of the predefined connection set
 
 
 def why_silent(
-    life: NodeLife, node_id: int, request_id: int, bus_name: str, frames: int, unclaimed: Collection[int]
+    life: NodeLife,
+    node_id: int,
+    request_id: int,
+    bus_name: str,
+    frames: int,
+    unclaimed: Collection[int],
+    load_percent: float | None = None,
 ) -> str | None:
     """Why no SDO is answered, from what is heard else; `None` where the node does talk SDO."""
     no_sdo = f"it answers no SDO on 0x{request_id:03X}: is another SDO client using this channel?"
@@ -24,6 +31,11 @@ def why_silent(
         return f"PDOs of node {node_id} come, but {no_sdo}"
     if frames == 0:
         return f"no frame at all on bus {bus_name}: check bitrate, wiring, termination and power"
+    if load_percent is not None and load_percent >= OVERLOAD_PERCENT:
+        return (
+            f"nothing comes through from node {node_id}: the bus {bus_name} is overloaded, "
+            f"{load_percent:.0f} % of its time is taken: look who sends so much (candump)"
+        )
     return (
         f"no frame at all from node {node_id}, others are heard on bus {bus_name}: "
         "check its power, cable and node id"

@@ -338,7 +338,13 @@ class Node(BusUser):
         bus = self.bus
         silent = isinstance(error, DeviceTimeout)
         words = silent and why_silent(
-            self.life, self.node_id, self._request_id, bus.name, bus.frames, bus.unclaimed
+            self.life,
+            self.node_id,
+            self._request_id,
+            bus.name,
+            bus.frames,
+            bus.unclaimed,
+            bus.health.load_percent,
         )
         return words or str(error)
 

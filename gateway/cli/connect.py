@@ -2,6 +2,7 @@
 
 import argparse
 import fnmatch
+import re
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import MappingProxyType
@@ -22,6 +23,7 @@ from gateway.wire.component import ChannelInfo
 from gateway.wire.robot import Description
 from gateway.wire.stream import ModuleName
 
+_OBJECT: Final = re.compile(r"([\w-]+)\.0[xX]([0-9A-Fa-f]{4})(?::(\w+))?")
 USUAL: Final = Address()  # who is asked where nobody says whom
 
 
@@ -112,9 +114,21 @@ def check_names(
             component = glob.partition(".")[0]
             for name in fnmatch.filter(absent, component):
                 raise UnknownName(f"{name} has no {what}: {absent[name]}")
+            if found := _OBJECT.fullmatch(glob):
+                raise UnknownName(_not_released(*found.groups("0")))
             raise UnknownName(
                 f"the robot has no {what} {glob!r}{did_you_mean(glob, known)} (gwrms describe lists them)"
             )
+
+
+def _not_released(component: str, index: str, subindex: str) -> str:
+    """Return why an object cannot be used as a parameter; another one's address is never proposed for it."""
+    table = f'[parameter."{component}.object_{index.lower()}"]'
+    return (
+        f"the robot's file releases no object 0x{index}:{subindex} of {component}: add {table} and below it "
+        f'object = "0x{index}:{subindex}" to the file, and start the gateway again '
+        f"(gwrms od {component} 0x{index} says what it is)"
+    )
 
 
 def modules_of(channels: Iterable[ChannelInfo]) -> list[ModuleName]:

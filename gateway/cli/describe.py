@@ -69,7 +69,7 @@ def held(robot: Description, values: Mapping[str, float | None]) -> Iterator[str
     for name in held_channels(robot, values):
         yield (
             f"{name} is {HELD}, as after a lost joint: it moves nothing until it is started again\n"
-            "(a simulated robot's: gwrms sim-fault --controller start)\n"
+            "(a simulated robot's: gwrms sim-fault --dir DIR --controller start)\n"
         )
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 
+from drivers.bus.boot_diagnosis import OVERLOAD_PERCENT
 from drivers.error_codes import error_check
 from gateway.amounts import NONE, percent
 from gateway.cli.text import table
@@ -37,7 +38,24 @@ def chapters(robot: Description) -> Iterator[str]:
 def _bus(bus: BusInfo) -> tuple[str, ...]:
     frames = NONE if bus.frames_per_s is None else f"{bus.frames_per_s:.0f}"
     counted = (bus.error_frames, bus.bus_offs, bus.dropped)
-    return (bus.name, bus.state, percent(bus.load_percent), frames, *map(str, counted), bus.problem or "")
+    return (
+        bus.name,
+        bus.state,
+        percent(bus.load_percent),
+        frames,
+        *map(str, counted),
+        bus.problem or _overload(bus),
+    )
+
+
+def _overload(bus: BusInfo) -> str:
+    """Return what its nodes then lack because of it: nothing that they send has its time."""
+    load = bus.load_percent
+    if load is None or load < OVERLOAD_PERCENT:
+        return ""
+    return (
+        f"the bus is overloaded: {load:.0f} % of its time is taken, and what its nodes lack may come of that"
+    )
 
 
 def _strangers(bus: BusInfo) -> str:

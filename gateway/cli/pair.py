@@ -71,6 +71,7 @@ def main(argv: list[str]) -> int:
         return 0
     say(f"Paired with {paired.robot}: it calls this desk {paired.name}, as {paired.role}.\n")
     say(f"Its key is pinned in {server_file()}, yours is in {keys_folder()}.\n")
+    say("If it had no keys before, start its gateway again there first. Then, here:\n")
     say(f"\n  gwrms describe --robot {paired.address}\n")
     return 0
 

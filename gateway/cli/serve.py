@@ -15,10 +15,12 @@ from pathlib import Path
 from msgspec.structs import replace
 
 from gateway import config
+from gateway.access.folder import AccessFolder
 from gateway.certificates import KeyProblem
 from gateway.connections.listener_kind import UnsafeListener, is_loopback
 from gateway.connections.listeners import Listeners, default_socket, inherited, listen, listen_locally, rest
 from gateway.daemon import Daemon
+from gateway.own_folders import given_for_socket, to_serve_in
 from gateway.process import systemd_notify
 from gateway.process.memory import share_heap
 from gateway.process.resting import ENDING
@@ -33,7 +35,8 @@ the computer's own CPU, memory and processes.
 
 Nothing runs until a client asks: no bus, no port, no timer is open. What a client asked
 for stops linger_s after the last client has left, and the gateway then becomes a small process
-that waits at its port; it reads CONFIG again when the next client comes. What is not there is
+that waits at its port. CONFIG is read at the start, and again when a client wakes the gateway
+from that rest; host, port, socket and keys are taken at a start only. What is not there is
 named in `gwrms describe` and tried again, the rest is served; a device's file that cannot be
 used is told in the log, too. A [guard] in CONFIG runs from the start and for ever, and so does
 what a held stop or a trial needs.
@@ -49,9 +52,10 @@ SIGINT and SIGTERM end it cleanly. A stop stays held, also over its end and rest
 Where [guard] heartbeat_ms has armed the drives, they are freed first, and the end is refused
 while one is enabled: gwrms stop, then end it.
 
-Without keys it is served on 127.0.0.1 and its Unix socket only. `gwrms keys pair CONFIG` makes
-them with the first desk: from the gateway's next start on every TCP connection is TLS, and lets in
-only whose key is known (gwrms docs pair).
+Without keys it serves this computer only, and does not start where host is open to others.
+`gwrms keys pair CONFIG` makes keys with the first desk: from the gateway's next start on every TCP
+connection is TLS, and lets in only whose key is known; accounts of this computer then come by its
+Unix socket, which commands without --robot find (gwrms docs pair).
 
 exit status: 0 ended by a signal; 1 the address cannot be used, or CONFIG is wrong; 2 usage
 """
@@ -153,24 +157,30 @@ def _listeners(robot: config.RobotConfig, handed: Listeners | None) -> Listeners
         except OSError:
             port.close()
             raise
-    if handed is not None:
-        return dataclasses.replace(handed, classic=classic)
-    return Listeners(port, classic, _local(robot))
+    if handed is None:
+        return Listeners(port, classic, _local(robot))
+    is_settled = handed.woken or handed.local is not None
+    return dataclasses.replace(handed, classic=classic, local=handed.local if is_settled else _local(robot))
 
 
 def _local(robot: config.RobotConfig) -> socket.socket | None:
-    """Return the Unix socket that the robot's file names, or one in the folder that we are given for such."""
+    """Return the Unix socket that the robot's file names, or one in a folder that is given for such.
+
+    With keys it is the only way in for this computer's accounts, a stop's too: there is always one.
+    """
     given = robot.gateway.socket
-    folder = os.environ.get("RUNTIME_DIRECTORY") or os.environ.get("XDG_RUNTIME_DIR")
-    if given == "" or (given is None and not folder):
-        return None
     if given is not None:
-        return listen_locally(robot.path.parent / given)
-    try:
-        return listen_locally(default_socket(Path(folder or ""), robot.robot.name))
-    except OSError as error:  # nobody has asked for it
-        log.warning("%s", error)
-        return None
+        return listen_locally(robot.path.parent / given) if given else None
+    folder, problems = given_for_socket(os.environ), []
+    folders = [] if folder is None else [folder]
+    for one in to_serve_in(os.environ) if AccessFolder(robot.access).has_keys else folders:
+        try:
+            return listen_locally(default_socket(one, robot.robot.name))
+        except OSError as error:  # nobody has asked for it here
+            problems.append(str(error))
+    if problems:
+        log.warning("no Unix socket for this computer's accounts: %s", "; ".join(problems))
+    return None
 
 
 def _refuse(handed: Listeners, error: Exception) -> int:

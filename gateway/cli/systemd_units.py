@@ -14,6 +14,7 @@ from gateway.connections.listeners import BACKLOG, CLASSIC, PORT
 MARK = "# Written by gwrms install-service; put changes into `systemctl edit`, or write it again."
 STATE = "gwrms"  # under /var/lib
 RUNTIME = "/run/gwrms"  # where its Unix socket is
+USER_RUNTIME = "%t/gwrms"  # the same for a user's own service
 LEAST_LINGER_S = 2.0  # a gateway that ends sooner may be started more often than it is allowed to
 MOST_STARTS = "StartLimitBurst=30"
 
@@ -142,7 +143,8 @@ class Service:
     def _socket(self, port: int, name: str) -> str:
         host = self.config.gateway.host
         address = f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
-        local = f"ListenStream={RUNTIME}/{self.name}.sock\n" if name == PORT and not self.of_user else ""
+        folder = USER_RUNTIME if self.of_user else RUNTIME
+        local = f"ListenStream={folder}/{self.name}.sock\n" if name == PORT else ""
         return (
             f"{MARK}\n[Unit]\nDescription=Port {port} of the {self._gateway}\n\n[Socket]\n"
             f"ListenStream={address}\n{local}FileDescriptorName={name}\nService={self.name}.service\n"

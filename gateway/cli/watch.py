@@ -4,7 +4,7 @@ import argparse
 import csv
 import itertools
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from gateway.cli.arguments import lines, number
 from gateway.cli.connect import (
@@ -27,6 +27,7 @@ from gateway.wire.stream import ModuleName
 Row = tuple[int, str | None, dict[str, float | None]]  # its stamp, that in UTC, its values
 
 MIN_WIDTH = 12
+FIRST_VALUE_S = 3
 
 EPILOG = """A missing or stale value is a dash (null with --json), never the old number. Time is the
 robot's, in seconds since the first line; --json and --csv have it as UTC too, by the robot's own clock, and
@@ -63,7 +64,7 @@ def main(argv: list[str]) -> int:
         check_names("channel", channels, channel_names(description), absent_components(description))
         named = meant(channels, description)
         every = _rows(robot, channels, modules_of(named), arguments.rate, description.clock)
-        rows = itertools.islice(every, arguments.count)
+        rows = itertools.islice(_from_first_value(every), arguments.count)
         try:
             shown = Channels(description, degrees=arguments.deg)
             if arguments.json:
@@ -96,6 +97,28 @@ def _rows(
         dropped, shed = batch.dropped, batch.shed
         for stamp_ns, values in batch.rows():
             yield stamp_ns, utc(stamp_ns, clock), values
+
+
+def _from_first_value(rows: Iterator[Row]) -> Iterator[Row]:
+    """Yield rows from the first that has a value: a bus that was closed is opened for the first client.
+
+    Where none has one, all from `FIRST_VALUE_S` on: that nothing comes is shown, too.
+    """
+    first_ns: int | None = None
+    for row in rows:
+        stamp_ns, _at, values = row
+        if first_ns is None:
+            first_ns = stamp_ns
+            if _is_empty(values):
+                warn("watch", f"no value has come yet; waiting for {FIRST_VALUE_S} s at most")
+        if not _is_empty(values) or stamp_ns - first_ns >= FIRST_VALUE_S * 1e9:
+            yield row
+            break
+    yield from rows
+
+
+def _is_empty(values: Mapping[str, float | None]) -> bool:
+    return all(value is None for value in values.values())
 
 
 def _clock(robot: Robot) -> Clock | None:

@@ -180,7 +180,10 @@ class Connection(asyncio.Protocol):
             return
         why = f" ({_reason(exc)})" if isinstance(exc, OSError) else ""
         if not self.received_bytes and self.address.path is None:
-            why += "; if it has keys, it is to be paired with first (gwrms pair)"
+            why += (
+                "; if it has keys, it is to be paired with first (gwrms pair); on its own computer root, the "
+                "account that it runs as and users whom access.toml names need no key, at its Unix socket"
+            )
         self._end(LinkLost(f"{self.address} closed the link{why}"))
 
     # --- matching

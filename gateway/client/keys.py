@@ -3,7 +3,6 @@
 ~/.config/gwrms/keys/desk.key and desk.crt; [robots] NAME = { address = "HOST:PORT", pin = "SHA-256" }.
 """
 
-import os
 import re
 import tomllib
 from collections.abc import Mapping
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 from gateway.certificates import KeyProblem, fingerprint
 from gateway.client.address import Address
 from gateway.client.errors import BadAddress, NotPaired, WrongRobot
+from gateway.own_folders import user_folder
 from gateway.private import check_private, forbid_core_dumps
 
 if TYPE_CHECKING:
@@ -21,12 +21,6 @@ if TYPE_CHECKING:
 KEY, CERTIFICATE = "desk.key", "desk.crt"
 PIN_LENGTH: Final = 64  # hexadecimal digits of a SHA-256
 _HERE: Final = re.compile(r"127(\.\d{1,3}){3}|localhost|::1")  # a name that only begins so is elsewhere
-
-
-def user_folder() -> Path:
-    """Return the user's own configuration (XDG base directories)."""
-    folder = os.environ.get("XDG_CONFIG_HOME")
-    return (Path(folder) if folder else Path.home() / ".config") / "gwrms"
 
 
 def keys_folder() -> Path:
@@ -38,6 +32,11 @@ def server_file() -> Path:
     return user_folder() / "server.toml"
 
 
+def is_loopback(address: Address) -> bool:
+    """Return whether it is one of this computer."""
+    return _HERE.fullmatch(address.host.lower()) is not None
+
+
 def pin_of(address: Address) -> str | None:
     """Return the certificate that a robot must have, by its address; None where it is not paired.
 
@@ -46,7 +45,7 @@ def pin_of(address: Address) -> str | None:
             file cannot be read, so nobody knows whether it is.
 
     """
-    is_here = _HERE.fullmatch(address.host.lower()) is not None
+    is_here = is_loopback(address)
     if address.pin is not None or address.path is not None:
         return address.pin
     try:

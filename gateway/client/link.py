@@ -14,7 +14,17 @@ from gateway.client.address import Address
 from gateway.client.backoff import Backoff
 from gateway.client.clock import ClockTracker
 from gateway.client.connection import UNREADABLE, Connection
-from gateway.client.errors import CallTimeout, ClientError, LinkLost, NotConnected, ProtocolError, RemoteError
+from gateway.client.errors import (
+    CallTimeout,
+    ClientError,
+    LinkLost,
+    NotConnected,
+    ProtocolError,
+    RemoteError,
+    Unreachable,
+    WrongRobot,
+)
+from gateway.client.local_sockets import listens_at, local_sockets
 from gateway.client.subscription import Subscription
 from gateway.wire.framing import PROTOCOL
 from gateway.wire.method import Method, P, Params, R
@@ -225,9 +235,8 @@ class Link:
 
     async def _session(self, backoff: Backoff) -> None:
         """One connection from beginning to end; returns only by raising why it ended."""
-        connection = await Connection.open(self.address, self._notified, self.settings.connect_timeout_s)
+        connection = await self._greeted()
         try:
-            await self._greet(connection)
             await self._beat(connection)
             self._connection = connection
             self.connections += 1
@@ -247,7 +256,53 @@ class Link:
             self._streams.clear()
             connection.close()
 
-    async def _greet(self, connection: Connection) -> None:
+    async def _greeted(self) -> Connection:
+        """Return a connection to the address; or, on its own computer, to the gateway's Unix socket.
+
+        A gateway with keys serves accounts of its own computer there, and its port only who has a key.
+        """
+        try:
+            connection, hello = await self._greet(self.address)
+        except WrongRobot:
+            raise
+        except (Unreachable, LinkLost) as error:
+            connection, hello = await self._greet_locally(error)
+        if self.hello is not None and self.hello.boot_id != hello.boot_id:
+            self.clock.clear()
+        self.hello = hello
+        return connection
+
+    async def _greet_locally(self, error: ClientError) -> tuple[Connection, Hello]:
+        """Greet the gateway that listens at the address by its Unix socket; raises `error` if there is none.
+
+        Where nobody listens at the address, the only one with the same port of another address is meant.
+        """
+        refusals, others = "", []
+        for socket in local_sockets(self.address):
+            try:
+                connection, hello = await self._greet(socket)
+            except ClientError as why:
+                refusals += "" if isinstance(why, Unreachable) else f"; {why}"
+                continue
+            is_it = listens_at(self.address, hello.listens)
+            if is_it:
+                return connection, hello
+            connection.close()
+            others += [socket] if is_it is None and isinstance(error, Unreachable) else []
+        if len(others) == 1:
+            return await self._greet(others[0])
+        raise type(error)(f"{error}{refusals}") from error
+
+    async def _greet(self, address: Address) -> tuple[Connection, Hello]:
+        connection = await Connection.open(address, self._notified, self.settings.connect_timeout_s)
+        try:
+            return connection, await self._exchange_hello(connection)
+        except BaseException:
+            self._received_bytes += connection.received_bytes
+            connection.close()
+            raise
+
+    async def _exchange_hello(self, connection: Connection) -> Hello:
         params = HelloParams(self.settings.client, PROTOCOL, self.settings.token)
         hello = await self._ask(connection, HELLO, params)
         if hello.protocol != PROTOCOL:
@@ -255,9 +310,7 @@ class Link:
                 f"{self.address} speaks protocol {hello.protocol}, this program speaks {PROTOCOL}; "
                 "update the older of the two"
             )
-        if self.hello is not None and self.hello.boot_id != hello.boot_id:
-            self.clock.clear()
-        self.hello = hello
+        return hello
 
     async def _beat(self, connection: Connection) -> None:
         """Ask for the robot's clock; silence for too long ends the connection."""

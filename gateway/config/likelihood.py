@@ -60,8 +60,8 @@ def _about_host(config: RobotConfig) -> Iterator[Finding]:
     host = config.gateway.host
     if (host in _EVERYWHERE or not _LOCAL.match(host)) and not AccessFolder(config.access).has_keys:
         text = (
-            f"{host!r} is open to other computers, and this robot has no keys yet: until `gwrms keys pair "
-            f"{config.path}` has let a desk in, it is not served there"
+            f"{host!r} is open to other computers, and this robot has no keys yet: the gateway does not "
+            f"start until `gwrms keys pair {config.path}` has let a desk in"
         )
         yield warning("[gateway]", "host", text)
 

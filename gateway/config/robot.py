@@ -48,7 +48,7 @@ class GatewaySettings(Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     linger_s: Annotated[float, Meta(ge=0, le=86_400)] = 5.0  # how long modules run on after the last client
     records: str | None = None  # folder of journal, held stop and pending reverts; relative to this file
     access: str = "."  # folder of keys, clients and roles; relative to this file
-    socket: str | None = None  # Unix socket for local users, "": none; None: in systemd's folder, if any
+    socket: str | None = None  # Unix socket for local users, "": none; None: see gwrms docs pair
     classic_port: Annotated[int, Meta(ge=0, le=65535)] | None = None  # port of the paper's protocol
     max_cpu_percent: Annotated[float, Meta(gt=0)] | None = (
         None  # of a core; beyond it, streams send fewer rows

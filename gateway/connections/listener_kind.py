@@ -57,7 +57,7 @@ def kind_of(listener: socket.socket, *, has_keys: bool) -> ListenerKind:
     if has_keys:
         return ListenerKind.TLS
     if not is_loopback(listener.getsockname()):
-        raise UnsafeListener(without_keys(_said(listener.getsockname())))
+        raise UnsafeListener(without_keys(said(listener.getsockname())))
     return ListenerKind.PLAIN
 
 
@@ -65,7 +65,7 @@ def check_classic(listener: socket.socket) -> None:
     """Refuse the paper's protocol, which has no keys, beyond this computer; raises `UnsafeListener`."""
     if not is_loopback(listener.getsockname()):
         raise UnsafeListener(
-            f"classic_port would be served at {_said(listener.getsockname())}: it has no keys, and is for "
+            f"classic_port would be served at {said(listener.getsockname())}: it has no keys, and is for "
             "this computer only; listen on 127.0.0.1, or leave it out"
         )
 
@@ -85,6 +85,7 @@ def is_loopback(address: Any) -> bool:
     return host.startswith(_LOOPBACK) or host.partition("%")[0] == "::1"
 
 
-def _said(address: Any) -> str:
+def said(address: Any) -> str:
+    """Return a TCP address, as `getsockname` gives it, as HOST:PORT."""
     host, port = address[:2]
     return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"

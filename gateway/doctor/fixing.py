@@ -195,7 +195,5 @@ def _value(fix: Write, parameter: ParameterInfo) -> float:
 
 def _permission(fix: Write) -> str:
     """How the robot's owner lets it be written."""
-    lines = (
-        f'[parameter."{fix.component}.object_{fix.index:04x}"] object = "0x{fix.index:04X}:{fix.subindex}"'
-    )
+    lines = " and below it ".join(fix.release)
     return f"the robot's file has the last word on what may be written; this allows it: {lines}"

@@ -115,8 +115,11 @@ def judged(seen: Observations) -> Iterator[Verdict]:
 
 
 def _in_units(seen: Observations, fixes: tuple[Fix, ...]) -> tuple[Fix, ...]:
-    found = []
+    found: list[Fix] = []
     for fix in fixes:
-        scale, unit = seen.units.get(fix.address, (1.0, "")) if isinstance(fix, Write) else (1.0, "")
-        found.append(replace(fix, scale=scale, unit=unit) if isinstance(fix, Write) else fix)
+        if isinstance(fix, Write):
+            scale, unit = seen.units.get(fix.address, (1.0, ""))
+            found.append(replace(fix, scale=scale, unit=unit, is_released=fix.address in seen.units))
+        else:
+            found.append(fix)
     return tuple(found)

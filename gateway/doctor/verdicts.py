@@ -51,6 +51,7 @@ class Write:
     was: int | None = None
     scale: float = 1.0  # of the parameter that it is in the robot's file, in `unit`
     unit: str = ""
+    is_released: bool = True  # by the robot's file, as the gateway says
 
     @property
     def is_safe(self) -> bool:
@@ -66,7 +67,25 @@ class Write:
     def words(self) -> str:
         before = "" if self.was is None else f"   # was {self._shown(self.was)}"
         counts = "" if self.scale == 1 else f"   ({self.value} of the device's own)"
-        return f"SDO: gwrms set {self.address}={self._shown(self.value)}{self.unit}{before}{counts}"
+        first = "" if self.is_released else self._first
+        return f"SDO: gwrms set {self.address}={self._shown(self.value)}{self.unit}{before}{counts}{first}"
+
+    @property
+    def release(self) -> tuple[str, str]:
+        """Lines of the robot's file that let it be written."""
+        return (
+            f'[parameter."{self.component}.object_{self.index:04x}"]',
+            f'object = "0x{self.index:04X}:{self.subindex}"',
+        )
+
+    @property
+    def _first(self) -> str:
+        table, line = (f"\n              {one}" for one in self.release)
+        return (
+            f"\n          first add to robot.toml, which does not release it:{table}{line}"
+            "\n          then start the gateway again, and stop first (gwrms stop): "
+            "it is changed only while no drive may move"
+        )
 
     def _shown(self, value: int) -> str:
         return str(value) if self.scale == 1 else f"{value * self.scale:.12g}"

@@ -36,6 +36,7 @@ class Hello(Struct, frozen=True):
     version: str | None = None  # of the gateway's software; None: from before gateways told it
     identity: str | None = None  # whose key or account it is; None: the robot has no keys
     refused: dict[str, str] = {}  # method → why this client may not ask for it
+    listens: str | None = None  # HOST:PORT of its TCP port; None: from before gateways told it
 
     @property
     def who(self) -> str:

@@ -31,6 +31,8 @@ def run(robot: SimulationHost, seconds: float | None, prepare: Callable[[], None
         RealTimeCheck(robot.loop, say)
         if not robot.config_is_ours:
             say(f"kept {robot.config} as it is; delete it to have it written anew")
+            for one in robot.disagreements:
+                say(f"{one}: delete the file, simulate what it says, or take another --dir")
         sys.stdout.write(json.dumps({"ready": True, "config": str(robot.config)}) + "\n")
         sys.stdout.flush()
         robot.run(seconds)

@@ -69,6 +69,7 @@ def run(options: Options) -> int:
     view = "the window" if options.window else "a view"
     print_line(f"gwrms demo: a simulated exoskeleton, its gateway and {view} start; Ctrl-C ends all of them")
     with ShutdownSignals() as ending, _folder(options.folder) as folder:
+        print_line(f"gwrms demo: to walk on after a reset: gwrms sim-fault --dir {folder} --controller start")
         try:
             with DemoRobot(options.scenario, folder) as own:
                 if options.window:

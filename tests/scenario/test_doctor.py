@@ -79,7 +79,7 @@ def test_what_is_safe_is_mended_and_what_the_file_does_not_allow_is_refused_in_w
     assert "changed: takes effect when the gateway restarts or wakes from rest" in done.stdout
     file = tomllib.loads(ill.config.read_text(encoding="utf-8"))
     assert file["joint"]["left_knee"]["gear_ratio"] == 100.0
-    assert '[parameter."right_knee.object_6065"] object = "0x6065:0"' in done.stderr
+    assert '[parameter."right_knee.object_6065"] and below it object = "0x6065:0"' in done.stderr
     records = Path(ill.folder, "records", "doctor.jsonl").read_text(encoding="utf-8")
     rows = [json.loads(line) for line in records.splitlines()]
     assert [row["rule"] for row in rows if "done" in row] == ["gear"]

@@ -11,7 +11,7 @@ _RESTART = Advice("start the gateway again while nobody is in the robot, so that
 _COPY = Advice("where this is a copy of the robot's file, or an old one: take that which the gateway serves")
 _CHANNEL = Advice("where it is another one: correct interface and channel in the robot's file")
 _RESET = Advice("see that nobody is in danger, then gwrms reset; then start the controller")
-_START = Advice("start the controller (a simulated robot's: gwrms sim-fault --controller start)")
+_START = Advice("start the controller (a simulated robot's: gwrms sim-fault --dir DIR --controller start)")
 _DESCRIBE = Advice("gwrms describe says since when, and what to check")
 
 

@@ -350,7 +350,8 @@ class StopControl:
         if self._config.gateway.role is not Role.MASTER:
             raise refuse(
                 ErrorKind.NOT_ALLOWED,
-                'enabling is the part of the controller that owns the bus; [gateway] role is "observer"',
+                "only the controller that owns the bus may enable drives: start it there "
+                '([gateway] role is "observer")',
             )
         check_globs("joint", self.drives, globs, self._absent)
         chosen = {name: drive for name, drive in self.drives.items() if matches(name, globs)}

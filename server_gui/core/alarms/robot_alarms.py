@@ -100,13 +100,20 @@ def _of_stop(robot: Robot, stopping: StopProgress) -> Iterator[Alarm]:
             "",
             what,
             did=_after_stop(robot, stopping),
-            check=check_of(Kind.STOPPED),
+            check=check_of(Kind.STOPPED, role=role_of(robot)),
             since_s=stopping.since_s,
             aside=by,
         )
     elif stopping.was_ended and not any_enabled(robot):
         what = EVERY_OFF if set(_words(robot).values()) <= OFF else _drives_did(robot) or EVERY_OFF
-        yield Alarm(Kind.RESET, "", what, check=check_of(Kind.RESET), since_s=stopping.since_s)
+        yield Alarm(
+            Kind.RESET, "", what, check=check_of(Kind.RESET, role=role_of(robot)), since_s=stopping.since_s
+        )
+
+
+def role_of(robot: Robot) -> str | None:
+    """Return the role of the robot's gateway on its buses."""
+    return None if robot.description is None else robot.description.role
 
 
 def remedy(robot: Robot) -> str:

@@ -51,6 +51,11 @@ def _text(kind: Kind, shape: str, colour: str, check: str) -> tuple[Kind, Text]:
     return kind, Text(Mark(shape, colour, kind.value), check)
 
 
+_ENABLE: Final = "enable the drives (gwrms enable, or the robot's controller)"
+_START: Final = (  # where only the controller may: the gateway is an observer
+    "enable the drives: start the robot's controller again (simulated: Start walking, or gwrms sim-fault "
+    "--dir DIR --controller start)"
+)
 TEXTS: Final = dict(
     (
         _text(Kind.NOT_STOPPED, "square", "bad", "use the hardware stop"),
@@ -106,8 +111,7 @@ TEXTS: Final = dict(
             Kind.STOPPED,
             "triangle",
             "warn",
-            "to go on: see that nobody is in danger, “Reset stop…”, then enable the drives "
-            "(gwrms enable, or the robot's controller)",
+            f"to go on: see that nobody is in danger, “Reset stop…”, then {_ENABLE}",
         ),
         _text(Kind.PART_STALE, "triangle", "warn", "check its power, and its cable or radio"),
         _text(
@@ -142,7 +146,7 @@ TEXTS: Final = dict(
             Kind.RESET,
             "ring",
             "dim",
-            "to go on: enable the drives (gwrms enable, or the robot's controller); nothing moves until then",
+            f"to go on: {_ENABLE}; nothing moves until then",
         ),
     )
 )
@@ -161,6 +165,7 @@ _CHECKS: Final = {
 }
 
 
-def check_of(kind: Kind, component: str = "") -> str:
-    """Return what to check, by the kind of component too."""
-    return _CHECKS.get((kind, component), TEXTS[kind].check)
+def check_of(kind: Kind, component: str = "", role: str | None = None) -> str:
+    """Return what to check, by the kind of component too, and by the gateway's role on the bus."""
+    check = _CHECKS.get((kind, component), TEXTS[kind].check)
+    return check.replace(_ENABLE, _START) if role == "observer" else check

@@ -113,7 +113,10 @@ class Robots:
         self.known(robot).describe({channel.name: channel.unit for channel in description.channels})
         found: list[Record] = []
         if description.robot != robot:
-            problem = f"{robot} calls itself {description.robot} in its own file"
+            problem = (
+                f"{robot} calls itself {description.robot} in its own file: give it one name, in [robot] "
+                f"there or here ({description.robot}=HOST:PORT)"
+            )
             found += self._tell(robot, problem, EventKind.NAME, now)
         self._names[robot] = description.robot
         for other in self._others_called(description.robot, robot):

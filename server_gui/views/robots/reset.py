@@ -17,7 +17,7 @@ def ask_reset(parent: QWidget, station: Station) -> Question:
     """Ask whether a held stop is to be ended."""
     why = station.stopping.reason
     held = f"Reset the stop of {station.title}?{f' It is held: {why}.' if why else ''}"
-    text = f"{held}\n\n{DOES}\n\nAfterwards, {check_of(Kind.RESET)}."
+    text = f"{held}\n\n{DOES}\n\nAfterwards, {check_of(Kind.RESET, role=station.bus_role)}."
     return _asked(parent, f"Reset the stop of {station.title}", text, "Reset stop", station)
 
 
@@ -25,7 +25,8 @@ def ask_clear(parent: QWidget, station: Station) -> Question:
     """Ask whether faults are to be cleared: what is enabled loses its torque by it."""
     more = f"\n\n{states}" if (states := _states(station)) else ""
     held = "\n\nThe STOP that is held ends with it." if station.stopping.held else ""
-    text = f"Clear the fault of {station.title}?\n\n{DOES}{more}{held}\n\nAfterwards, {check_of(Kind.RESET)}."
+    check = check_of(Kind.RESET, role=station.bus_role)
+    text = f"Clear the fault of {station.title}?\n\n{DOES}{more}{held}\n\nAfterwards, {check}."
     title = f"Clear the fault of {station.title}"
     return _asked(parent, title, text, "Clear fault", station, lambda why: _ask_again(parent, station, why))
 

@@ -126,6 +126,15 @@ def test_watch_prints_the_number_of_rows_asked_for(
     assert robot.called("stream.start")[0]["rate_hz"] == 100.0
 
 
+def test_another_object_s_address_is_never_proposed(
+    robot: FakeRobot, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(robot, "set", "left_knee.0x6073:0=1") == 1
+    said = capsys.readouterr().err
+    assert "did you mean" not in said
+    assert "releases no object 0x6073:0 of left_knee" in said
+
+
 def test_watch_gives_null_for_what_is_lost(robot: FakeRobot, capsys: pytest.CaptureFixture[str]) -> None:
     robot.lost.add("left_knee")
     assert run(robot, "watch", "left_knee.position", "--json", "--count", "1", "--rate", "50") == 0
@@ -197,6 +206,10 @@ def test_parameter_that_no_device_answers_for_fails(
         (("snapshot", "component", "left_nee.position"), "did you mean left_knee.position"),
         (("snapshot", "component", "resource"), "ask gwrms snapshot resource"),
         (("set", "gait.step_length=9"), "above 0.6 m"),
+        (
+            ("set", "right_knee.0x6065:0=22755"),
+            '[parameter."right_knee.object_6065"] and below it object = "0x6065:0"',
+        ),
     ],
 )
 def test_refusal_is_a_sentence_and_changes_nothing(

@@ -84,3 +84,11 @@ def test_a_bus_that_has_just_been_opened_is_measured_first(monkeypatch: pytest.M
     closed = msgspec.structs.replace(fresh, state=CLOSED)
     robot = Cold(closed)
     assert describe._measured(robot).buses == [closed], "what is not open is not waited for"
+
+
+def test_an_overloaded_bus_says_so_in_its_own_row() -> None:
+    busy = msgspec.structs.replace(BUS, load_percent=101.0)
+    row = next(chapter for chapter in chapters(described(busy)) if "LOAD" in chapter)
+    assert "the bus is overloaded: 101 % of its time is taken" in row
+    other = next(chapter for chapter in chapters(described(BUS)) if "LOAD" in chapter)
+    assert "overloaded" not in other

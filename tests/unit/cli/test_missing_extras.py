@@ -55,6 +55,12 @@ def test_a_command_that_needs_less_says_so(command: str) -> None:
     assert {"numpy", "rich"} <= brought("sim")
 
 
+@pytest.mark.parametrize(("command", "extra"), [("gui", "server"), ("query", "query")])
+def test_a_command_names_at_once_all_that_it_needs(command: str, extra: str) -> None:
+    assert {missing_extras.extra_of(name, command) for name in ("numpy", "rich", "pyarrow")} == {extra}
+    assert {"numpy", "rich", "pyarrow"} <= brought(extra)
+
+
 def test_every_help_calls_it_exit_status() -> None:
     assert [one.words for one in commands() if "exit code" in one.parser.format_help().lower()] == []
 

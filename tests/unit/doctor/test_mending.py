@@ -159,7 +159,8 @@ def test_an_object_is_not_written_where(why: str, file: Path) -> None:
 
 
 def test_what_the_file_does_not_allow_is_told_with_the_line_that_would(file: Path) -> None:
-    with pytest.raises(NotMended, match=r'\[parameter."left_knee.object_6007"\] object = "0x6007:0"'):
+    lines = r'\[parameter."left_knee.object_6007"\] and below it object = "0x6007:0"'
+    with pytest.raises(NotMended, match=lines):
         Mender(load(file), FakeRobot()).mend(FOUND, Write("left_knee", 0x6007, 0, 3, 0))
 
 

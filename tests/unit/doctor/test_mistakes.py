@@ -189,6 +189,9 @@ def test_what_is_to_be_written_is_told_in_its_parameters_unit(drives: Patient) -
     (found,) = (one for one in findings(window) if one.rule == "following_window")
     assert "right_knee.0x6065:0=0.349057328283rad" in found.fixes[0].words
     assert "22755 of the device's own" in found.fixes[0].words
+    assert "first add to robot.toml" not in found.fixes[0].words
+    (other,) = (one for one in findings(replace(window, units={})) if one.rule == "following_window")
+    assert "first add to robot.toml" in other.fixes[0].words
 
 
 def test_a_node_that_no_table_has_is_told_and_no_mistake(walker: Patient) -> None:
@@ -254,3 +257,9 @@ def test_a_fix_of_a_file_says_what_stood_there() -> None:
     assert Write("left_knee", 0x6065, 0, 22755, 0xFFFF_FFFF).words == (
         "SDO: gwrms set left_knee.0x6065:0=22755   # was 4294967295"
     )
+
+
+def test_a_write_that_the_file_does_not_release_comes_with_the_lines_that_do() -> None:
+    said = Write("left_knee", 0x6065, 0, 22755, is_released=False).words
+    assert '[parameter."left_knee.object_6065"]\n              object = "0x6065:0"\n' in said
+    assert "stop first (gwrms stop)" in said

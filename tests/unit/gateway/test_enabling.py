@@ -36,7 +36,9 @@ def client(bench: Bench, tmp_path: Path) -> Iterator[Client]:
 def test_an_observer_never_enables(connect: Callable[[], Client], bench: Bench) -> None:
     client = connect()
     client.call("control.acquire", ttl_s=60)
-    assert client.refused("robot.enable").kind == "not_allowed"
+    refusal = client.refused("robot.enable")
+    assert refusal.kind == "not_allowed"
+    assert "only the controller that owns the bus may enable drives: start it there" in str(refusal)
     assert bench.left.steps == []
 
 

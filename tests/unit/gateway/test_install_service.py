@@ -92,6 +92,7 @@ def test_what_is_left_unfinished_starts_it_where_the_service_keeps_it(file: Path
     assert "PathExists=/var/lib/gwrms/exo_01_100_/stop.json" in paths
     assert "PathExists=/var/lib/gwrms/exo_01_100_/undo.json" in paths
     mine = Service(load(file), of_user=True)
+    assert "ListenStream=%t/gwrms/gwrms.sock\n" in mine.units["gwrms.socket"]
     assert f"PathExists={load(file).records}/stop.json" in mine.units["gwrms.path"]
 
 

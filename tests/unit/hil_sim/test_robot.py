@@ -12,6 +12,7 @@ import serial
 import eds
 from hil_sim.errors import SimulatorError
 from hil_sim.exoskeleton import Scenario
+from hil_sim.kept_file import disagreements
 from hil_sim.robot import SimulatedRobot
 
 
@@ -102,6 +103,19 @@ def test_a_second_robot_in_a_folder_is_refused_and_the_next_keeps_port_and_file(
         assert again.port == port
         assert not again.config_is_ours
     assert robot.config.read_text(encoding="utf-8") == "# mine\n"
+
+
+def test_a_kept_file_that_says_another_sensor_is_told(tmp_path: Path) -> None:
+    with SimulatedRobot(tmp_path) as robot:
+        config = robot.config.read_text(encoding="utf-8")
+    assert disagreements(robot.config, config) == []
+    other = config.replace('format = "witmotion"', 'format = "xsens"')
+    assert disagreements(robot.config, other) == [
+        "the file says witmotion for [imu.trunk] format, you simulate xsens"
+    ]
+    robot.config.write_text("# mine", encoding="utf-8")
+    with SimulatedRobot(tmp_path) as again:
+        assert "the file has no [imu.trunk], and you simulate one" in again.disagreements
 
 
 def test_fast_as_it_goes_is_faster_than_real_time(tmp_path: Path) -> None:

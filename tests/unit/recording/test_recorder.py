@@ -106,7 +106,7 @@ def test_a_name_that_differs_or_repeats_is_an_event(spool: Spool) -> None:
         recorder.describe("left", description("exo"))
         recorder.describe("exo", description("exo"))
     assert [event["text"] for event in events(spool, "name")] == [
-        "left calls itself exo in its own file",
+        "left calls itself exo in its own file: give it one name, in [robot] there or here (exo=HOST:PORT)",
         "exo and left both call themselves exo",
     ]
 
@@ -116,7 +116,10 @@ def test_a_name_that_a_robot_has_given_up_is_free(spool: Spool) -> None:
         for robot, name in (("exo-01", "exo-02"), ("exo-01", "exo-01"), ("exo-02", "exo-02")):
             recorder.describe(robot, description(name))
     assert [event["text"] for event in events(spool, "name")] == [
-        "exo-01 calls itself exo-02 in its own file"
+        (
+            "exo-01 calls itself exo-02 in its own file: give it one name, in [robot] there or here "
+            "(exo-02=HOST:PORT)"
+        )
     ]
 
 
@@ -127,8 +130,8 @@ def test_a_robot_that_was_removed_shares_its_name_with_nobody(spool: Spool) -> N
         recorder.describe("exo", description("exo"))
         recorder.describe("left", description("exo"))
     assert [event["text"] for event in events(spool, "name")] == [
-        "left calls itself exo in its own file",
-        "left calls itself exo in its own file",
+        "left calls itself exo in its own file: give it one name, in [robot] there or here (exo=HOST:PORT)",
+        "left calls itself exo in its own file: give it one name, in [robot] there or here (exo=HOST:PORT)",
         "left and exo both call themselves exo",
     ]
 

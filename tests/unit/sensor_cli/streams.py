@@ -3,6 +3,8 @@
 import importlib
 from pathlib import Path
 
+import pytest
+
 from drivers.imu.formats import FORMATS as IMUS
 from drivers.insole.formats import FORMATS as INSOLES
 
@@ -15,11 +17,19 @@ GRID_EXAMPLE = bytes.fromhex(
 def streams() -> dict[str, bytes]:
     """Format name → bytes, each cut at both ends."""
     tests = dict.fromkeys(IMUS, "imu") | dict.fromkeys(INSOLES, "insole")
-    return {name: _stream(f"tests.unit.{folder}.test_{name}") for name, folder in tests.items()}
+    return {name: stream_of(folder, name) for name, folder in tests.items()}
 
 
-def _stream(module: str) -> bytes:
-    frames: list[bytes] = importlib.import_module(module.replace("-", "_")).STREAM
+def stream_of(folder: str, name: str) -> bytes:
+    """Return the stream of one format, from its own test in that folder."""
+    test = f"test_{name.replace('-', '_')}"
+    try:
+        frames: list[bytes] = importlib.import_module(f"tests.unit.{folder}.{test}").STREAM
+    except (ModuleNotFoundError, AttributeError) as error:
+        how = {"imu": "docs/how-to/add-an-imu.md", "insole": "docs/how-to/add-an-insole.md"}[folder]
+        raise pytest.UsageError(
+            f"write tests/unit/{folder}/{test}.py with STREAM: {how} ({error})"
+        ) from error
     return b"".join(frames)[7:-5]
 
 

@@ -5,7 +5,7 @@ import random
 import pytest
 
 from drivers.identify import matches, recognise
-from tests.unit.sensor_cli.streams import GRID_EXAMPLE, streams
+from tests.unit.sensor_cli.streams import GRID_EXAMPLE, stream_of, streams
 
 
 @pytest.mark.parametrize("name", streams())
@@ -52,3 +52,10 @@ def test_noisy_line_is_still_recognised_and_its_share_says_so() -> None:
     assert match is not None
     assert match.format_name == "bno08x-rvc"
     assert 0.6 < match.share < 1.0
+
+
+def test_a_format_without_its_test_is_told_what_to_write() -> None:
+    with pytest.raises(
+        pytest.UsageError, match=r"write tests/unit/imu/test_my_own\.py with STREAM: docs/how-to"
+    ):
+        stream_of("imu", "my-own")

@@ -1,0 +1,176 @@
+"""A robot with keys on its own computer: its accounts find its Unix socket by themselves."""
+
+import contextlib
+import os
+import shutil
+import socket
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from gateway import own_folders
+from gateway.cli import serve
+from gateway.client import Address, LinkLost, LinkSettings, Robot, Unreachable, WrongRobot
+from gateway.client.keys import keys_folder
+from gateway.client.local_sockets import listens_at, local_sockets
+from gateway.connections.listeners import listen_locally
+from gateway.main import main
+from tests.unit.gateway import keyed as keys
+from tests.unit.gateway.harness import HEAD, Bench, config, serving
+from tests.unit.gateway.keyed import keyed
+
+ONCE = LinkSettings(client="test", reconnect=False)
+
+
+@pytest.fixture
+def session(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Of a login; /run/gwrms is none that may be written to."""
+    folder = tmp_path / "run"
+    folder.mkdir(mode=0o700)
+    (tmp_path / "plain").write_text("")
+    monkeypatch.setattr(own_folders, "SYSTEM", tmp_path / "plain" / "gwrms")
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(folder))
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
+    for name in ("RUNTIME_DIRECTORY", "SUDO_UID"):
+        monkeypatch.delenv(name, raising=False)
+    return folder
+
+
+@pytest.fixture
+def address(tmp_path: Path, session: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Address]:
+    """Of a robot with keys, started as `gwrms gateway` starts it; the user here has no key."""
+    assert session.is_dir()
+    monkeypatch.setattr("gateway.modules.component.module.assemble", Bench().assemble)
+    robot = config(keyed(tmp_path))
+    with serving(robot, local=serve._local(robot)) as (host, port):
+        yield Address(host, port)
+
+
+def test_the_user_of_a_robot_with_keys_stops_and_resets_it_there_without_a_key(
+    address: Address, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["stop", "--robot", str(address)]) == 0
+    assert "confirmed" in capsys.readouterr().out
+    assert main(["reset", "--robot", str(address)]) == 0
+    assert main(["describe", "--robot", str(address)]) == 0
+
+
+def test_a_stale_socket_and_one_of_another_robot_are_passed_over(
+    address: Address, session: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "other").mkdir()
+    other = config(tmp_path / "other", HEAD.replace("exo-test", "a-first-one"))
+    with socket.socket(socket.AF_UNIX) as stale:
+        stale.bind(str(session / "gwrms" / "0-stale.sock"))
+    with serving(other, local=serve._local(other)), Robot(address, ONCE) as robot:
+        assert robot.hello is not None
+        assert robot.hello.robot == "exo-test"
+        assert robot.hello.listens == str(address)
+
+
+def test_a_socket_in_a_folder_that_others_may_write_to_is_not_believed(
+    address: Address, session: Path
+) -> None:
+    (session / "gwrms").chmod(0o777)
+    with pytest.raises(LinkLost, match=r"gwrms pair.*at its Unix socket"):
+        Robot(address, ONCE)
+
+
+def test_another_robot_that_is_pinned_there_is_not_gone_around(address: Address) -> None:
+    keys_folder().mkdir(parents=True, mode=0o700)
+    for file, name in zip(keys.pair("operator"), ("desk.key", "desk.crt"), strict=True):
+        shutil.copy(file, keys_folder() / name)
+    with pytest.raises(WrongRobot):
+        Robot(Address(address.host, address.port, keys.pin("impostor")), ONCE)
+
+
+def test_where_nobody_listens_the_only_gateway_with_that_port_is_meant(
+    session: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As where host is one address of the computer's, and the command asks the usual 127.0.0.1."""
+    assert session.is_dir()
+    robot = config(tmp_path)
+    with serving(robot, local=serve._local(robot)) as (_host, port):
+        elsewhere = Address("127.0.0.9", port)
+        with Robot(elsewhere, ONCE) as found:
+            assert found.hello is not None
+            assert found.hello.robot == "exo-test"
+        monkeypatch.setattr("gateway.client.link.listens_at", lambda *_: False)
+        with pytest.raises(Unreachable, match=r"no gateway at 127\.0\.0\.9"):
+            Robot(elsewhere, ONCE)
+
+
+@pytest.mark.parametrize(
+    ("listens", "expected"),
+    [
+        ("127.0.0.1:7420", True),
+        ("0.0.0.0:7420", True),
+        ("[::]:7420", True),
+        ("192.0.2.7:7420", None),
+        ("127.0.0.1:7421", False),
+        (None, False),
+    ],
+)
+def test_whether_a_gateway_is_the_one_at_an_address(listens: str | None, expected: bool | None) -> None:
+    assert listens_at(Address(), listens) is expected
+    assert listens_at(Address("localhost"), listens) is expected
+
+
+def test_no_socket_here_stands_for_another_computer(session: Path) -> None:
+    with listen_locally(session / "gwrms" / "exo.sock"):
+        assert [one.host for one in local_sockets(Address())] == [str(session / "gwrms" / "exo.sock")]
+        assert not list(local_sockets(Address("192.0.2.7")))
+
+
+@pytest.mark.parametrize(
+    ("broken", "expected"),
+    [("", "run/gwrms/exo-test.sock"), ("run", "config/gwrms/exo-test.sock"), ("all", None)],
+)
+def test_with_keys_there_is_a_socket_wherever_one_can_be(
+    broken: str, expected: str | None, session: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    if broken:
+        (session / "gwrms").write_text("no folder")
+    if broken == "all":
+        (tmp_path / "config").write_text("no folder")
+    made = serve._local(config(keyed(tmp_path)))
+    assert (made is None) == (expected is None)
+    if made is not None:
+        assert made.getsockname() == str(tmp_path / str(expected))
+        made.close()
+    else:
+        assert "no Unix socket for this computer's accounts" in caplog.text
+
+
+def test_two_gateways_of_one_name_both_have_their_socket(session: Path, tmp_path: Path) -> None:
+    assert session.is_dir()
+    robot = config(keyed(tmp_path))
+    with contextlib.closing(serve._local(robot)) as one, contextlib.closing(serve._local(robot)) as other:  # type: ignore[type-var]
+        assert one is not None
+        assert other is not None
+        assert one.getsockname() != other.getsockname()
+
+
+def test_the_system_s_folder_comes_first_where_it_may_be_used(
+    session: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Others than the gateway's own account reach it there only."""
+    assert session.is_dir()
+    monkeypatch.setattr(own_folders, "SYSTEM", tmp_path / "system" / "gwrms")
+    (tmp_path / "system" / "gwrms").mkdir(parents=True)
+    assert own_folders.to_serve_in(os.environ)[0] == tmp_path / "system" / "gwrms"
+    monkeypatch.setattr(os, "geteuid", lambda: 1000)
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    assert own_folders.to_serve_in(os.environ)[0] == session
+
+
+def test_root_by_sudo_looks_where_the_user_s_own_gateway_is(
+    session: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[Path] = []
+    monkeypatch.setattr(own_folders, "_is_safe", lambda folder: not asked.append(folder))  # type: ignore[func-returns-value]
+    monkeypatch.setattr(Path, "is_dir", lambda self: str(self) == "/run/user/1234")
+    monkeypatch.setattr(os, "geteuid", lambda: 0)
+    own_folders.to_look_in({"SUDO_UID": "1234", "XDG_RUNTIME_DIR": str(session)})
+    assert asked[1:3] == [session / "gwrms", Path("/run/user/1234/gwrms")]
