@@ -28,7 +28,7 @@ examples:
   gwrms scan --serial /dev/ttyUSB0             what talks on a serial port
 
 Without --active not one frame is sent. With it, nodes that somebody else asks by SDO are left alone, and
-nothing is ever written. If the interface is down or its bit rate is wrong, the command that fixes it is shown.
+nothing is ever written. If the interface is down or its bit rate is wrong, the remedy is shown.
 """
 WAIT_S = 3.0
 

@@ -22,8 +22,8 @@ LOOPBACK = ("127.0.0.1", "::1", "localhost")
 
 EPILOG = """It reads and changes nothing. CPU is the gateway's, of one core. Of a request P50 and P99 are how
 long its answer takes; of a stream how old a row is when it is here, right to within half a round
-trip. On the robot itself, psutil reading the same processes in this command stands beside it. Measure
-with all that the robot runs, and once more without, to see what is whose.
+trip. On the robot itself, psutil reading the same processes in this command is shown for comparison.
+Measure with everything the robot runs, and again without, to see the share of each.
 
 examples:
   gwrms bench

@@ -19,16 +19,16 @@ Checks a robot's file, a server's file or a scenario as a gateway, a collector o
 it, and tells everything that is wrong at once: line, table, key, what is allowed and what was likely meant.
 Which of them a file is shows in its tables. Nothing is started, and nothing is written.
 
-Of a robot's file also what it needs is looked at: whether its EDS files, layouts and calibrations can be used
-and allow what its parameters say, whether the ports exist and this user may open them, whether the CAN links
-are up and run at its bit rate, and whether its address is this computer's.
+For a robot's file, its surroundings are checked too: whether EDS files, layouts and calibrations can be used
+and allow its parameters, whether the ports exist and this user may open them, whether the CAN links are up
+and run at its bit rate, and whether its address is this computer's.
 """
 _EPILOG = """\
 A mistake is what a file is refused for, or, in a file that it names, the component that needs that one: the
 gateway starts without it. A warning is what can work and is likely not what was meant, or what this computer
 lacks: it may come yet. A gateway says the same of its file and of devices' files when it starts, and of ports
-and buses in gwrms describe. Lines that are no TOML are told, and the rest is checked without them; behind
-a header that cannot be read, or a value that does not end, nobody knows what is meant.
+and buses in gwrms describe. Lines that are not TOML are reported, and the rest is checked without them; text
+after an unreadable header, or in a value without an end, cannot be checked.
 
 exit status: 0 no mistakes; 1 mistakes, with --strict also warnings; 2 usage
 

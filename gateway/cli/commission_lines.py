@@ -35,7 +35,7 @@ CHUNK = 4096
 LONGEST = 65_536  # of a line; whoever sends a longer one is not heard any more
 
 
-class Answer(msgspec.Struct, frozen=True):
+class Answer(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A line that is no plain answer."""
 
     answer: str = ""
@@ -111,16 +111,26 @@ class Lines:
                 return
 
     def _take(self, line: bytes) -> None:
-        text = line.decode(errors="replace")
-        read = Answer(text)
-        if text.startswith("{"):
-            with contextlib.suppress(msgspec.DecodeError):
-                read = msgspec.json.decode(line, type=Answer)
+        read = _read(line.decode(errors="replace").strip())
         if not read.stop:
             self._read.put(read)
         elif not self.stop_asked:
             self.stop_asked = True
             signal.pthread_kill(self._main, signal.SIGINT)
+
+
+def _read(text: str) -> Answer:
+    """Return what a line says: whatever could be meant as a stop is one; what is no answer is plain text."""
+    try:
+        found = msgspec.json.decode(text) if text.startswith("{") else {}
+    except msgspec.DecodeError:
+        found = {}
+    if any(key.lower() == "stop" and value for key, value in found.items()):
+        return Answer(stop=True)
+    try:
+        return msgspec.convert(found, Answer) if "answer" in found else Answer(text)
+    except msgspec.ValidationError:
+        return Answer(text)
 
 
 class JsonFace:

@@ -37,8 +37,8 @@ gwrms keys COMMAND --help says more.
 _PAIR = """\
 Shows HOST:PORT and a code. On the desk, `gwrms pair HOST:PORT` asks for it and proves to know it; then you
 say here how that desk is called and what it may do. With its first desk the robot gets a key of its own: from
-its gateway's next start on, every TCP connection is TLS. Until a desk is let in nothing changes, also if this
-is cancelled.
+its gateway's next start on, every TCP connection is TLS. Until a desk is admitted nothing changes, even if
+this is cancelled.
 """
 
 

@@ -5,10 +5,10 @@ from gateway.cli.connect import connect, parser
 from gateway.cli.text import say, say_json, table, warn
 from gateway.wire.stop import Reset
 
-EPILOG = """Each drive is led to "switch on disabled": one that moves is stopped first, a fault is reset, and
-one that held its position lets go of it. Nothing is enabled: that is the controller's part, or
-gwrms enable's. The stop stays held unless it is known of every drive that its motor has no
-current, and of every controller that it is stopped; what stands against that is named."""
+EPILOG = """Each drive is taken to "switch on disabled": a moving one is stopped first, a fault is reset, and
+one that held its position releases it. Nothing is enabled: the controller or gwrms enable does
+that. The stop stays held until every drive is known to be without current, and every controller
+to be stopped; otherwise the reason is named."""
 
 
 def main(argv: list[str]) -> int:

@@ -15,16 +15,16 @@ from gateway.units import unit_named
 from gateway.wire.robot import Description
 
 EPILOG = """All changes happen or none: they are checked first, written, read back from the devices, and
-taken back if one fails. Where somebody else has control nothing is changed, and that
-is said.
+reverted if one fails. If somebody else has control, nothing is changed, and the command
+reports it.
 
-With --trial they are taken back by the robot itself after that time, and at once when this command ends in
-any way, its terminal, computer or network included. Enter keeps them.
+With --trial the robot itself reverts them after that time, and at once when this command ends in any way,
+also with its terminal, computer or network. Enter keeps them.
 
---mirror carries each value over to the same joint of the other side, --all-joints to every joint, in the
-same transaction; without =VALUE it is what that joint holds now. Limits of position are carried over as the
-joint's angle, whichever way its drive counts. A joint that cannot take the value is named, and nothing is
-written: --leave-out says that it is to stay as it is.
+--mirror copies each value to the same joint of the other side, --all-joints to every joint, in the same
+transaction; without =VALUE it copies that joint's present value. Position limits are converted to each
+joint's angle, in whichever direction its drive counts. A joint that cannot take the value is named, and
+nothing is written; --leave-out excludes it.
 
 examples:
   gwrms set gait.step_length=0.42 left_knee.max_torque=40

@@ -14,9 +14,9 @@ EPILOG = """Refused while one of its drives is enabled or in a state that is not
 is on trial, and where the device does not say that it can (1010h). All of its parameters are stored, whoever
 has changed them, and compared before and after. A write never stores by itself.
 
-With --all every device that can store is asked, one after another, and what came of each is said: stored,
-refused, or not confirmed, after which nobody knows what its flash holds. Where the link drops, the devices
-after it are not asked. Exit status 1 unless all have stored.
+With --all every device that can store is asked, one after another, and the outcome of each is printed:
+stored, refused, or not confirmed (the contents of its flash are then unknown). If the link drops, the
+remaining devices are not asked. Exit status 1 unless all have stored.
 
 examples:
   gwrms store left_knee

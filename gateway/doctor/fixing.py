@@ -101,7 +101,7 @@ class Mender:
     def _edit(self, edits: tuple[Edit, ...]) -> str:
         change(self._config.path, edits)
         self._edited |= {edit.name for edit in edits}
-        return f"{self._config.path} changed: takes effect when the gateway restarts, or wakes from rest"
+        return f"{self._config.path} changed: takes effect when the gateway restarts or wakes from rest"
 
     def _write(self, fix: Write) -> str:
         if self._robot is None:

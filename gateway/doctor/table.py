@@ -55,7 +55,12 @@ RULES: tuple[DoctorRule, ...] = (
         "walking: velocity beside position",
         drive.velocity_unit,
     ),
-    DoctorRule("mode", "the mode of operation is not what it is led in", "objects: 6061h, 1600h", drive.mode),
+    DoctorRule(
+        "mode",
+        "the mode of operation is not the mode it is commanded in",
+        "objects: 6061h, 1600h",
+        drive.mode,
+    ),
     DoctorRule(
         "current_limit",
         "current limit unset, or above the motor's",

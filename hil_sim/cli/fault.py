@@ -30,8 +30,8 @@ examples
 by program
   The socket DIR/control takes a line of JSON and answers with one: {"fault": "node_lost", "on": "left_knee",
   "for_s": 5}, {"fault": "bus_load", "params": {"percent": 100}}, {"clear": "all"}, {"activity": "sit"},
-  {"controller": "start"}, {"list": true}. The last one tells every fault with what it can be on, its keys and
-  where it is on now ("faults"), and those that are on with since when and how ("active").
+  {"controller": "start"}, {"list": true}. The last one lists every fault with its possible devices, its keys
+  and where it is active ("faults"), and the active ones with start and settings ("active").
 
 exit status: 0 done; 1 refused, or no simulator runs in DIR; 2 wrong usage
 """

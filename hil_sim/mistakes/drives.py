@@ -68,6 +68,6 @@ MISTAKES = {
         "The right ankle coasts when it is stopped.", act=_drive("right_ankle", (od.QUICK_STOP_OPTION, 0))
     ),
     "sync_slow": Mistake("The controller's SYNC comes each 40 ms.", act=_slow_sync),
-    "insole_scale": Mistake("The left insole tells a tenth of what it feels.", act=_insole),
-    "imu_frozen": Mistake("The IMU tells the same again and again.", act=_imu_frozen),
+    "insole_scale": Mistake("The left insole reports a tenth of the load.", act=_insole),
+    "imu_frozen": Mistake("The IMU repeats the same value.", act=_imu_frozen),
 }

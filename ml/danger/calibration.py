@@ -125,10 +125,13 @@ def _unfit(one: Calibration) -> Iterator[str]:
         yield f"it is of the detectors {', '.join(one.detectors)}, and these are {', '.join(DETECTORS)}"
     if not len(one.floor) == len(one.scale) == len(DETECTORS) or len(one.weights) != 2:
         yield "it does not have a floor and a scale of each detector, and the two weights of the worst"
-    if min((*one.weights, *one.scale), default=-1.0) < 0.0:
-        yield "a weight or a scale is negative: evidence would speak against danger"
+    if min(one.weights, default=-1.0) < 0.0 or min(one.scale, default=0.0) <= 0.0:
+        yield "a weight is negative, or a scale not above 0: evidence would not speak for danger"
     if not one.odds or len(one.odds) != len(one.share):
         yield "it does not say which odds came true how often"
     missing = [level.word for level in URGENT if level.word not in one.thresholds]
     if missing:
         yield f"no threshold of {', '.join(missing)}"
+    given = [one.thresholds[level.word] for level in URGENT if level.word in one.thresholds]
+    if given != sorted(given):
+        yield "a more urgent level has a lower threshold than one before it"

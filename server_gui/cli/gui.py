@@ -9,15 +9,15 @@ from server_gui.core.settings.server_file import add_robots, default_file, load,
 from server_gui.qt_needs import check, prefer_x
 
 EPILOG = """keys
-  F12, Ctrl+Space   STOP the robot that is looked at: quick stop on every drive. It is software over a
+  F12, Ctrl+Space   STOP the selected robot: quick stop on every drive. It is software over a
                     network, not a safety-rated emergency stop
   Ctrl+F            find a parameter
   Alt+O, S, R, C, L overview, signals, resources, recordings, cloud
   Alt+N             commission a robot
   Space             in a recording: play, or stand still; I and O begin and end a span
 
-What comes is recorded as gwrms collect records it, into the same spool and store, as long as the window is
-open. Where a collector owns the spool already, the window only shows, and says who records.
+While the window is open, it records as gwrms collect does, into the same spool and store. If a collector owns
+the spool already, the window only shows the data, and names the program that records.
 
 Without --robot the robots of the server's file are shown (~/.config/gwrms/server.toml, see gwrms collect
 --help); without any, the window offers a simulated one.

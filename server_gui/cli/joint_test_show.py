@@ -11,8 +11,8 @@ from server_gui.core.joint_tests.file import NotReadable
 from server_gui.core.joint_tests.measures import Measure
 
 EPILOG: Final = """\
-What could not be measured stands as a dash, with its reason. Proposals are for somebody who decides: nothing
-writes them. gwrms docs how-to/test-a-joint says how each figure is found.
+Figures that could not be measured are dashes, with the reason. Proposals are for you to decide on: nothing
+writes them. gwrms docs how-to/test-a-joint explains how each figure is found.
 
 exit status
   0 shown, 1 not to be read, 2 usage"""

@@ -37,7 +37,7 @@ LABEL: Final = 10  # letters of a scale
 EPILOG: Final = f"""Where there is a display, the window opens on its Signals with these channels ticked, and
 records nothing; else, and with --terminal, they are drawn in the terminal: the last {SPAN_S:g} s, a curve a
 channel, angles in degrees. What is missing is a hole; where nothing comes, the curves go on without it.
-Where the output is no terminal, the curves of --seconds are printed once.
+If the output is not a terminal, the curves of --seconds are printed once.
 
 examples
   gwrms plot left_knee.position right_knee.position

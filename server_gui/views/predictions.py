@@ -128,7 +128,7 @@ def activity(station: Station) -> PredictionRow:
 def by_steps(station: Station) -> PredictionRow:
     """Return what the steps that were seen tell, in the words of the models' labels."""
     walks = station.processing.derived().gait.walking
-    why = station.predictions.problem or "the model says nothing now"
+    why = station.predictions.problem or "the model predicts nothing now"
     if walks is None:
         mark, few = Mark("ring", "old", "not known"), "too few steps seen yet"
         return PredictionRow(mark, "Activity not known", few, "", why)
@@ -141,7 +141,7 @@ def doing(station: Station) -> tuple[str, ...]:
     """Return the robot's activity, the fullest wording first: `Walk 74 steps/min · 6 of 6 enabled`."""
     count = enabled_text(station.robot, live=station.is_live)
     if not station.is_live:
-        return ("what it does is not known", "not known")
+        return ("its activity is not known", "not known")
     line, gait = activity(station), station.processing.derived().gait
     walks = gait.walking and gait.cadence_spm is not None and line.mark.word != STOPPED
     between = " " if line.mark.colour == "accent" else " · "  # the steps are not those of what is not known
@@ -204,7 +204,7 @@ def _danger(predictions: StationPredictions) -> Iterator[PredictionRow]:
     if shown is None:
         if predictions.foresees:
             yield PredictionRow(
-                Mark("ring", "old", "not known"), "Danger: not known", "nothing has been said of it"
+                Mark("ring", "old", "not known"), "Danger: not known", "there is no assessment yet"
             )
         return
     verdict = shown.said.verdict

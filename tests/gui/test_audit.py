@@ -267,5 +267,5 @@ def test_what_was_altered_on_the_robot_after_it_was_collected_shows(
 def test_a_store_that_is_away_is_said_calmly(whole: Audit, collected: Collected) -> None:
     collected.found = JournalsFound(problem="s3://lab cannot be reached: Connection refused")
     whole.refresh()
-    assert "cannot be read now, and is tried again: s3://lab cannot be reached" in whole.verdict.text()
+    assert "cannot be read now; retrying: s3://lab cannot be reached" in whole.verdict.text()
     assert whole.verdict.property("tone") != "bad"

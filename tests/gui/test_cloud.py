@@ -64,7 +64,7 @@ def test_a_store_that_is_away_says_so_and_is_tried_again(
     shown.until(lambda: "Connection refused" in shown.window.tabs.cloud.state.text(), "said so")
     assert shown.window.tabs.cloud._facts["Holds"].text() == "not known"
     shown.open("Recordings")
-    assert "it is tried again" in shown.window.tabs.recordings.list.said.text()
+    assert "retrying" in shown.window.tabs.recordings.list.said.text()
     away[0] = False
     shown.until(lambda: shown.window.tabs.recordings.list.sessions.rowCount(), "came back")
     shown.open("Cloud")
@@ -87,7 +87,7 @@ def test_upload_now_asks_who_records_and_does_it_itself_where_nobody_does(
     cloud._recording.look()
     shown.draw()
     assert "2 batches wait" in cloud.waiting.text()
-    assert "It is tried again by itself: the store cannot be reached" in cloud.waiting.text()
+    assert "Retried automatically: the store cannot be reached" in cloud.waiting.text()
     cloud.upload.click()
     assert keeper.asked == ["upload"]
 

@@ -119,7 +119,7 @@ def test_a_trial_that_counts_down_says_what_it_does_so_far(
     said = {
         Word.FEW: "too early to judge it: 49 gait cycles before, 3 since; it takes 8 of each leg",
         Word.WORSE: "so far worse: left knee tracking error RMS +19.2 %",
-        None: "once somebody",
+        None: "once the wearer walks",
     }
     bench.station.writing.trial = Trial(
         1, {"gait.step_length": 0.4}, {"gait.step_length": 0.3}, time.monotonic_ns() + 10**10
@@ -142,7 +142,7 @@ def test_a_trial_that_counts_down_says_what_it_does_so_far(
             "40 gait cycles left",
         ),
         ({}, ("strides lasted 1.2 s before and 1.6 s after",), "strides lasted"),
-        ({}, (), "too few strides of both sides are alike"),
+        ({}, (), "too few strides before and after are comparable"),
     ],
 )
 def test_enough_strides_that_cannot_be_judged_say_why(
@@ -229,7 +229,7 @@ def test_what_has_ended_is_told_as_over_and_its_later_strides_as_such(bench: Ben
     assert parts.edits.list.item(0).text().endswith("reverted · was worse")
     said = parts.edits.verdict.text()
     assert said.endswith("was worse (40 gait cycles before and 9 since it was taken back, 41 with it)")
-    assert "strides since it was taken back are grey, too" in parts.edits._legend.text()
+    assert "strides after its revert are grey, too" in parts.edits._legend.text()
 
 
 def test_strides_are_read_where_the_pointer_is(bench: Bench, parts: Parts) -> None:

@@ -212,7 +212,7 @@ def test_when_the_link_goes_values_are_grey_with_their_age_and_nothing_is_asked(
     page.look()
     assert _cell(page, "0x6041:0", HOLDS) == "0x0237 (operation enabled)"
     assert _ink(page, theme, "0x6041:0", HOLDS) == "old"
-    assert "as old as it says" in page.said.text()
+    assert "each value has its age" in page.said.text()
     assert len(bench.first.asked) == asked
     assert not page.bar.all.isEnabled()
 

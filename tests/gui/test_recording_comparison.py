@@ -64,6 +64,6 @@ def test_a_store_that_cannot_be_read_is_said_and_nothing_is_shown_as_unchanged(
     page = compared(shown, settings)
     shown.until(lambda: archive.compared.problem, "told why not")
     shown.draw()
-    assert page.unknown.text() == "It cannot be told: the disk is away"
-    assert page.verdict.text() == "It cannot be told: the disk is away"
+    assert page.unknown.text() == "Not known: the disk is away"
+    assert page.verdict.text() == "Not known: the disk is away"
     assert cells(page) == []

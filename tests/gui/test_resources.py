@@ -220,7 +220,7 @@ def test_what_holds_the_cores_back_is_told(bench: Bench) -> None:
         held_back(replace(seen, throttling=hot))
         == "▲ too hot 3× since its start · ▲ processor holds back 40 %"
     )
-    assert held_back(replace(seen, throttling=Throttling(None, {}, []))) == "nothing holds the cores back"
+    assert held_back(replace(seen, throttling=Throttling(None, {}, []))) == "the cores are not throttled"
 
 
 def test_who_leaks_is_said(view: Resources, bench: Bench) -> None:

@@ -39,7 +39,7 @@ def test_a_card_says_what_its_robot_does_also_beside_an_alarm_and_nothing_of_the
     )
     other.take([LinkChanged(ConnectionState.WAITING, "gone", time.monotonic_ns())])
     settle(around, bench)
-    assert second.texts[3] == "what it does is not known"
+    assert second.texts[3] == "its activity is not known"
 
 
 def test_a_card_has_the_same_word_as_the_header_where_it_is_narrow(window: MainWindow, bench: Bench) -> None:

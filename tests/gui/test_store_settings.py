@@ -52,7 +52,7 @@ def test_only_what_was_edited_is_written_and_every_comment_stays(form: SettingsF
     form.batch.setText("30")
     assert "[store] url, [recorder] batch_s is to be written" in form.said.text()
     form.save.click()
-    assert form.said.text().startswith(f"Saved in {file}; in force when")
+    assert form.said.text().startswith(f"Saved in {file}; takes effect when")
     wanted = FILE.replace('"s3://lab/old"', '"s3://lab/new"')
     assert file.read_text() == wanted.replace("upload = 'idle'\n", "upload = 'idle'\nbatch_s = 30.0\n")
     assert file.stat().st_mode & 0o777 == 0o600
@@ -66,7 +66,7 @@ def test_only_what_was_edited_is_written_and_every_comment_stays(form: SettingsF
         ("ftp://lab", "60", "is no store: use file:///folder or s3://bucket/prefix"),
         ("s3://key:secret@lab", "60", "has no keys in it"),
         ("s3://lab/old", "0", "[recorder] batch_s: must be a number, at least 1"),
-        ("s3://lab/old", "soon", "'soon' is no number"),
+        ("s3://lab/old", "soon", "'soon' is not a number"),
         ("s3://lab/old", "nan", "no number that can be meant"),
     ],
 )

@@ -43,7 +43,7 @@ def test_two_robots_of_one_name_are_told_apart(theme: Theme, bench: Bench) -> No
     [
         ("host:port", "is not a robot's address"),
         ("127.0.0.1:7420", "is in the list already"),
-        ("my exo=192.0.2.7", "is no name"),
+        ("my exo=192.0.2.7", "is not a name"),
         ("exo-01=192.0.2.7", "give it another name"),
     ],
 )

@@ -360,9 +360,9 @@ def test_another_robot_is_beside_and_says_how_it_is_aligned(signals: Signals, be
     said(signals)
     assert signals.scene.read(TORQUE, 0.0, beside=True) is None, "an old value is shown as if it were of now"
     signals.beside.nudge("far")
-    assert "is no number of seconds" in said(signals)
+    assert "is not a number of seconds" in said(signals)
     bench.desk.remove(bench.desk.stations[1])
-    assert "what was beside is gone" in said(signals)
+    assert "the robot or recording beside is gone" in said(signals)
     assert signals.scene.beside is None
 
 
@@ -407,4 +407,4 @@ def test_a_note_is_kept_at_the_cursor_where_somebody_records_and_never_goes_to_a
     QTest.keyClick(question.field, Qt.Key.Key_Return)
     assert len(notes.kept) == 1
     bench.desk.select(bench.desk.stations[0])
-    assert "no note, other rows are looked at by now: slipped" in said(signals)
+    assert "no note, other rows are shown by now: slipped" in said(signals)

@@ -76,7 +76,7 @@ def test_a_running_robots_mistakes_are_found_through_its_gateway(ill: Ill) -> No
 def test_what_is_safe_is_mended_and_what_the_file_does_not_allow_is_refused_in_words(ill: Ill) -> None:
     done = gwrms(*doctor(ill, "--fix", "--yes"))
     assert done.returncode == 1, done.stderr
-    assert "changed: takes effect when the gateway restarts, or wakes from rest" in done.stdout
+    assert "changed: takes effect when the gateway restarts or wakes from rest" in done.stdout
     file = tomllib.loads(ill.config.read_text(encoding="utf-8"))
     assert file["joint"]["left_knee"]["gear_ratio"] == 100.0
     assert '[parameter."right_knee.object_6065"] and below it object = "0x6065:0"' in done.stderr

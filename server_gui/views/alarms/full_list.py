@@ -168,10 +168,10 @@ class AlarmButtons(QWidget):
     def __init__(self) -> None:
         super().__init__()
         self.clear = QPushButton("Clear fault…")
-        self.clear.setToolTip("Reset the drives' fault: they are led to switch on disabled, none is enabled")
+        self.clear.setToolTip("Reset the drives' fault: they go to switch on disabled, none is enabled")
         self.show_signal = QPushButton("Show the signal ± 5 s")
         self.acknowledge = QPushButton("Acknowledge")
-        self.acknowledge.setToolTip("It is read: it gives way to others until it is over")
+        self.acknowledge.setToolTip("Mark as read: other alarms come before it until it is over")
         self._row = QBoxLayout(QBoxLayout.Direction.LeftToRight, self)
         self._row.setContentsMargins(0, 0, 0, 0)
         self._row.setSpacing(6)

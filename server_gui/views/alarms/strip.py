@@ -55,7 +55,7 @@ class AlarmStrip(ClickableFrame):
         self.headline, self.details = WrappingLabel(), WrappingLabel("dim")
         self._words.hold(self.headline, self.details)
         self.buttons, self.more = AlarmButtons(), QPushButton()
-        self.more.setToolTip("Every alarm in full, and what may be done about it")
+        self.more.setToolTip("Every alarm in full, with its actions")
         row = QHBoxLayout(self)
         row.setContentsMargins(12, 3, 12, 3)
         row.setSpacing(8)

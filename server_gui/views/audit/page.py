@@ -33,14 +33,14 @@ from server_gui.views.widgets.wrapping_label import WrappingLabel
 EVERY_ROBOT, EVERYBODY = "All robots", "Everybody"
 WIDEST: Final = 300  # of a column, at text of 100 %: its tip has the rest
 MOST: Final = 4  # robots of which everything is said at once
-AWAY: Final = "What was collected before cannot be read now, and is tried again"
+AWAY: Final = "Earlier collected entries cannot be read now; retrying"
 NONE: Final = (
     "Nothing was done to a robot yet, as far as its journal has come. Each change is a row here: who, when, "
     "old → new, what the robot read back, and how it ended; likewise each STOP, reset, trial and store to "
     "flash, from this window, a command or the robot itself.\n\n"
     "To make the first: change a value under Parameters, and try it."
 )
-NONE_CHOSEN: Final = "No row is of this robot and person with these words: take one of the filters away."
+NONE_CHOSEN: Final = "No entry matches robot, person and words: remove a filter."
 CSV_TITLES: Final = (
     "utc",
     "robot",
@@ -103,7 +103,7 @@ class Audit(QWidget):
         for combo in (self.robot, self.who):
             combo.currentIndexChanged.connect(self._filter)
         export = QPushButton("CSV …")
-        export.setToolTip("What is shown, in SI units with every digit")
+        export.setToolTip("The visible entries, in SI units with every digit")
         export.clicked.connect(lambda: ask_save(self, "Export as CSV", "csv", self._export, "audit"))
         self._theme = theme
         self.table = self._table()

@@ -44,7 +44,7 @@ NO_STORE: Final = (
     "Nothing has been uploaded yet. What is recorded comes here by itself, a batch at a time; "
     "Upload now brings it at once."
 )
-NOT_READ: Final = "What it holds is not known while it is not reached."
+NOT_READ: Final = "Its contents are unknown while it cannot be reached."
 REACHES: Final = {
     Reach.NOT_LOOKED: Mark("ring", "dim", "looking"),
     Reach.REACHED: Mark("disc", "good", "reached"),
@@ -80,9 +80,7 @@ class Cloud(QWidget):
         self.waiting.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.upload = QPushButton("Upload now")
         self.upload.setObjectName("primary")
-        self.upload.setToolTip(
-            "Everything that was recorded until now, without waiting for the batch to be full"
-        )
+        self.upload.setToolTip("Everything recorded so far, without waiting for a full batch")
         self.upload.clicked.connect(self._upload)
         self.spool = PathLabel("dim")
         self._cards["Waiting for upload"].body.addWidget(self.waiting, 1)
@@ -169,7 +167,7 @@ class Cloud(QWidget):
         menu.addAction("The chosen recording …").triggered.connect(self._ask_chosen)
         self.download.setMenu(menu)
         self.download.setToolTip(
-            "Into a folder, which is a store then; interrupted, it goes on where it ended"
+            "Into a folder, which is then a store; an interrupted download continues where it ended"
         )
         row = QHBoxLayout()
         row.addStretch(1)
@@ -216,7 +214,7 @@ class Cloud(QWidget):
             f"{size(report.disk_free_bytes)} free on the disk of the spool",
         ]
         if uploader.problem is not None:
-            lines.insert(0, f"▲ It is tried again by itself: {uploader.problem}")
+            lines.insert(0, f"▲ Retried automatically: {uploader.problem}")
         lines += [f"▲ {alarm.text}" for alarm in report.recorder.alarms]
         set_text(self.waiting, "\n".join(lines))
 

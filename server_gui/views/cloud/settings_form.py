@@ -18,7 +18,7 @@ POLICIES: Final = {
 }
 URL, UPLOAD = ("store", "url"), ("recorder", "upload")
 BATCH, COMPACT = ("recorder", "batch_s"), ("store", "compact_h")
-WHEN: Final = "in force when the window, or the collector, starts again"
+WHEN: Final = "takes effect when the window or the collector restarts"
 NO_KEYS: Final = "keys are never written: they come from the AWS environment or profile"
 
 
@@ -53,7 +53,7 @@ class SettingsForm(Card):
             "Compact every, h": self.compact,
         }
         self.url.setPlaceholderText("file:///folder or s3://bucket/prefix")
-        self.compact.setToolTip("How often small files are put together; 0: not by this computer")
+        self.compact.setToolTip("How often small files are merged; 0: not by this computer")
         grid = QGridLayout()
         grid.setColumnStretch(1, 1)
         for place, (name, field) in enumerate(rows.items()):
@@ -101,4 +101,4 @@ def _value(key: tuple[str, str], text: str) -> Value:
         return float(text.replace(",", "."))
     except ValueError:
         table, name = key
-        raise SettingsError(f"[{table}] {name}: {text!r} is no number") from None
+        raise SettingsError(f"[{table}] {name}: {text!r} is not a number") from None

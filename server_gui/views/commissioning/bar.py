@@ -42,7 +42,7 @@ class Bar(QWidget):
         self._icon = MarkIcon(theme, 14)
         self.stage, self.words = WrappingLabel("title"), WrappingLabel()
         self.interrupt = QPushButton("Interrupt")
-        set_tip(self.interrupt, "End the command; what was found is kept, and gone on with")
+        set_tip(self.interrupt, "End the command; the findings are kept, and used when you continue")
         self.interrupt.clicked.connect(self.interrupted)
         self.stop = StopButton()
         self.stop.setAccessibleName("STOP the drives that are commissioned")
@@ -84,7 +84,7 @@ class Bar(QWidget):
         now = self._commissioning
         words = now.look_of.words
         if now.is_silent:
-            words = f"Nothing was heard for {now.working_s:.0f} s, longer than anything takes: press STOP."
+            words = f"No output for {now.working_s:.0f} s, longer than any step takes: press STOP."
         elif now.runs and not now.look_of.answers and now.working_s > LONG_S:
             words += f" ({now.working_s:.0f} s)"
         return "\n".join(filter(None, (words, now.problem)))

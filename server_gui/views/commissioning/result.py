@@ -105,4 +105,4 @@ def checked(written: WrittenMessage) -> str:
         lines.append(f"▲ not in it, because not finished: {', '.join(written.unfinished)}")
     if written.not_journaled:
         lines.append(f"▲ {written.not_journaled}")
-    return "\n".join(lines) or "● The check (gwrms check) has found nothing against it."
+    return "\n".join(lines) or "● The check (gwrms check) has found no problem."

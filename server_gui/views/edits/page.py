@@ -54,7 +54,7 @@ COLOURS: Final = "grey before, in colour after; {}the bands are one standard dev
 EDIT: Final = re.compile(
     r"(\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d)Z \([0-9a-f]+\)"
 )  # when, and its id for the command
-BACK: Final = "strides since it was taken back are grey, too: they have the old value; "
+BACK: Final = "strides after its revert are grey, too: they have the old value; "
 
 
 class Edits(QWidget):
@@ -148,8 +148,8 @@ class Edits(QWidget):
     def _left(self) -> QVBoxLayout:
         """Return the list, and what else may be tried."""
         self.ab, self.sweep = QPushButton("A/B trial…"), QPushButton("Sweep…")
-        self.ab.setToolTip("Two values of a parameter against each other, several times in a drawn order")
-        self.sweep.setToolTip("Values of a parameter upwards in small steps, while you watch")
+        self.ab.setToolTip("Compare two values of a parameter, several times in random order")
+        self.sweep.setToolTip("Increase a parameter in small steps, while you watch")
         self.ab.clicked.connect(lambda: self._ask(ExperimentKind.AB, self._desk.selected))
         self.sweep.clicked.connect(lambda: self._ask(ExperimentKind.SWEEP, self._desk.selected))
         buttons, column = QHBoxLayout(), QVBoxLayout()

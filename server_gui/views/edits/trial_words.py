@@ -14,7 +14,7 @@ from server_gui.core.tuning.writing import Trial
 
 TO_AB: Final = "Take it back now, and ask about an A/B trial of both values"
 AB_OF_ONE: Final = "An A/B trial is of one parameter, and {} are on trial: take them back, and try one"
-UNLIKE: Final = "too few strides of both sides are alike"
+UNLIKE: Final = "too few strides before and after are comparable"
 
 
 def changes(station: Station, trial: Trial, units: Units) -> list[str]:
@@ -45,7 +45,7 @@ def so_far(edit: EditEvidence | None) -> tuple[str, ...]:
     Then the same for where there is less and less room.
     """
     if edit is None:
-        return "what it does is seen once somebody walks", "not judged yet"
+        return "its effect shows once the wearer walks", "not judged yet"
     evidence = edit.evidence
     if evidence.word is Word.FEW:
         said = _not_enough(evidence)
@@ -70,7 +70,7 @@ def _not_enough(evidence: Evidence) -> str:
         return f"cannot be judged so far: {[*left_out, *evidence.notes, UNLIKE][0]}"
     if after >= 2 * FEWEST > before:
         need = f"{counted(before, 'gait cycle')}, and it takes {FEWEST} of each leg"
-        return f"too little was seen before it: {need}; what comes once it is taken back counts, too"
+        return f"too few cycles before it: {need}; those after its revert count, too"
     strides = f"{counted(before, 'gait cycle')} before, {after} since"
     return f"too early to judge it: {strides}; it takes {FEWEST} of each leg on both sides"
 

@@ -93,10 +93,10 @@ class DemoBar(QToolBar):
         self.walk.clicked.connect(lambda: self._ask(self._control.walk))
         self.mend.clicked.connect(lambda: self._ask(self._control.mend))
         self.mend.setToolTip(
-            "End every fault that is on. A drive that has tripped stays off until its fault is cleared"
+            "End every active fault. A drive that has tripped stays off until its fault is cleared"
         )
         self.again.clicked.connect(self._begin_tour)
-        self.again.setToolTip("What stands where, in five steps")
+        self.again.setToolTip("The parts of the window, in five steps")
         self.breaking.setMenu(self.faults)
         self.faults.aboutToShow.connect(self._fill)
         self.breaking.setToolTip("The simulator's faults by name, as gwrms sim-fault makes them")

@@ -18,7 +18,7 @@ ADD = (
 )
 HINT = "Robots that are to be followed at every start go into ~/.config/gwrms/server.toml."
 SIMULATE = "A whole exoskeleton without hardware walks on this computer. It can be stopped, tuned and broken."
-COMMISSION = "Drives that nobody knows yet become a robot's file: it asks, and you move the joints by hand."
+COMMISSION = "Make a robot's file for unknown drives: answer questions, and move the joints by hand."
 OPEN = "Everything that was recorded, played in the same views; no robot is needed."
 STARTS = "The simulated robot is starting; this takes a few seconds …"
 

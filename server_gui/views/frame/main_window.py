@@ -341,7 +341,7 @@ class MainWindow(QMainWindow):
 
     def _help_corner(self) -> QWidget:
         self.help_button.setAccessibleName("Help")
-        self.help_button.setToolTip("What the manual says of this (F1)")
+        self.help_button.setToolTip("The manual on this page (F1)")
         self.help_button.clicked.connect(self.show_help)
         self.panels_button = QPushButton("Panels")
         self.panels_button.setToolTip("Hide robots, parameters and events, or show them again (F9)")

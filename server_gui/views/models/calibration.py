@@ -43,7 +43,7 @@ class CalibrationPlot(QWidget):
     def show_curves(self, curves: Sequence[Curve]) -> None:
         """Show these from now on."""
         self._curves = curves
-        self.setAccessibleName("Calibration: what was said, and how often it was right")
+        self.setAccessibleName("Calibration: predicted probability, and how often it was right")
         self.setAccessibleDescription("; ".join(map(_told, curves)) or NOTHING)
         self.update()
 

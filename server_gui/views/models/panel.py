@@ -28,7 +28,7 @@ EMPTY: Final = (
 )
 
 
-AWAY: Final = "▲ The store is not reached, it is tried again; what was promoted there is not shown: {why}"
+AWAY: Final = "▲ The store is not reached; retrying; models promoted there are not shown: {why}"
 
 
 class ModelsPage(QWidget):
@@ -104,8 +104,8 @@ class ModelsPage(QWidget):
     # --- inside
 
     def _build(self) -> None:
-        self.promote.setToolTip("Let the chosen model serve; what changes is said first")
-        self.back.setToolTip("Let that serve which did before; what changes is said first")
+        self.promote.setToolTip("Let the selected model serve, after showing the change")
+        self.back.setToolTip("Return to the previous model, after showing the change")
         self.new.setCheckable(True)
         words = PlainLabel("for")
         words.setObjectName("dim")

@@ -25,7 +25,7 @@ READ_ALL, READ_NO_MORE = "Read all", "Stop reading"
 TIPS: Final = {
     RowKind.ALL: "Every object of the device's EDS",
     RowKind.PARAMETERS: "Those that may be written: parameters",
-    RowKind.DIFFERENT: "Those that were read, and hold something else than what they are compared with",
+    RowKind.DIFFERENT: "Objects that were read and differ from the comparison",
     RowKind.PINNED: "Those that are pinned (Ctrl+P pins the chosen one)",
 }
 
@@ -41,15 +41,15 @@ class ChoiceBar(QWidget):
         self._theme = theme
         self._columns = 0  # of buttons, for the room that there is
         self.device, self.other = _combo("Device"), _combo("Compare with")
-        set_tip(self.other, "What is beside it: the default of its EDS, or what another device holds")
+        set_tip(self.other, "The comparison: the EDS default, or the value of another device")
         self.words = QLineEdit()
         self.words.setPlaceholderText("Search: 0x6041, 0x60*, 0x6060-0x607F, words …")
         self.words.setClearButtonEnabled(True)
         self.words.setAccessibleName("Search of the objects")
         self.kinds = {kind: QPushButton(kind.value) for kind in RowKind}
         self.all, self.export = QPushButton(READ_ALL), QPushButton("CSV …")
-        set_tip(self.all, "Every object once, some hundred a second at most; goes on while this is shown")
-        set_tip(self.export, "All that was read of this device, with every digit")
+        set_tip(self.all, "Read every object once, at most some hundred a second, while this page is shown")
+        set_tip(self.export, "Everything read from this device, with every digit")
         self._group = QButtonGroup(self)
         for kind, button in self.kinds.items():
             button.setCheckable(True)

@@ -17,7 +17,7 @@ from server_gui.views.widgets.plain import set_tip
 NOTHING: Final = "No object chosen"
 HIGH: Final = 128  # px: as high whatever is chosen, so that nothing moves
 UNLIKE: Final = "Opens it among the parameters, where it is staged, reviewed, tried and written"
-LINES: Final = "The lines for robot.toml that let it be written; the gateway reads them when it starts"
+LINES: Final = "The lines for robot.toml that allow writing it; the gateway reads them when it starts"
 CHANNEL: Final = "The lines for robot.toml that make it a channel, which is drawn and recorded"
 
 

@@ -37,7 +37,7 @@ from server_gui.views.widgets.plain import PlainLabel
 from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 
 READ: Final = 6  # frames between two looks
-LOST: Final = "The robot is not linked: what is shown is as old as it says."
+LOST: Final = "The robot is not linked: each value has its age."
 NO_DEVICE: Final = f"This robot has no CANopen device with an EDS. {NO_EDS}"
 ASKING: Final = "Asking for the objects of its EDS …"
 
@@ -245,7 +245,7 @@ class ObjectsPage(QWidget):
     def _refused(self, station: Station, info: ObjectInfo) -> str:
         """Why it cannot be changed here; empty where it can."""
         if info.read_only is not None or info.parameter not in station.known:
-            return info.locked or info.read_only or "it is no parameter that may be changed"
+            return info.locked or info.read_only or "it is not a parameter that may be changed"
         return station.refused(PARAMETER_WRITE)
 
     # --- what is asked

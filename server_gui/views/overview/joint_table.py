@@ -457,5 +457,5 @@ def _stop(station: Station, joint: str) -> Cell:
         colour = "dim" if proof.was_so else "good"
         return Cell(proof.when, colour if station.is_live else "old", None, proof.text)
     if stopping.state is StopState.IDLE:
-        return Cell(NONE, "dim", None, "no stop was sent since the window began")
+        return Cell(NONE, "dim", None, "no stop was sent since the window opened")
     return Cell("no proof", "bad" if stopping.state is StopState.NOT_CONFIRMED else "warn")

@@ -37,7 +37,7 @@ class JointWords(PlainLabel):
         self._errors: Sequence[tuple[str, str]] = ()
         self._tone = "bad"
         self._bars: frozenset[int] = frozenset()
-        self.setAccessibleName("What is wrong with joints")
+        self.setAccessibleName("Problems of joints")
         self.setWordWrap(True)
         self.setObjectName("dim")
         self.setAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop)

@@ -15,10 +15,10 @@ from server_gui.views.widgets.plain import set_tip
 from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 
 WORDS: Final = {
-    Happening.ACCEPT: ("Use it", "This robot is served by it, for this wearer and recording alone"),
-    Happening.DECLINE: ("No", "The general model goes on to serve; what was learned is forgotten"),
-    Happening.TAKE_BACK: ("Take back", "The general model serves again; what was learned is forgotten"),
-    Happening.AGAIN: ("Learn again", "A minute of steps is learned from anew"),
+    Happening.ACCEPT: ("Use it", "Use it on this robot, for this wearer and recording only"),
+    Happening.DECLINE: ("No", "Keep the general model; the adapted one is deleted"),
+    Happening.TAKE_BACK: ("Take back", "Return to the general model; the adapted one is deleted"),
+    Happening.AGAIN: ("Learn again", "Learn again from a minute of steps"),
 }
 
 

@@ -84,8 +84,8 @@ class NowLine(QFrame):
         self.trial.setParent(self)  # also while it has no place, so that it is no window of its own
         self.keep, self.take_back = QPushButton("Keep"), QPushButton("Take back")
         self.keep.setObjectName("primary")
-        self.keep.setToolTip("What is on trial stays")
-        self.take_back.setToolTip("The values from before are in force again")
+        self.keep.setToolTip("Keep the values on trial")
+        self.take_back.setToolTip("Return to the values from before")
         self.keep.clicked.connect(lambda: desk.selected.keep_trial() if desk.selected else None)
         self.take_back.clicked.connect(lambda: desk.selected.end_trial() if desk.selected else None)
         self.ab = QPushButton("A/B …")

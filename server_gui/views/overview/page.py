@@ -82,7 +82,7 @@ class Overview(QWidget):
         self.setObjectName("page")
         self.now = NowLine(desk, theme)
         self._status, self._ring = Card("Wearer"), GaitRing(theme)
-        self.status_lines = Lines(theme, "What is predicted, and what devices say", STATUS_LINES)
+        self.status_lines = Lines(theme, "Predictions, and problems of devices", STATUS_LINES)
         self._status.body.addWidget(self._ring, 1)
         self._status.body.addWidget(self.status_lines)
         self.learned = LearnedOffer(desk, theme)

@@ -31,7 +31,7 @@ class ControlBar(QWidget):
         self.words.setWordWrap(True)
         self._take, self._release = QPushButton("Take control"), QPushButton("Release")
         set_tip(self._take, TAKING)
-        self._release.setToolTip("Let others write; what is on trial goes back")
+        self._release.setToolTip("Let others write; a running trial is reverted")
         self._take.clicked.connect(self.take)
         self._release.clicked.connect(self.release)
         row = QHBoxLayout(self)

@@ -23,7 +23,7 @@ from server_gui.views.widgets.plain import PlainLabel, set_tip
 from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 
 STEPS: Final = 200
-SEVERAL: Final = "The same for other joints: one change, reviewed, written and taken back as a whole"
+SEVERAL: Final = "The same for other joints: one change, reviewed, written and reverted as a whole"
 
 
 class CalmSlider(QSlider):
@@ -64,7 +64,7 @@ class Detail(Card):
         self._drop.clicked.connect(self._dropped)
         self.pin = QPushButton("☆")
         self.pin.setAccessibleName("Pinned")
-        self.pin.setToolTip("Pin it, or no more: kept for this robot, and shown with the filter ★ (Ctrl+P)")
+        self.pin.setToolTip("Pin or unpin it: kept for this robot, and shown with the filter ★ (Ctrl+P)")
         self.pin.clicked.connect(self._pinned)
         row = QHBoxLayout()
         row.addWidget(self.pin)

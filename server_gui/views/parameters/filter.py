@@ -144,7 +144,7 @@ KINDS: Final[Mapping[str, Callable[[Desk, Station], tuple[str, ...]]]] = {
 }
 _TIPS: Final = {
     "All": "Every parameter that can be changed",
-    "Changed": "Those with an edit that is staged and not written",
+    "Changed": "Those with a staged edit",
     "≠ file": "Those that differ from the file that is open",
     "≠ default": "Those that differ from the default of the device's EDS",
     "★": "Those that are pinned (Ctrl+P pins the chosen one)",

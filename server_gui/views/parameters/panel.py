@@ -38,7 +38,7 @@ from server_gui.views.widgets.plain import PlainLabel, set_tip
 from server_gui.views.widgets.scroll_area import ScrollArea
 
 EDIT, REVIEW, STORE = range(3)  # pages; those that are not in front ask for no room
-STORING: Final = "Make a device keep its parameters when its power goes; a step of its own"
+STORING: Final = "Make a device keep its parameters without power; a separate step"
 
 
 class ParametersPanel(QWidget):
@@ -223,7 +223,7 @@ class ParametersPanel(QWidget):
         self._compare.setToolTip(
             "Compare with a .toml or .dcf file, and load edits from it. Nothing is written"
         )
-        self._save.setToolTip("Save what the robot holds as a .toml file")
+        self._save.setToolTip("Save the robot's values as a .toml file")
         self.store_button = QPushButton("Store to flash …")
         set_tip(self.store_button, STORING)
         grid = self._buttons_grid = QGridLayout()
@@ -392,7 +392,7 @@ def _banner(station: Station | None, staged: int, problem: str) -> tuple[str, st
         what = f"{run.plan.kind.value} of {run.plan.name}"
         return f"{what[0].upper()}{what[1:]} goes on, and writes by itself: a write of yours ends it.", "warn"
     if staged:
-        return f"{staged} staged · nothing of it has been sent to the robot", "warn"
+        return f"{staged} staged · nothing has been sent to the robot", "warn"
     if not station.known:
         return "This robot lets no parameter be changed, or has not said which yet.", "plain"
     if writing.text:

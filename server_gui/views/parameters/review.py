@@ -73,7 +73,7 @@ class Review(QWidget):
         self.seconds.setAccessibleName("Length of the trial")
         self.seconds.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.try_it = QPushButton("Try it for")
-        self.try_it.setToolTip("In force at once; the robot takes it back by itself unless you keep it")
+        self.try_it.setToolTip("Takes effect at once; the robot reverts it by itself unless you keep it")
         self.try_it.clicked.connect(lambda: self.write.emit(self.changes, float(self.seconds.value())))
         self.write_it = QPushButton("Write")
         self.write_it.setObjectName("primary")

@@ -124,7 +124,7 @@ class StorePage(QWidget):
     def _state(self, station: Station | None, chosen: list[Storable]) -> tuple[str, str]:
         """Return the notes before storing, and whether it is possible."""
         if station is None or not chosen:
-            return "No device of this robot says that it can store (1010h).", "bad"
+            return "No device of this robot can store its parameters (1010h).", "bad"
         trial = station.writing.trial
         objections = dict.fromkeys(objection(one, station.robot, trial) or "" for one in chosen)
         why_not = "\n".join(filter(None, objections))
@@ -133,7 +133,7 @@ class StorePage(QWidget):
         staged = [name for name in station.edits.staged if any(name in one.parameters for one in chosen)]
         if staged:
             return f"{', '.join(staged)}: staged and not written, so not stored. Write first.", "warn"
-        return "Values are compared before and after; the journal tells who stored.", "good"
+        return "Values are compared before and after; the journal shows who stored.", "good"
 
     def _table(self) -> QTableWidget:
         table = QTableWidget(0, len(TITLES))

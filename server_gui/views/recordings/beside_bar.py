@@ -11,7 +11,7 @@ from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.plain import set_tip
 from server_gui.views.widgets.wrapping_label import WrappingLabel
 
-ALIGN_HINT: Final = "What of both recordings is at one place; both play on from there together"
+ALIGN_HINT: Final = "The points of both recordings that are aligned; both play from there together"
 CLOSE_HINT: Final = "Show the first recording alone"
 
 
@@ -31,7 +31,7 @@ class BesideBar(QWidget):
         self.by.activated.connect(self._align)
         set_tip(self.by, ALIGN_HINT)
         self.close_button = QPushButton("Put away")
-        self.close_button.setAccessibleName("Put the second recording away")
+        self.close_button.setAccessibleName("Close the second recording")
         set_tip(self.close_button, CLOSE_HINT)
         self.close_button.clicked.connect(self._close)
         row = QHBoxLayout(self)

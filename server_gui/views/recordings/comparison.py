@@ -86,7 +86,7 @@ class ComparisonPage(QWidget):
         _fill(self.changed, cells)
         self.changed.setVisible(bool(cells))
         if found is None:
-            set_text(self.unknown, f"It cannot be told: {problem}" if problem else "looking …")
+            set_text(self.unknown, f"Not known: {problem}" if problem else "looking …")
             return
         alike = f"{counted(found.same, 'thing', 'things')} recorded in both, and the same."
         said = ["" if cells else "Nothing recorded in both has changed.", alike, *not_known(found)]
@@ -102,7 +102,7 @@ class ComparisonPage(QWidget):
             if item is not None and one.word in TONES:
                 item.setForeground(self._theme.colour(TONES[one.word]))
         if found is None:
-            set_text(self.verdict, f"It cannot be told: {problem}" if problem else "reading both walks …")
+            set_text(self.verdict, f"Not known: {problem}" if problem else "reading both walks …")
             return
         cycles = f"{counted(found.cycles_before, 'gait cycle')} before, {found.cycles_after} after"
         notes = "".join(f" · {note}" for note in found.notes)

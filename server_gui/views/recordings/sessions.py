@@ -48,7 +48,7 @@ WRAPPED: Final = Qt.TextFlag.TextWordWrap.value
 EVENTS_TOLD: Final = 200
 MARK_TWO: Final = "Mark two recordings: a click on one, a click with Ctrl on the other"
 TOGETHER: Final = "Both in the same plots, played together: aligned by their beginnings or a heel strike"
-COMPARING: Final = "What was otherwise in the later one, and what of the walk moved with it"
+COMPARING: Final = "Differences in the set-up of the later one, and measures of the walk that moved with it"
 
 
 class SessionModel(RowsModel[Session]):
@@ -144,7 +144,7 @@ class SessionsPage(QWidget):
         self.together = QPushButton("Side by side")
         self.together.clicked.connect(self.beside)
         self.details = QPlainTextEdit(readOnly=True)
-        self.details.setAccessibleName("What is known of the chosen recording")
+        self.details.setAccessibleName("Facts of the selected recording")
         self._card = Card("Recording")
         self._card.body.addWidget(self.details, 1)
         self._card.body.addWidget(self.play)
@@ -213,7 +213,7 @@ class SessionsPage(QWidget):
     def _state(self) -> str:
         library = self._archive.library
         if library.reach.problem is not None:
-            return f"The store is not reached, it is tried again: {library.reach.problem}"
+            return f"The store is not reached; retrying: {library.reach.problem}"
         return EMPTY if library.revision and not library.found.sessions else ""
 
     def _refresh_details(self) -> None:
@@ -298,7 +298,9 @@ def _told(session: Session | None, tape: Tape | None, problem: str, held: Sequen
         "Session": session.session,
         "Robot": session.robot,
         "Began": _when(session.began),
-        "Ended": "it goes on, or its server was killed" if session.ended is None else _when(session.ended),
+        "Ended": "it is still running, or its server was killed"
+        if session.ended is None
+        else _when(session.ended),
         "Length": f"{_cells(session)[LENGTH]}, {_cells(session)[ROWS]} rows, {_cells(session)[SIZE]}",
         "State": _state(session),
         "Operator": session.operator,
@@ -319,7 +321,7 @@ def _inside(tape: Tape) -> list[str]:
     length = clock_text((tape.last_ns - tape.first_ns) / SECOND_NS, 1)
     head = f"{length} of {len(tape.units)} channels"
     if not tape.events:
-        return [head, "Nothing is missing in it, and nobody marked anything."]
+        return [head, "It has no gaps and no marks."]
     return [head, "", *(_event(tape, row) for row in tape.events[:EVENTS_TOLD])]
 
 

@@ -63,8 +63,8 @@ TITLES: Final = (
 SPARE: Final = (4, 5, 6, 3)  # left out in this order where there is less room; kinds stand above, too
 NUMBERS: Final = (2, 3, 5, 6, 7)
 NOBODY: Final = "no node"
-TOO_OLD: Final = "The robot's gateway does not tell how its buses are now: it is of an older version."
-NOT_NOW: Final = "How the buses are is not known now."
+TOO_OLD: Final = "The robot's gateway does not report its buses: it is an older version."
+NOT_NOW: Final = "The state of the buses is not known now."
 
 
 class LoadBar(QWidget):

@@ -38,7 +38,7 @@ def held_back(seen: ResourceSnapshot | None) -> str:
     slowest = min((share for share in told.frequency if share is not None), default=None)
     if slowest is not None:
         said.append(f"slowest core at {100 * slowest:.0f} % of its frequency")
-    return " · ".join(said) or "nothing holds the cores back"
+    return " · ".join(said) or "the cores are not throttled"
 
 
 def _costs(cost: GatewayCost | None) -> list[str]:

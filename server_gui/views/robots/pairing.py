@@ -18,7 +18,7 @@ HOW: Final = (
     "On the robot: sudo gwrms keys pair. It shows its address and a code, for five minutes. Type both here, "
     "or the link. Then somebody there says what this desk may do."
 )
-WAITS: Final = "Waiting until somebody confirms it on the robot: who this desk is, and what it may …"
+WAITS: Final = "Waiting for confirmation on the robot: the name and role of this desk …"
 
 
 class Attempt(QObject):

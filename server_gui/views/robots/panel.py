@@ -212,7 +212,7 @@ class RobotsPanel(QWidget):
             return
         name, equals, address = text.rpartition("=")
         if equals and (not name or name_of(name) != name):
-            self.say(f"{name!r} is no name: letters, digits, _, . and -, then = and the address")
+            self.say(f"{name!r} is not a name: use letters, digits, _, . and -, then = and the address")
             return
         if name in {station.name for station in self._desk}:
             self.say(f"{name} is in the list already: give it another name")

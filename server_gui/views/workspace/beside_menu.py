@@ -67,7 +67,7 @@ class BesideMenu(QPushButton):
         except ValueError:
             seconds = float("nan")
         if not abs(seconds) <= MOST_S:
-            self._say(f"▲ {text!r} is no number of seconds: write one such as −0.25")
+            self._say(f"▲ {text!r} is not a number of seconds: write one such as −0.25")
             return
         self._scene.nudge_s = seconds
 
@@ -76,7 +76,7 @@ class BesideMenu(QPushButton):
 
     def _ask(self) -> None:
         field = QLineEdit(f"{self._scene.nudge_s:g}")
-        field.setAccessibleName("Seconds that it is moved by")
+        field.setAccessibleName("Offset in seconds")
         text = "Seconds to the right; to the left with −."
         ask(self, "Move what is beside", text, "Move", lambda: self.nudge(field.text()), field)
 

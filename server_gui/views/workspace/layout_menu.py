@@ -127,13 +127,13 @@ class LayoutMenu(QPushButton):
             self._say(done)
 
     def _ask_name(self) -> None:
-        self._ask("Save the layout", "Its name; one that is called so is replaced.", "Save", self.save)
+        self._ask("Save the layout", "Its name; a layout of the same name is replaced.", "Save", self.save)
 
     def _ask_rename(self) -> None:
         self._ask("Rename the layout", f"Another name for {self.current}.", "Rename", self.rename)
 
     def _ask_delete(self) -> None:
-        text = f"The layout {self.current} is forgotten, and its file deleted. What is drawn stays."
+        text = f"The layout {self.current} is deleted, with its file. The plots stay as they are."
         ask(self, "Delete the layout", text, "Delete", self.delete)
 
     def _ask(self, title: str, text: str, action: str, do: Callable[[str], None]) -> None:

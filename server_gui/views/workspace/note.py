@@ -24,13 +24,13 @@ def ask_note(
     field.setMaxLength(LONGEST_NOTE)
     field.setAccessibleName("Note")
     where = f"{time_text(round(at_s, 2))}, where the cursor is" if at_s else "the newest row"
-    text = f"Kept with the recording at {where}, and shown on every axis of time."
+    text = f"Kept with the recording at {where}, and shown on every time axis."
 
     def done() -> None:
         told = " ".join(field.text().split())
         here = desk.selected
         if told and (here is None or here is not station or here.rings.source is not source):
-            say(f"▲ no note, other rows are looked at by now: {told}")
+            say(f"▲ no note, other rows are shown by now: {told}")
         elif told:
             keep(told)
 

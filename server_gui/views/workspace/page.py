@@ -366,7 +366,7 @@ class Signals(QWidget):
             return
         if beside.station not in self._others():
             self.scene.put_beside(None)
-            self.tell("what was beside is gone")
+            self.tell("the robot or recording beside is gone")
         elif beside.station.robot.is_recording and self._step_beside is not None:
             self._step_beside()
 
@@ -374,7 +374,7 @@ class Signals(QWidget):
         scene = self.scene
         set_text(self.beside_said, scene.beside_text())
         self.beside_said.setVisible(scene.beside is not None)
-        self.trigger.say(scene.trigger_text() or "off: what comes is shown")
+        self.trigger.say(scene.trigger_text() or "off: live data is shown")
 
     # --- what happened
 
@@ -490,7 +490,7 @@ class Signals(QWidget):
         more = len([name for name in self.chosen if name not in self.scene.workspace.curves])
         many = f" · {more} more are not drawn: {MOST_CURVES} at a time" if more > 0 else ""
         if self.pause.isChecked() or self.scene.frozen is not None:
-            return f"{'Paused' if self.pause.isChecked() else 'Kept by the trigger'}, data go on{many}"
+            return f"{'Paused' if self.pause.isChecked() else 'Kept by the trigger'}, data continue{many}"
         if self._is_gone:
             return GONE
         live = f"{station.robot.rate_hz():.0f} rows/s"

@@ -32,9 +32,7 @@ class PlotArea(QFrame):
         self._theme = theme
         self.cards: list[AnyPlot] = []
         self.built = -1  # revision of the workspace that the plots are of
-        self.empty = PlainLabel(
-            "Tick channels at the left to see them here, or drag them to where they are to be."
-        )
+        self.empty = PlainLabel("Tick channels at the left to see them here, or drag them to a place.")
         self.empty.setWordWrap(True)
         self.empty.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.empty.setObjectName("dim")

@@ -30,15 +30,16 @@ class Tools(QWidget):
         self.span = QComboBox()
         self.span.addItems([f"{seconds} s" for seconds in SPANS_S])
         self.span.setCurrentIndex(SPANS_S.index(10))
-        self.span.setAccessibleName("How much of the past is shown")
-        self.pause = _switch("Pause view", "The view stands still; data and recording go on")
+        self.span.setAccessibleName("The visible time span")
+        self.pause = _switch("Pause view", "Freeze the view; data and recording continue")
         self.follow = QPushButton("Fit")
         self.follow.setToolTip("Undo zoom: the range follows the data again")
         self.box = _switch(
-            "Box zoom", "Drag a box around what is to be seen; else a drag moves, and the wheel zooms"
+            "Box zoom", "Drag a box around the part to see; otherwise a drag moves, and the wheel zooms"
         )
         self.cursors = _switch(
-            "Cursors", "Two cursors with their difference, and every curve over what is in sight"
+            "Cursors",
+            "Two cursors with their difference, and statistics of every curve over the visible span",
         )
         self.as_csv, self.as_png = QPushButton("CSV …"), QPushButton("PNG …")
         self.as_csv.setAccessibleName("Save what is on screen as CSV")
@@ -48,8 +49,10 @@ class Tools(QWidget):
             button.setAccessibleName(f"To the event {which}")
             set_tip(button, f"To the event {which}: a stop, fault, write, trial or mark")
             button.clicked.connect(lambda _=False, way=way: self.turned.emit(way))
-        self.expression = _switch("Expression", "A curve that is computed, such as the left minus the right")
-        self.trigger = _switch("Trigger", "Stand still when a curve does something, as an oscilloscope does")
+        self.expression = _switch("Expression", "A computed curve, such as left minus right")
+        self.trigger = _switch(
+            "Trigger", "Freeze the view when a curve meets a condition, as an oscilloscope does"
+        )
         self.note = QPushButton("Note …")
         self.note.setToolTip("A note on the time axis, kept in the recording: at the active cursor, or now")
         self.note.clicked.connect(self.noted)

@@ -113,7 +113,7 @@ class EmptyPlot(TakesCurves):
     def __init__(self, theme: Theme, place: int, curves: Sequence[Drawn]) -> None:
         super().__init__(f"{place + 1} · nothing to draw here")
         self.menu = QMenu(self)
-        self.legend = WrappingLegend(f"What plot {place + 1} lacks")
+        self.legend = WrappingLegend(f"Missing in plot {place + 1}")
         self.body.addLayout(legend_row(theme, self.legend, self.menu, f"Plot {place + 1}: curves and kind"))
         bad = css(theme, "bad")
         self.legend.say([(bad, "▲", f"{one.name}: {one.problem}") for one in curves])

@@ -157,7 +157,7 @@ def side_by_side(bench: Bench) -> None:
     hand.sees("┅ dashed", "aligned by", within_s=AGAIN_S)
     hand.misses("reading …", within_s=AGAIN_S)
     hand.keep("side-by-side")
-    hand.click("Put the second recording away")
+    hand.click("Close the second recording")
     hand.misses("┅ dashed")
     hand.click("← All")
 
@@ -206,7 +206,7 @@ def store_gone(bench: Bench) -> None:
     hand.click("Upload now")
     hand.sees("Not reached", within_s=AGAIN_S)
     hand.keep("store-gone")
-    for title, key, words in (("models", "alt+m", "Train a model"), ("recordings", "alt+c", "tried again")):
+    for title, key, words in (("models", "alt+m", "Train a model"), ("recordings", "alt+c", "retrying")):
         hand.key(key)
         hand.sees(words)
         hand.keep(f"store-gone-{title}")
@@ -222,7 +222,7 @@ def keys(bench: Bench) -> None:
     hand.sees("Ctrl+F")
     hand.keep("keys")
     hand.key("question")
-    hand.misses("What the manual says of this")
+    hand.misses("The manual on this page")
 
 
 def stage(hand: Hand, words: str, value: str) -> None:

@@ -93,8 +93,26 @@ def test_what_drives_tell_comes_until_the_answer_and_one_that_is_silent_is_told(
     assert (two["live"], two["problem"]) == ([], "node 7 does not answer")
 
 
-def stopped_in(pipe: Pipe, lines: Lines, busy: Callable[[Lines], object]) -> None:
-    pipe.write('{"stop": true}', '{"stop": true}')
+def test_an_object_that_is_no_answer_is_not_taken_for_enter(pipe: Pipe) -> None:
+    mistyped = ['{"anwser": "y"}', '{"number": 1}', '{"answer": 1}', '{"answer": "y", "nubmer": 1}']
+    pipe.write(*mistyped)
+    with Lines(pipe.source) as lines:
+        face = JsonFace(lines)
+        assert [face.ask(Ask("?")) for _ in mistyped] == mistyped
+
+
+@pytest.mark.parametrize(
+    "line", [' {"stop": true}\r', '{"STOP": true}', '{"stop": 1}', '{"stop": true, "x": 1}']
+)
+def test_whatever_could_be_meant_as_a_stop_is_one(pipe: Pipe, line: str) -> None:
+    with ending(), Lines(pipe.source) as lines, pytest.raises(MotionEnded):
+        stopped_in(pipe, lines, lambda lines: JsonFace(lines).ask(Ask("?")), line)
+
+
+def stopped_in(
+    pipe: Pipe, lines: Lines, busy: Callable[[Lines], object], line: str = '{"stop": true}'
+) -> None:
+    pipe.write(line, line)
     busy(lines)
 
 

@@ -154,8 +154,10 @@ def test_no_rule_begins_to_hold_by_what_is_unknown() -> None:
         ({"floor": (1.0,) * 8}, "a floor and a scale of each detector"),
         ({"weights": (1.0,) * 8}, "the two weights of the worst"),
         ({"weights": (-1.0,) * 2}, "negative"),
+        ({"scale": (0.0,) * len(CALIBRATION.scale)}, "not above 0"),
         ({"odds": ()}, "how often"),
         ({"thresholds": {"alarm": 1.0}}, "no threshold of early warning, advice, stop"),
+        ({"thresholds": {**CALIBRATION.thresholds, "stop": -9.0}}, "lower threshold"),
     ],
 )
 def test_a_calibration_of_something_else_is_refused(
