@@ -289,7 +289,7 @@ class Recording:
             _coming(rows, [link for link in report.robots.values() if address in (None, link.address)])
             if comes
             else NOTHING,
-            *_queue(report, is_reached=self.reach.trouble is None),
+            *_queue(report, is_reached=self.reach.problem is None and self.reach.upload_problem is None),
             f"{size(report.disk_free_bytes)} free",
         ]
         detail = [*problems, f"spool {report.spool}", f"store {report.store}", self.why]
