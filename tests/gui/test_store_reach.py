@@ -3,15 +3,19 @@
 import shutil
 from pathlib import Path
 
+import pytest
+
 from server_gui.core.alarms.texts import Kind
 from server_gui.core.archive import library
 from server_gui.core.archive.archive import Archive
 from server_gui.core.archive.library import Library
 from server_gui.core.cloud.store_reach import AGAIN_S, KNOWN_S, LOOK_S, Reach, StoreReach
+from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.recording import By, Recording
+from server_gui.core.follow.news import NewsKind
 from server_gui.core.settings.server_file import ServerSettings
 from tests.gui.fakes import Bench
-from tests.gui.test_recording import AWAY, FakeKeeper, looked, report
+from tests.gui.test_recording import AWAY, FakeKeeper, looked, report, settled
 from tests.support.waiting import WAIT_S, until
 from tests.unit.cloud.recordings import record
 
@@ -94,6 +98,38 @@ def test_what_waits_is_uploaded_as_soon_as_the_store_is_back() -> None:
     reach.looked(None)
     assert keeper.asked == ["upload"]
     assert recording.alarms.active, "until the upload has succeeded"
+
+
+def test_one_keeper_is_asked_once_however_often_its_recording_is_set_and_a_replaced_one_not_at_all() -> None:
+    desk = Desk()
+    old, new = (FakeKeeper(report(problem=AWAY, waiting=3)) for _ in range(2))
+    recording, replacing = looked(old)[0], looked(new)[0]
+
+    def away_and_back() -> None:
+        desk.reach.looked(AWAY)
+        desk.reach.looked(None)
+
+    for _ in range(2):
+        desk.recording = recording
+    away_and_back()
+    assert (old.asked, len(recording.on_mark)) == (["upload"], 1)
+    desk.recording = replacing
+    away_and_back()
+    assert (old.asked, new.asked) == (["upload"], ["upload"])
+    assert (len(recording.on_mark), len(replacing.on_mark)) == (0, 1)
+    recording._reported(old, report(problem="of the replaced one"))
+    assert desk.reach.upload_problem is None
+
+
+def test_an_upload_to_a_store_that_is_back_says_why_it_was_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    keeper, reach = FakeKeeper(report(problem=AWAY, waiting=3)), StoreReach(Clock())
+    recording, news = looked(keeper)
+    recording.rely_on(reach)
+    refused = OSError("its door is shut")
+    monkeypatch.setattr(keeper, "upload", lambda: settled(refused))
+    reach.looked(AWAY)
+    reach.looked(None)
+    assert [item.text for item in news.items if item.kind is NewsKind.WARNING][0] == "its door is shut"
 
 
 def test_a_list_that_cannot_be_read_stays_told_until_it_was_read_and_is_no_store_that_was_away() -> None:
