@@ -60,8 +60,13 @@ class Archive:
 
     def look(self) -> None:
         """See now and then whether the store is reached, where something is to go there or was away."""
-        if self._desk.recording.by is not By.NOBODY or self._desk.reach.problem is not None:
+        reach = self._desk.reach
+        if self._desk.recording.by is By.NOBODY and reach.problem is None and reach.list_problem is None:
+            return
+        if reach.looked_s is None or self.library.is_listed:
             self.library.knock()
+        else:
+            self.library.look()
 
     def choose(self, session: Session | None) -> None:
         """Look into this session; its tape comes when it has been read."""
