@@ -24,10 +24,14 @@ class StopState(Enum):
 
 
 class Sent:
-    """A STOP on its way, timed where it is sent and where its answer comes: however late that is noted."""
+    """A STOP on its way, timed where it is sent and where its answer comes: however late that is noted.
 
-    def __init__(self, at_ns: int, future: Future[Stopped]) -> None:
+    `off` drives were seen not to be enabled when it was sent.
+    """
+
+    def __init__(self, at_ns: int, future: Future[Stopped], off: Collection[str] = ()) -> None:
         self.at_ns = at_ns
+        self.off = off
         self.answered_ns: int | None = None
         self.future = future
         future.add_done_callback(self._done)

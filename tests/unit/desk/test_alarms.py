@@ -275,6 +275,18 @@ def test_a_stop_that_never_went_out_has_stopped_no_drive_that_was_off(
     assert proofs["left_hip"].when == "already off"
 
 
+def test_a_drive_that_a_stop_has_stopped_before_the_window_notes_it_was_not_off_already(bench: Bench) -> None:
+    bench.station.take([states(4.0)])
+    sent = bench.station.send_stop("a key, in a thread of its own")
+    stopped = states(5.0)
+    bench.station.take([stopped])
+    bench.station.note_stop(sent)
+    bench.station.take([stopped])
+    proofs = bench.station.stopping.proofs
+    assert set(proofs) == set(JOINTS)
+    assert not any(proof.was_so for proof in proofs.values())
+
+
 def test_the_result_of_a_stop_does_not_hide_a_fault(bench: Bench) -> None:
     fault(bench.station)
     bench.station.stop("test")
