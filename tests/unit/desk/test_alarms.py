@@ -302,7 +302,7 @@ def test_after_a_reset_it_says_how_to_go_on_until_a_drive_is_enabled(bench: Benc
     bench.first.answer(Reset(dict.fromkeys(JOINTS, "switch on disabled"), {}, held=False))
     (one,) = bench.station.alarms.active
     assert one.alarm.kind is Kind.RESET
-    assert "gwrms enable" in one.alarm.check
+    assert "to go on: enable the drives: start the robot's controller again" in one.alarm.check
     bench.station.take([states(4.0)])
     assert kinds(bench.station) == []
 
