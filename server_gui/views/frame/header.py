@@ -167,7 +167,7 @@ def _outcome(station: Station) -> Words:
     tip = "\n".join(filter(None, (stopping.text, *stopping.proof_lines)))
     parts: dict[StopState, tuple[str, ...]] = {
         StopState.SENT: ("the drives are asked",),
-        StopState.CONFIRMED: (f"{stopping.drives} drives in {stopping.answered_ms or 0:.0f} ms",),
+        StopState.CONFIRMED: (stopping.timed(f"{stopping.drives} drives"),),
         StopState.NOT_CONFIRMED: (remedy(station.robot),),
     }
     return Words(STOP_MARKS[stopping.state], f"STOP {stopping.state.value}", parts[stopping.state], tip)
