@@ -227,7 +227,8 @@ def _link(station: Station) -> Words:
         return Words(Mark("ring", "old"), "Linked, no data yet", parts)
     if robot.is_stale():
         return Words(Mark("triangle", "warn"), f"STALE · {age} old", parts)
-    mark = Mark("triangle", "warn") if robot.is_slow() else Mark("disc", "warn" if lost else "good")
+    mark = Mark("disc", "warn" if lost else "good") if robot.has_rate() else Mark("ring", "old")
+    mark = Mark("triangle", "warn") if robot.is_slow() else mark
     return Words(mark, f"{age} old · {robot.rate_text()}", parts)
 
 
