@@ -119,9 +119,10 @@ def look(settings: ServerSettings) -> Found:
         size_bytes = sum(each.size_bytes for each in store.objects.listing())
     except NoSuchTable:
         gone = _gone(settings)
-        return Found(_joined([], waiting), problem=gone, is_empty=gone is None)
+        here = waiting if gone is None else spool_reader.with_store_away(waiting)
+        return Found(_joined([], here), problem=gone, is_empty=gone is None)
     except StoreError as error:
-        return Found(_joined([], waiting), problem=str(error))
+        return Found(_joined([], spool_reader.with_store_away(waiting)), problem=str(error))
     return Found(_joined(stored, waiting), used, size_bytes)
 
 
