@@ -49,7 +49,8 @@ class BesideBar(QWidget):
             return
         tape = beside.second.tape
         if beside.problem:
-            said = f"▲ it cannot be shown beside: {beside.problem}"
+            again = "" if tape is None else ", it is tried again"
+            said = f"▲ it cannot be shown beside{again}: {beside.problem}"
         elif tape is None:
             said = "reading …"
         else:
