@@ -16,6 +16,7 @@ from server_gui.core.settings.server_file import ServerSettings
 from server_gui.core.threads.answers import Deliver, when_done
 
 AGAIN_S: Final = 5.0  # before what could not be read is tried again
+CLOSED: Final = "the first recording was closed while this one was read"
 Do = Callable[[Callable[[], Any]], "Future[Any]"]
 
 
@@ -147,9 +148,13 @@ class SideBySide:
 
     def _opened(self, session: Session, tape: Tape) -> None:
         first = self._first.tape
-        if session is self.session and first is not None:
-            self.second.open(tape)
-            self._offset_ns = tape.first_ns - first.first_ns
+        if session is not self.session:
+            return
+        if first is None:
+            self.session, self._not_opened = None, CLOSED
+            return
+        self.second.open(tape)
+        self._offset_ns = tape.first_ns - first.first_ns
 
     def _failed(self, session: Session, error: Exception) -> None:
         if session is self.session:

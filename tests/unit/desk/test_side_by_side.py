@@ -12,7 +12,7 @@ from ml.store import StoreError
 from ml.store.sessions import Session
 from server_gui.core.archive import side_by_side as module
 from server_gui.core.archive.playback import Playback
-from server_gui.core.archive.side_by_side import AGAIN_S, SideBySide
+from server_gui.core.archive.side_by_side import AGAIN_S, CLOSED, SideBySide
 from server_gui.core.cloud.tape import Rows, Tape
 from server_gui.core.desk.desk import Shown
 from server_gui.core.settings.server_file import ServerSettings
@@ -126,3 +126,17 @@ def test_what_is_read_already_is_shown_while_what_comes_next_cannot_be_read(besi
     assert beside.both.problem
     beside.jump(3.0)
     assert beside.is_together
+
+
+def test_a_second_that_is_read_when_the_first_was_closed_is_put_away_with_a_word(beside: Beside) -> None:
+    beside.held = []
+    beside.both.open(beside.second.session)
+    beside.first.close()
+    for call in beside.held:
+        call()
+    assert (beside.both.session, beside.both.second.tape, beside.both.problem) == (None, None, CLOSED)
+    beside.held = None
+    beside.first.open(cast("Tape", beside.tape))
+    beside.both.open(beside.second.session)
+    beside.draw()
+    assert (beside.both.problem, beside.is_together) == ("", True)
