@@ -10,7 +10,6 @@ import pytest
 
 from ml.store import StoreError
 from ml.store.sessions import Session
-from server_gui.core.archive import side_by_side as module
 from server_gui.core.archive.playback import Playback
 from server_gui.core.archive.side_by_side import AGAIN_S, CLOSED, SideBySide
 from server_gui.core.cloud.tape import Rows, Tape
@@ -51,7 +50,7 @@ class Beside:
         self.tape, self.second = KneeTape("first", 1_700_000_000), KneeTape("second", 1_700_100_000)
         self.now_s = 100.0
         self.held: list[Callable[[], None]] | None = None  # what is done later, while a test holds it
-        monkeypatch.setattr(module.Tape, "open", lambda _settings, _session: self.second)
+        monkeypatch.setattr(Tape, "open", lambda _settings, _session: self.second)
         self.first = Playback(_done, lambda call: call(), Shown())
         self.first.open(cast("Tape", self.tape))
         settings = cast("ServerSettings", None)
