@@ -129,7 +129,7 @@ def test_an_upload_to_a_store_that_is_back_says_why_it_was_refused(monkeypatch: 
     monkeypatch.setattr(keeper, "upload", lambda: settled(refused))
     reach.looked(AWAY)
     reach.looked(None)
-    assert [item.text for item in news.items if item.kind is NewsKind.WARNING][0] == "its door is shut"
+    assert next(item.text for item in news.items if item.kind is NewsKind.WARNING) == "its door is shut"
 
 
 def test_a_list_that_cannot_be_read_stays_told_until_it_was_read_and_is_no_store_that_was_away() -> None:

@@ -39,10 +39,10 @@ class Archive:
         self.file = file
         self.library = Library(settings, deliver, desk.reach)
         self.journals = KeptJournals(settings, self.library.reading.do, deliver)
-        self._reading = Background("playback")
-        self.playback = Playback(self._reading.do, deliver, desk.shown)
-        self.compared = RecordingComparison(settings, self._reading.do, deliver)
-        self.labels = SessionLabels(settings, self._reading.do, deliver, author)
+        self.reading = Background("playback")  # what is played, alone or beside; a look never waits for it
+        self.playback = Playback(self.reading.do, deliver, desk.shown)
+        self.compared = RecordingComparison(settings, self.reading.do, deliver)
+        self.labels = SessionLabels(settings, self.reading.do, deliver, author)
         self.jobs = Jobs(lambda job: deliver(lambda: self._over(job)))
         self.models = Models(
             settings.store.url, deliver, self._robots, author, settings.promoters, desk.reach
@@ -55,7 +55,7 @@ class Archive:
 
     def close(self, within_s: float) -> bool:
         """End everything; False where something hangs, which only the end of the process ends."""
-        ended = [part.close(within_s) for part in (self.jobs, self.models, self.library, self._reading)]
+        ended = [part.close(within_s) for part in (self.jobs, self.models, self.library, self.reading)]
         return all(ended)
 
     def look(self) -> None:
@@ -73,7 +73,7 @@ class Archive:
         self.chosen, self.tape, self.problem = session, None, ""
         if session is not None:
             when_done(
-                self._reading.do(lambda: Tape.open(self.settings, session)),
+                self.reading.do(lambda: Tape.open(self.settings, session)),
                 self.deliver,
                 lambda tape: self._opened(session, tape),
                 lambda error: self._failed(session, error),

@@ -128,13 +128,14 @@ def look(settings: ServerSettings) -> Found:
     """Return what there is now; blocks."""
     waiting, store = _waiting(settings), _opened(settings)
     if isinstance(store, Found):
-        return replace(store, sessions=_joined([], waiting))
+        here = waiting if store.problem is None else spool_reader.with_store_away(waiting)
+        return replace(store, sessions=_joined([], here))
     try:
         stored = sessions(store)
         used = tuple(usage.by_robot(store))
         size_bytes = sum(each.size_bytes for each in store.objects.listing())
     except StoreError as error:
-        return Found(_joined([], waiting), problem=str(error))
+        return Found(_joined([], spool_reader.with_store_away(waiting)), problem=str(error))
     return Found(_joined(stored, waiting), used, size_bytes)
 
 
