@@ -94,6 +94,8 @@ def worst(robot: Robot) -> tuple[BusHealthLevel, tuple[str, ...]]:
         return BusHealthLevel.UNKNOWN, ("no CAN bus", "no bus")
     bus = max(buses, key=lambda one: (ORDER.index(level(one)), one.load_percent or 0.0))
     load = f"CAN {bus.name} {load_text(bus)}"
+    if bus.load_percent is None and level(bus) is BusHealthLevel.UNKNOWN:
+        return BusHealthLevel.UNKNOWN, (f"CAN {bus.name} –", "CAN –")
     most = next(iter(talking(bus)), None)
     who = "" if most is None else f" · most: {_names(most)}"
     if (why := reason(bus)) is not None:

@@ -169,7 +169,7 @@ def _outcome(station: Station) -> Words:
     tip = "\n".join(filter(None, (stopping.text, *stopping.proof_lines)))
     parts: dict[StopState, tuple[str, ...]] = {
         StopState.SENT: ("the drives are asked",),
-        StopState.CONFIRMED: (f"{stopping.drives} drives in {stopping.answered_ms or 0:.0f} ms",),
+        StopState.CONFIRMED: (stopping.timed(f"{stopping.drives} drives"),),
         StopState.NOT_CONFIRMED: (remedy(station.robot),),
     }
     return Words(STOP_MARKS[stopping.state], f"STOP {stopping.state.value}", parts[stopping.state], tip)
@@ -229,7 +229,8 @@ def _link(station: Station) -> Words:
         return Words(Mark("ring", "old"), "Linked, no data yet", parts)
     if robot.is_stale():
         return Words(Mark("triangle", "warn"), f"STALE · {age} old", parts)
-    mark = Mark("triangle", "warn") if robot.is_slow() else Mark("disc", "warn" if lost else "good")
+    mark = Mark("disc", "warn" if lost else "good") if robot.has_rate() else Mark("ring", "old")
+    mark = Mark("triangle", "warn") if robot.is_slow() else mark
     return Words(mark, f"{age} old · {robot.rate_text()}", parts)
 
 

@@ -63,8 +63,7 @@ class Player(QWidget):
         self.overview = Overview(self._playback.desk, theme)
         self.overview.is_numbers_first = False  # a walk is replayed for how it looked
         notes = RecordedNotes(self._playback, archive.labels)
-        deliver, reading = archive.deliver, archive.library.reading
-        self.beside = SideBySide(self._playback, archive.settings, reading.do, deliver)
+        self.beside = SideBySide(self._playback, archive.settings, archive.reading.do, archive.deliver)
         self.signals = Signals(
             self._playback.desk,
             theme,

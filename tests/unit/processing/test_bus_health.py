@@ -80,6 +80,14 @@ def test_what_is_old_or_never_came_or_is_of_a_link_that_is_gone_is_not_known() -
         assert "%" not in worst(each)[1][0]
 
 
+def test_a_bus_of_which_nothing_has_come_yet_is_not_said_to_have_no_errors() -> None:
+    new = replace(BUS, load_percent=None, talks=[])
+    assert worst(robot(new)) == (BusHealthLevel.UNKNOWN, (f"CAN {BUS.name} –", "CAN –"))
+    bad, wordings = worst(robot(replace(new, state="error passive")))
+    assert bad is BusHealthLevel.WARNING
+    assert "error passive" in wordings[0]
+
+
 def test_the_worst_bus_is_said_with_its_load_its_errors_and_who_talks_most() -> None:
     full = replace(BUS, name="legs", load_percent=97.0, error_frames=3, bus_offs=2)
     bad, wordings = worst(robot(BUS, full))
