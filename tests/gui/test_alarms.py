@@ -460,5 +460,5 @@ def test_the_list_of_alarms_is_no_higher_than_its_rows(window: MainWindow, bench
     settle(window, bench)
     window.alarms.list.turn()
     settle(window, bench)
-    assert window.alarms.list.height() < window.alarms.list.parentWidget().height() / 2
+    assert window.alarms.list.height() < window.height() / 2
     assert rules.cut_words(window, [row.headline for row in window.alarms.list.rows]) == []
