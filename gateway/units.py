@@ -128,8 +128,9 @@ def unit_named(symbol: str, si: str) -> Unit:
 
 
 def rounded(value: float, digits: int, sign: str = "") -> str:
-    """Return a number with so many decimal places, and never −0; `sign` "+" shows that of others, too."""
-    return with_minus(f"{round(value, digits) + 0.0:{sign}.{digits}f}")
+    """Return a number with so many decimal places; `sign` "+" shows that of others, too; zero has none."""
+    shown = round(value, digits) + 0.0
+    return with_minus(f"{shown:{sign if shown else ''}.{digits}f}")
 
 
 def with_minus(number: str) -> str:

@@ -146,7 +146,7 @@ class App:
         self.theme = theme or kept_theme(qt, kept)
         operator = "" if record is None else record.operator
         self._archive = Archive(settings, self.desk, self._poster.deliver, operator, file)
-        self.commissioning = Commissioning(talk)
+        self.commissioning = Commissioning(talk, who=operator)
         self._gateway: FileGateway | None = None  # of a robot that was commissioned here
         self.ending = Shutdown(self.feeds, self._close_others, self._close_own)
         self.window = MainWindow(self.desk, self.theme, kept, self._archive, self.commissioning)

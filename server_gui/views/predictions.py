@@ -15,7 +15,7 @@ from server_gui.core.desk.station import Station
 from server_gui.core.models.names import model_name, told_name
 from server_gui.core.prediction.adaptation import LEARNED_S, TRIED_S, AdaptationState, Adapting
 from server_gui.core.prediction.newest_predictions import STALE_S, Recalled, StationPredictions, Told
-from server_gui.core.processing.gait_events import Leg
+from server_gui.core.processing.gait_events import EventSource, Leg
 from server_gui.views.marks import Mark, enabled_text
 
 ACTIVITY, FALLING, GAIT_PHASE = "activity", "falling", "gait_phase"
@@ -232,10 +232,11 @@ _DANGERS: Final = {
 def model_phases(station: Station) -> dict[Leg, LegPhase | None]:
     """Return where each leg is in its stride by a model; None where it does not know.
 
-    A model speaks of the window that it was given; since then the stride has gone on.
+    It does not know without a component that it has learned from. It speaks of the window that it was
+    given; since then the stride has gone on.
     """
     shown = station.predictions.told.get(GAIT_PHASE)
-    if shown is None or shown.is_stale() or not _knows(shown):
+    if shown is None or shown.is_stale() or not _knows(shown) or blind(station):
         return dict.fromkeys(Leg)
     derived, values = station.processing.derived(), shown.prediction.values
     late_s = (derived.stamp_ns - shown.prediction.stamp_ns) / 1e9
@@ -249,6 +250,17 @@ def model_phases(station: Station) -> dict[Leg, LegPhase | None]:
     return found
 
 
+def step_phases(station: Station) -> dict[Leg, LegPhase | None]:
+    """Return where each leg is in its stride by the steps seen; None where what shows them is not ok now."""
+    derived, wrong = station.processing.derived(), {part.name for part in station.robot.not_ok()}
+    unseen = {
+        leg
+        for leg in Leg
+        if derived.sources.get(leg) is EventSource.PRESSURE and f"{leg.value}_insole" in wrong
+    }
+    return {leg: None if leg in unseen else leg_phase(derived, leg, derived.stamp_ns) for leg in Leg}
+
+
 def label_text(label: str) -> str:
     """Return a label for people."""
     return label.replace("_", " ").capitalize()
@@ -256,8 +268,11 @@ def label_text(label: str) -> str:
 
 def _stride(station: Station, line: PredictionRow) -> PredictionRow:
     """Return the line with the agreement of steps and model; the ring has the numbers."""
-    derived, modelled = station.processing.derived(), model_phases(station)
-    steps = {leg: leg_phase(derived, leg, derived.stamp_ns) for leg in Leg}
+    if unseen := blind(station):
+        return replace(
+            line, mark=Mark("ring", "old", UNSEEN), text=UNSEEN, detail=unseen, short=unseen, brief=""
+        )
+    modelled, steps = model_phases(station), step_phases(station)
     pairs = [(steps[leg], modelled[leg]) for leg in Leg]
     differences = [apart(one.percent, other.percent) for one, other in pairs if one and other]
     if not differences:

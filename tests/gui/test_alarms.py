@@ -452,3 +452,13 @@ def test_of_much_to_check_the_first_thing_is_kept_where_not_all_of_it_has_room()
         "since 07:28:21, for 4 s",
         "",
     )
+
+
+def test_the_list_of_alarms_is_no_higher_than_its_rows(window: MainWindow, bench: Bench) -> None:
+    window.resize(1920, 1000)
+    fault(bench)
+    settle(window, bench)
+    window.alarms.list.turn()
+    settle(window, bench)
+    assert window.alarms.list.height() < window.height() / 2
+    assert rules.cut_words(window, [row.headline for row in window.alarms.list.rows]) == []

@@ -58,7 +58,7 @@ def test_a_robot_that_was_gone_for_an_hour_says_so_and_is_live_again(
     bench.draw(window)
     assert texts(window)["link"].startswith("No link · 60 min old")
     assert "no route to 192.0.2.7" in texts(window)["link"]
-    assert texts(window)["status"].startswith("Status not known")
+    assert texts(window)["status"].startswith("Activity not known")
     shown(window, lambda: window.tabs.overview.notes[4] == "STALE, 60 min old", "said how old the curves are")
     assert len(said(bench, NewsKind.LINK)) == 1, "an hour of attempts is told once"
     bench.look_again([LinkChanged(ConnectionState.CONNECTED, None, time.monotonic_ns()), described()])

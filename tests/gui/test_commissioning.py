@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QAbstractButton, QApplication, QLineEdit, QPushBut
 
 from server_gui.core.commissioning.request import SUFFIX
 from server_gui.core.commissioning.stages import Stage
+from server_gui.views.commissioning.form import Form
 from server_gui.views.commissioning.page import CommissionPage
 from server_gui.views.confirmation import Question
 from server_gui.views.frame.main_window import MainWindow
@@ -268,3 +269,9 @@ def test_a_window_without_a_robot_leads_to_it(full_window: MainWindow) -> None:
     assert button is not None
     button.click()
     assert full_window.tabs.view is full_window.tabs.commission
+
+
+def test_the_form_knows_who_sits_at_the_window() -> None:
+    form = Form("Ada")
+    assert form.wish.who == "Ada"
+    destroy(form)

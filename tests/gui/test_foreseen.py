@@ -21,7 +21,7 @@ from server_gui.core.processing.gait_events import Leg
 from server_gui.core.settings.prediction import Action, RuleSettings
 from server_gui.views.frame.header import Header
 from server_gui.views.overview.page import Overview
-from server_gui.views.predictions import activity, doing, lines, model_phases, status
+from server_gui.views.predictions import activity, doing, lines, model_phases, status, step_phases
 from server_gui.views.theme import Theme
 from tests.gui.fakes import Bench, destroy
 from tests.gui.foreseen import predicted
@@ -290,3 +290,17 @@ def test_what_was_said_when_a_recording_was_made_is_said_to_be_of_then(
     shown(window, lambda: window.overview._ring._word == "Walk 94 %")
     said = "said then by model 3fa2 of activity · else turn 4 %"
     shown(window, lambda: window.overview.now.activity.detail.text() == said)
+
+
+def test_without_an_insole_its_leg_has_no_phase_and_the_stride_is_not_judged(station: Station) -> None:
+    station.take_prediction(
+        predicted("stride", {"stride": 0.9}, "gait_phase", values={"left": 0.25, "right": 0.75})
+    )
+    assert step_phases(station)[Leg.LEFT] is not None
+    part = station.robot.parts["left_insole"]
+    station.robot.parts["left_insole"] = dataclasses.replace(part, state="lost", problem="it is gone")
+    assert step_phases(station)[Leg.LEFT] is None
+    assert step_phases(station)[Leg.RIGHT] is not None
+    assert model_phases(station) == dict.fromkeys(Leg)
+    line = next(one for one in lines(station) if one.text.startswith("Stride"))
+    assert (line.text, line.detail) == ("Stride: not judged", "nothing comes from left insole")

@@ -1,5 +1,6 @@
 """The overview's plots: one time, limits, flags, a pointer over all; the wheel zooms time, not for good."""
 
+import itertools
 import time
 from collections.abc import Iterator
 
@@ -224,3 +225,13 @@ def test_the_word_at_the_end_of_the_time_axis_is_whole(
 def test_a_fault_is_not_hidden_by_the_stop_that_it_brings() -> None:
     flags = [(0.50, FlagKind.FAULT), (0.51, FlagKind.STOP), (0.90, FlagKind.STOP), (0.905, FlagKind.WRITE)]
     assert told(flags, 0.05) == [(0.50, FlagKind.FAULT), (0.90, FlagKind.STOP)]
+
+
+def test_a_low_plot_has_two_numbers_that_do_not_touch(qt: QApplication) -> None:
+    axis = ValueAxis()
+    axis.set_label_room(14)
+    for height in (24.0, 30.0, 34.0, 40.0):
+        ((_, values),) = axis.tickValues(-33.0, 31.0, height)
+        gaps = [(high - low) / 64.0 * height for low, high in itertools.pairwise(values)]
+        assert len(values) > 1, height
+        assert min(gaps) >= 14 * 0.8, (height, values)

@@ -12,12 +12,13 @@ import numpy.typing as npt
 import pytest
 from msgspec.structs import replace
 from PySide6.QtCore import QPointF, QRectF, QSizeF, Qt
-from PySide6.QtGui import QFontMetricsF, QImage
+from PySide6.QtGui import QFontMetrics, QFontMetricsF, QImage
 from PySide6.QtWidgets import QWidget
 
 from gateway.client import ConnectionState
 from gateway.units import Units
 from gateway.wire.component import LayoutInfo
+from gateway.wire.stop import Stopped
 from server_gui.core.desk.leg_phase import LegPhase, leg_phase, phase_at
 from server_gui.core.desk.soles import cells_of, sole
 from server_gui.core.follow import robot
@@ -26,16 +27,16 @@ from server_gui.core.follow.robot import STALE_NS
 from server_gui.core.processing.gait_events import EventKind, Leg
 from server_gui.core.tuning.stop import Proof
 from server_gui.core.tuning.writing import Trial
-from server_gui.views.overview.joint_table import ERROR, STATE, STOP, TORQUE, JointModel
+from server_gui.views.overview.joint_table import ERROR, STATE, STOP, TORQUE, JointModel, JointTable
 from server_gui.views.overview.now_line import NowLine
 from server_gui.views.overview.page import Overview
 from server_gui.views.theme import Theme
-from server_gui.views.widgets.figure import ANKLE, SHANK, THIGH, Pose, chain, placed_names
+from server_gui.views.widgets.figure import ANKLE, SHANK, THIGH, Pose, beside_legs, chain, placed_names
 from server_gui.views.widgets.gait_ring import GaitRing, Phases
 from server_gui.views.widgets.pressure_map import COLUMNS, ROWS, PressureMap, weights
 from tests.gui.fakes import Bench, destroy
 from tests.gui.rules import settle
-from tests.support.desk import described, looked, telemetry, walking
+from tests.support.desk import JOINTS, described, looked, telemetry, walking
 
 
 @pytest.fixture
@@ -285,8 +286,8 @@ def test_a_joint_in_trouble_is_in_words_with_its_code_and_no_zero_is_negative(
     bench.station.take([telemetry([received_ns], columns, received_ns), looked(state="fault", problem=why)])
     shown = cells(JointModel(bench.desk, theme), 1)
     assert shown[ERROR] == "0x2310 continuous overcurrent at the output"
-    assert shown[TORQUE] == "+0.00 / 80"
-    assert shown[2] == "+0.0 / –"
+    assert shown[TORQUE] == "0.00 / 80"
+    assert shown[2] == "0.0 / –"
     assert cells(JointModel(bench.desk, theme), 0)[ERROR] == "–"
 
 
@@ -465,3 +466,34 @@ def _pixels(widget: QWidget) -> npt.NDArray[np.uint8]:
     """(height, width, 4)."""
     image = widget.grab().toImage().convertToFormat(QImage.Format.Format_RGB32)
     return np.array(image.constBits(), np.uint8).reshape(image.height(), image.width(), 4)
+
+
+def test_what_the_latest_stop_did_is_among_the_last_columns_to_go(bench: Bench, theme: Theme) -> None:
+    bench.station.take([walking(50), looked()])
+    bench.station.stop("test")
+    bench.first.answer(Stopped(dict.fromkeys(JOINTS, "confirmed"), held=True))
+    model = JointModel(bench.desk, theme)
+    table = JointTable(model, theme)
+    model.refresh()
+    assert model.is_stop_news
+    table.show()
+    hidden: list[int] = []
+    for width in range(900, 250, -25):
+        table.resize(width, 200)
+        hidden += [
+            column for column in range(STOP + 1) if table.isColumnHidden(column) and column not in hidden
+        ]
+    assert hidden.index(TORQUE) < hidden.index(STOP)
+    destroy(table)
+
+
+def test_letters_of_the_sides_stand_on_no_leg(theme: Theme) -> None:
+    metrics = QFontMetrics(theme.text_font(bold=True))
+    leg = [QPointF(50, 20), QPointF(52, 50), QPointF(46, 80), QPointF(70, 82)]
+    taken: list[QRectF] = []
+    for text in "LR":
+        beside_legs(text, QPointF(44, 80), metrics, [leg], 2.0, taken)
+    first, second = taken
+    assert not first.intersects(second)
+    for box in taken:
+        assert not any(box.contains(point) for point in leg)

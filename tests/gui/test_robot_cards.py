@@ -71,3 +71,10 @@ def test_the_worst_state_is_never_cut_on_card_and_header(window: MainWindow, ben
         window.resize(width, 768)
         settle(window, bench)
         assert not list(rules.cut_states(rules.seen(window))), width
+
+
+def test_an_empty_list_says_what_to_do(around: Around, bench: Bench) -> None:
+    assert around.robots.none.isHidden()
+    bench.desk.stations = []
+    around.robots.refresh()
+    assert not around.robots.none.isHidden()

@@ -88,7 +88,8 @@ class LogLineKind(Enum):
 class Commissioning:
     """`talk` starts a command; `look` takes what has come, some times a second."""
 
-    def __init__(self, talk: Talk, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, talk: Talk, clock: Callable[[], float] = time.monotonic, who: str = "") -> None:
+        self.who = who  # sits at the window; "": it was not said
         self.wish: CommissioningRequest | None = None
         self.stage = Stage.NOT_STARTED
         self.question: Message | None = None

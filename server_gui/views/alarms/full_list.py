@@ -208,6 +208,7 @@ class AlarmList(Overlay):
         words = QWidget()
         super().__init__("All alarms", words, theme, below, WIDEST)
         self._strip = strip
+        self._is_laid_out = False
         self._shown: dict[Key, Told] = {}
         self.rows: list[AlarmRow] = []
         self._column = QVBoxLayout(words)
@@ -220,11 +221,25 @@ class AlarmList(Overlay):
 
     def turn(self) -> None:
         self._shown.clear()
+        self._is_laid_out = False
         for row in self.rows:
             row.hold(False)
         super().turn()
         self.refresh()
         self._settle()
+        self._is_laid_out = True
+        self._fit()
+        self._settle()
+
+    def high(self, width: int) -> int:
+        """As high as its rows, once they are laid out: what is below stays in sight."""
+        if not self._is_laid_out:
+            return super().high(width)
+        around = self.height() - self._scrolled.viewport().height()
+        room = max(width - (self.width() - self._scrolled.viewport().width()), 1)
+        has_height = self._column.hasHeightForWidth()
+        rows = self._column.totalHeightForWidth(room) if has_height else self._column.totalSizeHint().height()
+        return rows + around
 
     def _settle(self) -> None:
         """Let words that need more lines have them before they are first seen: each layer tells the next."""
@@ -248,6 +263,8 @@ class AlarmList(Overlay):
         for place, row in enumerate(self.rows):
             row.setVisible(place < len(self._shown))
         self._none.setVisible(not self._shown)
+        if self.high(self.width()) > self.height():  # never lower while it is open
+            self._fit()
 
     def _add_row(self) -> None:
         row, place = AlarmRow(self._theme), len(self.rows)

@@ -7,6 +7,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
 from server_gui.core.commissioning.commissioning import Commissioning
+from server_gui.core.commissioning.stages import GO_ON
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import set_text
 from server_gui.views.widgets.mark import MarkIcon
@@ -14,6 +15,7 @@ from server_gui.views.widgets.plain import set_tip
 from server_gui.views.widgets.stop_button import StopButton
 from server_gui.views.widgets.wrapping_label import WrappingLabel
 
+GO_ON_SOON: Final = "What was found is kept: “Go on” takes it up again once the command has ended."
 STOP_WIDE: Final = 150  # at text of 100 %
 LONG_S: Final = 3.0  # work that takes longer says for how long
 STOP_TIP: Final = (
@@ -82,7 +84,7 @@ class Bar(QWidget):
 
     def _said(self) -> str:
         now = self._commissioning
-        words = now.look_of.words
+        words = now.look_of.words if now.can_start else now.look_of.words.replace(GO_ON, GO_ON_SOON)
         if now.is_silent:
             words = f"No output for {now.working_s:.0f} s, longer than any step takes: press STOP."
         elif now.runs and not now.look_of.answers and now.working_s > LONG_S:

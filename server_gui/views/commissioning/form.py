@@ -32,10 +32,10 @@ class Form(Card):
 
     wished = Signal(object)
 
-    def __init__(self) -> None:
+    def __init__(self, who: str = "") -> None:
         super().__init__("What is to be commissioned")
         self.file, self.bitrate, self.eds = QLineEdit(), QLineEdit(), QLineEdit()
-        self.serial, self.who, self.computer = QLineEdit(), QLineEdit(user_name()), QLineEdit()
+        self.serial, self.who, self.computer = QLineEdit(), QLineEdit(who or user_name()), QLineEdit()
         self.bus = QComboBox()
         self.bus.setEditable(True)
         self.bus.addItems(can_interfaces())

@@ -41,7 +41,7 @@ class CommissionPage(QWidget):
         self.commissioning = commissioning
         self._theme = theme
         self.setObjectName("page")
-        self.form = Form()
+        self.form = Form(commissioning.who)
         self.bar = Bar(commissioning, theme, self.form.start)
         self.question, self.steps = Question(commissioning, theme), Steps(theme)
         self.result, self.log = ResultCard(commissioning, theme), Log(commissioning, theme)

@@ -196,7 +196,7 @@ def _drives(station: Station) -> Words:
 
 def _status(station: Station) -> Words:
     if not station.is_live:
-        return Words(Mark("ring", "old"), "Status not known", ("no live data",))
+        return Words(Mark("ring", "old"), "Activity not known", ("no live data",))
     line = status(station)
     if line is not None and line.mark.word != OLD:
         parts = ("predicted", line.short) if line.detail.startswith("predicted") else (line.detail,)

@@ -50,6 +50,7 @@ SI: Final = {
 }
 SIGNED: Final = frozenset({"position", "velocity", "torque", "current"})
 SPARE: Final = (CURRENT, VELOCITY, TEMPERATURE, STOP)  # left out in this order where there is less room
+ENABLED_AGAIN: Final = "enabled again"  # after which the latest STOP is no news
 # How error codes of CiA 402 begin (IEC 61800-7-201) → the column that holds what they are about.
 ABOUT: Final = {0x2000: CURRENT, 0x4000: TEMPERATURE, 0x8400: VELOCITY}
 FAMILIES: Final = (0xF000, 0xFF00)  # of a code: how much of it says what it is about
@@ -143,6 +144,11 @@ class JointModel(QAbstractTableModel):
     def empty(self) -> set[int]:
         """Return the columns that say nothing yet: no stop was sent."""
         return {STOP} if all(row[STOP].text == NONE for row in self._cells) else set()
+
+    @property
+    def is_stop_news(self) -> bool:
+        """Whether what the latest STOP did is looked for: not every drive is enabled again."""
+        return any(row[STOP].text not in (NONE, ENABLED_AGAIN) for row in self._cells)
 
     def rowCount(self, parent: Index = QModelIndex()) -> int:  # noqa: B008 - Qt's own default
         return 0 if parent.isValid() else len(self._cells)
@@ -299,7 +305,7 @@ class JointTable(QTableView):
             if sum(widths[known] for known in shown) <= room:
                 break
         least = (ANGLE, ERROR) if self._model.errors else (ERROR, ANGLE)  # errors stand below the table, too
-        for column in (TORQUE, *least):
+        for column in (TORQUE, STOP, *least) if self._model.is_stop_news else (TORQUE, *least):
             if sum(widths[known] for known in shown) > room:
                 shown.discard(column)
         if sum(widths[known] for known in shown) + widths[ERROR] <= room:
@@ -309,7 +315,8 @@ class JointTable(QTableView):
     def _with_room(self, widths: list[int]) -> set[int]:
         """Return the columns that are shown, without the spare ones that have no room."""
         shown = set(range(len(COLUMNS))) - self._model.empty()
-        for column in (column for column in SPARE if column not in self._model.at_fault):
+        kept = self._model.at_fault | ({STOP} if self._model.is_stop_news else set())
+        for column in (column for column in SPARE if column not in kept):
             if sum(widths[known] for known in shown) > self.viewport().width():
                 shown.discard(column)
         return shown
@@ -453,7 +460,7 @@ def _stop(station: Station, joint: str) -> Cell:
     proof = stopping.proofs.get(joint)
     if proof is not None:
         if station.robot.word(f"{joint}.state") == ENABLED:
-            return Cell("enabled again", "dim", None, f"{proof.text}; enabled again since")
+            return Cell(ENABLED_AGAIN, "dim", None, f"{proof.text}; enabled again since")
         colour = "dim" if proof.was_so else "good"
         return Cell(proof.when, colour if station.is_live else "old", None, proof.text)
     if stopping.state is StopState.IDLE:

@@ -13,7 +13,6 @@ from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QVBoxLayout, QWidget
 from gateway.units import Unit, rounded
 from server_gui.core.desk.confidence import not_judged
 from server_gui.core.desk.desk import Desk
-from server_gui.core.desk.leg_phase import leg_phase
 from server_gui.core.desk.soles import Load, Sole, loads, sole
 from server_gui.core.desk.station import Station
 from server_gui.core.follow.frame_time import now_ns
@@ -24,7 +23,7 @@ from server_gui.views.overview.joint_words import JointWords
 from server_gui.views.overview.key_plot import SECONDS, KeyPlot, PlotKind
 from server_gui.views.overview.learned_offer import LearnedOffer
 from server_gui.views.overview.now_line import NowLine
-from server_gui.views.predictions import STOPPED, activity, lines, model_phases
+from server_gui.views.predictions import STOPPED, activity, lines, model_phases, step_phases
 from server_gui.views.refresh_rate import READ_NS
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.card import Card, set_tone
@@ -237,7 +236,7 @@ class Overview(QWidget):
         derived = station.processing.derived()
         live = station.is_live
         judged = live and not not_judged(station)
-        phases = {leg: leg_phase(derived, leg, derived.stamp_ns) if judged else None for leg in Leg}
+        phases = step_phases(station) if judged else dict.fromkeys(Leg)
         modelled = model_phases(station) if judged else dict.fromkeys(Leg)
         word, below = self._words(station)
         self._ring.show_phases(phases, modelled, word, below, live=live)

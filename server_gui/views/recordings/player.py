@@ -29,7 +29,7 @@ from server_gui.core.cloud.tape import Tape, as_time
 from server_gui.core.workspace.alignment import Align
 from server_gui.views.alarms.strip import AlarmStrip
 from server_gui.views.overview.page import Overview
-from server_gui.views.predictions import status
+from server_gui.views.predictions import STOPPED, UNSEEN, status
 from server_gui.views.recordings.beside_bar import BesideBar
 from server_gui.views.recordings.label_bar import LabelBar
 from server_gui.views.recordings.timeline import SECOND_NS, Timeline, clock_text, day_text
@@ -305,7 +305,10 @@ class Player(QWidget):
         if playback.is_loading:
             return f"{what} · reading …"
         then = status(playback.desk.stations[0])
-        return what if then is None else f"{what} · predicted then: {then.text}"
+        if then is None:
+            return what
+        is_said = then.mark.word not in (STOPPED, UNSEEN)
+        return f"{what} · {f'predicted then: {then.text}' if is_said else then.text.lower()}"
 
     def _tone(self, tone: str) -> None:
         if self.banner.property("tone") != tone:

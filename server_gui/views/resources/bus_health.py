@@ -36,7 +36,7 @@ from server_gui.core.processing.bus_health import (
 )
 from server_gui.views.marks import Mark
 from server_gui.views.theme import Theme
-from server_gui.views.widgets.card import Card, set_text
+from server_gui.views.widgets.card import Card, set_text, set_tone
 from server_gui.views.widgets.columns import title_widths
 from server_gui.views.widgets.mark import MarkIcon
 from server_gui.views.widgets.plot import css
@@ -147,15 +147,17 @@ class BusCard(Card):
         """Rows and letters are of the size before."""
         self.table.setRowCount(0)
 
-    def show_bus(self, bus: BusInfo, alarms: Alarms) -> None:
-        """Show how it is now, as bad as what is told of it and of its nodes."""
+    def show_bus(self, bus: BusInfo, alarms: Alarms, *, live: bool) -> None:
+        """Show it as bad as what is told of it and of its nodes; nothing of a stale robot is good."""
         bad = bus_level(level(bus), bus.name, alarms)
+        bad = BusHealthLevel.UNKNOWN if bad is BusHealthLevel.GOOD and not live else bad
         mark = LEVELS[bad]
         self._icon.show_mark(mark)
         rate = "" if bus.bitrate is None else f" of {bus.bitrate / 1e6:g} Mbit/s"
         word = "FULL: " if bad is BusHealthLevel.ALARM and (bus.load_percent or 0.0) >= FULL_PERCENT else ""
         self.load.say(f"{word}{load_text(bus)}{rate}", f"{word}{load_text(bus)}")
-        self._bar.show_load(bus.load_percent, _colour_of(bus.load_percent or 0.0))
+        self._bar.show_load(bus.load_percent, _colour_of(bus.load_percent or 0.0) if live else "old")
+        set_tone(self.load, "" if live else "old")
         self.set_title(f"Bus {bus.name}")
         self.set_note(bus.state)
         frames = "–" if bus.frames_per_s is None else f"{bus.frames_per_s:.0f}"
@@ -257,7 +259,7 @@ class BusHealthView(QWidget):
         for place, card in enumerate(self.cards):
             card.setVisible(place < len(shown))
             if place < len(shown):
-                card.show_bus(shown[place], station.alarms)
+                card.show_bus(shown[place], station.alarms, live=station.is_live)
 
     def _say(self, station: Station, buses: Sequence[BusInfo] | None) -> None:
         alarms = station.alarms

@@ -32,6 +32,7 @@ from server_gui.views.widgets.plain import PlainLabel, set_tip
 from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 from server_gui.views.widgets.stop_button import StopButton
 
+NO_ROBOT: Final = "No robot yet: type an address below, such as 192.0.2.7:7420, and press Enter."
 PAIRING_ENDS_S: Final = 1.0  # how long the window waits for that when it closes
 
 
@@ -147,6 +148,10 @@ class RobotsPanel(QWidget):
         self.said.setObjectName("dim")
         self.said.setWordWrap(True)
         self.said.hide()
+        self.none = PlainLabel(NO_ROBOT)
+        self.none.setObjectName("dim")
+        self.none.setWordWrap(True)
+        self._list.insertWidget(0, self.none)
         self.all_stop = StopButton()
         self.all_stop.name("ALL")
         self.all_stop.setAccessibleName("STOP every robot")
@@ -177,6 +182,7 @@ class RobotsPanel(QWidget):
         for card in self.cards:
             card.refresh(selected=card.station is self._desk.selected)
         self.all_stop.setEnabled(bool(stations))
+        self.none.setVisible(not stations)
 
     def _restyle(self) -> None:
         self.setMinimumWidth(self._theme.px(170))

@@ -1,12 +1,22 @@
 """The wearer from the right side, as a stick figure that the real angles drive."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Final
 
 from PySide6.QtCore import QPointF, QRectF, QSize, QSizeF, Qt
-from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPainterPath, QPaintEvent, QPen
+from PySide6.QtGui import (
+    QColor,
+    QFont,
+    QFontMetrics,
+    QFontMetricsF,
+    QPainter,
+    QPainterPath,
+    QPaintEvent,
+    QPen,
+)
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from server_gui.views.theme import Theme
@@ -18,6 +28,7 @@ HEAD: Final = 0.065  # radius
 REACH: Final = 1.12  # the drawing's height
 SIDES: Final = ("left", "right")
 JOINTS: Final = ("hip", "knee", "ankle")
+STEPS: Final = 16  # points of a segment, within which letters are kept off it
 ANGLES_SIZES: Final = (0.95, 0.85, 0.75, 0.65, 0.55, 0.45)  # of the text's
 
 
@@ -97,7 +108,8 @@ class StickFigure(QWidget):
         self._draw_trunk(painter, hip, lean, unit)
         if last in chains:
             self._draw_leg(painter, last, chains[last], hip, unit)
-        self._name_sides(painter, {side: hip + points[-1] * unit for side, points in chains.items()})
+        placed = {side: [hip, *(hip + point * unit for point in points)] for side, points in chains.items()}
+        self._name_sides(painter, placed, unit * 0.03)
         self._name_joints(painter, chains, hip, unit)
         self._draw_angles(painter)
         painter.end()
@@ -109,17 +121,19 @@ class StickFigure(QWidget):
     def _is_wrong(self, side: str) -> bool:
         return any(joint.startswith(side) for joint in self._wrong)
 
-    def _name_sides(self, painter: QPainter, toes: Mapping[str, QPointF]) -> None:
-        """Draw the sides' names before the toes: colour alone says nothing to some people."""
+    def _name_sides(self, painter: QPainter, legs: Mapping[str, Sequence[QPointF]], thick: float) -> None:
+        """Draw the sides' names before the toes, on no leg: colour alone says nothing to some people."""
         painter.setFont(self._theme.text_font(bold=True))
         metrics = painter.fontMetrics()
-        at = {side: toe + QPointF(6, 3) for side, toe in toes.items()}
+        at = {side: points[-1] + QPointF(6, 3) for side, points in legs.items()}
         if len(at) == len(SIDES):
             left, right = at["left"], at["right"]
             high, beside = metrics.ascent(), abs(left.x() - right.x()) > metrics.maxWidth()
             if not beside and abs(left.y() - right.y()) < high:  # neither letter lies over the other
                 left.setY(right.y() - high)
-        for side, point in at.items():
+        taken: list[QRectF] = []
+        for side, wanted in at.items():
+            point = beside_legs(side[0].upper(), wanted, metrics, legs.values(), thick, taken)
             letter = QPainterPath()
             letter.addText(point, painter.font(), side[0].upper())
             painter.strokePath(letter, QPen(self._theme.colour("card"), 3))  # it may stand on the other leg
@@ -217,6 +231,32 @@ class StickFigure(QWidget):
         if dashed:
             pen.setStyle(Qt.PenStyle.DotLine)
         return pen
+
+
+def beside_legs(
+    text: str,
+    wanted: QPointF,
+    metrics: QFontMetrics,
+    legs: Iterable[Sequence[QPointF]],
+    thick: float,
+    taken: list[QRectF],
+) -> QPointF:
+    """Return where a letter stands, as near as it can to the right of what is wanted: on no leg or letter."""
+    steps = [number / STEPS for number in range(STEPS + 1)]
+    drawn = [
+        one + (other - one) * step for points in legs for one, other in pairwise(points) for step in steps
+    ]
+    wide, high = metrics.horizontalAdvance(text), metrics.capHeight()
+    point = QPointF(wanted)
+    while True:
+        box = QRectF(point.x(), point.y() - high, wide, high)
+        around = box.adjusted(-thick - 1, -thick - 1, thick + 1, thick + 1)
+        met = [one.x() + thick + 2 for one in drawn if around.contains(one)]
+        met += [one.right() + 2 for one in taken if one.intersects(around)]
+        if not met:
+            taken.append(box)
+            return point
+        point.setX(max(point.x() + 1.0, max(met)))
 
 
 Named = tuple[str, QRectF, Sequence[QPointF]]  # a name, where it stands, and the joints that it names

@@ -56,4 +56,9 @@ class Overlay(QFrame):
     def _fit(self) -> None:
         room = self._below.rect().adjusted(AROUND, AROUND, -AROUND, -AROUND)
         width = min(room.width(), self._theme.px(self._widest))
-        self.setGeometry(room.x() + (room.width() - width) // 2, room.y(), width, room.height())
+        high = min(self.high(width), room.height())
+        self.setGeometry(room.x() + (room.width() - width) // 2, room.y(), width, high)
+
+    def high(self, width: int) -> int:
+        """How high it is with that width, where there is so much room: all of it, unless it needs less."""
+        return self._below.height()
