@@ -23,7 +23,7 @@ from server_gui.views.widgets.scroll_area import ScrollArea
 from server_gui.views.widgets.stride_curves import CYCLE
 from tests.gui.fakes import Bench, Parts, destroy
 from tests.gui.rules import settle
-from tests.support.desk import looked
+from tests.support.desk import looked, walking
 from tests.unit.evidence.synthetic import cycles, spell
 from tests.unit.evidence.test_comparison import ERROR, times
 from tests.unit.evidence.test_file import told
@@ -131,6 +131,17 @@ def test_a_trial_that_counts_down_says_what_it_does_so_far(
         bench.station.judged.take(replace(known, evidence=found))
     parts.trial.refresh()
     assert said[word] in parts.trial.words.text()
+
+
+def test_of_somebody_who_walks_a_new_trial_is_not_judged_yet(bench: Bench, parts: Parts) -> None:
+    bench.station.writing.trial = Trial(
+        1, {"gait.step_length": 0.4}, {"gait.step_length": 0.3}, time.monotonic_ns() + 10**10
+    )
+    bench.look_again([walking(1000), looked()])
+    assert bench.station.processing.derived().gait.walking
+    parts.trial.refresh()
+    assert "not judged yet" in parts.trial.words.text()
+    assert "once the wearer walks" not in parts.trial.words.text()
 
 
 @pytest.mark.parametrize(
