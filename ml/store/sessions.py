@@ -26,6 +26,7 @@ KEYS: Final = ("utc", "stamp_ns")  # columns before the channels
 ORDER: Final = [(name, "ascending") for name in ("stamp_ns", "connection", "stream", "seq", "row")]
 _NAMING: Final = pa.schema([TELEMETRY.schema.field(name) for name in ("utc", *(name for name, _ in ORDER))])
 UNTOLD: Final = "what was known of this session is lost; its rows are here"  # notes of one
+UNREAD: Final = "the rest of it is in the store, which is not reached"  # where nobody has looked there
 _UNKNOWN: Final = datetime(1970, 1, 1, tzinfo=UTC)  # when it began
 _WHOLE: Final = (-(1 << 63), (1 << 63) - 2)  # stamps, where nobody knows which
 _AT_ONCE: Final = 8  # footers that are read at a time

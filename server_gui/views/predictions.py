@@ -147,7 +147,10 @@ def doing(station: Station) -> tuple[str, ...]:
     between = " " if line.mark.colour == "accent" else " · "  # the steps are not those of what is not known
     cadence = f"{line.text}{between}{gait.cadence_spm:.0f} steps/min" if walks else line.short_text
     least = f"{PROBABLE.sub('', line.short_text)} · {count.replace(' of ', '/')}"
-    return tuple(dict.fromkeys((f"{cadence} · {count}", f"{line.short_text} · {count}", least, count)))
+    fewest = count.replace(" of ", "/").replace(" enabled", "") if "," in count else count
+    return tuple(
+        dict.fromkeys((f"{cadence} · {count}", f"{line.short_text} · {count}", least, count, fewest))
+    )
 
 
 def lines(station: Station) -> Iterator[PredictionRow]:

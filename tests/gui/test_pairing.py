@@ -99,7 +99,7 @@ def test_a_robot_is_paired_by_address_and_code_and_followed(
     dialog.code.setText(CODE.lower())
     dialog.act.click()
     assert not dialog.act.isEnabled()
-    assert "Waiting until somebody confirms" in dialog.said.text()
+    assert "Waiting for confirmation on the robot" in dialog.said.text()
     around.header.stop.click()  # nothing of the window waits for it
     shown.confirm()
     ended(dialog)

@@ -23,6 +23,7 @@ from server_gui.views.robots.reset import ask_clear
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.stop_button import StopButton
 from tests.gui.fakes import Bench, destroy, stop_is_whole
+from tests.gui.faulty import CAUSE, fault
 from tests.support.desk import JOINTS, described, looked, walking
 
 ALL = Stopped(dict.fromkeys(JOINTS, "confirmed"), held=True)
@@ -171,6 +172,15 @@ def test_a_fault_that_stays_after_it_was_cleared_is_shown_and_can_be_cleared_aga
     assert [one.words.text() for one in shown] == [f"left_knee DID NOT LEAVE FAULT: {stays}."]
     shown[0].act.click()
     assert any(one.windowTitle().startswith("Clear the fault") for one in header.findChildren(Question))
+
+
+def test_the_question_whether_to_clear_a_fault_names_it(header: Header, bench: Bench) -> None:
+    fault(bench)
+    asked = ask_clear(header, bench.station)
+    first, named, *_ = asked.words.text().splitlines()
+    assert first == "Clear the fault of exo-01?"
+    assert named == f"left knee: {CAUSE}"
+    assert "this moves nothing" in asked.words.text()
 
 
 def test_what_is_known_of_the_drives_is_said_before_a_fault_is_cleared(header: Header, bench: Bench) -> None:

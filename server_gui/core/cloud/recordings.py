@@ -83,6 +83,7 @@ class Recordings:
         for batch in self._batches:
             try:
                 here = spool_reader.untold(self._spool, [batch], ())
+                here = here if self.problem is None else spool_reader.with_store_away(here)
                 told += self._waiting(SESSIONS, [batch])
             except SpoolUnusable as error:
                 self.unread = self.unread or error

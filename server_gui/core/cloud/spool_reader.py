@@ -82,6 +82,14 @@ def untold(spool: Path, batches: Iterable[int], known: Iterable[tuple[str, str]]
     return [sessions_.untold(robot, name, Extent(()), uploaded=False) for robot, name in sorted(found)]
 
 
+def with_store_away(found: Iterable[Session]) -> list[Session]:
+    """Return these sessions without calling lost what may be in a store that was not read."""
+    return [
+        msgspec.structs.replace(each, notes=sessions_.UNREAD) if each.notes == sessions_.UNTOLD else each
+        for each in found
+    ]
+
+
 def rows(spool: Path, table: Table, batches: Iterable[int] | None = None) -> list[dict[str, Any]]:
     """Return a table's rows in these batches, or in all that wait."""
     made: list[dict[str, Any]] = table_of(spool, table, batches).to_pylist()

@@ -73,6 +73,7 @@ class Tape:
     last_ns: int
     _recorded: Recorded = field(repr=False)
     _settings: ServerSettings = field(repr=False)
+    is_partial: bool = False  # the store, which may have more of it, was not reached
 
     @classmethod
     def open(cls, settings: ServerSettings, session: Session) -> Self:
@@ -91,7 +92,8 @@ class Tape:
             )
         events, units = recordings.rows_of(session), _units(session, recorded.channels)
         ends = utc_ns(session.first), utc_ns(session.last)
-        return cls(session, units, events, *ends, recorded, settings)
+        away = recordings.problem is not None
+        return cls(session, units, events, *ends, recorded, settings, away)
 
     def read(self, begin_ns: int, end_ns: int, channels: Sequence[str] | None = None) -> Rows:
         """Return the rows from `begin_ns` up to before `end_ns`; blocks. Raises as `open`.

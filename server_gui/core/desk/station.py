@@ -273,8 +273,7 @@ class Station:
     def _processes(self, event: Resources) -> None:
         """Take a look at the process table; CPU and memory come from other looks."""
         self.processes, self.processes_at_ns = event.snapshot, event.at_ns
-        table = event.snapshot.processes or []
-        known = max(table, key=lambda one: one.cpu_percent or 0.0, default=None)
+        known = max(event.snapshot.processes or [], key=lambda one: one.cpu_percent or 0.0, default=None)
         self.most = None if known is None else (known, event.at_ns)
         seen = self.robot.resources
         if seen is not None:

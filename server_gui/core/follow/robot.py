@@ -210,6 +210,8 @@ class Robot:
             link.is_another = event.is_another
 
     def _described(self, event: Described) -> None:
+        if self.description is not None and self.description.boot_id != event.description.boot_id:
+            self._missing = MissingPdos()  # what was before another start of the robot lasts no longer
         self.description, self.hello = event.description, event.hello
         self._words = {channel.name: channel.enum for channel in event.description.channels if channel.enum}
         self.parts = {

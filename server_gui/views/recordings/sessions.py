@@ -21,7 +21,7 @@ from PySide6.QtWidgets import (
 from gateway.amounts import size
 from gateway.plain_text import plain
 from ml.store.labels import utc_ns
-from ml.store.sessions import Session
+from ml.store.sessions import UNREAD, Session
 from server_gui.core.archive.archive import Archive
 from server_gui.core.cloud.tape import Tape
 from server_gui.core.desk.recording import Recording
@@ -46,6 +46,8 @@ ROW: Final = 21  # high, at text of 100 %
 LINES: Final = 6  # of notes, at most
 WRAPPED: Final = Qt.TextFlag.TextWordWrap.value
 EVENTS_TOLD: Final = 200
+PARTIAL: Final = "only what is still on this computer; the store is not reached"
+NOT_KNOWN: Final = "not known while the store is not reached"
 MARK_TWO: Final = "Mark two recordings: a click on one, a click with Ctrl on the other"
 TOGETHER: Final = "Both in the same plots, played together: aligned by their beginnings or a heel strike"
 COMPARING: Final = "Differences in the set-up of the later one, and measures of the walk that moved with it"
@@ -214,6 +216,8 @@ class SessionsPage(QWidget):
         library = self._archive.library
         if library.reach.problem is not None:
             return f"The store is not reached; retrying: {library.reach.problem}"
+        if library.reach.list_problem is not None:
+            return f"The store's list cannot be read; retrying: {library.reach.list_problem}"
         return EMPTY if library.revision and not library.found.sessions else ""
 
     def _refresh_details(self) -> None:
@@ -224,7 +228,7 @@ class SessionsPage(QWidget):
             self._told = known
             self._card.set_title("Recording" if session is None else session.session)
             held = [] if session is None else archive.held_then(session)
-            self.details.setPlainText(_told(session, archive.tape, archive.problem, held))
+            self.details.setPlainText(facts_text(session, archive.tape, archive.problem, held))
 
     # --- how it is put together
 
@@ -290,18 +294,21 @@ def _when(time: datetime | None) -> str:
     return "–" if time is None else f"{time.astimezone():%Y-%m-%d %H:%M:%S}"
 
 
-def _told(session: Session | None, tape: Tape | None, problem: str, held: Sequence[str]) -> str:
+def facts_text(session: Session | None, tape: Tape | None, problem: str, held: Sequence[str]) -> str:
     """Return the facts of a session as text."""
     if session is None:
         return "Choose a recording to see what is in it; with Ctrl a second one, to compare the two."
+    away = session.notes == UNREAD or (tape is not None and tape.is_partial)
     known = {
         "Session": session.session,
         "Robot": session.robot,
-        "Began": _when(session.began),
+        "Began": NOT_KNOWN if away and session.began is None else _when(session.began),
         "Ended": "it is still running, or its server was killed"
         if session.ended is None
         else _when(session.ended),
-        "Length": f"{_cells(session)[LENGTH]}, {_cells(session)[ROWS]} rows, {_cells(session)[SIZE]}",
+        "Length": NOT_KNOWN
+        if away and not session.rows
+        else f"{_cells(session)[LENGTH]}, {_cells(session)[ROWS]} rows, {_cells(session)[SIZE]}",
         "State": _state(session),
         "Operator": session.operator,
         "Notes": session.notes,
@@ -320,8 +327,10 @@ def _told(session: Session | None, tape: Tape | None, problem: str, held: Sequen
 def _inside(tape: Tape) -> list[str]:
     length = clock_text((tape.last_ns - tape.first_ns) / SECOND_NS, 1)
     head = f"{length} of {len(tape.units)} channels"
+    if tape.is_partial:
+        head = f"{head}: {PARTIAL}"
     if not tape.events:
-        return [head, "It has no gaps and no marks."]
+        return [head] if tape.is_partial else [head, "It has no gaps and no marks."]
     return [head, "", *(_event(tape, row) for row in tape.events[:EVENTS_TOLD])]
 
 

@@ -11,11 +11,12 @@ import pytest
 from gateway.main import main
 from ml.store import Store
 from ml.store import sessions as stored
-from ml.store.sessions import UNTOLD, Session
+from ml.store.sessions import UNREAD, UNTOLD, Session
 from ml.training.recorded import recorded
 from server_gui.core.archive.library import look
 from server_gui.core.cloud import spool_reader
 from server_gui.core.cloud.recordings import Recordings
+from server_gui.core.cloud.tape import Tape
 from server_gui.core.recording.errors import Damaged
 from server_gui.core.recording.recorder import Recorder
 from server_gui.core.recording.records import Facts
@@ -23,10 +24,17 @@ from server_gui.core.recording.rows import Record
 from server_gui.core.recording.spool import Spool
 from server_gui.core.recording.upload import send
 from server_gui.core.settings.server_file import RecordingSettings, ServerSettings, StoreSettings
+from server_gui.views.recordings.sessions import facts_text
 from tests.support.waiting import WAIT_S
 from tests.unit.recording.robots import CHANNELS, batch, description
 
 ROWS = 50
+AWAY = "s3://nowhere/store"
+REFUSED = {
+    "AWS_ENDPOINT_URL": "http://127.0.0.1:9",
+    "AWS_ACCESS_KEY_ID": "key",
+    "AWS_SECRET_ACCESS_KEY": "secret",
+}
 
 
 def record(folder: Path) -> str:
@@ -85,6 +93,30 @@ def test_a_session_that_is_told_of_in_the_spool_is_listed_once(tmp_path: Path, f
     assert (session.rows, session.notes, session.uploaded) == (ROWS, "", True)
     [shown] = look(ServerSettings({}, StoreSettings(folder_url), RecordingSettings(spool=tmp_path))).sessions
     assert (shown.rows, shown.notes, shown.uploaded) == (ROWS, "", True)
+
+
+def test_while_the_store_is_away_the_rest_of_a_session_is_not_called_lost(
+    tmp_path: Path, folder_url: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    name, settings = (
+        record(tmp_path),
+        ServerSettings({}, StoreSettings(AWAY), RecordingSettings(spool=tmp_path)),
+    )
+    for variable, value in REFUSED.items():
+        monkeypatch.setenv(variable, value)
+    [shown] = look(settings).sessions
+    assert (shown.session, shown.notes) == (name, UNREAD)
+    [session] = Recordings(AWAY, tmp_path).sessions()
+    assert session.notes == UNREAD
+    tape = Tape.open(settings, shown)
+    assert tape.is_partial
+    said = facts_text(shown, tape, "", ())
+    assert "Began: not known while the store is not reached" in said
+    assert "Length: not known while the store is not reached" in said
+    assert "only what is still on this computer; the store is not reached" in said
+    assert "no gaps" not in said
+    here = ServerSettings({}, StoreSettings(folder_url), RecordingSettings(spool=tmp_path))
+    assert not Tape.open(here, shown).is_partial, "nothing was uploaded yet, so all of it is here"
 
 
 def _row(session: Session) -> Record:

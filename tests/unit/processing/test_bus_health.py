@@ -14,6 +14,7 @@ from server_gui.core.processing.bus_health import (
     BusHealthLevel,
     findings,
     level,
+    rated,
     seen,
     talking,
     trouble,
@@ -150,3 +151,11 @@ def test_what_several_nodes_have_is_said_once() -> None:
         (f"left hip, left knee: {LOST.words}", LOST.check),
         ("right knee: 5 % of its PDOs are missing", ""),
     ]
+
+
+def test_a_count_that_grows_is_told_by_the_page_alone_and_each_finding_has_its_own_level() -> None:
+    silent = FindingInfo(1, "it answers no SDO, 7 requests in a row", "switch it off and on")
+    bus = replace(BUS, load_percent=100.0, nodes=[replace(NODE, findings=[silent])])
+    assert rated(bus)[1] == (BusHealthLevel.WARNING, f"left knee: {silent.words}", silent.check)
+    assert rated(bus)[0][0] is BusHealthLevel.ALARM
+    assert (trouble(bus) or ("", ""))[0].endswith("left knee: it answers no SDO")
