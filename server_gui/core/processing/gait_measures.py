@@ -55,8 +55,8 @@ class Gait:
 
     Whether somebody walks is None while too little was seen to say so: no whole stride, and no pause either.
 
-    `cadence_spm` is in steps a minute, None before a few strides. `symmetry` is left against right, 0 where both are alike
-    (`symmetry_index`), of step time, stance and swing.
+    `cadence_spm` is in steps a minute, None before a few strides. `symmetry` is left against right, 0 where
+    both are alike (`symmetry_index`), of step time, stance and swing.
     """
 
     walking: bool | None = None
