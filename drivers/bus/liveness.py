@@ -126,7 +126,7 @@ class NodeLife:
             if words is not None:
                 return words
             silent_s = (self.silent_ms(now_ns) or 0) / 1000
-            return f"its heartbeat is missing for {silent_s:.1f} s: check the node's power and cable"
+            return f"its heartbeat has been missing for {silent_s:.1f} s: check the node's power and cable"
         # After a boot-up message alone nobody knows: a node may start itself.
         if self.nmt_state in (NmtState.STOPPED, NmtState.PRE_OPERATIONAL):
             return f"it is {self.nmt_state.words} (NMT) and sends no PDOs until its master starts it"

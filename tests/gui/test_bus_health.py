@@ -58,7 +58,7 @@ def test_load_counters_and_who_talks_stand_there(view: BusHealthView, bench: Ben
     assert view.cards[0].load.text() == "41 % of 1 Mbit/s"
     assert view.cards[0]._counters.accessibleDescription().startswith("1010 frames/s, 4 error frames")
     assert row(view, 0) == ["2", "left knee", "90 %", "900", "TPDO 900/s", "0.4 / 12.0 ms", "3", "0.0 %"]
-    assert row(view, 1)[:4] == ["no node", "", "10 %", "100"]
+    assert row(view, 1)[:4] == ["no known node", "", "10 %", "100"]
     assert not view.said.isVisible()
 
 

@@ -23,7 +23,7 @@ from server_gui.views.widgets.scroll_area import ScrollArea
 from server_gui.views.widgets.stride_curves import CYCLE
 from tests.gui.fakes import Bench, Parts, destroy
 from tests.gui.rules import settle
-from tests.support.desk import looked
+from tests.support.desk import looked, walking
 from tests.unit.evidence.synthetic import cycles, spell
 from tests.unit.evidence.test_comparison import ERROR, times
 from tests.unit.evidence.test_file import told
@@ -117,7 +117,7 @@ def test_a_trial_that_counts_down_says_what_it_does_so_far(
     bench: Bench, parts: Parts, word: Word | None
 ) -> None:
     said = {
-        Word.FEW: "too early to judge it: 49 gait cycles before, 3 since; it takes 8 of each leg",
+        Word.FEW: "too early to judge it: 49 gait cycles before, 3 since; it takes 8 of each leg, before and",
         Word.WORSE: "so far worse: left knee tracking error RMS +19.2 %",
         None: "once the wearer walks",
     }
@@ -131,6 +131,17 @@ def test_a_trial_that_counts_down_says_what_it_does_so_far(
         bench.station.judged.take(replace(known, evidence=found))
     parts.trial.refresh()
     assert said[word] in parts.trial.words.text()
+
+
+def test_of_somebody_who_walks_a_new_trial_is_not_judged_yet(bench: Bench, parts: Parts) -> None:
+    bench.station.writing.trial = Trial(
+        1, {"gait.step_length": 0.4}, {"gait.step_length": 0.3}, time.monotonic_ns() + 10**10
+    )
+    bench.look_again([walking(1000), looked()])
+    assert bench.station.processing.derived().gait.walking
+    parts.trial.refresh()
+    assert "not judged yet" in parts.trial.words.text()
+    assert "once the wearer walks" not in parts.trial.words.text()
 
 
 @pytest.mark.parametrize(
@@ -226,10 +237,10 @@ def test_what_has_ended_is_told_as_over_and_its_later_strides_as_such(bench: Ben
     counts = replace(known.evidence, cycles_before=49, cycles_after=41, cycles_back=9)
     bench.station.judged.take(replace(known, evidence=counts))
     parts.edits.refresh()
-    assert parts.edits.list.item(0).text().endswith("reverted · was worse")
+    assert parts.edits.list.item(0).text().endswith("taken back · was worse")
     said = parts.edits.verdict.text()
     assert said.endswith("was worse (40 gait cycles before and 9 since it was taken back, 41 with it)")
-    assert "strides after its revert are grey, too" in parts.edits._legend.text()
+    assert "strides since it was taken back are grey, too" in parts.edits._legend.text()
 
 
 def test_strides_are_read_where_the_pointer_is(bench: Bench, parts: Parts) -> None:

@@ -21,13 +21,17 @@ def reset(bench: Bench, state: float, quality: str = "ok") -> None:
     bench.look_again([looked(state=quality, problem="late")])
 
 
-def test_a_warning_leads_after_a_reset_with_how_to_go_on_beside_it(around: Around, bench: Bench) -> None:
+def test_after_a_reset_how_to_go_on_is_said_with_a_warning_that_is_not_its_cause_beside_it(
+    around: Around, bench: Bench
+) -> None:
     reset(bench, 6.0, "stale")
     settle(around, bench)
     assert around.alarms.told[0][1].alarm.kind is Kind.RESET
     assert around.alarms._icon.mark == bench.station.mark
     said = around.alarms.accessibleDescription()
-    assert said.startswith("component stale: left knee: late (stop reset)")
+    assert said.startswith(
+        "stop reset: enable the drives to go on · also component stale: left knee: late; since "
+    )
     assert "to go on: enable the drives" in said
 
 

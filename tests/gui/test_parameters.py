@@ -309,7 +309,7 @@ def test_what_is_outside_is_refused_before_it_is_staged(panel: ParametersPanel, 
     panel.refresh()
     assert bench.station.edits.staged == {}
     assert panel.banner.text() == (
-        "gait.step_length: 900 mm is not staged, it is above the largest allowed, 600 mm"
+        "gait.step_length: 900 mm is not staged: it is above the largest allowed, 600 mm"
     )
     panel.stage_text("gait.step_length", "520")
     panel.refresh()

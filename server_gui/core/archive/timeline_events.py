@@ -1,11 +1,21 @@
 """The events of one recording for its time axis: marks, the robot's journal, and changes of its drives."""
 
+import copy
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Future
 from typing import Any, Final
 
 from server_gui.core.cloud.tape import Rows, Tape
-from server_gui.core.desk.flags import Entry, Flag, Flags, StateWatch, of_events, of_recorded_journal
+from server_gui.core.desk.flags import (
+    Entry,
+    Flag,
+    FlagKind,
+    Flags,
+    StateWatch,
+    code_of,
+    of_events,
+    of_recorded_journal,
+)
 from server_gui.core.threads.answers import Deliver, when_done
 
 PIECE_NS: Final = (
@@ -55,25 +65,37 @@ class TimelineEvents:
         """Return the last before an instant."""
         return next((flag for flag in reversed(list(self.flags)) if flag.at_ns < before_ns), None)
 
-    def _look(self, tape: Tape, words: Words, watch: StateWatch) -> None:
+    def _look(self, tape: Tape, words: Words, watch: StateWatch, *, coded: bool = False) -> None:
+        """Look through a piece: with the drives' error codes only where one falls into a fault."""
         begin_ns, states = self.until_ns, [name for name in tape.units if name in words]
         if not states or begin_ns > tape.last_ns:
             self.until_ns = tape.last_ns + 1
             return
+        codes = _codes(tape, states) if coded else []
         when_done(
-            self._read(lambda: tape.read(begin_ns, begin_ns + PIECE_NS, states)),
+            self._read(lambda: tape.read(begin_ns, begin_ns + PIECE_NS, [*states, *codes])),
             self._deliver,
-            lambda rows: self._looked(tape, words, watch, rows),
+            lambda rows: self._looked(tape, words, watch, rows, coded=coded),
             lambda error: self._failed(watch, error),
         )
 
-    def _looked(self, tape: Tape, words: Words, watch: StateWatch, rows: Rows) -> None:
+    def _looked(self, tape: Tape, words: Words, watch: StateWatch, rows: Rows, *, coded: bool) -> None:
         if watch is self._watch:  # what was asked before the same recording was opened again is not
             columns = {name: column.tolist() for name, column in rows.columns.items()}
-            self.flags.add(*watch.take(rows.utc_ns.tolist(), columns, words))
+            before = copy.deepcopy(watch)
+            found = list(watch.take(rows.utc_ns.tolist(), columns, words))
+            if not coded and _codes(tape, columns) and any(flag.kind is FlagKind.FAULT for flag in found):
+                self._watch = before
+                self._look(tape, words, before, coded=True)
+                return
+            self.flags.add(*found)
             self.until_ns += PIECE_NS
             self._look(tape, words, watch)
 
     def _failed(self, watch: StateWatch, error: Exception) -> None:
         if watch is self._watch:
             self.problem = str(error)
+
+
+def _codes(tape: Tape, states: Iterable[str]) -> list[str]:
+    return [code for state in states if (code := code_of(state)) in tape.units]

@@ -6,11 +6,15 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any, Final
 
+from drivers.error_codes import error_text
 from ml.store.labels import utc_ns
 from server_gui.core.recording.batching import EventKind
 
 Entry = Mapping[str, Any]
 KEPT: Final = 500
+SOON_NS: Final = 1_000_000_000  # after a fault: then its code is of it
+ASKED_FOR: Final = "asked for"  # with no word of by whom
+TAKEN_BACK: Final = "taken back"  # as the robot's journal has it
 JUST_BEFORE_NS: Final = 200_000_000  # flags of one kind and text so near each other are one
 
 
@@ -85,14 +89,17 @@ class StateWatch:
         columns: Mapping[str, Sequence[float | None]],
         words: Mapping[str, Mapping[str, str]],
     ) -> Iterator[Flag]:
-        """Yield what these rows bring."""
-        found: dict[tuple[int, FlagKind], list[str]] = {}
+        """Yield what these rows bring; of a fault its code, where a row tells that soon."""
+        found: dict[tuple[int, FlagKind, str], list[str]] = {}
         for channel in columns.keys() & words.keys():
             if channel.endswith(".state"):
                 for at_ns, kind in self._turns(stamps_ns, channel, columns[channel], words[channel]):
-                    found.setdefault((at_ns, kind), []).append(_spoken(channel))
-        for (at_ns, kind), joints in sorted(found.items(), key=lambda item: item[0][0]):
-            yield Flag(at_ns, f"{', '.join(sorted(joints))}: {_HOW[kind]}", kind)
+                    codes = columns.get(code_of(channel), ()) if kind is FlagKind.FAULT else ()
+                    found.setdefault((at_ns, kind, _code(stamps_ns, codes, at_ns)), []).append(
+                        _spoken(channel)
+                    )
+        for (at_ns, kind, code), joints in sorted(found.items(), key=lambda item: item[0][0]):
+            yield Flag(at_ns, f"{', '.join(sorted(joints))}: {_HOW[kind]}{code}", kind)
 
     def _turns(
         self,
@@ -143,10 +150,27 @@ def _of_entry(entry: Entry, clock: str) -> Iterator[Flag]:
 
 
 def _said(entry: Entry) -> str:
-    """Who did what: the parameters of a write, the reason of a stop."""
+    """Who did what, and why: the parameters of a write, the reason of a stop."""
     after, what, who = entry.get("after"), str(entry.get("what")), entry.get("who")
-    about = ", ".join(map(str, after)) if isinstance(after, Mapping) else str(entry.get("reason") or "")
-    return " ".join(filter(None, (what, about, f"by {who}" if who else "")))
+    about = ", ".join(map(str, after)) if isinstance(after, Mapping) else ""
+    why = "" if about else str(entry.get("reason") or "")
+    why = "as somebody asked for" if why == ASKED_FOR else why
+    by = "" if what == TAKEN_BACK or not who else f"by {who}"  # by itself, whoever has asked for it
+    return ": ".join(filter(None, (" ".join(filter(None, (what, about, by))), why)))
+
+
+def code_of(channel: str) -> str:
+    """Return the channel of a drive's error code, by that of its state."""
+    return f"{channel.removesuffix('.state')}.error_code"
+
+
+def _code(stamps_ns: Sequence[int], codes: Sequence[float | None], at_ns: int) -> str:
+    """Return the first error code from an instant on, in words; a drive may tell it a little later."""
+    soon = (
+        code for stamp_ns, code in zip(stamps_ns, codes, strict=False) if 0 <= stamp_ns - at_ns <= SOON_NS
+    )
+    code = next((int(code) for code in soon if code and code == code), None)
+    return "" if code is None else f" {error_text(code)}"
 
 
 def _kind(word: str) -> FlagKind | None:
@@ -177,5 +201,5 @@ _ENTRIES: Final = {
     "stop": FlagKind.STOP,
     "write": FlagKind.WRITE,
     "trial confirmed": FlagKind.TRIAL,
-    "taken back": FlagKind.TRIAL,
+    TAKEN_BACK: FlagKind.TRIAL,
 }

@@ -337,8 +337,7 @@ class Station:
         self._tell_stop()
 
     def _tell_stop(self) -> None:
-        not_stopped = self.stopping.state is StopState.NOT_CONFIRMED
-        self.tell(NewsKind.NOT_STOPPED if not_stopped else NewsKind.STOP, self.stopping.text)
+        self.tell(NewsKind.NOT_STOPPED if self.stopping.is_unproven else NewsKind.STOP, self.stopping.text)
 
     def _show_stop(self, event: Telemetry) -> None:
         """Update a running STOP from the drives' states."""

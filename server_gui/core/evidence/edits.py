@@ -22,6 +22,7 @@ BEFORE_NS: Final = 120_000_000_000  # of walking before an edit
 AFTER_NS: Final = 120_000_000_000  # with the new values
 BACK_NS: Final = 60_000_000_000  # after they were taken back
 TRIAL_NS: Final = 300_000_000_000  # the longest trial that a robot takes
+BACK: Final = "taken back"  # as it is called wherever it is shown; files of evidence say `reverted`
 ID: Final = 10  # digits of the hash of the journal's entry
 
 
@@ -69,7 +70,8 @@ class Edit(Struct, frozen=True):
     @property
     def became(self) -> str:
         """Its result, in words."""
-        return f"{self.state}, NOT all of it" if self.not_back else str(self.state)
+        said = BACK if self.state is EditState.REVERTED else str(self.state)
+        return f"{said}, NOT all of it" if self.not_back else said
 
     @property
     def utc(self) -> str:

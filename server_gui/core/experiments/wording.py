@@ -31,7 +31,7 @@ def stated(plan: ExperimentPlan) -> Iterator[str]:
     yield f"  each for {each}, {left_out} after each change left out: about {minutes(plan.expected_s(1.2))}"
     yield (
         "  it ends at once, and the original value comes back, with any new alarm or warning of the guard, a "
-        "STOP, a trial that is refused or reverted, a write of others, a lost link, when nobody walks, "
+        "STOP, a trial that is refused or taken back, a write of others, a lost link, when nobody walks, "
         "beyond the bounds, and when you say so"
     )
 

@@ -80,9 +80,11 @@ class RobotNews:
             self._drives[joint] = word
             if before is not None:
                 changed.setdefault((before, word), []).append(joint)
+        every = len(robot.names("joint"))
         for (before, word), joints in changed.items():
             kind = NewsKind.FAULT if "fault" in word else NewsKind.STATE
-            self._tell(kind, f"{', '.join(map(_spoken, joints))}: {before} → {word}")
+            whose = f"all {every} drives" if len(joints) == every > 2 else ", ".join(map(_spoken, joints))
+            self._tell(kind, f"{whose}: {before} → {word}")
         self._look_at_errors(robot)
 
     def _look_at_errors(self, robot: Robot) -> None:

@@ -185,7 +185,7 @@ def talking(bus: BusInfo) -> list[Talking]:
 
 def _names(one: Talking) -> str:
     known = ", ".join(name.replace("_", " ") for name in one.names)
-    nameless = "frames of no node" if one.node_id is None else f"node {one.node_id}"
+    nameless = "frames of no known node" if one.node_id is None else f"node {one.node_id}"
     return f"{known or nameless} {100 * one.share:.0f} %"
 
 

@@ -12,6 +12,8 @@ LONGEST_STRIDE_NS = 3_500_000_000  # who takes longer has stood in between
 WALKING_NS = 2_500_000_000  # since the last heel strike; who takes longer has stopped
 UNSEEN_NS = 500_000_000  # a gap in which a step may have been made
 FEWEST = 5  # strides for a variability
+STEADY = 4  # strides of both legs for a cadence: who has only begun to walk has none yet
+PAUSED = 1.4  # of the median stride time; who takes longer has stood within that stride
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,8 +55,8 @@ class Gait:
 
     Whether somebody walks is None while too little was seen to say so: no whole stride, and no pause either.
 
-    `cadence_spm` is in steps a minute. `symmetry` is left against right, 0 where both are alike
-    (`symmetry_index`), of step time, stance and swing.
+    `cadence_spm` is in steps a minute, None before a few strides. `symmetry` is left against right, 0 where
+    both are alike (`symmetry_index`), of step time, stance and swing.
     """
 
     walking: bool | None = None
@@ -117,7 +119,16 @@ class GaitMeasures:
             return Gait(walking=False)
         if now_ns - newest_ns > WALKING_NS:
             return Gait()
-        return summary({leg: found.strides for leg, found in self._legs.items()})
+        return summary(_without_pauses({leg: list(found.strides) for leg, found in self._legs.items()}))
+
+
+def _without_pauses(strides: Mapping[Leg, list[Stride]]) -> dict[Leg, list[Stride]]:
+    """Return the strides of one walk without those that span a stop or the walk's start."""
+    times_s = [stride.time_s for taken in strides.values() for stride in taken]
+    if len(times_s) < STEADY:
+        return dict(strides)
+    longest_s = PAUSED * statistics.median(times_s)
+    return {leg: [one for one in taken if one.time_s <= longest_s] for leg, taken in strides.items()}
 
 
 def summary(strides: Mapping[Leg, Iterable[Stride]]) -> Gait:
@@ -125,7 +136,8 @@ def summary(strides: Mapping[Leg, Iterable[Stride]]) -> Gait:
     found = {leg: list(strides.get(leg, ())) for leg in Leg}
     legs = {leg: _leg_gait(taken) for leg, taken in found.items()}
     both = [stride for taken in found.values() for stride in taken]
-    step_s = _mean(stride.step_s for stride in both)
+    steps_s = [stride.step_s for stride in both if stride.step_s is not None]
+    step_s = _mean(steps_s) if len(steps_s) >= STEADY else None
     sides = {name: [getattr(legs[leg], name) for leg in Leg] for name in SYMMETRIES}
     return Gait(
         walking=True if both else None,

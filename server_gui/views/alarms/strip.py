@@ -15,6 +15,7 @@ from server_gui.views.alarms.words import (
     Told,
     details,
     fewer,
+    going_on,
     headline,
     key_of,
     leading,
@@ -172,9 +173,7 @@ class AlarmStrip(ClickableFrame):
             fuller: tuple[str, ...] = (rest,)
         else:
             mark, lead = leading(first, self.told)
-            more = "" if lead is first else first[1].alarm.mark.word
-            wordings = tuple(headline(lead, named=self.named, more=more, brief=brief) for brief in range(3))
-            wordings = wordings[:1] if first[1].alarm.kind is Kind.NOT_STOPPED else wordings
+            wordings = self._wordings(first) if lead is first else self._after_reset(first, lead)
             fuller = fewer(details(first[1], now_s(first[0])))
         self._icon.show_mark(mark)
         set_tone(self, mark.colour)
@@ -184,6 +183,15 @@ class AlarmStrip(ClickableFrame):
         if said_now != self._said:
             self._said = said_now
             self._fit(wordings, fuller)
+
+    def _wordings(self, told: Told) -> tuple[str, ...]:
+        """Return its line for less and less room; nothing is cut of why a stop is not confirmed."""
+        said = tuple(headline(told, named=self.named, brief=brief) for brief in range(3))
+        alarm = told[1].alarm
+        return said[: 2 if alarm.aside else 1] if alarm.kind is Kind.NOT_STOPPED else said
+
+    def _after_reset(self, told: Told, worse: Told) -> tuple[str, ...]:
+        return going_on(told, worse[1].alarm, named=self.named)
 
     def _fit(self, wordings: tuple[str, ...], fuller: tuple[str, ...]) -> None:
         room = self._words.viewport().size()

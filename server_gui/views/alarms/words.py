@@ -5,7 +5,7 @@ import time
 from collections.abc import Iterable
 from typing import Final
 
-from server_gui.core.alarms.alarm import Active
+from server_gui.core.alarms.alarm import Active, Alarm
 from server_gui.core.alarms.marks import age_text
 from server_gui.core.alarms.texts import Kind
 from server_gui.core.desk.recording import Recording
@@ -41,7 +41,7 @@ def quiet(station: Station | None, recording: Recording | None = None) -> tuple[
 
 
 def leading(told: Told, beside: Iterable[Told]) -> tuple[Mark, Told]:
-    """Return the state that leads, and whose line says it: the worst, as on the robot's card.
+    """Return the state that leads, and what is in it: the worst, as on the robot's card.
 
     A reset says how to go on, before warnings of its robot; it is not how that robot is.
     """
@@ -50,6 +50,16 @@ def leading(told: Told, beside: Iterable[Told]) -> tuple[Mark, Told]:
         return one.alarm.mark, told
     others = (each for each in beside if each[0] is station and each[1] is not one)
     return station.mark, min(others, key=lambda each: each[1].alarm.rank, default=told)
+
+
+def going_on(told: Told, worse: Alarm, *, named: bool) -> tuple[str, ...]:
+    """Return how to go on after a reset, and what else is wrong: neither is the other's cause or remedy."""
+    station, one = told
+    where = f"{worse.mark.word}: {worse.spoken}" if worse.spoken else worse.mark.word
+    whose = f"{station.title} · " if station and named else ""
+    first = f"{whose}{one.alarm.mark.word}: enable the drives to go on"
+    last = "" if worse.is_now else " (last known)"
+    return tuple(f"{first} · also {also}{last}" for also in dict.fromkeys((worse.line, where)))
 
 
 def headline(told: Told, *, named: bool, more: str = "", brief: int = 0) -> str:

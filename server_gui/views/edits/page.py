@@ -54,7 +54,7 @@ COLOURS: Final = "grey before, in colour after; {}the bands are one standard dev
 EDIT: Final = re.compile(
     r"(\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d)Z \([0-9a-f]+\)"
 )  # when, and its id for the command
-BACK: Final = "strides after its revert are grey, too: they have the old value; "
+BACK: Final = "strides since it was taken back are grey, too: they have the old value; "
 
 
 class Edits(QWidget):

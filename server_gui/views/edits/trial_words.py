@@ -7,7 +7,6 @@ from gateway.amounts import counted
 from gateway.units import Units
 from server_gui.core.desk.station import Station
 from server_gui.core.evidence.comparison import FEWEST, Evidence, Word
-from server_gui.core.evidence.file import EditEvidence
 from server_gui.core.evidence.wording import share
 from server_gui.core.tuning.edits import unit_of
 from server_gui.core.tuning.writing import Trial
@@ -39,13 +38,15 @@ def why_no_ab(trial: Trial) -> str:
     return "" if count == 1 else AB_OF_ONE.format(count)
 
 
-def so_far(edit: EditEvidence | None) -> tuple[str, ...]:
+def so_far(station: Station) -> tuple[str, ...]:
     """Return its effect so far in one clause: `so far worse: left knee tracking error RMS +45.0 %`.
 
     Then the same for where there is less and less room.
     """
+    edit = station.trial_evidence
     if edit is None:
-        return "its effect shows once the wearer walks", "not judged yet"
+        walks = station.is_live and station.processing.derived().gait.walking
+        return ("not judged yet",) if walks else ("its effect shows once the wearer walks", "not judged yet")
     evidence = edit.evidence
     if evidence.word is Word.FEW:
         said = _not_enough(evidence)
@@ -70,9 +71,9 @@ def _not_enough(evidence: Evidence) -> str:
         return f"cannot be judged so far: {[*left_out, *evidence.notes, UNLIKE][0]}"
     if after >= 2 * FEWEST > before:
         need = f"{counted(before, 'gait cycle')}, and it takes {FEWEST} of each leg"
-        return f"too few cycles before it: {need}; those after its revert count, too"
+        return f"too few cycles before it: {need}; those after it is taken back count, too"
     strides = f"{counted(before, 'gait cycle')} before, {after} since"
-    return f"too early to judge it: {strides}; it takes {FEWEST} of each leg on both sides"
+    return f"too early to judge it: {strides}; it takes {FEWEST} of each leg, before and since"
 
 
 def ends(trial: Trial) -> str:

@@ -139,7 +139,7 @@ class NowLine(QFrame):
         units = self._desk.shown.units
         tip = "\n".join(changes(station, trial, units))
         back = ends(trial)
-        seen = tuple(f"{back}; {words}" for words in so_far(station.trial_evidence))
+        seen = tuple(f"{back}; {words}" for words in so_far(station))
         self.trial.say(ON_TRIAL, wordings(station, trial, units), (*seen, back), tip)
         why_not = why_no_ab(trial)
         self.ab.setEnabled(not why_not)

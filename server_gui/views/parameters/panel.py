@@ -131,7 +131,7 @@ class ParametersPanel(QWidget):
         held = station.robot.parameters.get(name)
         why = refusal(value, None if held is None else held.value, station.known[name], unit)
         if why is not None:
-            self._problem = f"{name}: {text.strip()} {unit.symbol}".rstrip() + f" is not staged, it is {why}"
+            self._problem = f"{name}: {text.strip()} {unit.symbol}".rstrip() + f" is not staged: it is {why}"
             return
         self.stage(name, value)
 

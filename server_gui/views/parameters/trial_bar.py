@@ -70,7 +70,7 @@ class TrialBar(QFrame):
         self._bar.setValue(round(left_s * 10))
         whose = "" if station is self._desk.selected else f"{station.title}: "
         said = ", ".join(changes(station, trial, self._desk.shown.units))
-        seen = so_far(station.trial_evidence)[0]
+        seen = so_far(station)[0]
         set_text(self.words, f"{whose}on trial: {said}; {ends(trial)}; {seen}")
 
     def _whose(self, *, shown: bool) -> Station | None:

@@ -64,7 +64,7 @@ TITLES: Final = (
 )
 SPARE: Final = (4, 5, 6, 3)  # left out in this order where there is less room; kinds stand above, too
 NUMBERS: Final = (2, 3, 5, 6, 7)
-NOBODY: Final = "no node"
+NOBODY: Final = "no known node"
 TOO_OLD: Final = "The robot's gateway does not report its buses: it is an older version."
 NOT_NOW: Final = "The state of the buses is not known now."
 

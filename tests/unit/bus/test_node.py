@@ -247,7 +247,7 @@ def test_a_heartbeat_that_stays_away_is_told_while_sdo_works(
         fake.heartbeat()
         until(lambda: gait.node.life.heartbeats)
         until(lambda: state(gait) is ComponentState.LOST)
-        until(lambda: "its heartbeat is missing for" in problem(gait))
+        until(lambda: "its heartbeat has been missing for" in problem(gait))
         assert gait.node.upload(0x1000, 0).result(WAIT_S)
 
         def is_back() -> bool:

@@ -57,7 +57,7 @@ def test_what_waited_while_we_stood_still_was_not_missing() -> None:
     assert not life.lost(reader.now_ns)
     reader.runs(1200)
     assert life.lost(reader.now_ns), "it has stayed away while we were there"
-    assert "its heartbeat is missing for 2.2 s" in (life.problem(reader.now_ns) or "")
+    assert "its heartbeat has been missing for 2.2 s" in (life.problem(reader.now_ns) or "")
 
 
 def test_a_standstill_is_not_told_for_ever_where_every_look_is_a_little_late() -> None:
@@ -88,9 +88,9 @@ def test_who_was_silent_before_is_not_explained_by_standing_still() -> None:
     reader.runs(1000)
     for _ in range(5):
         reader.stands(300)
-        assert "its heartbeat is missing" in (life.problem(reader.now_ns) or "")
+        assert "its heartbeat has been missing" in (life.problem(reader.now_ns) or "")
         reader.runs()
-        assert "its heartbeat is missing" in (life.problem(reader.now_ns) or "")
+        assert "its heartbeat has been missing" in (life.problem(reader.now_ns) or "")
 
 
 def test_a_period_is_not_learned_from_heartbeats_that_waited() -> None:

@@ -103,6 +103,8 @@ def test_a_master_guards_a_node_that_has_no_heartbeat(
             quality = gait.quality(time.monotonic_ns())
             if answers:
                 return quality.state is ComponentState.OK and gait.node.life.heartbeats >= 8
-            return quality.state is ComponentState.LOST and "heartbeat is missing" in str(quality.problem)
+            return quality.state is ComponentState.LOST and "heartbeat has been missing" in str(
+                quality.problem
+            )
 
         until(lambda: asked >= 10 and is_as_it_should(), step=guard)

@@ -24,6 +24,7 @@ from server_gui.core.desk.station import Station
 from server_gui.core.follow.events import BusesSeen, Described, Event, Journalled, LinkChanged, Looked
 from server_gui.core.follow.frame_time import one_moment
 from server_gui.core.follow.news import News, NewsKind
+from server_gui.core.follow.robot_news import RobotNews
 from tests.support.desk import JOINTS, Bench, described, looked, telemetry, walking
 
 CAUSE = "0x2310 continuous overcurrent at the output (register: generic, current)"
@@ -285,6 +286,18 @@ def test_a_drive_that_a_stop_has_stopped_before_the_window_notes_it_was_not_off_
     proofs = bench.station.stopping.proofs
     assert set(proofs) == set(JOINTS)
     assert not any(proof.was_so for proof in proofs.values())
+
+
+def test_what_every_drive_does_at_once_is_one_short_event(bench: Bench) -> None:
+    told: list[str] = []
+    news = RobotNews(lambda _kind, text, _about="": told.append(text))
+    for event in (states(4.0), states(5.0), states(5.0, left_knee=4.0)):
+        bench.station.take([event])
+        news.look(bench.station.robot)
+    assert [text for text in told if "→" in text] == [
+        "all 6 drives: operation enabled → quick stop active",
+        "left knee: quick stop active → operation enabled",
+    ]
 
 
 def test_the_result_of_a_stop_does_not_hide_a_fault(bench: Bench) -> None:

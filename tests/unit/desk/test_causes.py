@@ -96,7 +96,7 @@ def test_a_short_stall_is_told_only_of_what_it_explains() -> None:
 
 @pytest.mark.parametrize("kind", [Kind.IMPLAUSIBLE, Kind.REPORTS, Kind.FAULT])
 def test_a_node_that_has_gone_stands_above_those_that_miss_its_heartbeat(kind: Kind) -> None:
-    lost = active(Kind.LOST, "left_knee", 100.0, "its heartbeat is missing for 2.2 s", "main")
+    lost = active(Kind.LOST, "left_knee", 100.0, "its heartbeat has been missing for 2.2 s", "main")
     others = [
         active(kind, "gait", 100.1, HEARTBEAT, "main"),
         active(Kind.BUS, "bus.main", 101.0, "32 error frames in the last 10 s"),
@@ -117,7 +117,7 @@ def test_a_node_that_has_gone_stands_above_those_that_miss_its_heartbeat(kind: K
     ],
 )
 def test_what_a_node_that_has_gone_does_not_explain_stands_for_itself(other: Active) -> None:
-    lost = active(Kind.LOST, "left_knee", 100.0, "its heartbeat is missing for 2.2 s", "main")
+    lost = active(Kind.LOST, "left_knee", 100.0, "its heartbeat has been missing for 2.2 s", "main")
     assert [one.alarm.key for one in gathered([other, lost], (), 105.0)] == [other.alarm.key, lost.alarm.key]
 
 

@@ -4,6 +4,7 @@ import datetime
 
 import msgspec
 
+from drivers.error_codes import error_text
 from server_gui.core.desk.flags import (
     Flag,
     FlagKind,
@@ -64,11 +65,42 @@ def test_the_journal_tells_stops_writes_and_trials_of_this_boot() -> None:
         entry("control acquired", 9),
     ]
     assert list(of_journal(entries, "b")) == [
-        Flag(5, "stop F12 by jkim", FlagKind.STOP),
+        Flag(5, "stop by jkim: F12", FlagKind.STOP),
         Flag(6, "write gait.step by jkim", FlagKind.WRITE),
         Flag(7, "write a.b", FlagKind.TRIAL),
     ]
     assert [flag.at_ns for flag in of_recorded_journal(entries)] == [50, 60, 70, 80]
+
+
+def test_a_trial_that_the_robot_took_back_is_told_with_why() -> None:
+    entries = [
+        entry("taken back", 5, who="gateway", reason="its time was over"),
+        entry("taken back", 5, who="gateway", reason="asked for"),
+        entry("stop", 6, who="guard", reason="knee_heat: 71 N·m"),
+    ]
+    assert [flag.text for flag in of_journal(entries, "b")] == [
+        "taken back: its time was over",
+        "taken back: as somebody asked for",
+        "stop by guard: knee_heat: 71 N·m",
+    ]
+
+
+def test_a_fault_is_flagged_with_the_code_that_its_drive_tells_soon() -> None:
+    columns: dict[str, list[float | None]] = {
+        "left_knee.state": [4.0, 7.0, 7.0],
+        "left_knee.error_code": [0.0, 0.0, 0x2310],
+        "right_knee.state": [4.0, 7.0, 7.0],
+        "right_knee.error_code": [0x2310, None, 0.0],
+        "right_hip.state": [4.0, 4.0, 5.0],
+        "right_hip.error_code": [0.0, 0.0, 0x2310],
+    }
+    assert {flag.text for flag in StateWatch().take([10 * MS, 20 * MS, 30 * MS], columns, WORDS)} == {
+        f"left knee: fault {error_text(0x2310)}",
+        "right knee: fault",
+        "right hip: quick stop",
+    }
+    late = StateWatch().take([0, 1 * MS, 3000 * MS], columns, WORDS)
+    assert "left knee, right knee: fault" in {flag.text for flag in late}
 
 
 def test_marks_and_rules_of_a_recording_are_flags() -> None:

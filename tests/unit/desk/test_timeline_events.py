@@ -44,8 +44,13 @@ class FaultTape:
     def read(self, begin_ns: int, end_ns: int, channels: list[str]) -> Rows:
         self.asked.append(tuple(channels))
         utc_ns = np.arange(max(begin_ns, self.first_ns), min(end_ns, self.last_ns + 1), SECOND_NS)
-        states = np.where(utc_ns < BEGIN_NS + 360 * SECOND_NS, 4.0, 7.0)
-        return Rows(utc_ns, utc_ns - BEGIN_NS, dict.fromkeys(channels, states))
+        is_well = utc_ns < BEGIN_NS + 360 * SECOND_NS
+        codes = {name: (0.0, 0x2310) if name.endswith(".error_code") else (4.0, 7.0) for name in channels}
+        return Rows(
+            utc_ns,
+            utc_ns - BEGIN_NS,
+            {name: np.where(is_well, before, since) for name, (before, since) in codes.items()},
+        )
 
 
 def at_once(work: Callable[[], Any]) -> "Future[Any]":
@@ -66,8 +71,11 @@ def test_a_fault_anywhere_in_a_recording_is_found_by_its_drives_states_alone() -
     assert [(flag.kind, flag.at_ns - BEGIN_NS) for flag in happened.flags] == [
         (FlagKind.FAULT, 360 * SECOND_NS)
     ]
-    assert set(tape.asked) == {("left_knee.state",)}
-    assert len(tape.asked) == 1 + 600 * SECOND_NS // PIECE_NS
+    assert [flag.text for flag in happened.flags] == [f"left knee: fault {error_text(0x2310)}"]
+    states, coded = ("left_knee.state",), ("left_knee.state", "left_knee.error_code")
+    assert set(tape.asked) == {states, coded}
+    assert tape.asked.count(states) == 1 + 600 * SECOND_NS // PIECE_NS
+    assert tape.asked.count(coded) == 1, "only of the piece with the fault"
     assert not happened.is_looking
 
 

@@ -134,14 +134,14 @@ def test_what_did_not_come_back_is_said_and_no_stretch_of_before() -> None:
         told[2]["outcome"], told[3]["outcome"] = {NAME: said}, {"left_hip.max_torque": "taken back"}
         edits.take(told)
         (edit,) = edits.all
-        assert (edit.ended_ns, edit.became) == (231 * SECOND, "reverted, NOT all of it")
+        assert (edit.ended_ns, edit.became) == (231 * SECOND, "taken back, NOT all of it")
         assert edit.not_back == (f"{NAME}: {said}",)
         assert len(spell(edit, edits.all)[0].before) == 1
     edits = JournalEdits("exo-01")
     told = _entries((200, "write", 1), (201, "trial begun", 1), (231, "taken back", 1))
     told[2]["outcome"] = {NAME: "unchanged"}
     edits.take(told)
-    assert (edits.all[0].became, len(spell(edits.all[0], edits.all)[0].before)) == ("reverted", 2)
+    assert (edits.all[0].became, len(spell(edits.all[0], edits.all)[0].before)) == ("taken back", 2)
 
 
 def test_a_replayed_tail_changes_nothing() -> None:

@@ -100,7 +100,7 @@ def test_the_worst_bus_is_said_with_its_load_its_errors_and_who_talks_most() -> 
 def test_frames_of_no_node_are_said_to_take_most_of_a_bus() -> None:
     injected = TalkInfo("other", None, 9000.0)
     _, wordings = worst(robot(replace(BUS, load_percent=97.0, talks=[*BUS.talks, injected])))
-    assert wordings[0].endswith(" · most: frames of no node 91 %")
+    assert wordings[0].endswith(" · most: frames of no known node 91 %")
     unlisted = TalkInfo("other", 12, 9000.0)
     _, wordings = worst(robot(replace(BUS, load_percent=24.0, talks=[*BUS.talks, unlisted])))
     assert wordings[0].endswith(" · most: node 12 90 %")

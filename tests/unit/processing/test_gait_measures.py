@@ -121,6 +121,25 @@ def test_another_walk_begins_anew() -> None:
     assert measures.now(round(105e9)).cadence_spm == pytest.approx(60.0)
 
 
+def test_whoever_has_only_begun_to_walk_has_no_cadence_yet() -> None:
+    said = []
+    measures = GaitMeasures()
+    for one in walk(4, stride_s=1.6, right_after=0.8):
+        measures.take(one)
+        said.append(measures.now(one.stamp_ns))
+    assert any(gait.walking and gait.cadence_spm is None for gait in said)
+    assert {round(gait.cadence_spm) for gait in said if gait.cadence_spm is not None} == {75}
+
+
+def test_a_stride_in_which_somebody_stood_is_no_part_of_the_cadence() -> None:
+    first = [event(Leg.LEFT, STRIKE, -2.4), event(Leg.RIGHT, STRIKE, -2.3), event(Leg.LEFT, OFF, -0.5)]
+    measures, strides = taken([*first, event(Leg.RIGHT, OFF, 0.3), *walk(4, stride_s=1.6, right_after=0.8)])
+    assert max(stride.time_s for stride in strides) > 2.0
+    gait = measures.now(round(4 * 1.6e9))
+    assert gait.cadence_spm == pytest.approx(75.0)
+    assert gait.legs[Leg.LEFT].stride_s == pytest.approx(1.6)
+
+
 def test_running_has_no_double_support() -> None:
     strides = taken(walk(6, stance=0.4))[1]
     assert [stride.double_support for stride in strides] == [None] * len(strides)
