@@ -46,6 +46,7 @@ class Models:
     ) -> None:
         self.url = url
         self.reach = reach or StoreReach()  # of the store
+        self.knock: Callable[[], None] = lambda: None  # see at once whether it is reached
         self.found = Catalogue()
         self.revision = 0
         self.looked_s: float | None = None  # when the newest look came back, on our monotonic clock
