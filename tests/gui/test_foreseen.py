@@ -284,7 +284,7 @@ def test_rules_that_hold_and_devices_in_trouble_stand_beside(window: Parts, stat
     assert [text.partition(" · ")[0] for text in texts] == [
         "Balance: Fall 97 %",
         "Rule alarm",
-        "left knee: not to be believed",  # the word of its alarm
+        "left knee: unreliable",  # the word of its alarm
     ]
     assert texts[2].endswith("i²t at 83 %")
 
@@ -302,5 +302,5 @@ def test_what_was_said_when_a_recording_was_made_is_said_to_be_of_then(
     walks = predicted("walk", WALKS).prediction
     station.predictions.recalled = {"activity": Recalled(walks, 0.1)}
     shown(window, lambda: window.overview._ring._word == "Walk 94 %")
-    said = "said then by model 3fa2 of activity · else turn 4 %"
+    said = "said then by the activity model · else turn 4 %"
     shown(window, lambda: window.overview.now.activity.detail.text() == said)

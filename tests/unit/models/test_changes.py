@@ -40,7 +40,8 @@ def test_a_promotion_says_what_serves_now_and_what_will(registry: Registry) -> N
     one, other = publish(registry), publish(registry, 1)
     first = promotion(registry.url, one.id, "")
     assert first.sentences[0] == (
-        "Serves now: no promoted model; until then a robot is served by what came with GWRMS and fits it."
+        "Serves now: no promoted model; robots use the model that came with GWRMS, "
+        "where it fits their sensors."
     )
     assert registry.history("falling") == []
     carry_out(registry.url, first, "Ada", "a test")
