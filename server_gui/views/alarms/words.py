@@ -28,7 +28,7 @@ def quiet(station: Station | None, recording: Recording | None = None) -> tuple[
     if station is None:
         return Mark("ring", "dim"), "No robot", ""
     if station.robot.is_recording:
-        return Mark("diamond", "accent"), "A recording", "no fault shown"
+        return Mark("diamond", "accent"), "No alarm then", "in the recording, at this instant"
     if not station.is_live or not station.robot.parts:
         return Mark("ring", "old"), "Alarms not known", "no live data"
     if station.mark.colour in ("warn", "bad", "old"):  # as its card says
