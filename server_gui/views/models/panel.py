@@ -95,7 +95,8 @@ class ModelsPage(QWidget):
         self._show_learned()
         entry = self.chosen
         trained = None if entry is None else models.trained.get(entry.card.id)
-        judged = "" if trained is None else f"Training has judged it: {trained.said}"
+        is_said = trained is None or trained.said in self._models.said  # above already
+        judged = "" if trained is None or is_said else f"Training has judged it: {trained.said}"
         self.compare.show_entry(entry, models.found, judged)
         self.confirm.refresh()
         self.form.refresh()

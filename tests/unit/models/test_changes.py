@@ -183,7 +183,7 @@ def test_what_was_judged_not_better_is_not_promoted(desk: Desk, registry: Regist
     desk.models.trained[model] = Trained(model, "not better", ("macro_f1 on held-out people: 0.5",))
     desk.models.ask_promotion(model, "")
     assert desk.models.tone is Tone.BAD
-    assert "is not better: F1, mean over classes, on held-out people: 0.5" in desk.models.said
+    assert "is not better: F1 on held-out people: 0.5" in desk.models.said
     assert not desk.models.said.startswith("Looking")
     assert registry.history("falling") == []
 
