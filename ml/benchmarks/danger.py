@@ -39,7 +39,7 @@ LEVELS: Final = {Level.EARLY: "early", Level.ADVICE: "advice", Level.ALARM: "ala
 WHY: Final = (
     "synthetic: wearers of gwrms sim-record --scenario dangers, judged by weights and thresholds of others"
     " (sim-danger) or by those that ship (sim-danger-shipped,"
-    " learned from 301-318 of seed 23 and 401-410 of 24)."
+    " learned from 301-318 of seed 23, 401-410 of 24 and healthy days of 601-612 of 31)."
     " Foreseen: advice at least 0.3 s before harm in the simulator's truth. …_low and …_high: 95 % intervals;"
     " stops_per_100_h_upper is the one-sided 95 % bound (3 / hours where none was seen);"
     " …_extrapolated what an exponential tail of this recording's own healthy blocks makes of it."

@@ -1,5 +1,7 @@
 """States as shapes: draws what `server_gui.core.alarms.marks` calls them."""
 
+from typing import Final
+
 from PySide6.QtCore import QPointF, QRectF
 from PySide6.QtGui import QBrush, QColor, QPainter, QPen, QPolygonF
 
@@ -17,6 +19,7 @@ from server_gui.core.desk.station import Station
 
 __all__ = [
     "NEWS",
+    "SHORTER",
     "STATES",
     "STILL_ENABLED",
     "Mark",
@@ -26,6 +29,16 @@ __all__ = [
     "enabled_text",
     "state_mark",
 ]
+
+# Where there is no room for a state's own words.
+SHORTER: Final = {
+    "operation enabled": "enabled",
+    "switch on disabled": "disabled",
+    "ready to switch on": "ready",
+    "quick stop active": "quick stop",
+    "STOP NOT CONFIRMED": "NOT CONFIRMED",
+    "ANOTHER ROBOT ANSWERS": "ANOTHER ROBOT",
+}
 
 
 def old_text(station: Station) -> tuple[str, ...]:

@@ -154,7 +154,8 @@ def doing(station: Station) -> tuple[str, ...]:
     short = line.short_text
     cadence = f"{line.text}{between}{gait.cadence_spm:.0f} steps/min" if walks else short
     least = f"{PROBABLE.sub('', short)} · {count.replace(' of ', '/')}"
-    return tuple(dict.fromkeys((f"{cadence} · {count}", f"{short} · {count}", least, count)))
+    fewest = count.replace(" of ", "/").replace(" enabled", "") if "," in count else count
+    return tuple(dict.fromkeys((f"{cadence} · {count}", f"{short} · {count}", least, count, fewest)))
 
 
 def lines(station: Station) -> Iterator[PredictionRow]:

@@ -49,6 +49,7 @@ def broken(window: QWidget) -> Iterator[str]:
     yield from (f"nameless: {one}" for one in nameless(window, every))
     yield from (f"no room for: {one}" for one in cut_words(window, sight))
     yield from (f"no room for the title: {one}" for one in cut_titles(window, sight))
+    yield from (f"state cut: {one}" for one in cut_states(sight))
 
 
 def green(window: QWidget, theme: Theme) -> list[str]:
@@ -81,7 +82,11 @@ def halved_numbers(window: QWidget, sight: Iterable[QWidget] | None = None) -> l
         if (
             isinstance(widget, QLabel)
             and _has_number(widget)
-            and (_is_cut(widget) or not (_is_inside(widget, window) or _is_scrolled(widget)))
+            and (
+                _is_cut(widget)
+                or _is_clipped(widget)
+                or not (_is_inside(widget, window) or _is_scrolled(widget))
+            )
         ):
             found.append(f"{_path(widget)}: {widget.text()}")
         if isinstance(widget, ShrinkingLabel) and DIGIT.search(widget.shown) and not widget.is_whole:
@@ -120,13 +125,26 @@ def cut_titles(window: QWidget, sight: Iterable[QWidget] | None = None) -> list[
     ]
 
 
+def cut_states(sight: Iterable[QWidget]) -> Iterator[str]:
+    """Every worst state of a robot, on its card or in the header, of which letters have no room."""
+    for widget in sight:
+        if isinstance(widget, Chip) and widget._words.shorter:
+            label, word = widget._detail, widget._words.shorter
+            wide = label.fontMetrics().horizontalAdvance(label.text())
+            if word not in label.text() or wide > label.contentsRect().width():
+                yield f"{_path(widget)}: {label.text()} for {word}"
+        elif isinstance(widget, RobotCard) and not widget._state.is_whole:
+            yield f"{_path(widget)}: {widget._state.shown}"
+
+
 def out_of_reach(window: QWidget, every: Iterable[QWidget] | None = None) -> list[str]:
     """Every control that is not whole on the screen, and to which nothing scrolls."""
     found = []
     for widget in shown(window) if every is None else every:
         if not widget.focusPolicy() & Qt.FocusPolicy.TabFocus:
             continue
-        if not _is_inside(widget, window) and not _is_scrolled(widget) and not _is_behind(widget):
+        is_lost = not _is_inside(widget, window) and not _is_scrolled(widget)
+        if (is_lost or _is_clipped(widget)) and not _is_behind(widget):
             found.append(f"{_path(widget)} at {widget.mapTo(window, widget.rect().topLeft()).toTuple()}")
     return found
 
@@ -204,6 +222,23 @@ def _is_scrolled(widget: QWidget) -> bool:
     while parent is not None:
         if isinstance(parent, QScrollArea | QAbstractItemView | QAbstractScrollArea):
             return True
+        parent = parent.parentWidget()
+    return False
+
+
+def _is_clipped(widget: QWidget) -> bool:
+    """Whether it is cut at the side by a view that does not scroll there."""
+    parent = widget.parentWidget()
+    while parent is not None:
+        off = Qt.ScrollBarPolicy.ScrollBarAlwaysOff
+        if isinstance(parent, QScrollArea) and parent.horizontalScrollBarPolicy() is off:
+            view = parent.viewport()
+            ends = (
+                widget.mapTo(view, corner).x()
+                for corner in (widget.rect().topLeft(), widget.rect().bottomRight())
+            )
+            if not all(0 <= x < view.width() for x in ends):
+                return True
         parent = parent.parentWidget()
     return False
 

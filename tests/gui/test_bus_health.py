@@ -7,7 +7,9 @@ import pytest
 from msgspec.structs import replace
 
 from gateway.wire.bus import BusInfo, NodeInfo, TalkInfo
-from server_gui.core.follow.events import BusesSeen
+from gateway.wire.component import QualityInfo, Snapshot
+from gateway.wire.finding import FindingInfo
+from server_gui.core.follow.events import BusesSeen, Described, Looked
 from server_gui.core.processing.bus_health import TAKEN
 from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.frame.status_bar import StatusBar
@@ -15,7 +17,7 @@ from server_gui.views.refresh_rate import SLOW
 from server_gui.views.resources.bus_health import NOT_NOW, TOO_OLD, BusHealthView
 from server_gui.views.theme import Theme
 from tests.gui.fakes import Bench, destroy
-from tests.support.desk import walking
+from tests.support.desk import described, looked, walking
 
 NODE = NodeInfo(2, ["left_knee"], 0.44, 12.0, 88, 3, 0, 0.0)
 TALKS = [TalkInfo("TPDO", 2, 900.0), TalkInfo("SYNC", None, 100.0)]
@@ -125,3 +127,31 @@ def test_page_and_alarms_tell_of_a_full_bus_in_the_same_frame(window: MainWindow
                 )
                 assert on_page is any(TAKEN in text for text in window.alarms.texts), (before, load)
     assert on_page
+
+
+def test_page_and_last_line_give_one_fact_one_severity(
+    view: BusHealthView, bar: StatusBar, bench: Bench
+) -> None:
+    known = described().description
+    parts = [
+        replace(one, device={"node_id": 2, "bus": "main"}) if one.name == "left_knee" else one
+        for one in known.components
+    ]
+    lost: QualityInfo = {"state": "lost", "age_ms": 900.0, "problem": "its heartbeat is missing"}
+    whole = looked()
+    bench.station.take([Described(replace(known, components=parts)), walking(50)])
+    bench.look_again([Looked(Snapshot(0, {}, {}, {"left_knee": lost}), whole.parameters, whole.at_ns)])
+    errors = FindingInfo(1, "32 error frames in the last 10 s", "check termination")
+    show(view, bench, replace(BUS, nodes=[replace(NODE, pdos_missing_percent=4.4)]))
+    show(view, bench, replace(BUS, findings=[errors], nodes=[NODE]))  # none is missing any more
+    first, *others = view.said.text().splitlines()
+    assert first.startswith("ALARM: lost: left knee")
+    assert others == [
+        "warning: bus main: 32 error frames in the last 10 s",
+        "warning: bus main: left knee: 4 % of its PDOs are missing",
+    ]
+    assert row(view, 0)[-1] == "4.4 %", "the table says of a node what the line above says of it"
+    assert view.cards[0]._bar._colour == "accent", "the load is as good as ever"
+    bar.refresh()
+    assert bar._bus_icon.accessibleName() == "ALARM"
+    assert bar.bus.text() == "CAN main 41 %: lost left knee"

@@ -5,6 +5,7 @@ import pytest
 from server_gui.core.archive.archive import Archive
 from server_gui.core.settings.server_file import ServerSettings
 from server_gui.views.recordings.player import SIGNALS, Player
+from server_gui.views.recordings.timeline import clock_text
 from tests.gui.archives import Shown, play, record
 
 FAULT_S = 5.0
@@ -79,3 +80,29 @@ def test_its_signal_is_shown_before_and_after_the_fault(
     at_s = (at_ns - newest_ns) / 1e9
     assert left == pytest.approx(at_s - 5.0, abs=0.2)
     assert right == pytest.approx(at_s + 5.0, abs=0.2)
+
+
+def test_clock_and_alarm_are_of_the_instant_that_a_jump_leads_to(
+    shown: Shown, archive: Archive, player: Player
+) -> None:
+    to_the_fault(shown, archive, player)
+    shown.draw()
+    playback, tape = archive.playback, archive.playback.tape
+    assert tape is not None
+    for seconds, told in ((FAULT_S - 3.0, False), (FAULT_S + 1.0, True)):
+        player._frame = 1  # the next look at what people read is some frames away
+        playback.seek(tape.first_ns + round(seconds * 1e9))
+        player.refresh()
+        assert not playback.is_loading
+        assert player.place.text().startswith(clock_text(seconds, 1))
+        assert bool(player.alarms.told) is told
+
+
+def test_a_recording_that_stands_still_is_said_to_be_paused_alone(
+    shown: Shown, archive: Archive, player: Player
+) -> None:
+    to_the_fault(shown, archive, player)
+    player._choice.button(SIGNALS).click()
+    player.signals.pause.click()
+    shown.draw()
+    assert player.signals.said.text() == "Paused"

@@ -5,9 +5,10 @@ import time
 from gateway.client import ConnectionState, NotConnected
 from server_gui.core.follow.events import LinkChanged
 from server_gui.views.frame.main_window import MainWindow
+from tests.gui import rules
 from tests.gui.fakes import Around, Bench
 from tests.gui.faulty import fault, settle
-from tests.support.desk import described, looked, walking
+from tests.support.desk import JOINTS, described, looked, walking
 
 
 def test_each_stop_names_its_robot_and_all_says_all(around: Around, bench: Bench) -> None:
@@ -50,3 +51,23 @@ def test_a_card_has_the_same_word_as_the_header_where_it_is_narrow(window: MainW
     card = window.robots.cards[0]
     assert "STOP NOT CONFIRMED" in card._state.shown
     assert card._state.is_whole
+
+
+def test_a_card_is_never_wider_than_its_list(window: MainWindow, bench: Bench) -> None:
+    rows = walking(300)
+    rows.batch.columns[f"{JOINTS[0]}.state"] = [None] * len(rows.batch.stamps_ns)
+    bench.look_again([rows, looked()])
+    window.resize(1366, 768)
+    settle(window, bench)
+    assert "not known" in window.robots.cards[0].texts[3]
+    assert not list(rules.out_of_reach(window.robots))
+    assert window.robots.cards[0]._doing.is_whole
+
+
+def test_the_worst_state_is_never_cut_on_card_and_header(window: MainWindow, bench: Bench) -> None:
+    bench.station.stop("test")
+    bench.first.fail(NotConnected("there is no link"))
+    for width in (1024, 1366, 1920):
+        window.resize(width, 768)
+        settle(window, bench)
+        assert not list(rules.cut_states(rules.seen(window))), width

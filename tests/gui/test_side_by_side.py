@@ -1,5 +1,7 @@
 """Two recordings in the same plots: played together, aligned by their beginnings or by a heel strike."""
 
+import threading
+
 import numpy as np
 import pytest
 
@@ -96,7 +98,10 @@ def test_by_a_heel_strike_their_strides_lie_over_each_other_and_one_that_cannot_
 
 
 def _cannot_be_read(shown: Shown, player: Player, monkeypatch: pytest.MonkeyPatch) -> None:
+    threads = list[str]()
+
     def broken(*_: object) -> None:
+        threads.append(threading.current_thread().name)
         raise OSError("the disk is away")
 
     session = player.beside.session
@@ -106,3 +111,7 @@ def _cannot_be_read(shown: Shown, player: Player, monkeypatch: pytest.MonkeyPatc
     shown.until(lambda: player.beside.problem, "told why not")
     shown.draw()
     assert "the disk is away" in player.beside_bar.said.text()
+    assert threads[0].startswith("playback"), "a store that hangs must not keep anybody from looking at it"
+    player.beside.close()
+    player.beside_bar.refresh()
+    assert not player.beside_bar.isVisible()

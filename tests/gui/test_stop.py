@@ -16,13 +16,14 @@ from gateway.wire.stop import Reset, Stopped
 from server_gui.core.follow.events import LinkChanged
 from server_gui.core.tuning.stop import Sent, StopProgress, StopState
 from server_gui.views.confirmation import Question
-from server_gui.views.frame.header import Header
+from server_gui.views.frame.header import Header, _outcome
 from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.frame.stop_keys import StopKeys
 from server_gui.views.robots.reset import ask_clear
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.stop_button import StopButton
 from tests.gui.fakes import Bench, destroy, stop_is_whole
+from tests.gui.faulty import CAUSE, fault
 from tests.support.desk import JOINTS, described, looked, walking
 
 ALL = Stopped(dict.fromkeys(JOINTS, "confirmed"), held=True)
@@ -173,6 +174,15 @@ def test_a_fault_that_stays_after_it_was_cleared_is_shown_and_can_be_cleared_aga
     assert any(one.windowTitle().startswith("Clear the fault") for one in header.findChildren(Question))
 
 
+def test_the_question_whether_to_clear_a_fault_names_it(header: Header, bench: Bench) -> None:
+    fault(bench)
+    asked = ask_clear(header, bench.station)
+    first, named, *_ = asked.words.text().splitlines()
+    assert first == "Clear the fault of exo-01?"
+    assert named == f"left knee: {CAUSE}"
+    assert "this moves nothing" in asked.words.text()
+
+
 def test_what_is_known_of_the_drives_is_said_before_a_fault_is_cleared(header: Header, bench: Bench) -> None:
     def said() -> str:
         asked = ask_clear(header, bench.station)
@@ -276,6 +286,40 @@ def test_a_stop_is_timed_where_it_is_sent_however_late_the_window_notes_it() -> 
     assert time.time() - (stopping.since_s or 0.0) >= 2.9
     stopping.show([sent.at_ns + 20_000_000], {"left_knee": ["quick stop active"]}, offset_ns=0)
     assert stopping.proofs["left_knee"].when == "20 ms"
+
+
+def test_the_times_of_one_stop_do_not_contradict_each_other() -> None:
+    stopping, at_ns, joints = StopProgress(), time.monotonic_ns(), list(JOINTS)
+    number = stopping.sent(at_ns=at_ns)
+    stopping.show([at_ns + 181_000_000], {joints[0]: ["quick stop active"]}, offset_ns=0)
+    stopping.answered(number, ALL, at_ns + 119_000_000)
+    late: dict[str, list[str | None]] = {joint: ["quick stop active"] for joint in joints[1:]}
+    stopping.show([at_ns + 181_000_000], late, offset_ns=0)
+    assert stopping.text.endswith("drives in 119 ms")
+    assert stopping.proof.endswith("within 119 ms")
+    assert {proof.when for proof in stopping.proofs.values()} == {"119 ms"}
+
+
+def test_an_answer_that_comes_after_the_drives_have_stopped_is_called_an_answer(
+    window: MainWindow, bench: Bench
+) -> None:
+    stopping, at_ns = bench.station.stopping, time.monotonic_ns()
+    number = stopping.sent(at_ns=at_ns)
+    rows: dict[str, list[str | None]] = {joint: ["quick stop active"] for joint in JOINTS}
+    stopping.show([at_ns + 183_000_000], rows, offset_ns=0)
+    stopping.answered(number, ALL, at_ns + 1_001_000_000)
+    assert stopping.text == f"STOP confirmed by all {len(JOINTS)} drives, answer after 1001 ms"
+    assert stopping.proof.endswith("within 183 ms")
+    window.refresh()
+    assert "6 drives, answer after 1001 ms" in _outcome(bench.station).parts
+
+
+def test_an_answer_says_nothing_of_a_drive_that_has_not_confirmed_the_stop() -> None:
+    stopping, at_ns = StopProgress(), time.monotonic_ns()
+    number = stopping.sent(at_ns=at_ns)
+    stopping.answered(number, Stopped({"left_knee": "unreachable"}, held=True), at_ns + 100_000_000)
+    stopping.show([at_ns + 900_000_000], {"left_knee": ["quick stop active"]}, offset_ns=0)
+    assert stopping.proofs["left_knee"].when == "900 ms"
 
 
 def test_a_name_that_has_room_beside_the_word_is_not_cut(theme: Theme) -> None:

@@ -3,14 +3,23 @@
 import shutil
 from pathlib import Path
 
+import pytest
+
 from server_gui.core.alarms.texts import Kind
 from server_gui.core.archive import library
+from server_gui.core.archive.archive import Archive
 from server_gui.core.archive.library import Library
 from server_gui.core.cloud.store_reach import AGAIN_S, KNOWN_S, LOOK_S, Reach, StoreReach
+from server_gui.core.desk.desk import Desk
+from server_gui.core.desk.recording import By, Recording
+from server_gui.core.follow.news import NewsKind
 from server_gui.core.settings.server_file import ServerSettings
-from tests.gui.test_recording import AWAY, FakeKeeper, looked, report
+from tests.gui.fakes import Bench
+from tests.gui.test_recording import AWAY, FakeKeeper, looked, report, settled
 from tests.support.waiting import WAIT_S, until
 from tests.unit.cloud.recordings import record
+
+DAMAGED = "file:///lab/sessions has files and no _delta_log"
 
 
 class Clock:
@@ -89,6 +98,86 @@ def test_what_waits_is_uploaded_as_soon_as_the_store_is_back() -> None:
     reach.looked(None)
     assert keeper.asked == ["upload"]
     assert recording.alarms.active, "until the upload has succeeded"
+
+
+def test_one_keeper_is_asked_once_however_often_its_recording_is_set_and_a_replaced_one_not_at_all() -> None:
+    desk = Desk()
+    old, new = (FakeKeeper(report(problem=AWAY, waiting=3)) for _ in range(2))
+    recording, replacing = looked(old)[0], looked(new)[0]
+
+    def away_and_back() -> None:
+        desk.reach.looked(AWAY)
+        desk.reach.looked(None)
+
+    for _ in range(2):
+        desk.recording = recording
+    away_and_back()
+    assert (old.asked, len(recording.on_mark)) == (["upload"], 1)
+    desk.recording = replacing
+    away_and_back()
+    assert (old.asked, new.asked) == (["upload"], ["upload"])
+    assert (len(recording.on_mark), len(replacing.on_mark)) == (0, 1)
+    recording._reported(old, report(problem="of the replaced one"))
+    assert desk.reach.upload_problem is None
+
+
+def test_an_upload_to_a_store_that_is_back_says_why_it_was_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    keeper, reach = FakeKeeper(report(problem=AWAY, waiting=3)), StoreReach(Clock())
+    recording, news = looked(keeper)
+    recording.rely_on(reach)
+    refused = OSError("its door is shut")
+    monkeypatch.setattr(keeper, "upload", lambda: settled(refused))
+    reach.looked(AWAY)
+    reach.looked(None)
+    assert next(item.text for item in news.items if item.kind is NewsKind.WARNING) == "its door is shut"
+
+
+def test_a_list_that_cannot_be_read_stays_told_until_it_was_read_and_is_no_store_that_was_away() -> None:
+    reach, back = StoreReach(Clock()), list[str]()
+    reach.on_return.append(lambda: back.append("back"))
+    reach.listed(DAMAGED)
+    for _ in range(2):
+        reach.looked(None)
+        assert (reach.state, reach.is_known, reach.trouble) == (Reach.UNREADABLE, False, DAMAGED)
+    assert back == []
+    reach.looked(AWAY)
+    assert (reach.state, reach.trouble) == (Reach.AWAY, AWAY)
+    reach.looked(None)
+    assert (reach.state, back) == (Reach.UNREADABLE, ["back"])
+    reach.listed(None)
+    assert (reach.state, back) == (Reach.REACHED, ["back"])
+
+
+def test_a_damaged_list_does_not_come_and_go_with_the_first_file_and_is_looked_at_without_a_page(
+    settings: ServerSettings, tmp_path: Path, bench: Bench
+) -> None:
+    record(settings.store.url, settings.recorder.spool)
+    log = tmp_path / "store" / "sessions" / "_delta_log"
+    shutil.move(log, tmp_path / "log")
+    archive, states, reach = (
+        Archive(settings, bench.desk, lambda call: call()),
+        list[Reach](),
+        bench.desk.reach,
+    )
+    keeper = FakeKeeper(report())
+    bench.desk.recording = Recording(By.WINDOW, keeper, lambda call: call(), bench.desk.news)
+
+    def look() -> None:
+        """As time passes with no page open that lists."""
+        reach.looked_s, archive.library.looked_s = reach.looked_s and 0.0, archive.library.looked_s and 0.0
+        archive.look()
+        until(lambda: reach.looked_s)
+        states.append(reach.state)
+
+    for _ in range(4):
+        look()
+    assert states == [Reach.REACHED, *[Reach.UNREADABLE] * 3]
+    assert "_delta_log" in reach.said
+    assert keeper.asked == []
+    shutil.move(tmp_path / "log", log)
+    look()
+    assert reach.state is Reach.REACHED
+    assert archive.close(WAIT_S)
 
 
 def test_a_knock_sees_a_folder_that_has_gone_and_that_is_back(

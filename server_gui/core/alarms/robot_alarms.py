@@ -21,6 +21,7 @@ from server_gui.core.processing import bus_health
 from server_gui.core.tuning.stop import StopProgress, StopState
 
 EVERY_OFF: Final = "every drive is off"
+STILL_MOVING: Final = "still moving: STOP again"
 OFF: Final = frozenset({"switch on disabled"})
 MOVES: Final = 0.1  # rad/s: what turns faster is not at rest
 SOON_NS: Final = 3_000_000_000  # for so long a link without a row is nothing strange
@@ -90,9 +91,16 @@ def _found(facts: Facts) -> Iterator[Alarm]:
 def _of_stop(robot: Robot, stopping: StopProgress) -> Iterator[Alarm]:
     if stopping.state is StopState.NOT_CONFIRMED:
         now, moving = _after_unconfirmed(robot), _is_live(robot) and _moving(robot)
-        what = f"still moving: STOP again; the STOP before failed: {stopping.why}" if moving else stopping.why
-        check = remedy(robot)
-        yield Alarm(Kind.NOT_STOPPED, "", what, did=now, check=check, since_s=stopping.since_s)
+        what = STILL_MOVING if moving else stopping.why
+        yield Alarm(
+            Kind.NOT_STOPPED,
+            "",
+            what,
+            did=now,
+            check=remedy(robot),
+            since_s=stopping.since_s,
+            aside=f"the STOP before failed: {_then(stopping.why)}" if moving else "",
+        )
     elif stopping.held:
         what, by = stopping.said
         yield Alarm(
@@ -109,6 +117,11 @@ def _of_stop(robot: Robot, stopping: StopProgress) -> Iterator[Alarm]:
         yield Alarm(
             Kind.RESET, "", what, check=check_of(Kind.RESET, role=role_of(robot)), since_s=stopping.since_s
         )
+
+
+def _then(why: str) -> str:
+    """Return why a STOP failed, said when that is past: there is a link again."""
+    return "there was no link" if why.startswith("there is no link") else why
 
 
 def role_of(robot: Robot) -> str | None:

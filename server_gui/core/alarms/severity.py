@@ -27,12 +27,28 @@ def colour_of(subject: str, alarms: Alarms, otherwise: str = "bad") -> str:
 
 def bus_level(own: BusHealthLevel, bus: str, alarms: Alarms) -> BusHealthLevel:
     """Return how bad a bus is: no better than the alarms about it and about its nodes."""
-    told = [
-        alarm.mark.colour for alarm in alarms.each if bus in (alarm.node, alarm.subject.removeprefix("bus."))
-    ]
+    told = [alarm.mark.colour for alarm in _on(bus, alarms)]
     if "bad" in told:
         return BusHealthLevel.ALARM
     return BusHealthLevel.WARNING if "warn" in told and own is not BusHealthLevel.ALARM else own
+
+
+def worsened_by(own: BusHealthLevel, bus: str, alarms: Alarms) -> Alarm | None:
+    """Return the alarm of a node by which a bus is worse than by itself; None where it is not."""
+    if (bad := bus_level(own, bus, alarms)) is own:
+        return None
+    colour = "bad" if bad is BusHealthLevel.ALARM else "warn"
+    of_nodes = (
+        alarm
+        for alarm in _on(bus, alarms)
+        if alarm.mark.colour == colour and not alarm.subject.startswith("bus.")
+    )
+    return min(of_nodes, key=lambda alarm: alarm.rank, default=None)
+
+
+def _on(bus: str, alarms: Alarms) -> list[Alarm]:
+    """About a bus or its nodes."""
+    return [alarm for alarm in alarms.each if bus in (alarm.node, alarm.subject.removeprefix("bus."))]
 
 
 def _since(alarms: Alarms, item: Item) -> Iterator[Alarm]:

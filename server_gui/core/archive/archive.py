@@ -39,10 +39,10 @@ class Archive:
         self.file = file
         self.library = Library(settings, deliver, desk.reach)
         self.journals = KeptJournals(settings, self.library.reading.do, deliver)
-        self._reading = Background("playback")
-        self.playback = Playback(self._reading.do, deliver, desk.shown)
-        self.compared = RecordingComparison(settings, self._reading.do, deliver)
-        self.labels = SessionLabels(settings, self._reading.do, deliver, author)
+        self.reading = Background("playback")  # what is played, alone or beside; a look never waits for it
+        self.playback = Playback(self.reading.do, deliver, desk.shown)
+        self.compared = RecordingComparison(settings, self.reading.do, deliver)
+        self.labels = SessionLabels(settings, self.reading.do, deliver, author)
         self.jobs = Jobs(lambda job: deliver(lambda: self._over(job)))
         self.models = Models(
             settings.store.url, deliver, self._robots, author, settings.promoters, desk.reach
@@ -56,20 +56,25 @@ class Archive:
 
     def close(self, within_s: float) -> bool:
         """End everything; False where something hangs, which only the end of the process ends."""
-        ended = [part.close(within_s) for part in (self.jobs, self.models, self.library, self._reading)]
+        ended = [part.close(within_s) for part in (self.jobs, self.models, self.library, self.reading)]
         return all(ended)
 
     def look(self) -> None:
         """See now and then whether the store is reached, where something is to go there or was away."""
-        if self._desk.recording.by is not By.NOBODY or self._desk.reach.problem is not None:
+        reach = self._desk.reach
+        if self._desk.recording.by is By.NOBODY and reach.problem is None and reach.list_problem is None:
+            return
+        if reach.looked_s is None or self.library.is_listed:
             self.library.knock()
+        else:
+            self.library.look()
 
     def choose(self, session: Session | None) -> None:
         """Look into this session; its tape comes when it has been read."""
         self.chosen, self.tape, self.problem = session, None, ""
         if session is not None:
             when_done(
-                self._reading.do(lambda: Tape.open(self.settings, session)),
+                self.reading.do(lambda: Tape.open(self.settings, session)),
                 self.deliver,
                 lambda tape: self._opened(session, tape),
                 lambda error: self._failed(session, error),

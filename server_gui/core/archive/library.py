@@ -3,7 +3,7 @@
 import time
 from collections.abc import Mapping
 from concurrent.futures import Future
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import msgspec
@@ -22,6 +22,7 @@ from server_gui.core.threads.background import Background
 
 LOOK_S: Final = 10.0  # between looks, while somebody looks
 AGAIN_S: Final = 5.0  # before a store that was away is tried again
+LIST_S: Final = 300.0  # between looks while nobody looks
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +34,7 @@ class Found:
     size_bytes: int = 0
     problem: str | None = None
     is_empty: bool = False  # there is no store yet: nothing was uploaded
+    is_reached: bool = True  # else `problem` is why not; a store that is reached may have a damaged list
 
 
 class Library:
@@ -59,6 +61,11 @@ class Library:
         """Whether a look is under way."""
         return self._looking
 
+    @property
+    def is_listed(self) -> bool:
+        """Whether a look has listed the store not long ago; one that only knocks sees no damaged list."""
+        return self.looked_s is not None and time.monotonic() - self.looked_s < LIST_S
+
     def look(self, *, now: bool = False) -> None:
         """Look again where it is time, or at once."""
         wait_s = LOOK_S if self.found.problem is None else AGAIN_S
@@ -72,6 +79,9 @@ class Library:
     def knock(self, *, now: bool = False) -> None:
         """See whether the store is there, where it is time or at once: one small file of it."""
         if self._knocking or self._looking or not (now or self.reach.is_due):
+            return
+        if self.reach.list_problem is not None:
+            self.look()  # one file would not say whether its list is whole again
             return
         self._knocking = True
         settings = self.settings
@@ -96,31 +106,34 @@ class Library:
         ) or self.revision == 0:
             self.revision += 1
         self.found = found
-        self.reach.looked(found.problem, is_empty=found.is_empty)
+        if found.is_reached:
+            self.reach.listed(found.problem)
+        self._reached(found)
 
     def _failed(self, error: Exception) -> None:
         self._looked(Found(problem=f"internal error, {type(error).__name__}"))
 
     def _knocked(self, found: Found) -> None:
         self._knocking = False
-        self.reach.looked(found.problem, is_empty=found.is_empty)
+        self._reached(found)
 
     def _knock_failed(self, error: Exception) -> None:
-        self._knocked(Found(problem=f"internal error, {type(error).__name__}"))
+        self._knocked(Found(problem=f"internal error, {type(error).__name__}", is_reached=False))
+
+    def _reached(self, found: Found) -> None:
+        self.reach.looked(None if found.is_reached else found.problem, is_empty=found.is_empty)
 
 
 def look(settings: ServerSettings) -> Found:
     """Return what there is now; blocks."""
-    waiting = _waiting(settings)
+    waiting, store = _waiting(settings), _opened(settings)
+    if isinstance(store, Found):
+        here = waiting if store.problem is None else spool_reader.with_store_away(waiting)
+        return replace(store, sessions=_joined([], here))
     try:
-        store = Store.existing(settings.store.url)
         stored = sessions(store)
         used = tuple(usage.by_robot(store))
         size_bytes = sum(each.size_bytes for each in store.objects.listing())
-    except NoSuchTable:
-        gone = _gone(settings)
-        here = waiting if gone is None else spool_reader.with_store_away(waiting)
-        return Found(_joined([], here), problem=gone, is_empty=gone is None)
     except StoreError as error:
         return Found(_joined([], spool_reader.with_store_away(waiting)), problem=str(error))
     return Found(_joined(stored, waiting), used, size_bytes)
@@ -128,14 +141,19 @@ def look(settings: ServerSettings) -> Found:
 
 def knock(settings: ServerSettings) -> Found:
     """Return only whether the store is reached; blocks."""
+    store = _opened(settings)
+    return store if isinstance(store, Found) else Found()
+
+
+def _opened(settings: ServerSettings) -> Store | Found:
+    """Return the store, of which one small file has been read; else why there is none."""
     try:
-        Store.existing(settings.store.url)
+        return Store.existing(settings.store.url)
     except NoSuchTable:
         gone = _gone(settings)
-        return Found(problem=gone, is_empty=gone is None)
+        return Found(problem=gone, is_empty=gone is None, is_reached=gone is None)
     except StoreError as error:
-        return Found(problem=str(error))
-    return Found()
+        return Found(problem=str(error), is_reached=False)
 
 
 def _gone(settings: ServerSettings) -> str | None:

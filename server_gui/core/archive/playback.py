@@ -151,6 +151,7 @@ class Playback:
         self.speed = 1.0
         self.position_ns = 0
         self.problem = ""  # why there is nothing to see
+        self.wishes = 0  # how often somebody has wished to be elsewhere, or to play
         self._read = read
         self._deliver = deliver
         self._robot = PlayedRobot()
@@ -196,10 +197,12 @@ class Playback:
         """Go on, or stand still; from the beginning where it had come to the end."""
         if on and self.tape is not None and self.position_ns >= self.tape.last_ns:
             self.seek(self.tape.first_ns)
+        self.wishes += 1
         self.playing, self.problem, self._stepped_s = on, "", None
 
     def seek(self, position_ns: int) -> None:
         """Jump there, or as near as the recording goes."""
+        self.wishes += 1
         if self.tape is not None:
             self.position_ns = min(max(position_ns, self.tape.first_ns), self.tape.last_ns)
             self._fed_ns, self.problem = None, ""

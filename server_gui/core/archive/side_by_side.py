@@ -1,18 +1,22 @@
 """A second recording beside the one that is played, aligned by their beginnings or by a heel strike."""
 
+import time
 from collections.abc import Callable
 from concurrent.futures import Future
 from enum import Enum
-from typing import Any
+from typing import Any, Final
 
 from ml.store.sessions import Session
-from server_gui.core.archive.playback import LEAD_NS, Playback, PlayedRobot
+from server_gui.core.archive.playback import LEAD_NS, Piece, Playback, PlayedRobot
 from server_gui.core.cloud.tape import Tape
+from server_gui.core.desk.desk import Shown
 from server_gui.core.desk.station import Station
 from server_gui.core.processing.gait_events import EventKind, Leg
 from server_gui.core.settings.server_file import ServerSettings
 from server_gui.core.threads.answers import Deliver, when_done
 
+AGAIN_S: Final = 5.0  # before what could not be read is tried again
+CLOSED: Final = "the first recording was closed while this one was read"
 Do = Callable[[Callable[[], Any]], "Future[Any]"]
 
 
@@ -24,30 +28,70 @@ class By(Enum):
 
 
 class Followed(Playback):
-    """Is always where it is told to be, and has no time of its own."""
+    """Is always where it is told to be, and has no time of its own; what cannot be read is tried again."""
+
+    def __init__(
+        self, read: Do, deliver: Deliver, shown: Shown, clock_s: Callable[[], float] = time.monotonic
+    ) -> None:
+        super().__init__(read, deliver, shown)
+        self._clock_s = clock_s
+        self._again_s: float | None = None  # not before that
+
+    def try_again(self) -> None:
+        """Read at once what could not be read."""
+        self._again_s = None
+
+    def close(self) -> None:
+        """Show nothing more."""
+        super().close()
+        self.try_again()
 
     def follow(self, target_ns: int) -> None:
         """Show this instant; what is after its end is shown as the past that it is."""
         tape = self.tape
-        if tape is None or self.problem:
+        if tape is None:
             return
         within_ns = min(max(target_ns, tape.first_ns), tape.last_ns)
         fed_ns = self._fed_ns
         if fed_ns is not None and not fed_ns <= within_ns <= fed_ns + LEAD_NS:
             self.seek(within_ns)
+            self.try_again()
         if self._show_until(tape, within_ns):
             self.position_ns = within_ns
             self._robot.shown_ns = max(target_ns, tape.first_ns)
+
+    def _fetch(self, tape: Tape, place: int | None) -> None:
+        if self._again_s is None or self._clock_s() >= self._again_s:
+            super()._fetch(tape, place)
+
+    def _fetched(self, tape: Tape, place: int, piece: Piece) -> None:
+        super()._fetched(tape, place, piece)
+        if tape is self.tape:
+            self.problem, self._again_s = "", None
+
+    def _failed(self, tape: Tape, error: Exception) -> None:
+        super()._failed(tape, error)
+        if tape is self.tape:
+            self.problem = self.problem or type(error).__name__
+            self._again_s = self._clock_s() + AGAIN_S
 
 
 class SideBySide:
     """For the window's thread; `second` is beside `playback`, from whose beginning `offset_ns` is counted."""
 
-    def __init__(self, playback: Playback, settings: ServerSettings, do: Do, deliver: Deliver) -> None:
-        self.second = Followed(do, deliver, playback.desk.shown)
+    def __init__(
+        self,
+        playback: Playback,
+        settings: ServerSettings,
+        do: Do,
+        deliver: Deliver,
+        clock_s: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.second = Followed(do, deliver, playback.desk.shown, clock_s)
         self.session: Session | None = None  # what is beside, or is looked into
-        self.problem = ""
         self.by = By.START
+        self._not_opened = ""  # why
+        self._wishes = playback.wishes  # of the first, that the second has followed
         self._offset_ns = 0  # of the second's instants after those of the first
         self._first = playback
         self._settings = settings
@@ -67,8 +111,13 @@ class SideBySide:
 
     def close(self) -> None:
         """Put it away."""
-        self.session, self.problem, self.by = None, "", By.START
+        self.session, self._not_opened, self.by = None, "", By.START
         self.second.close()
+
+    @property
+    def problem(self) -> str:
+        """Why it is not shown, or not now; empty where it is."""
+        return self._not_opened or self.second.problem
 
     @property
     def station(self) -> Station | None:
@@ -76,9 +125,11 @@ class SideBySide:
         return self.second.desk.selected
 
     def step(self) -> None:
-        """Show what is at the instant of the first."""
+        """Show what is at the instant of the first; a jump of it, or its *play*, tries what failed again."""
+        if self._first.wishes != self._wishes:
+            self._wishes = self._first.wishes
+            self.second.try_again()
         self.second.follow(self._first.position_ns + self._offset_ns)
-        self.problem = self.problem or self.second.problem
 
     def align(self, by: By) -> str:
         """Align them; why that is not possible, else empty, and then nothing has changed."""
@@ -97,13 +148,17 @@ class SideBySide:
 
     def _opened(self, session: Session, tape: Tape) -> None:
         first = self._first.tape
-        if session is self.session and first is not None:
-            self.second.open(tape)
-            self._offset_ns = tape.first_ns - first.first_ns
+        if session is not self.session:
+            return
+        if first is None:
+            self.session, self._not_opened = None, CLOSED
+            return
+        self.second.open(tape)
+        self._offset_ns = tape.first_ns - first.first_ns
 
     def _failed(self, session: Session, error: Exception) -> None:
         if session is self.session:
-            self.problem = str(error) or type(error).__name__
+            self._not_opened = str(error) or type(error).__name__
 
 
 def _heel_strike_ns(station: Station | None) -> int | None:

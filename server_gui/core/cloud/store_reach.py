@@ -19,15 +19,20 @@ class Reach(Enum):
     REACHED = "reached"
     EMPTY = "nothing uploaded yet"
     AWAY = "not reached"
+    UNREADABLE = "reached, but its list cannot be read"
     FAILING = "an upload failed"
     OLD = "not known"
 
 
 class StoreReach:
-    """Result of the newest check, by whomever; for the window's thread."""
+    """Result of the newest check, by whomever; for the window's thread.
+
+    Whether it is reached, and whether its list can be read, are two facts: one small file tells the first.
+    """
 
     def __init__(self, clock_s: Callable[[], float] = time.monotonic) -> None:
         self.problem: str | None = None  # why it is not reached; stays until a look says otherwise
+        self.list_problem: str | None = None  # why its list cannot be read; stays until that was read
         self.upload_problem: str | None = None  # why nothing goes into it, as whoever records says
         self.looked_s: float | None = None  # on our monotonic clock
         self.on_return: list[Callable[[], None]] = []  # called when it is reached after it was not
@@ -40,6 +45,8 @@ class StoreReach:
         """What is known now; what was last seen to be away is so until it is seen again."""
         if self.problem is not None:
             return Reach.AWAY
+        if self.list_problem is not None:
+            return Reach.UNREADABLE
         if self.upload_problem is not None:
             return Reach.FAILING
         if self.looked_s is None:
@@ -51,7 +58,8 @@ class StoreReach:
     @property
     def trouble(self) -> str | None:
         """Why it cannot be relied on, whoever has noticed; None where nobody has."""
-        return self.upload_problem if self.problem is None else self.problem
+        known = (self.problem, self.list_problem, self.upload_problem)
+        return next((problem for problem in known if problem is not None), None)
 
     @property
     def age_s(self) -> float:
@@ -71,6 +79,7 @@ class StoreReach:
             Reach.REACHED: f"Reached; looked {self.age_s:.0f} s ago",
             Reach.EMPTY: f"There is no store at this URL yet (looked {self.age_s:.0f} s ago)",
             Reach.AWAY: f"Not reached, tried again by itself: {self.problem or NONE}",
+            Reach.UNREADABLE: f"Reached, but its list cannot be read: {self.list_problem or NONE}",
             Reach.FAILING: f"An upload failed, tried again by itself: {self.upload_problem or NONE}",
             Reach.OLD: f"Not known: the newest answer came {self.age_s:.0f} s ago",
         }[self.state]
@@ -78,16 +87,20 @@ class StoreReach:
     @property
     def is_due(self) -> bool:
         """Whether it is time for somebody to look."""
-        wait_s = LOOK_S if self.problem is None else AGAIN_S
+        wait_s = LOOK_S if self.problem is None and self.list_problem is None else AGAIN_S
         return self._is_doubted or self.looked_s is None or self.age_s >= wait_s
 
     def looked(self, problem: str | None, *, is_empty: bool = False) -> None:
-        """Take what a look has found."""
+        """Take whether it was reached."""
         was_away, self.problem = self.problem is not None, problem
         self.looked_s, self._is_empty, self._is_doubted = self._clock_s(), is_empty, False
         if was_away and problem is None:
             for told in self.on_return:
                 told()
+
+    def listed(self, problem: str | None) -> None:
+        """Take whether the list of a store that was reached could be read."""
+        self.list_problem = problem
 
     def uploads(self, problem: str | None) -> None:
         """Take how uploading goes; where that has changed, it is time to look."""

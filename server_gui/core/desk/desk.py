@@ -36,6 +36,7 @@ class Desk:
         self.shown = Shown()
         self.reach = StoreReach()  # of the store that is recorded into, and read from
         self._recording = Recording(By.NOBODY, None, lambda call: call(), self.news)
+        self._recording.rely_on(self.reach)
         self.pins = Pins()
         self.keep_evidence: Callable[[str, EditEvidence], None] = lambda _robot, _told: None  # on the disk
         self.adapt: Callable[[str, int, Happening], None] = lambda _robot, _number, _what: None
@@ -46,12 +47,19 @@ class Desk:
 
     @property
     def recording(self) -> Recording:
-        """What is recorded of the robots; what is marked there is flagged at each of them."""
+        """What is recorded of the robots; what is marked there is flagged at each of them.
+
+        One that is replaced relies on the store's reach no more, and marks nothing here.
+        """
         return self._recording
 
     @recording.setter
     def recording(self, recording: Recording) -> None:
-        self._recording = recording
+        old, self._recording = self._recording, recording
+        if self._marked in old.on_mark:
+            old.on_mark.remove(self._marked)
+        if recording is not old:
+            old.rely_on(StoreReach())
         recording.rely_on(self.reach)
         recording.on_mark.append(self._marked)
 

@@ -116,7 +116,12 @@ class Recording:
         self._threads: dict[By, tuple[Trouble, ...]] = {}  # by whose they are
 
     def rely_on(self, reach: StoreReach) -> None:
-        """Judge the store by this, which others look at too."""
+        """Judge the store by this, which others look at too, and by no other any more. Idempotent."""
+        if self._returned in self.reach.on_return:
+            if reach is self.reach:
+                return
+            self.reach.on_return.remove(self._returned)
+            self.reach.uploads(None)  # nobody says so any more
         self.reach = reach
         reach.on_return.append(self._returned)
 
@@ -289,7 +294,7 @@ class Recording:
             _coming(rows, [link for link in report.robots.values() if address in (None, link.address)])
             if comes
             else NOTHING,
-            *_queue(report, is_reached=self.reach.trouble is None),
+            *_queue(report, is_reached=self.reach.problem is None and self.reach.upload_problem is None),
             f"{size(report.disk_free_bytes)} free",
         ]
         detail = [*problems, f"spool {report.spool}", f"store {report.store}", self.why]
@@ -327,11 +332,12 @@ class Recording:
 
     def _returned(self) -> None:
         """Send what waits now that the store is back, not when the next attempt would be due."""
-        report, keeper = self.report, self._keeper
-        if keeper is None or report is None or report.upload is not Upload.ALWAYS:
+        report = self.report
+        if self._keeper is None or report is None or report.upload is not Upload.ALWAYS:
             return
-        if report.uploader.problem is not None:
-            keeper.upload()  # whether that helps, the next report says
+        if report.uploader.problem is not None:  # whether it helps, the next report says
+            said = NewsKind.STATE, "the store is back: what waits goes there"
+            self._ask(lambda keeper: keeper.upload(), lambda _: said)
 
     def _ask(
         self, ask: Callable[[Keeper], "Future[int]"], done: Callable[[int], tuple[NewsKind, str]]

@@ -273,8 +273,7 @@ class Station:
     def _processes(self, event: Resources) -> None:
         """Take a look at the process table; CPU and memory come from other looks."""
         self.processes, self.processes_at_ns = event.snapshot, event.at_ns
-        table = event.snapshot.processes or []
-        known = max(table, key=lambda one: one.cpu_percent or 0.0, default=None)
+        known = max(event.snapshot.processes or [], key=lambda one: one.cpu_percent or 0.0, default=None)
         self.most = None if known is None else (known, event.at_ns)
         seen = self.robot.resources
         if seen is not None:
@@ -314,13 +313,14 @@ class Station:
 
     def send_stop(self, reason: str) -> Sent:
         """Send a quick stop from any thread, at once; its answer is for `note_stop`."""
-        return Sent(time.monotonic_ns(), self._commands.stop(reason))
+        at_ns, future = time.monotonic_ns(), self._commands.stop(reason)
+        joints = self.robot.names("joint") if self.is_live else ()
+        off = {joint for joint in joints if self.robot.word(f"{joint}.state") not in (None, ENABLED)}
+        return Sent(at_ns, future, off)
 
     def note_stop(self, sent: Sent) -> None:
         """Follow what becomes of a STOP that was sent."""
-        joints = self.robot.names("joint") if self.is_live else ()
-        off = {joint for joint in joints if self.robot.word(f"{joint}.state") not in (None, ENABLED)}
-        number = self.stopping.sent(off, sent.at_ns)
+        number = self.stopping.sent(sent.off, sent.at_ns)
         when_done(
             sent.future,
             self._deliver,

@@ -3,7 +3,9 @@
 Many are told at once; few only when they stay, and both until there are none for a while.
 """
 
+import collections
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import Final
 
 from msgspec.structs import asdict, replace
@@ -12,9 +14,14 @@ from gateway.wire.bus import BusInfo, NodeInfo
 
 SOME_PERCENT: Final = 1.0  # of a node's PDOs: fewer are none
 MANY_PERCENT: Final = 2.5  # told at once
-BEGINS_NS: Final = 10_000_000_000  # a few last so long, before they are told
-ENDS_NS: Final = 10_000_000_000  # without any, and it is over
-LOST_NS: Final = 5_000_000_000  # without a look: nothing lasts over that
+SOME_LOOKS: Final = 4  # that have found a few, before they are told,
+ONE_IN: Final = 4  # and at least one in so many,
+BEGINS_NS: Final = 10_000_000_000  # and over so long
+ENDS_NS: Final = 10_000_000_000  # without any, in so many looks, and it is over
+ENDS_LOOKS: Final = 4
+LOST_NS: Final = 15_000_000_000  # without a look: nothing lasts over that
+KEPT_NS: Final = 20_000_000_000  # of looks that are judged, and at least
+KEPT_LOOKS: Final = 16  # so many, however far apart they are
 CHECK: Final = "see what keeps the robot's computer busy (gwrms blame), or take load from it"
 BUSY_PERCENT: Final = 90.0  # of the computer's cores
 
@@ -42,26 +49,58 @@ def told_words(node: NodeInfo) -> tuple[str, str]:
     return words, ""
 
 
+@dataclass(slots=True)
+class NodeHistory:
+    """What the newest looks have found of one node."""
+
+    looks: collections.deque[tuple[int, float]] = field(default_factory=collections.deque)  # when, and share
+    is_told: bool = False
+
+    def take(self, now_ns: int, percent: float) -> float:
+        """Return the share that is told after another look: the newest that is not zero."""
+        self.looks.append((now_ns, percent))
+        while len(self.looks) > KEPT_LOOKS and now_ns - self.looks[0][0] > KEPT_NS:
+            self.looks.popleft()
+        places = [place for place, (_, share) in enumerate(self.looks) if share]
+        if not places or self._is_over(now_ns, places[-1]):
+            self.is_told = False
+        else:
+            self.is_told |= percent >= MANY_PERCENT or self._lasts(now_ns, places)
+        return self.looks[places[-1]][1] if self.is_told else 0.0
+
+    def _is_over(self, now_ns: int, newest: int) -> bool:
+        fine = len(self.looks) - 1 - newest
+        return fine >= ENDS_LOOKS and now_ns - self.looks[newest][0] >= ENDS_NS
+
+    def _lasts(self, now_ns: int, places: Sequence[int]) -> bool:
+        since = len(self.looks) - places[0]
+        is_long = now_ns - self.looks[places[0]][0] >= BEGINS_NS
+        return is_long and len(places) >= SOME_LOOKS and len(places) * ONE_IN >= since
+
+
 class MissingPdos:
     """Missing PDOs of one robot's nodes, measurement by measurement."""
 
     def __init__(self) -> None:
-        self._some: dict[tuple[str, int], list[tuple[int, float]]] = {}  # when, and how many
-        self._told: set[tuple[str, int]] = set()
+        self._nodes: dict[tuple[str, int], NodeHistory] = {}
         self._looked_ns: int | None = None
 
     def take(
         self, buses: Sequence[BusInfo], now_ns: int, cpu_percent: float | None = None
     ) -> tuple[BusInfo, ...]:
-        """Return the buses of a look with nodes that have their history, where that says otherwise."""
-        if self._looked_ns is not None and now_ns - self._looked_ns > LOST_NS:
-            self._some.clear()
-            self._told.clear()
+        """Return the buses of a look with nodes that have their history, where that says otherwise.
+
+        A node that is missing from a look begins anew with the next one that has it.
+        """
+        is_lost = self._looked_ns is not None and now_ns - self._looked_ns > LOST_NS
+        known = {} if is_lost else self._nodes
+        keys = [(bus.name, node.node_id) for bus in buses for node in bus.nodes]
+        self._nodes = {key: known.get(key) or NodeHistory() for key in keys}
         self._looked_ns = now_ns
         return tuple(self._bus(bus, now_ns, (cpu_percent or 0.0) >= BUSY_PERCENT) for bus in buses)
 
     def _bus(self, bus: BusInfo, now_ns: int, is_busy: bool) -> BusInfo:
-        told = [self._percent(bus.name, node, now_ns) for node in bus.nodes]
+        told = [self._nodes[bus.name, node.node_id].take(now_ns, told_percent(node)) for node in bus.nodes]
         is_busy = is_busy and len(told) > 1 and all(told)  # one alone has a cable of its own
         nodes = [
             node
@@ -70,16 +109,3 @@ class MissingPdos:
             for node, percent in zip(bus.nodes, told, strict=True)
         ]
         return replace(bus, nodes=nodes)
-
-    def _percent(self, bus: str, node: NodeInfo, now_ns: int) -> float:
-        key, percent = (bus, node.node_id), told_percent(node)
-        known = [one for one in self._some.get(key, []) if now_ns - one[0] <= ENDS_NS + BEGINS_NS]
-        if percent:
-            known.append((now_ns, percent))
-        lately = [share for at_ns, share in known if now_ns - at_ns < ENDS_NS]
-        self._some[key] = known if lately else []
-        if not lately:
-            self._told.discard(key)
-        elif percent >= MANY_PERCENT or now_ns - known[0][0] >= BEGINS_NS:
-            self._told.add(key)
-        return max(lately, default=0.0) if key in self._told else 0.0

@@ -154,13 +154,20 @@ class Robot:
         recent = sum(rows for at_ns, rows in self._arrivals if now_ns - at_ns <= RATE_WINDOW_NS)
         return recent / (RATE_WINDOW_NS / 1e9)
 
-    def is_slow(self, now_ns: int | None = None) -> bool:
-        """Return whether fewer rows come than were asked for; not before a link has lasted for a while."""
+    def has_rate(self, now_ns: int | None = None) -> bool:
+        """Return whether rows have come over this link for as long as a rate is counted over."""
         now_ns = frame_time.now_ns() if now_ns is None else now_ns
-        return now_ns - self._flows_since_ns > RATE_WINDOW_NS and self.rate_hz(now_ns) < SLOW * self.asked_hz
+        return self._flows_since_ns > 0 and now_ns - self._flows_since_ns > RATE_WINDOW_NS
+
+    def is_slow(self, now_ns: int | None = None) -> bool:
+        """Return whether fewer rows come than were asked for; not before that is known."""
+        now_ns = frame_time.now_ns() if now_ns is None else now_ns
+        return self.has_rate(now_ns) and self.rate_hz(now_ns) < SLOW * self.asked_hz
 
     def rate_text(self, now_ns: int | None = None) -> str:
-        """Return the row rate in words, with the requested rate if it is lower."""
+        """Return the row rate in words, with the requested rate if it is lower; a dash until it is known."""
+        if not self.has_rate(now_ns):
+            return "– Hz"
         of = f" of {self.asked_hz:.0f}" if self.is_slow(now_ns) else ""
         return f"{self.rate_hz(now_ns):.0f}{of} Hz"
 
@@ -203,6 +210,8 @@ class Robot:
             link.is_another = event.is_another
 
     def _described(self, event: Described) -> None:
+        if self.description is not None and self.description.boot_id != event.description.boot_id:
+            self._missing = MissingPdos()  # what was before another start of the robot lasts no longer
         self.description, self.hello = event.description, event.hello
         self._words = {channel.name: channel.enum for channel in event.description.channels if channel.enum}
         self.parts = {

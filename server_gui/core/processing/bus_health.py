@@ -21,6 +21,7 @@ OLD_S: Final = 5.0  # what was seen before is not known now
 FEWER: Final = "find what sends so much, and send fewer PDOs or SYNC less often"
 UNKNOWN: Final = "bus not known"
 FEW: Final = 2  # nodes that are named one by one, also where all of them are meant
+GROWS: Final = re.compile(r", \d+ requests in a row")  # a count of one look, which the bus's page alone has
 NUMBER: Final = re.compile(r"(?<![\w.])\d+(?:\.\d+)?(?![\w.])")
 
 
@@ -93,6 +94,8 @@ def worst(robot: Robot) -> tuple[BusHealthLevel, tuple[str, ...]]:
         return BusHealthLevel.UNKNOWN, ("no CAN bus", "no bus")
     bus = max(buses, key=lambda one: (ORDER.index(level(one)), one.load_percent or 0.0))
     load = f"CAN {bus.name} {load_text(bus)}"
+    if bus.load_percent is None and level(bus) is BusHealthLevel.UNKNOWN:
+        return BusHealthLevel.UNKNOWN, (f"CAN {bus.name} –", "CAN –")
     most = next(iter(talking(bus)), None)
     who = "" if most is None else f" · most: {_names(most)}"
     if (why := reason(bus)) is not None:
@@ -106,11 +109,17 @@ def worst(robot: Robot) -> tuple[BusHealthLevel, tuple[str, ...]]:
 def trouble(bus: BusInfo) -> tuple[str, str] | None:
     """Return a bus's problems, and what to check if that is known; None if there are none."""
     told = findings(bus)
-    return (_joined(words for words, _ in told), _joined(check for _, check in told)) if told else None
+    said = _joined(GROWS.sub("", words) for words, _ in told)
+    return (said, _joined(check for _, check in told)) if told else None
 
 
 def findings(bus: BusInfo) -> list[tuple[str, str]]:
     """Return each thing that is wrong with a bus, and what to check; what several nodes have, once."""
+    return [(words, check) for _, words, check in rated(bus)]
+
+
+def rated(bus: BusInfo) -> list[tuple[BusHealthLevel, str, str]]:
+    """Return each thing that is wrong with a bus: how bad that is by itself, and what to check."""
     if level(bus) in (BusHealthLevel.GOOD, BusHealthLevel.UNKNOWN):
         return []
     load, full = bus.load_percent or 0.0, []
@@ -118,14 +127,18 @@ def findings(bus: BusInfo) -> list[tuple[str, str]]:
     if len(own) < len(bus.findings) or load >= (FULL_PERCENT if own else BUSY_PERCENT):
         said = "it is full" if load >= FULL_PERCENT else "it is busy"
         full = [(f"{said}: {load_text(bus)} {TAKEN}", FEWER)]
+    warning, alarm = BusHealthLevel.WARNING, BusHealthLevel.ALARM
+    of_state, of_load = (
+        alarm if bad else warning for bad in (bus.state in (CLOSED, OFF), load >= FULL_PERCENT)
+    )
     told = [
-        (bus.problem or "", ""),
-        (bus.state if bus.state != ACTIVE else "", ""),
-        *full,
-        *((one.words, one.check) for one in own),
-        *_gathered(bus.nodes),
+        (of_state, bus.problem or "", ""),
+        (of_state, bus.state if bus.state != ACTIVE else "", ""),
+        *((of_load, *one) for one in full),
+        *((warning, one.words, one.check) for one in own),
+        *((warning, *one) for one in _gathered(bus.nodes)),
     ]
-    return [(words, check) for words, check in told if words]
+    return [one for one in told if one[1]]
 
 
 def reason(bus: BusInfo) -> tuple[str, ...] | None:

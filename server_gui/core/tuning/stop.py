@@ -3,7 +3,7 @@
 import time
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from concurrent.futures import Future
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import Any
 
@@ -24,10 +24,14 @@ class StopState(Enum):
 
 
 class Sent:
-    """A STOP on its way, timed where it is sent and where its answer comes: however late that is noted."""
+    """A STOP on its way, timed where it is sent and where its answer comes: however late that is noted.
 
-    def __init__(self, at_ns: int, future: Future[Stopped]) -> None:
+    `off` drives were seen not to be enabled when it was sent.
+    """
+
+    def __init__(self, at_ns: int, future: Future[Stopped], off: Collection[str] = ()) -> None:
         self.at_ns = at_ns
+        self.off = off
         self.answered_ns: int | None = None
         self.future = future
         future.add_done_callback(self._done)
@@ -38,7 +42,10 @@ class Sent:
 
 @dataclass(frozen=True, slots=True)
 class Proof:
-    """A drive's first state that is not enabled, and how long after the STOP it came; 0: it was so before."""
+    """A drive's first state that is not enabled, and how long after the STOP it came; 0: it was so before.
+
+    The time is what a row has shown, or the drive's own confirmation, whichever was first.
+    """
 
     after_ms: float
     state: str
@@ -79,6 +86,7 @@ class StopProgress:
     drives: int = 0  # that have confirmed it
     proofs: dict[str, Proof] = field(default_factory=dict)  # drive → what its state channel has shown
     _off: Collection[str] = ()  # drives that were not enabled when it was sent
+    _confirmed: Collection[str] = ()  # drives that have confirmed it
     _entry: int = 0  # of the journal: the newest that was read
 
     @property
@@ -98,7 +106,7 @@ class StopProgress:
         self.state, self.text, self.at_ns = StopState.SENT, "STOP sent …", now_ns if at_ns is None else at_ns
         self.why, self.answered_ms, self.was_ended = "", None, False
         self.since_s = time.time() - (now_ns - self.at_ns) / 1e9
-        self.proofs, self._off = {}, off
+        self.proofs, self._off, self._confirmed = {}, off, ()
         return self.number
 
     def answered(self, number: int, stopped: Stopped, at_ns: int | None = None) -> None:
@@ -108,15 +116,15 @@ class StopProgress:
         self.held = stopped.held
         if self.at_ns is not None:
             self.answered_ms = ((time.monotonic_ns() if at_ns is None else at_ns) - self.at_ns) / 1e6
+        self._confirmed = {name for name, said in stopped.drives.items() if said == "confirmed"}
+        self.proofs = {drive: self._earliest(drive, proof) for drive, proof in self.proofs.items()}
         outcomes = stopped.drives | {f"controller {name}": said for name, said in stopped.controllers.items()}
         missing = [f"{_listed([name])} {said}" for name, said in outcomes.items() if said != "confirmed"]
         if missing or not stopped.drives:
             self._not_confirmed(", ".join(missing) or "no drive answered")
         else:
             self.state, self.drives = StopState.CONFIRMED, len(stopped.drives)
-            self.text = (
-                f"STOP confirmed by all {len(stopped.drives)} drives in {self.answered_ms or 0:.0f} ms"
-            )
+            self.text = self.timed(f"STOP confirmed by all {self.drives} drives")
 
     def failed(self, number: int, reason: str) -> None:
         """Nobody answered: consider the robot not stopped."""
@@ -165,6 +173,8 @@ class StopProgress:
         for drive, words in columns.items():
             if drive not in self.proofs:
                 self._prove(drive, stamps_ns, words, offset_ns, self.at_ns)
+        if self.state is StopState.CONFIRMED:
+            self.text = self.timed(f"STOP confirmed by all {self.drives} drives")
 
     def _prove(
         self, drive: str, stamps_ns: Sequence[int], words: Sequence[str | None], offset_ns: int, at_ns: int
@@ -172,15 +182,32 @@ class StopProgress:
         for stamp_ns, word in zip(stamps_ns, words, strict=True):
             after_ms = (stamp_ns - offset_ns - at_ns) / 1e6
             if after_ms >= 0.0 and word is not None and word != ENABLED:
-                self.proofs[drive] = Proof(0.0 if drive in self._off else after_ms, word)
+                proof = Proof(0.0 if drive in self._off else after_ms, word)
+                self.proofs[drive] = self._earliest(drive, proof)
                 return
+
+    def _earliest(self, drive: str, proof: Proof) -> Proof:
+        """Return its proof, no later than the answer in which the drive itself has confirmed the STOP."""
+        if self.answered_ms is None or drive not in self._confirmed:
+            return proof
+        return replace(proof, after_ms=min(proof.after_ms, self.answered_ms))
+
+    @property
+    def _slowest_ms(self) -> float:
+        return max([1.0, *(proof.after_ms for proof in self.proofs.values())])
+
+    def timed(self, confirmed: str) -> str:
+        """Return the confirmation with its time; if rows show an earlier stop, with when its answer came."""
+        answered = f"{self.answered_ms or 0:.0f} ms"
+        is_late = set(self.proofs) >= set(self._confirmed) and f"{self._slowest_ms:.0f} ms" != answered
+        return f"{confirmed}, answer after {answered}" if is_late else f"{confirmed} in {answered}"
 
     @property
     def proof(self) -> str:
         """Proof from the drives' own states: `6 drives confirmed in quick stop active within 3 ms`."""
         if not self.proofs:
             return ""
-        slowest = max(1.0, *(proof.after_ms for proof in self.proofs.values()))
+        slowest = self._slowest_ms
         by_state: dict[str, list[str]] = {}
         for drive, proof in self.proofs.items():
             by_state.setdefault(proof.state, []).append(drive)

@@ -44,12 +44,13 @@ NO_STORE: Final = (
     "Nothing has been uploaded yet. What is recorded comes here by itself, a batch at a time; "
     "Upload now brings it at once."
 )
-NOT_READ: Final = "Its contents are unknown while it cannot be reached."
+NOT_READ: Final = "Its contents are unknown while it cannot be read."
 REACHES: Final = {
     Reach.NOT_LOOKED: Mark("ring", "dim", "looking"),
     Reach.REACHED: Mark("disc", "good", "reached"),
     Reach.EMPTY: Mark("ring", "dim", "empty"),
     Reach.AWAY: Mark("triangle", "warn", "away"),
+    Reach.UNREADABLE: Mark("triangle", "warn", "damaged"),
     Reach.FAILING: Mark("triangle", "warn", "an upload failed"),
     Reach.OLD: Mark("ring", "old", "not known"),
 }

@@ -25,6 +25,7 @@ class Words:
     main: str
     parts: tuple[str, ...] = ()
     tip: str = ""
+    shorter: str = ""  # the first part, where it has no room: never less
 
 
 class Chip(QFrame):
@@ -68,7 +69,14 @@ class Chip(QFrame):
         bold, plain = QFontMetrics(self._theme.text_font(bold=True)), QFontMetrics(self._theme.text_font())
         short = next((part for part in self._words.parts[:1] if len(part) <= SHORT), "")
         words = max(bold.horizontalAdvance(self._words.main), plain.horizontalAdvance(short)) + self._around
-        return max(min(words, self._theme.px(self._most) or words), self._theme.px(LEAST))
+        return max(min(words, self._theme.px(self._most) or words), self.least)
+
+    @property
+    def least(self) -> int:
+        """How wide it is with what it must say."""
+        plain = QFontMetrics(self._theme.text_font())
+        word = plain.horizontalAdvance(self._words.shorter) + self._around if self._words.shorter else 0
+        return max(word, self._theme.px(LEAST))
 
     @property
     def wants(self) -> int:
@@ -95,6 +103,7 @@ class Chip(QFrame):
         room = self.width() - self._around
         plain, parts = QFontMetrics(self._theme.text_font()), self._words.parts
         texts = [" · ".join(parts[:count]) for count in range(len(parts), 0, -1)]
+        texts += filter(None, (self._words.shorter,))
         fits = (text for text in texts if plain.horizontalAdvance(text) <= room)
         last = texts[-1] if texts and not any(sign.isdigit() for sign in texts[-1]) else ""  # a name at most
         set_text(self._detail, next(fits, last))

@@ -14,7 +14,7 @@ from server_gui.core.desk.station import Station
 from server_gui.core.tuning.stop import StopState
 from server_gui.views.frame.chip import Chip, Words
 from server_gui.views.frame.recording_chip import NAME, RecordingChip
-from server_gui.views.marks import Mark, age_text, drives_mark, enabled_text
+from server_gui.views.marks import SHORTER, Mark, age_text, drives_mark, enabled_text
 from server_gui.views.predictions import OLD, by_steps, status
 from server_gui.views.theme import Theme
 from server_gui.views.widgets.plain import PlainLabel, set_tip
@@ -123,7 +123,9 @@ class Header(QWidget):
         wide = dict(needs)
         for name in SPARE:
             if name == "link":  # before that the name of the robot gives way
-                needs["robot"] = min(needs["robot"], self._theme.px(LEAST_NAME))
+                needs["robot"] = min(
+                    needs["robot"], max(self._chips["robot"].least, self._theme.px(LEAST_NAME))
+                )
             if sum(needs[one] + self._row.spacing() for one in shown) > room and name in shown:
                 shown.remove(name)
         if sum(wide[one] + self._row.spacing() for one in shown) <= room:
@@ -167,7 +169,7 @@ def _outcome(station: Station) -> Words:
     tip = "\n".join(filter(None, (stopping.text, *stopping.proof_lines)))
     parts: dict[StopState, tuple[str, ...]] = {
         StopState.SENT: ("the drives are asked",),
-        StopState.CONFIRMED: (f"{stopping.drives} drives in {stopping.answered_ms or 0:.0f} ms",),
+        StopState.CONFIRMED: (stopping.timed(f"{stopping.drives} drives"),),
         StopState.NOT_CONFIRMED: (remedy(station.robot),),
     }
     return Words(STOP_MARKS[stopping.state], f"STOP {stopping.state.value}", parts[stopping.state], tip)
@@ -181,7 +183,7 @@ def _robot(station: Station) -> Words:
     parts.append(station.address)
     parts += [] if description is None else [description.role]
     parts += [f"you are {station.who}"] if station.who else []
-    return Words(mark, station.title, tuple(parts))
+    return Words(mark, station.title, tuple(parts), shorter=SHORTER.get(mark.word, mark.word))
 
 
 def _drives(station: Station) -> Words:
@@ -228,7 +230,8 @@ def _link(station: Station) -> Words:
         return Words(Mark("ring", "old"), "Linked, no data yet", parts)
     if robot.is_stale():
         return Words(Mark("triangle", "warn"), f"STALE · {age} old", parts)
-    mark = Mark("triangle", "warn") if robot.is_slow() else Mark("disc", "warn" if lost else "good")
+    mark = Mark("disc", "warn" if lost else "good") if robot.has_rate() else Mark("ring", "old")
+    mark = Mark("triangle", "warn") if robot.is_slow() else mark
     return Words(mark, f"{age} old · {robot.rate_text()}", parts)
 
 

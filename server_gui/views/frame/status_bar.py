@@ -7,12 +7,12 @@ from typing import Final
 from PySide6.QtCore import QEvent, Qt
 from PySide6.QtWidgets import QApplication, QStatusBar
 
-from server_gui.core.alarms.severity import bus_level
+from server_gui.core.alarms.severity import bus_level, worsened_by
 from server_gui.core.desk.busiest import busiest
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.recording import Tone
 from server_gui.core.desk.station import Station
-from server_gui.core.processing.bus_health import ORDER, UNKNOWN, BusHealthLevel, seen, worst
+from server_gui.core.processing.bus_health import ORDER, UNKNOWN, BusHealthLevel, load_text, seen, worst
 from server_gui.views.frame.recording_chip import TONES
 from server_gui.views.resources.bus_health import LEVELS
 from server_gui.views.theme import Theme
@@ -97,7 +97,14 @@ def _bus(station: Station) -> tuple[BusHealthLevel, tuple[str, ...]]:
     """Return the worst bus; where nothing new comes from the robot, none is known to be good."""
     level, words = worst(station.robot)
     for bus in seen(station.robot) or ():
+        cause = worsened_by(level, bus.name, station.alarms)
         level = max(level, bus_level(level, bus.name, station.alarms), key=ORDER.index)
+        if cause is not None:  # its mark is of this, not of what is less bad
+            load = load_text(bus)
+            words = tuple(
+                f"CAN {name}{load}: {cause.mark.word}{whom}"
+                for name, whom in ((f"{bus.name} ", f" {cause.spoken}"), ("", f" {cause.spoken}"), ("", ""))
+            )
     is_known = level is not BusHealthLevel.GOOD or station.is_live
     return (level, words) if is_known else (BusHealthLevel.UNKNOWN, (UNKNOWN, "CAN –"))
 

@@ -38,7 +38,7 @@ COLUMNS: Final = (
     ("Current", "current"),
     ("Temp.", "temperature"),
     ("Error", "error_code"),
-    ("Off after STOP", ""),
+    ("Stopped after", ""),
 )
 JOINT, STATE, ANGLE, VELOCITY, TORQUE, CURRENT, TEMPERATURE, ERROR, STOP = range(len(COLUMNS))
 SI: Final = {
@@ -62,8 +62,8 @@ NOT_KNOWN: Final = "not known"
 IN_FAULT: Final = "the drive is in fault: "  # with which what a robot says of it begins
 BELOW: Final = "↓"  # its words stand there
 HINT: Final = (
-    "Time from the latest STOP to the first state without torque that this drive reported. "
-    "“already off”: it had no torque before that STOP. “no proof”: it has not reported such a state since"
+    "Time from the latest STOP until this drive reported a state other than enabled, or confirmed it. "
+    "“already off”: it was not enabled before that STOP. “no proof”: it has not reported such a state since"
 )
 MOST_ERROR: Final = 280  # wide, in words
 # A drive's states where there is little room; in alarms and on cards they stand in full.

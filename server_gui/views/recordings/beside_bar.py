@@ -43,13 +43,15 @@ class BesideBar(QWidget):
 
     def refresh(self) -> None:
         """Show how it is now."""
-        beside, session = self._beside, self._beside.session
-        self.setVisible(session is not None)
-        if session is None:
+        beside = self._beside
+        is_told = beside.session is not None or bool(beside.problem)
+        self.setVisible(is_told)
+        if not is_told:
             return
         tape = beside.second.tape
         if beside.problem:
-            said = f"▲ it cannot be shown beside: {beside.problem}"
+            again = "" if tape is None else ", it is tried again"
+            said = f"▲ it cannot be shown beside{again}: {beside.problem}"
         elif tape is None:
             said = "reading …"
         else:

@@ -60,12 +60,12 @@ class Player(QWidget):
         self._playback = archive.playback
         self._theme = theme
         self._frame = 0
+        self._worded = 0, False  # the instant of which the words are, and whether it was being read
         self._told: object = None  # which recording and journal have been told of
         self.overview = Overview(self._playback.desk, theme)
         self.overview.is_numbers_first = False  # a walk is replayed for how it looked
         notes = RecordedNotes(self._playback, archive.labels)
-        deliver, reading = archive.deliver, archive.library.reading
-        self.beside = SideBySide(self._playback, archive.settings, reading.do, deliver)
+        self.beside = SideBySide(self._playback, archive.settings, archive.reading.do, archive.deliver)
         self.signals = Signals(
             self._playback.desk,
             theme,
@@ -172,7 +172,9 @@ class Player(QWidget):
         self.timeline.show_position(playback.position_ns)
         self.timeline.show_outline(playback.outline)
         self._frame += 1
-        if self._frame % SLOW == 1:
+        jumped = not playback.playing and (playback.position_ns, playback.is_loading) != self._worded
+        if self._frame % SLOW == 1 or jumped:
+            self._worded = playback.position_ns, playback.is_loading
             self._refresh_words()
 
     def _refresh_beside(self) -> None:

@@ -216,6 +216,8 @@ class SessionsPage(QWidget):
         library = self._archive.library
         if library.reach.problem is not None:
             return f"The store is not reached; retrying: {library.reach.problem}"
+        if library.reach.list_problem is not None:
+            return f"The store's list cannot be read; retrying: {library.reach.list_problem}"
         return EMPTY if library.revision and not library.found.sessions else ""
 
     def _refresh_details(self) -> None:

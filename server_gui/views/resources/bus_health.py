@@ -18,18 +18,19 @@ from PySide6.QtWidgets import (
 
 from gateway.wire.bus import BusInfo, NodeInfo
 from server_gui.core.alarms.alarm import Alarms
-from server_gui.core.alarms.severity import bus_level
+from server_gui.core.alarms.severity import bus_level, worsened_by
 from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
+from server_gui.core.follow.missing_pdos import told_percent
 from server_gui.core.processing.bus_health import (
     BUSY_PERCENT,
     FULL_PERCENT,
     BusHealthLevel,
     Talking,
-    findings,
     level,
     load_text,
     node_level,
+    rated,
     seen,
     talking,
 )
@@ -50,6 +51,7 @@ LEVELS: Final = {
     BusHealthLevel.WARNING: Mark("triangle", "warn", "warning"),
     BusHealthLevel.ALARM: Mark("square", "bad", "ALARM"),
 }
+OF_COLOUR: Final = {"warn": BusHealthLevel.WARNING, "bad": BusHealthLevel.ALARM}
 TITLES: Final = (
     "Node",
     "Components",
@@ -153,7 +155,7 @@ class BusCard(Card):
         rate = "" if bus.bitrate is None else f" of {bus.bitrate / 1e6:g} Mbit/s"
         word = "FULL: " if bad is BusHealthLevel.ALARM and (bus.load_percent or 0.0) >= FULL_PERCENT else ""
         self.load.say(f"{word}{load_text(bus)}{rate}", f"{word}{load_text(bus)}")
-        self._bar.show_load(bus.load_percent, "accent" if mark.colour == "good" else mark.colour)
+        self._bar.show_load(bus.load_percent, _colour_of(bus.load_percent or 0.0))
         self.set_title(f"Bus {bus.name}")
         self.set_note(bus.state)
         frames = "–" if bus.frames_per_s is None else f"{bus.frames_per_s:.0f}"
@@ -262,10 +264,11 @@ class BusHealthView(QWidget):
     def _say(self, station: Station, buses: Sequence[BusInfo] | None) -> None:
         alarms = station.alarms
         found = [
-            (bus_level(level(bus), bus.name, alarms), bus.name, *one)
-            for bus in buses or ()
-            for one in findings(bus)
+            (bad, f"bus {bus.name}: {what}", check) for bus in buses or () for bad, what, check in rated(bus)
         ]
+        worse = [worsened_by(level(bus), bus.name, alarms) for bus in buses or ()]
+        found += [(OF_COLOUR[one.mark.colour], one.line, one.check) for one in worse if one is not None]
+        found.sort(key=lambda one: one[0] is not BusHealthLevel.ALARM)
         if buses is None:
             is_old = (
                 station.is_linked and station.robot.buses_at_ns is not None and station.robot.buses is None
@@ -274,7 +277,7 @@ class BusHealthView(QWidget):
         elif not buses:
             text = "This robot has no CAN bus."
         else:
-            rows = dict.fromkeys(f"{LEVELS[bad].word}: bus {bus}: {what}" for bad, bus, what, _ in found)
+            rows = dict.fromkeys(f"{LEVELS[bad].word}: {what}" for bad, what, _ in found)
             text = "\n".join(rows)
         checks = dict.fromkeys(check for *_, check in found if check)
         set_text(self.checks, "\n".join(f"→ {check}" for check in checks))
@@ -285,6 +288,11 @@ class BusHealthView(QWidget):
             self.said.style().polish(self.said)
         set_text(self.said, text)
         self.said.setVisible(bool(text))
+
+
+def _colour_of(load_percent: float) -> str:
+    """Return the colour of a load by itself, whatever else is wrong with its bus."""
+    return "bad" if load_percent >= FULL_PERCENT else "warn" if load_percent >= BUSY_PERCENT else "accent"
 
 
 def _kinds(bus: BusInfo) -> list[tuple[str, float]]:
@@ -307,7 +315,7 @@ def _texts(node_id: int | None, node: NodeInfo | None, talk: Talking | None) -> 
     if node is None:
         return NOBODY if node_id is None else str(node_id), names or "", share, frames, sends, "–", "–", "–"
     trips = "–" if node.sdo_p50_ms is None else f"{node.sdo_p50_ms:.1f} / {node.sdo_max_ms or 0.0:.1f} ms"
-    percent = node.pdos_missing_percent
+    percent = told_percent(node) or node.pdos_missing_percent  # what is told of it stands in its row, too
     is_known = percent is not None and (percent > 0.0 or talk is not None)  # who is silent misses none
     missing = f"{percent:.1f} %" if is_known else "–"
     return str(node_id), names, share, frames, sends, trips, str(node.sdo_timeouts), missing

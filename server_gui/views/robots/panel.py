@@ -20,7 +20,7 @@ from server_gui.core.desk.desk import Desk
 from server_gui.core.desk.station import Station
 from server_gui.core.settings.server_file import name_of
 from server_gui.views.confirmation import ask
-from server_gui.views.marks import age_text
+from server_gui.views.marks import SHORTER, age_text
 from server_gui.views.predictions import doing
 from server_gui.views.robots.pairing import PairingDialog, show_pairing
 from server_gui.views.theme import Theme
@@ -32,13 +32,6 @@ from server_gui.views.widgets.plain import PlainLabel, set_tip
 from server_gui.views.widgets.shrinking_label import ShrinkingLabel
 from server_gui.views.widgets.stop_button import StopButton
 
-# Where a card has no room for a state's own words.
-SHORTER: Final = {
-    "operation enabled": "enabled",
-    "switch on disabled": "disabled",
-    "ready to switch on": "ready",
-    "ANOTHER ROBOT ANSWERS": "ANOTHER ROBOT",
-}
 PAIRING_ENDS_S: Final = 1.0  # how long the window waits for that when it closes
 
 
@@ -59,7 +52,8 @@ class RobotCard(ClickableFrame):
         )
         self._doing = ShrinkingLabel("dim")
         self._where = ShrinkingLabel("dim")  # only where another robot is called so, too
-        self._state.setMinimumWidth(1)
+        for label in (self._where, self._state, self._doing, self._link):
+            label.setMinimumWidth(1)  # else the card is wider than its list
         self.stop = StopButton("robot_stop")
         self.remove = QToolButton()
         self.remove.setText("✕")

@@ -1,6 +1,6 @@
 """Asks before a stop is ended or a fault cleared, and says what that does and how to go on."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 from PySide6.QtWidgets import QWidget
 
@@ -10,7 +10,7 @@ from server_gui.core.alarms.texts import Kind, check_of
 from server_gui.core.desk.station import Station
 from server_gui.views.confirmation import Question, ask
 
-DOES = "Every drive is led to “switch on disabled”. None is enabled, and nothing moves by it."
+DOES = "Every drive is led to “switch on disabled”. None is enabled, and this moves nothing."
 
 
 def ask_reset(parent: QWidget, station: Station) -> Question:
@@ -26,9 +26,17 @@ def ask_clear(parent: QWidget, station: Station) -> Question:
     more = f"\n\n{states}" if (states := _states(station)) else ""
     held = "\n\nThe STOP that is held ends with it." if station.stopping.held else ""
     check = check_of(Kind.RESET, role=station.bus_role)
-    text = f"Clear the fault of {station.title}?\n\n{DOES}{more}{held}\n\nAfterwards, {check}."
+    asked = "\n".join((f"Clear the fault of {station.title}?", *_faults(station)))
+    text = f"{asked}\n\n{DOES}{more}{held}\n\nAfterwards, {check}."
     title = f"Clear the fault of {station.title}"
     return _asked(parent, title, text, "Clear fault", station, lambda why: _ask_again(parent, station, why))
+
+
+def _faults(station: Station) -> Iterator[str]:
+    """Yield each fault that would be cleared: the question lies over what else says it."""
+    for alarm in station.alarms.each:
+        if alarm.kind in (Kind.FAULT, Kind.REPORTS) and alarm.what:
+            yield f"{alarm.spoken}: {alarm.what}"
 
 
 def _states(station: Station) -> str:

@@ -490,7 +490,8 @@ class Signals(QWidget):
         more = len([name for name in self.chosen if name not in self.scene.workspace.curves])
         many = f" · {more} more are not drawn: {MOST_CURVES} at a time" if more > 0 else ""
         if self.pause.isChecked() or self.scene.frozen is not None:
-            return f"{'Paused' if self.pause.isChecked() else 'Kept by the trigger'}, data continue{many}"
+            goes_on = "" if station.robot.is_recording else ", data continue"
+            return f"{'Paused' if self.pause.isChecked() else 'Kept by the trigger'}{goes_on}{many}"
         if self._is_gone:
             return GONE
         live = f"{station.robot.rate_hz():.0f} rows/s"

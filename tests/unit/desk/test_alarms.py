@@ -275,6 +275,18 @@ def test_a_stop_that_never_went_out_has_stopped_no_drive_that_was_off(
     assert proofs["left_hip"].when == "already off"
 
 
+def test_a_drive_that_a_stop_has_stopped_before_the_window_notes_it_was_not_off_already(bench: Bench) -> None:
+    bench.station.take([states(4.0)])
+    sent = bench.station.send_stop("a key, in a thread of its own")
+    stopped = states(5.0)
+    bench.station.take([stopped])
+    bench.station.note_stop(sent)
+    bench.station.take([stopped])
+    proofs = bench.station.stopping.proofs
+    assert set(proofs) == set(JOINTS)
+    assert not any(proof.was_so for proof in proofs.values())
+
+
 def test_the_result_of_a_stop_does_not_hide_a_fault(bench: Bench) -> None:
     fault(bench.station)
     bench.station.stop("test")
@@ -290,7 +302,7 @@ def test_after_a_reset_it_says_how_to_go_on_until_a_drive_is_enabled(bench: Benc
     bench.first.answer(Reset(dict.fromkeys(JOINTS, "switch on disabled"), {}, held=False))
     (one,) = bench.station.alarms.active
     assert one.alarm.kind is Kind.RESET
-    assert "gwrms enable" in one.alarm.check
+    assert "to go on: enable the drives: start the robot's controller again" in one.alarm.check
     bench.station.take([states(4.0)])
     assert kinds(bench.station) == []
 

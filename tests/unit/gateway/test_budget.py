@@ -158,7 +158,7 @@ def test_describe_shows_the_budget(bench: Bench, tmp_path: Path, capsys: pytest.
         port,
     ):
         assert main(["describe", "--robot", f"{host}:{port}"]) == 0
-    assert capsys.readouterr().out.endswith("BUDGET  at most 8.0 % of a core\n")
+    assert "\nBUDGET  at most 8.0 % of a core\n" in capsys.readouterr().out
 
 
 def test_watch_says_that_rows_are_shed(

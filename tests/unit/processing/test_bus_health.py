@@ -14,6 +14,7 @@ from server_gui.core.processing.bus_health import (
     BusHealthLevel,
     findings,
     level,
+    rated,
     seen,
     talking,
     trouble,
@@ -79,6 +80,14 @@ def test_what_is_old_or_never_came_or_is_of_a_link_that_is_gone_is_not_known() -
         assert "%" not in worst(each)[1][0]
 
 
+def test_a_bus_of_which_nothing_has_come_yet_is_not_said_to_have_no_errors() -> None:
+    new = replace(BUS, load_percent=None, talks=[])
+    assert worst(robot(new)) == (BusHealthLevel.UNKNOWN, (f"CAN {BUS.name} –", "CAN –"))
+    bad, wordings = worst(robot(replace(new, state="error passive")))
+    assert bad is BusHealthLevel.WARNING
+    assert "error passive" in wordings[0]
+
+
 def test_the_worst_bus_is_said_with_its_load_its_errors_and_who_talks_most() -> None:
     full = replace(BUS, name="legs", load_percent=97.0, error_frames=3, bus_offs=2)
     bad, wordings = worst(robot(BUS, full))
@@ -142,3 +151,11 @@ def test_what_several_nodes_have_is_said_once() -> None:
         (f"left hip, left knee: {LOST.words}", LOST.check),
         ("right knee: 5 % of its PDOs are missing", ""),
     ]
+
+
+def test_a_count_that_grows_is_told_by_the_page_alone_and_each_finding_has_its_own_level() -> None:
+    silent = FindingInfo(1, "it answers no SDO, 7 requests in a row", "switch it off and on")
+    bus = replace(BUS, load_percent=100.0, nodes=[replace(NODE, findings=[silent])])
+    assert rated(bus)[1] == (BusHealthLevel.WARNING, f"left knee: {silent.words}", silent.check)
+    assert rated(bus)[0][0] is BusHealthLevel.ALARM
+    assert (trouble(bus) or ("", ""))[0].endswith("left knee: it answers no SDO")

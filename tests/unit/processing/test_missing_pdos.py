@@ -3,20 +3,24 @@
 from msgspec.structs import replace
 
 from gateway.wire.bus import BusInfo
-from server_gui.core.follow.missing_pdos import MissingPdos
+from server_gui.core.follow.events import BusesSeen, Described
+from server_gui.core.follow.missing_pdos import BEGINS_NS, LOST_NS, MissingPdos
+from server_gui.core.follow.robot import Robot
 from server_gui.core.processing.bus_health import BusHealthLevel as Level
 from server_gui.core.processing.bus_health import findings, level
 from tests.unit.processing.test_bus_health import BUS, NODE
+from tests.unit.recording.robots import description
 
 SECOND_NS = 1_000_000_000
 
 
-def looks(*percents: float, cpu_percent: float = 20.0, nodes: int = 2) -> list[BusInfo]:
-    """What is known after each look, one a second."""
+def looks(*percents: float, cpu_percent: float = 20.0, nodes: int = 2, every_s: float = 1.0) -> list[BusInfo]:
+    """What is known after each look."""
     watched, found = MissingPdos(), list[BusInfo]()
-    for second, percent in enumerate(percents):
+    for look, percent in enumerate(percents):
         each = [replace(NODE, node_id=number, pdos_missing_percent=percent) for number in range(1, nodes + 1)]
-        (bus,) = watched.take((replace(BUS, nodes=each),), second * SECOND_NS, cpu_percent)
+        at_ns = round(look * every_s * SECOND_NS)
+        (bus,) = watched.take((replace(BUS, nodes=each),), at_ns, cpu_percent)
         found.append(bus)
     return found
 
@@ -56,4 +60,46 @@ def test_what_was_seen_before_a_time_without_a_look_lasts_no_longer() -> None:
     lost = replace(BUS, nodes=[replace(NODE, pdos_missing_percent=20.0)])
     fine = replace(BUS, nodes=[replace(NODE, pdos_missing_percent=0.0)])
     assert level(watched.take((lost,), 0)[0]) is Level.WARNING
-    assert level(watched.take((fine,), 6 * SECOND_NS)[0]) is Level.GOOD
+    assert level(watched.take((fine,), LOST_NS)[0]) is Level.WARNING
+    assert level(watched.take((lost,), LOST_NS + SECOND_NS)[0]) is Level.WARNING
+    assert level(watched.take((fine,), 2 * LOST_NS + 2 * SECOND_NS)[0]) is Level.GOOD
+
+
+def test_a_few_that_last_are_told_however_far_apart_looks_are() -> None:
+    assert LOST_NS >= BEGINS_NS
+    for every_s in (0.5, 1.0, 5.5, LOST_NS / SECOND_NS):
+        assert changes(looks(*[1.5] * 40, every_s=every_s)) == [Level.GOOD, Level.WARNING], every_s
+    slow = looks(*[1.4, 0.4, 0.0] * 10, *[0.0] * 10, every_s=5.5)
+    assert changes(slow) == [Level.GOOD, Level.WARNING, Level.GOOD]
+
+
+def test_single_looks_with_a_few_do_not_last() -> None:
+    for apart in (9, 11, 12):
+        one = [1.0, *[0.0] * (apart - 1)]
+        assert changes(looks(0.0, *one * 2, *[0.0] * 10)) == [Level.GOOD], apart
+        assert changes(looks(0.0, *one * 10)) == [Level.GOOD], apart
+
+
+def test_the_newest_share_is_told_and_not_the_highest() -> None:
+    found = looks(40.0, 1.2, 0.0)
+    told = [findings(bus)[0][0] for bus in found]
+    assert ["40 %" in words for words in told] == [True, False, False]
+    assert all("1 % of their PDOs are missing" in words for words in told[1:])
+
+
+def test_a_node_that_was_gone_and_a_robot_that_has_started_anew_begin_without_a_past() -> None:
+    lost, fine = (replace(BUS, nodes=[replace(NODE, pdos_missing_percent=each)]) for each in (20.0, 0.0))
+    watched = MissingPdos()
+    levels = [
+        level(watched.take((bus,), look * SECOND_NS)[0])
+        for look, bus in enumerate((lost, fine, replace(BUS, nodes=[]), fine))
+    ]
+    assert levels == [Level.WARNING, Level.WARNING, Level.GOOD, Level.GOOD]
+
+    robot, found = Robot(), list[Level]()
+    for look, (boot, bus) in enumerate((("a", lost), ("a", fine), ("b", fine))):
+        described = description("exo-01")
+        robot.apply(Described(replace(described, boot_id=boot)))
+        robot.apply(BusesSeen((bus,), look * SECOND_NS))
+        found += [level(one) for one in robot.buses or ()]
+    assert found == [Level.WARNING, Level.WARNING, Level.GOOD]

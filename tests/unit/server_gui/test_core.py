@@ -68,6 +68,20 @@ def test_rate_counts_the_rows_of_the_last_two_seconds() -> None:
     assert robot.rate_hz(20 * SECOND_NS) == 0.0
 
 
+def test_a_rate_is_not_known_until_rows_have_come_for_a_while_after_a_new_link() -> None:
+    robot = Robot()
+    assert robot.rate_text(SECOND_NS) == "– Hz"
+    for link in (1, 21):
+        robot.apply(LinkChanged(ConnectionState.CONNECTED, None, link * SECOND_NS))
+        said = []
+        for tenth in range(10 * link, 10 * link + 31):
+            at_ns = tenth * SECOND_NS // 10
+            robot.apply(Telemetry(1, batch({"a": [0.0] * 10}, at_ns=at_ns), None, asked_hz=100.0))
+            said.append(robot.rate_text(at_ns + 1))
+        assert list(dict.fromkeys(said)) == ["– Hz", "100 Hz"]
+        assert said.count("– Hz") == 20
+
+
 @pytest.mark.parametrize(("rows", "said"), [(26, "26 of 100 Hz"), (98, "98 Hz")])
 def test_a_rate_that_is_lower_than_what_was_asked_for_is_said_with_both(rows: int, said: str) -> None:
     robot = Robot()

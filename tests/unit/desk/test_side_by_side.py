@@ -1,0 +1,141 @@
+"""A second recording beside the one that is played: what cannot be read now is read later."""
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future
+from datetime import UTC, datetime, timedelta
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from ml.store import StoreError
+from ml.store.sessions import Session
+from server_gui.core.archive.playback import Playback
+from server_gui.core.archive.side_by_side import AGAIN_S, CLOSED, SideBySide
+from server_gui.core.cloud.tape import Rows, Tape
+from server_gui.core.desk.desk import Shown
+from server_gui.core.settings.server_file import ServerSettings
+
+SECOND_NS = 1_000_000_000
+LENGTH_S = 60
+
+
+class KneeTape:
+    """A minute of a knee's position; while the store is `away`, nothing of it can be read."""
+
+    events = ()
+    units: Mapping[str, str] = {"left_knee.position": "rad"}
+
+    def __init__(self, name: str, first_s: int) -> None:
+        first = datetime.fromtimestamp(first_s, UTC)
+        last = first + timedelta(seconds=LENGTH_S)
+        self.session = Session("exo-01", name, first=first, last=last, rows=LENGTH_S * 10)
+        self.first_ns, self.last_ns = first_s * SECOND_NS, (first_s + LENGTH_S) * SECOND_NS
+        self.away = False
+        self.reads = 0
+
+    def read(self, begin_ns: int, end_ns: int, channels: Sequence[str] | None = None) -> Rows:
+        if channels is None:  # as it is played
+            self.reads += 1
+        if self.away:
+            raise StoreError("the store is away")
+        utc_ns = np.arange(max(begin_ns, self.first_ns), min(end_ns, self.last_ns), SECOND_NS // 10)
+        return Rows(utc_ns, utc_ns - 1000 * SECOND_NS, {"left_knee.position": utc_ns / 1e18})
+
+
+class Beside:
+    """Both of them, in a thread that does at once what it is given, and a clock that a test moves."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.tape, self.second = KneeTape("first", 1_700_000_000), KneeTape("second", 1_700_100_000)
+        self.now_s = 100.0
+        self.held: list[Callable[[], None]] | None = None  # what is done later, while a test holds it
+        monkeypatch.setattr(Tape, "open", lambda _settings, _session: self.second)
+        self.first = Playback(_done, lambda call: call(), Shown())
+        self.first.open(cast("Tape", self.tape))
+        settings = cast("ServerSettings", None)
+        self.both = SideBySide(self.first, settings, _done, self._deliver, lambda: self.now_s)
+
+    def _deliver(self, call: Callable[[], None]) -> None:
+        if self.held is None:
+            call()
+        else:
+            self.held.append(call)
+
+    def draw(self, frames: int = 8) -> None:
+        for _ in range(frames):
+            self.first.step()
+            self.both.step()
+
+    def jump(self, seconds: float) -> None:
+        self.first.seek(self.tape.first_ns + round(seconds * SECOND_NS))
+        self.draw()
+
+    @property
+    def is_together(self) -> bool:
+        """Whether both have been read at the same time since their beginnings, and show it."""
+        each = (self.first, self.tape), (self.both.second, self.second)
+        since = [None if one._fed_ns is None else one._fed_ns - tape.first_ns for one, tape in each]
+        return since[0] == since[1]
+
+
+def _done(work: Callable[[], Any]) -> "Future[Any]":
+    future: Future[Any] = Future()
+    try:
+        future.set_result(work())
+    except StoreError as error:
+        future.set_exception(error)
+    return future
+
+
+@pytest.fixture
+def beside(monkeypatch: pytest.MonkeyPatch) -> Beside:
+    """Both stand still at their beginnings."""
+    made = Beside(monkeypatch)
+    made.both.open(made.second.session)
+    made.draw()
+    return made
+
+
+@pytest.mark.parametrize("wish", ["jump", "play", "wait"])
+def test_a_second_that_could_not_be_read_is_tried_again_by_a_jump_by_play_and_after_some_seconds(
+    beside: Beside, wish: str
+) -> None:
+    beside.second.away = True
+    beside.jump(45.0)
+    assert beside.both.problem == "the store is away"
+    reads = beside.second.reads
+    beside.draw(50)
+    assert (beside.second.reads, beside.is_together) == (reads, False), "not with every frame"
+    beside.second.away = False
+    if wish == "jump":
+        beside.jump(46.0)
+    elif wish == "play":
+        beside.first.play(on=True)
+        beside.first.play(on=False)
+    else:
+        beside.now_s += AGAIN_S
+    beside.draw()
+    assert (beside.both.problem, beside.is_together) == ("", True)
+
+
+def test_what_is_read_already_is_shown_while_what_comes_next_cannot_be_read(beside: Beside) -> None:
+    beside.second.away = True
+    beside.jump(22.0)
+    assert beside.both.problem
+    beside.jump(3.0)
+    assert beside.is_together
+
+
+def test_a_second_that_is_read_when_the_first_was_closed_is_put_away_with_a_word(beside: Beside) -> None:
+    beside.held = []
+    beside.both.open(beside.second.session)
+    beside.first.close()
+    for call in beside.held:
+        call()
+    assert (beside.both.session, beside.both.second.tape, beside.both.problem) == (None, None, CLOSED)
+    beside.held = None
+    beside.first.open(cast("Tape", beside.tape))
+    beside.both.open(beside.second.session)
+    beside.draw()
+    assert (beside.both.problem, beside.is_together) == ("", True)
