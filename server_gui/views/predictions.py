@@ -91,9 +91,7 @@ def said(shown: Told, *, stopped: str = "", unseen: str = "") -> PredictionRow:
     shape = ("square", "bad") if falls else ("diamond", "accent")
     text = f"{word} {100 * prediction.probability:.0f} %"
     is_doubtful = worth.worth is Worth.DOUBTFUL
-    return PredictionRow(
-        Mark(*shape, prediction.label), text, *details, _tip(shown), is_doubtful=is_doubtful
-    )
+    return PredictionRow(Mark(*shape, prediction.label), text, *details, _tip(shown), is_doubtful=is_doubtful)
 
 
 def unjudged(why: str) -> PredictionRow:
