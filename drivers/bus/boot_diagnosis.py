@@ -34,7 +34,7 @@ def why_silent(
     if load_percent is not None and load_percent >= OVERLOAD_PERCENT:
         return (
             f"nothing comes through from node {node_id}: the bus {bus_name} is overloaded, "
-            f"{load_percent:.0f} % of its time is taken: look who sends so much (candump)"
+            f"{load_percent:.0f} % of its time is taken: find what sends so much (candump)"
         )
     return (
         f"no frame at all from node {node_id}, others are heard on bus {bus_name}: "

@@ -107,7 +107,7 @@ class BusHealth:
             self._load.note(
                 now_ns,
                 f"{min(load, 100.0):.0f} % of its time is taken",
-                "send fewer PDOs, or SYNC less often; look who sends so much (candump)",
+                "send fewer PDOs, or SYNC less often; find what sends so much (candump)",
             )
 
     def _judge_errors(self, now_ns: int) -> None:

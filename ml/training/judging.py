@@ -28,6 +28,7 @@ FEW: Final = 20  # decisions; a class or person with fewer is no reason
 MOST_LOST: Final = 0.05  # of a class's or a person's F1, or of the calibration
 MOST_LOST_PERCENT: Final = 1.0  # of the cycle, of a person's error
 MOST_ABSTAINED: Final = 0.1  # more than the serving model
+NONE_SERVES: Final = "not compared with another: no promoted model serves yet"
 NAMED: Final = 3  # channels that are told
 WITHIN: Final = 0.1  # of the cycle: a phase that is right
 
@@ -116,20 +117,17 @@ def _without_serving(task: Task, held_out: Judged, figure: str, lacking: Sequenc
     new, idle = held_out.new.figures[figure], held_out.new.figures["idle"]
     knows = new > idle if task.fold else new < idle
     ours, its = _percents(task, new, idle)
-    told = (
-        f"{figure} on {held_out.name}: {ours}; saying always the same has {its}; "
-        "no model that was promoted serves yet"
-    )
+    told = f"{figure} {ours} on wearers it has not seen (always guessing the same: {its})"
     verdict = Verdict.NOT_COMPARED if knows else Verdict.NOT_BETTER
-    return Decision(verdict, (told, *([_unable(lacking)] if lacking else [])))
+    return Decision(verdict, (told, _unable(lacking) if lacking else NONE_SERVES))
 
 
 def _unable(lacking: Sequence[str]) -> str:
-    """Return why what came with GWRMS is not compared, which a promotion for every robot would replace."""
+    """Return why the model that came with GWRMS is not compared."""
     named = f"{', '.join(lacking[:NAMED])}{', …' if len(lacking) > NAMED else ''}"
     return (
-        f"channels that what came with GWRMS needs and these sessions lack: {len(lacking)} ({named}); so "
-        "it is not compared, and serves robots that have them until this model is promoted for every robot"
+        "not compared with the model that came with GWRMS: these sessions lack "
+        f"{len(lacking)} of its channels ({named})"
     )
 
 

@@ -158,7 +158,8 @@ def _tell(arguments: argparse.Namespace, task: str, now: Pointer) -> int:
         say(f"{task}: {now.model} serves {whom}\n" if now.model else f"{task}: {gone}\n")
     if now.model and not now.signature:
         warn(
-            "models", f"{UNSIGNED}, so no rule stops a robot by it: gwrms models key makes a key, then again"
+            "models",
+            f"{UNSIGNED}, so its predictions cannot stop a robot: gwrms models key makes a key, then again",
         )
     return 0
 

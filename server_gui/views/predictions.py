@@ -9,7 +9,7 @@ from ml.danger.detector import DETECTORS
 from ml.danger.levels import Level as DangerLevel
 from ml.robot.task import ABNORMAL, UNKNOWN
 from ml.serving.trust import TrustLevel
-from server_gui.core.desk.confidence import belief, blind, not_judged
+from server_gui.core.desk.confidence import Worth, belief, blind, not_judged
 from server_gui.core.desk.leg_phase import LegPhase, apart, leg_phase, phase_at
 from server_gui.core.desk.station import Station
 from server_gui.core.models.names import model_name, told_name
@@ -48,6 +48,7 @@ class PredictionRow:
     short: str = ""
     tip: str = ""
     brief: str = ""  # all of it where there is the least room
+    is_doubtful: bool = False  # the model says itself that it is not to be relied on
 
     @property
     def short_text(self) -> str:
@@ -89,7 +90,8 @@ def said(shown: Told, *, stopped: str = "", unseen: str = "") -> PredictionRow:
         return PredictionRow(Mark("ring", "dim", UNKNOWN), word, *details, _tip(shown))
     shape = ("square", "bad") if falls else ("diamond", "accent")
     text = f"{word} {100 * prediction.probability:.0f} %"
-    return PredictionRow(Mark(*shape, prediction.label), text, *details, _tip(shown))
+    is_doubtful = worth.worth is Worth.DOUBTFUL
+    return PredictionRow(Mark(*shape, prediction.label), text, *details, _tip(shown), is_doubtful=is_doubtful)
 
 
 def unjudged(why: str) -> PredictionRow:
@@ -145,12 +147,13 @@ def doing(station: Station) -> tuple[str, ...]:
     line, gait = activity(station), station.processing.derived().gait
     walks = gait.walking and gait.cadence_spm is not None and line.mark.word != STOPPED
     between = " " if line.mark.colour == "accent" else " · "  # the steps are not those of what is not known
-    cadence = f"{line.text}{between}{gait.cadence_spm:.0f} steps/min" if walks else line.short_text
-    least = f"{PROBABLE.sub('', line.short_text)} · {count.replace(' of ', '/')}"
+    if line.is_doubtful:  # a percentage would look sure
+        line = replace(line, text=f"{PROBABLE.sub('', line.text)}?")
+    short = line.short_text
+    cadence = f"{line.text}{between}{gait.cadence_spm:.0f} steps/min" if walks else short
+    least = f"{PROBABLE.sub('', short)} · {count.replace(' of ', '/')}"
     fewest = count.replace(" of ", "/").replace(" enabled", "") if "," in count else count
-    return tuple(
-        dict.fromkeys((f"{cadence} · {count}", f"{line.short_text} · {count}", least, count, fewest))
-    )
+    return tuple(dict.fromkeys((f"{cadence} · {count}", f"{short} · {count}", least, count, fewest)))
 
 
 def lines(station: Station) -> Iterator[PredictionRow]:

@@ -105,7 +105,7 @@ def test_playback_is_marked_never_mixed_with_what_is_live_and_shows_what_was_pre
     whole.until(lambda: activity.main.text().startswith("Walk 94 %"), "said it large")
     axis = player.overview._plots[0].plot.getPlotItem().getAxis("bottom")
     whole.until(lambda: axis.tickStrings([0.0], 1.0, 1.0) == [SHOWN], "an instant long past was called now")
-    assert activity.detail.text().startswith("said then by model 3fa2 of activity")
+    assert activity.detail.text().startswith("said then by the activity model")
     archive.playback.seek(tape.last_ns)
     whole.until(lambda: "predicted" not in player.banner.text(), "jumped")
     whole.until(lambda: any(text.startswith("Not predicted") for text in lines.texts), "said so")

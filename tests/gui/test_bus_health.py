@@ -62,10 +62,18 @@ def test_load_counters_and_who_talks_stand_there(view: BusHealthView, bench: Ben
     assert not view.said.isVisible()
 
 
+@pytest.mark.parametrize(("opened", "words"), [(1, "opened once"), (3, "opened 3 times")])
+def test_how_often_it_was_opened_is_in_words(
+    view: BusHealthView, bench: Bench, opened: int, words: str
+) -> None:
+    show(view, bench, replace(BUS, opened=opened))
+    assert words in view.cards[0]._counters.accessibleDescription()
+
+
 def test_a_full_bus_is_an_alarm(view: BusHealthView, bench: Bench) -> None:
     show(view, bench, replace(BUS, load_percent=100.0))
     assert view.said.text() == "ALARM: bus main: it is full: 100 % of its time is taken"
-    assert view.checks.text().startswith("→ look who sends so much")
+    assert view.checks.text().startswith("→ find what sends so much")
     assert view.checks.isVisible()
     assert view.said.property("tone") == "bad"
     assert view.cards[0]._icon.accessibleName() == "ALARM"

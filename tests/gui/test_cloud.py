@@ -12,6 +12,7 @@ from ml.store import Store, StoreError
 from server_gui.core.archive import library
 from server_gui.core.archive.archive import Archive
 from server_gui.core.cloud.jobs import Job, Jobs, JobState
+from server_gui.core.cloud.store_reach import Reach
 from server_gui.core.desk.recording import By, Recording
 from server_gui.core.settings.server_file import ServerSettings
 from server_gui.views.cloud.jobs_table import SAID, JobsTable
@@ -139,6 +140,26 @@ def test_what_came_of_a_job_is_whole(theme: Theme, width: int) -> None:
     assert room.height() >= needs.height() > 0
     assert jobs.close(1.0)
     destroy(table)
+
+
+def test_models_and_cloud_see_at_once_that_the_store_has_gone(
+    whole: Shown, archive: Archive, settings: ServerSettings, bench: Bench, tmp_path: Path
+) -> None:
+    record(settings)
+    archive.library.knock(now=True)
+    whole.until(lambda: bench.desk.reach.state is Reach.REACHED, "reached it")
+    whole.open("Models")
+    bench.desk.reach.uploads("the disk is full")
+    state = whole.window.tabs.models.state
+    whole.until(lambda: state.text() == f"▲ Store: {bench.desk.reach.said}", "said so")
+    whole.open("Cloud")
+    bench.desk.reach.uploads(None)
+    bench.desk.reach.looked(None)
+    shutil.move(tmp_path / "store", tmp_path / "away")
+    assert not bench.desk.reach.is_due
+    whole.open("Models")
+    whole.until(lambda: bench.desk.reach.state is Reach.AWAY, "saw that it is gone")
+    whole.until(lambda: "ot reached" in state.text(), "said so")
 
 
 def test_no_place_is_green_while_the_store_is_gone_and_every_one_is_again_when_it_is_back(

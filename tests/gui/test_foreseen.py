@@ -152,6 +152,20 @@ def test_a_robot_that_differs_from_what_was_learned_is_said_to(station: Station)
     assert "unlike what it has learned (left_hip.position): do not rely on it" in line.detail
 
 
+def test_a_doubtful_prediction_does_not_look_sure_in_header_and_card(window: Parts, station: Station) -> None:
+    drifted = Trust(600, 0.0, 0.0, 0.5, {"left_hip.position": 0.4})
+    station.take_prediction(predicted("walk", {"walk": 1.0}, trust=drifted))
+    window.header.refresh()
+    words = window.header._chips["status"]._words
+    assert (words.main, words.parts) == ("Walk 100 %", ("doubtful", "predicted"))
+    assert all("%" not in wording for wording in doing(station))
+    assert doing(station)[0].startswith("Walk? 120 steps/min · ")
+    station.take_prediction(predicted("walk", {"walk": 1.0}))
+    window.header.refresh()
+    assert "doubtful" not in window.header._chips["status"]._words.parts
+    assert doing(station)[0].startswith("Walk 100 % 120 steps/min · ")
+
+
 @pytest.mark.parametrize(
     ("states", "held", "why"),
     [
@@ -270,7 +284,7 @@ def test_rules_that_hold_and_devices_in_trouble_stand_beside(window: Parts, stat
     assert [text.partition(" · ")[0] for text in texts] == [
         "Balance: Fall 97 %",
         "Rule alarm",
-        "left knee: not to be believed",  # the word of its alarm
+        "left knee: unreliable",  # the word of its alarm
     ]
     assert texts[2].endswith("i²t at 83 %")
 
@@ -288,7 +302,7 @@ def test_what_was_said_when_a_recording_was_made_is_said_to_be_of_then(
     walks = predicted("walk", WALKS).prediction
     station.predictions.recalled = {"activity": Recalled(walks, 0.1)}
     shown(window, lambda: window.overview._ring._word == "Walk 94 %")
-    said = "said then by model 3fa2 of activity · else turn 4 %"
+    said = "said then by the activity model · else turn 4 %"
     shown(window, lambda: window.overview.now.activity.detail.text() == said)
 
 

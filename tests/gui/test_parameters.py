@@ -1,22 +1,26 @@
 """Parameters: what is written is exactly the difference shown, and nobody is overwritten unseen."""
 
+import re
+import time
+
 import pytest
 from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtGui import QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLineEdit
 
-from gateway.client import RemoteError
+from gateway.client import ConnectionState, RemoteError
 from gateway.units import Units
 from gateway.wire.control import Lease
 from gateway.wire.parameter import Confirmed, Reverted, Written
+from server_gui.core.follow.events import LinkChanged
 from server_gui.views.frame.main_window import MainWindow
 from server_gui.views.parameters.panel import ParametersPanel
 from server_gui.views.parameters.review import NUMBERS, SETTLE_MS
 from server_gui.views.parameters.tree import NAME, NEW, ROBOT, SAID, TITLES
 from tests.gui.fakes import Bench
 from tests.gui.running import wait
-from tests.support.desk import HELD, JOINTS, described, looked
+from tests.support.desk import HELD, JOINTS, described, looked, walking
 
 
 def row(panel: ParametersPanel, name: str) -> list[str]:
@@ -302,6 +306,23 @@ def test_control_shows_who_has_it_and_how_long(panel: ParametersPanel, bench: Be
     bench.first.fail(RemoteError(-32003, "ada at 10.0.0.3 has control", {"kind": "lease_held"}))
     panel.refresh()
     assert panel.control.words.text() == "ada at 10.0.0.3 has control"
+
+
+def test_without_a_link_values_are_dim_and_their_age_is_said(panel: ParametersPanel, bench: Bench) -> None:
+    def colour() -> object:
+        panel.refresh()
+        panel.tree.select_name("gait.step_length")
+        held = panel.tree.currentIndex().siblingAtColumn(ROBOT)
+        return held.data(Qt.ItemDataRole.ForegroundRole).color()
+
+    bench.station.take([walking(20)])
+    live = colour()
+    bench.station.take([LinkChanged(ConnectionState.WAITING, "no gateway", time.monotonic_ns())])
+    assert colour() != live
+    assert re.fullmatch(r"No link: these values are \d+(\.\d)? m?s old", panel.control.words.text())
+    bench.station.take([LinkChanged(ConnectionState.CONNECTED, "", time.monotonic_ns())])
+    assert colour() == live
+    assert panel.control.words.text() == "Looking only: writing takes control"
 
 
 def test_what_is_outside_is_refused_before_it_is_staged(panel: ParametersPanel, bench: Bench) -> None:

@@ -46,6 +46,20 @@ def test_before_the_fault_there_is_no_alarm_and_at_it_there_is_about_which_nothi
     assert player.alarms.buttons.acknowledge.isHidden()
 
 
+def test_back_before_the_fault_its_line_says_that_there_was_none_then(
+    shown: Shown, archive: Archive, player: Player
+) -> None:
+    to_the_fault(shown, archive, player)
+    shown.until(lambda: player.timeline._flags, "showed its events on the axis of time")
+    assert player.events.isEnabled(), "they are listed as soon as they are shown"
+    tape = archive.playback.tape
+    assert tape is not None
+    archive.playback.seek(tape.first_ns + 1_000_000_000)
+    shown.until(lambda: not player.alarms.told, "went back")
+    shown.until(lambda: player.alarms.headline.text() == "No alarm then", "said so")
+    assert player.alarms.isVisible(), "nothing moves"
+
+
 def test_its_signal_is_shown_before_and_after_the_fault(
     shown: Shown, archive: Archive, player: Player
 ) -> None:

@@ -42,6 +42,16 @@ def _link_lost(bench: Bench) -> None:
     bench.station.take([LinkChanged(ConnectionState.WAITING, "no gateway", time.monotonic_ns())])
 
 
+def test_no_alarm_on_a_full_computer_is_not_called_all_ok(bench: Bench) -> None:
+    bench.station.take([described(), walking(100), looked()])
+    bench.station.predictions.foresees = False
+    assert quiet(bench.station)[2] == "all ok"
+    bench.station.is_full = lambda: True
+    mark, headline, why = quiet(bench.station)
+    assert (mark.colour, headline) == ("warn", "No alarms")
+    assert why.startswith("this computer is busy")
+
+
 @pytest.mark.parametrize("happened", [_never_reached, _nothing_came, _link_lost])
 def test_nothing_in_the_header_is_green_where_nothing_is_known(
     bench: Bench, happened: Callable[[Bench], None]

@@ -353,7 +353,7 @@ def test_another_robot_is_beside_and_says_how_it_is_aligned(signals: Signals, be
     assert labels(menu)[:2] == ["Nothing", "exo-02"]
     menu.actions()[1].trigger()
     said(signals)
-    assert "exo-02 by now: its newest row is at" in signals.beside_said.text()
+    assert "exo-02, aligned by their clocks: its newest row is" in signals.beside_said.text()
     assert len(signals.plots[0].plot._curves) == 2
     assert signals.scene.read(TORQUE, 0.0, beside=True) == 2.0
     signals.beside.nudge("-6")

@@ -55,7 +55,7 @@ class Alarm:
 
     @property
     def consequences(self) -> str:
-        """What it explains, by kind: `not to be believed: left hip, right knee; stale: gait`."""
+        """What it explains, by kind: `unreliable: left hip, right knee; stale: gait`."""
         names: dict[str, list[str]] = {}
         for one in self.under:
             names.setdefault(one.mark.word, []).append(one.spoken or one.what)

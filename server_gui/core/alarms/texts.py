@@ -20,7 +20,7 @@ class Kind(Enum):
     FAULT = "fault"
     GUARD = "guard tripped"
     DANGER = "danger foreseen"
-    IMPLAUSIBLE = "not to be believed"
+    IMPLAUSIBLE = "unreliable"
     LOST = "lost"
     NO_DATA = "no data yet"
     STALE = "stale"

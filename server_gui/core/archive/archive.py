@@ -47,6 +47,7 @@ class Archive:
         self.models = Models(
             settings.store.url, deliver, self._robots, author, settings.promoters, desk.reach
         )
+        self.models.knock = lambda: self.library.knock(now=True)
         self.tape: Tape | None = None  # of the session that is chosen
         self.problem = ""  # why there is none
         self.chosen: Session | None = None

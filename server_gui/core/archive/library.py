@@ -76,9 +76,9 @@ class Library:
         settings = self.settings
         when_done(self.reading.do(lambda: look(settings)), self._deliver, self._looked, self._failed)
 
-    def knock(self) -> None:
-        """See whether the store is there, where it is time: one small file of it, whoever looks at a page."""
-        if self._knocking or self._looking or not self.reach.is_due:
+    def knock(self, *, now: bool = False) -> None:
+        """See whether the store is there, where it is time or at once: one small file of it."""
+        if self._knocking or self._looking or not (now or self.reach.is_due):
             return
         if self.reach.list_problem is not None:
             self.look()  # one file would not say whether its list is whole again

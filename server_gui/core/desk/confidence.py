@@ -9,7 +9,7 @@ from ml.registry.card import DataSource
 from ml.serving.trust import TrustLevel
 from server_gui.core.alarms.robot_alarms import undriven
 from server_gui.core.desk.station import Station
-from server_gui.core.models.names import told_name
+from server_gui.core.models.names import told_task
 from server_gui.core.prediction.newest_predictions import NewestPrediction, Recalled, Told
 from server_gui.core.prediction.state import Quality
 
@@ -40,7 +40,7 @@ class Confidence:
 def belief(told: Told) -> Confidence:
     """Return the confidence in what a model says."""
     if isinstance(told, Recalled):
-        return Confidence(Worth.UNCHECKED, (f"said then by {told_name(told.prediction.model)}", "said then"))
+        return Confidence(Worth.UNCHECKED, (f"said then by {told_task(told.prediction.model)}", "said then"))
     predicted = told.predicted
     if predicted.trust.level is TrustLevel.DRIFTED:
         return Confidence(Worth.DOUBTFUL, (_drifted(told), "unlike its learning", "do not rely on it"))

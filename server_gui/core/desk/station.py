@@ -82,6 +82,7 @@ class Station:
         self.is_named = is_named  # by the user, who is to find that name everywhere
         self.address = address
         self.is_overloaded: Callable[[], bool] = lambda: False  # this computer
+        self.is_full: Callable[[], bool] = lambda: False  # this computer, for some seconds
         self.neighbours: Sequence[Station] = ()  # the robots of the desk, this one among them
         self.robot = Robot()
         self.rings = Rings()
@@ -96,8 +97,7 @@ class Station:
         self.judged = EditList()
         self.stopping = StopProgress()
         self.control = LeaseState()
-        self.edits = Edits()
-        self.writing = WriteProgress()
+        self.edits, self.writing = Edits(), WriteProgress()
         self.file: Comparison | None = None  # what its parameters are compared with
         self.audit = Audit()
         self.flash = Flash(self.audit)

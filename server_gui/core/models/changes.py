@@ -15,10 +15,13 @@ from server_gui.core.settings.promoters import UNSIGNED, desk_signature
 SOON: Final = "Servers that run take it within seconds, without a restart."
 SIGNED: Final = "It is signed with this desk's key."
 KEYLESS: Final = (
-    f"This desk has no key, so it is {UNSIGNED}: no rule stops a robot by it. gwrms models key makes one."
+    f"This desk has no key, so it is {UNSIGNED}: its predictions cannot stop a robot. "
+    "gwrms models key makes one."
 )
 OWN: Final = "A robot with a model of its own keeps that."
-UNPROMOTED: Final = "no promoted model; until then a robot is served by what came with GWRMS and fits it"
+UNPROMOTED: Final = (
+    "no promoted model; robots use the model that came with GWRMS, where it fits their sensors"
+)
 
 
 @dataclass(frozen=True, slots=True)

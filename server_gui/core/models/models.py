@@ -46,6 +46,7 @@ class Models:
     ) -> None:
         self.url = url
         self.reach = reach or StoreReach()  # of the store
+        self.knock: Callable[[], None] = lambda: None  # see at once whether it is reached
         self.found = Catalogue()
         self.revision = 0
         self.looked_s: float | None = None  # when the newest look came back, on our monotonic clock
@@ -60,6 +61,8 @@ class Models:
         self._thread = Background("list of models")
         self._looking = Looking(url, promoters)
         self._looks = False
+        self._results: list[tuple[str, Tone]] = []  # of trainings, said once their models are listed
+        self._lists = 0  # of them, those whose models the look under way must find
         self._ending = False
 
     def close(self, within_s: float) -> bool:
@@ -74,7 +77,7 @@ class Models:
         due = self.looked_s is None or time.monotonic() - self.looked_s >= wait_s
         if self._looks or not (now or due):
             return
-        self._looks = True
+        self._looks, self._lists = True, len(self._results)
         robots = frozenset(self.robots())
         look = self._thread.do(lambda: self._looking.look(robots, lambda: self._ending))
         when_done(look, self._deliver, self._looked, self._look_failed)
@@ -150,11 +153,20 @@ class Models:
         self._looks, self.looked_s = False, time.monotonic()
         self.revision += 1
         self.found = found
+        listed, self._results = self._results[: self._lists], self._results[self._lists :]
+        for text, tone in listed:
+            self._say(text, tone)
+        if self._results:  # over since this look began
+            self.look(now=True)
 
     def _look_failed(self, error: Exception) -> None:
         self._looked(Catalogue(problem=f"internal error, {type(error).__name__}"))
 
     def _over(self, job: Job) -> None:
         good = Tone.GOOD if job.said.startswith(BETTER) else Tone.PLAIN
-        self._say(f"{job.name}: {job.said}", Tone.BAD if job.state is JobState.FAILED else good)
+        text = f"{job.name}: {job.said}"
+        if job.state is JobState.FAILED:
+            self._say(text, Tone.BAD)
+        else:
+            self._results.append((text, good))
         self.look(now=True)

@@ -49,6 +49,14 @@ def told_name(model: str) -> str:
     return f"model {digits[:ID_SHOWN]} of {task_name(task).lower()}{own}" if task else f"the model {model}"
 
 
+def told_task(model: str) -> str:
+    """Return the same without digits, which nobody can read: `the falling model`."""
+    base, adapted, _ = model.partition(ADAPTED)
+    task = base.rpartition("-")[0]
+    own = ", learned from its wearer" if adapted else ""
+    return f"the {task_name(task).lower()} model{own}" if task else "a model"
+
+
 def class_name(name: str) -> str:
     """Return a class, as people read it."""
     return name.replace("_", " ")

@@ -17,8 +17,9 @@ UNITS: Final = {
 
 BETTER: Final = "Better"
 NOT_BETTER: Final = "not better"  # the verdict with which nothing is promoted
+NOT_COMPARED: Final = "not compared"  # with which the reasons say so themselves
 WORDS: Final = {
-    "macro_f1": "F1, mean over classes,",
+    "macro_f1": "F1",
     "rmse_percent": "error of the place in the gait cycle",
     "calibration_error": "how far its probabilities are off",
     "abstained": "how often it says “unknown”",
@@ -46,10 +47,7 @@ class Trained(msgspec.Struct, frozen=True):
     @property
     def reasons(self) -> str:
         """Return why, with figures by their names for people."""
-        why = "; ".join(self.why)
-        for figure, words in WORDS.items():
-            why = why.replace(figure, words)
-        return why
+        return "; ".join(self._why)
 
     @property
     def may_serve(self) -> bool:
@@ -59,7 +57,16 @@ class Trained(msgspec.Struct, frozen=True):
     @property
     def said(self) -> str:
         """Return verdict and reasons in words."""
+        if self.verdict == NOT_COMPARED:
+            return " ".join(f"{why[:1].upper()}{why[1:]}." for why in self._why)
         return f"{self.verdict.capitalize()}: {self.reasons}"
+
+    @property
+    def _why(self) -> list[str]:
+        why = list(self.why)
+        for figure, words in WORDS.items():
+            why = [each.replace(figure, words) for each in why]
+        return why
 
 
 class _Wrong(msgspec.Struct, frozen=True):

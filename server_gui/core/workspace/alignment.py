@@ -8,6 +8,7 @@ from server_gui.core.desk.flags import FlagKind
 from server_gui.core.desk.station import Station
 
 HOLD_NS: Final = 100_000_000  # what is measured anew differs a little each time: only more than this moves
+SAME_S: Final = 0.005  # what is less is not shown with two decimals
 
 
 class Align(Enum):
@@ -64,4 +65,6 @@ def offset_text(here: Station, beside: Station, shift: int | None, nudge_s: floa
         return "no rows yet"
     behind_s = (theirs + shift - ours) / 1e9 + nudge_s
     moved = f", moved by {nudge_s:+.2f} s" if nudge_s else ""
-    return with_minus(f"its newest row is at {behind_s:+.2f} s{moved}")
+    way = "later" if behind_s > 0.0 else "earlier"
+    when = f"{abs(behind_s):.2f} s {way}" if abs(behind_s) >= SAME_S else "of the same instant"
+    return with_minus(f"its newest row is {when}{moved}")

@@ -311,7 +311,8 @@ class Scene:
         if self.beside is None or self._station is None:
             return ""
         said = offset_text(self._station, self.beside.station, self._shift_ns, self.nudge_s)
-        return f"┅ {self.beside.station.title} by {self.align.value}: {said}"
+        by = "their clocks" if self.align is Align.NOW else self.align.value
+        return f"┅ {self.beside.station.title}, aligned by {by}: {said}"
 
 
 def _faults(station: Station, channel: str, rows: int) -> Floats:

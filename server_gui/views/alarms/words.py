@@ -14,6 +14,7 @@ from server_gui.views.marks import Mark
 
 Told = tuple[Station | None, Active]  # without a robot: of what this window records
 Key = tuple[str, tuple[Kind, str]]
+BUSY: Final = "this computer is busy, what it shows may be late: end other programs on it"
 REMEDY: Final = "→"  # what there is to check, or to do
 
 
@@ -27,7 +28,7 @@ def quiet(station: Station | None, recording: Recording | None = None) -> tuple[
     if station is None:
         return Mark("ring", "dim"), "No robot", ""
     if station.robot.is_recording:
-        return Mark("diamond", "accent"), "A recording", "no fault shown"
+        return Mark("diamond", "accent"), "No alarm then", "in the recording, at this instant"
     if not station.is_live or not station.robot.parts:
         return Mark("ring", "old"), "Alarms not known", "no live data"
     if station.mark.colour in ("warn", "bad", "old"):  # as its card says
@@ -37,6 +38,8 @@ def quiet(station: Station | None, recording: Recording | None = None) -> tuple[
         return Mark("ring", "dim"), "No alarms", "danger is not known"
     if recording is not None and recording.can_ask and not recording.reach.is_known:
         return Mark("ring", "dim"), "No alarms", "the store is not known"
+    if station.is_full():
+        return Mark("triangle", "warn", "busy"), "No alarms", BUSY
     return Mark("disc", "good"), "No alarms", "all ok"
 
 

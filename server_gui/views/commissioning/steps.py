@@ -71,7 +71,7 @@ class Steps(Card):
                 set_text(words, _told(its))
                 words.setVisible(bool(words.text()))
         done = sum(one.state in (DONE, PASSED) for one in steps)
-        self.set_note(*((f"{done} of {len(steps)} gone through", f"{done}/{len(steps)}") if steps else ("",)))
+        self.set_note(*((f"{done} of {len(steps)} done", f"{done}/{len(steps)}") if steps else ("",)))
 
     def _add(self) -> None:
         icon, title, words = MarkIcon(self._theme), WrappingLabel("title"), WrappingLabel("dim")

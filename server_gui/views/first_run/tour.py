@@ -27,7 +27,7 @@ class Stop:
 STOPS: Final = (
     Stop(
         "at a glance",
-        "drives and link are at the top beside STOP, alarms below, whatever tab is open. What is not known "
+        "the robot's state is at the top beside STOP, alarms below, whatever tab is open. What is not known "
         "now is grey.",
         lambda window: window.header,
     ),

@@ -3,9 +3,10 @@
 from typing import Final
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QResizeEvent
+from PySide6.QtGui import QResizeEvent, QShowEvent
 from PySide6.QtWidgets import QBoxLayout, QComboBox, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
+from server_gui.core.cloud.store_reach import Reach
 from server_gui.core.desk.desk import Desk
 from server_gui.core.models.catalogue import Entry
 from server_gui.core.models.models import Models
@@ -65,6 +66,10 @@ class ModelsPage(QWidget):
         self._build()
         self._connect()
 
+    def showEvent(self, event: QShowEvent) -> None:
+        super().showEvent(event)
+        self._models.knock()
+
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         direction = QBoxLayout.Direction
@@ -90,7 +95,8 @@ class ModelsPage(QWidget):
         self._show_learned()
         entry = self.chosen
         trained = None if entry is None else models.trained.get(entry.card.id)
-        judged = "" if trained is None else f"Training has judged it: {trained.said}"
+        is_said = trained is None or trained.said in self._models.said  # above already
+        judged = "" if trained is None or is_said else f"Training has judged it: {trained.said}"
         self.compare.show_entry(entry, models.found, judged)
         self.confirm.refresh()
         self.form.refresh()
@@ -162,8 +168,10 @@ class ModelsPage(QWidget):
 
     def _show_state(self) -> None:
         found = self._models.found
-        away = self._models.reach.problem
+        reach = self._models.reach
+        away = reach.problem
         lines = [] if away is None else [AWAY.format(why=away)]
+        lines += [f"▲ Store: {reach.said}"] if reach.state is Reach.FAILING else []
         lines += [f"▲ {found.problem}"] if found.problem and found.problem != away else []
         lines += [f"▲ {each}" for each in found.damaged]
         if self._models.looked_s is None:

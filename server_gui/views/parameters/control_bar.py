@@ -6,6 +6,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QHBoxLayout, QPushButton, QWidget
 
 from gateway.wire.control import CONTROL_ACQUIRE
+from server_gui.core.alarms.marks import age_text
 from server_gui.core.desk.desk import Desk
 from server_gui.views.marks import Mark
 from server_gui.views.theme import Theme
@@ -62,5 +63,10 @@ class ControlBar(QWidget):
             set_text(self.words, f"You have control for {int(left_s) // 60}:{int(left_s) % 60:02}")
         else:
             self._icon.show_mark(Mark("ring", "dim", "not in control"))
+            if not station.is_linked:
+                age_s = station.robot.age_s()
+                old = "no value is known" if age_s is None else f"these values are {age_text(age_s)} old"
+                set_text(self.words, f"No link: {old}")
+                return
             asking = "asking …" if station.control.asking else "Looking only: writing takes control"
             set_text(self.words, why_not or station.control.problem or asking)

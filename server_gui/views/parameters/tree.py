@@ -96,6 +96,7 @@ class ParameterTree(QTreeView):
         self._rows: dict[str, list[QStandardItem]] = {}
         self._shape: tuple[object, ...] = ()
         self._fitted: tuple[object, ...] = ()
+        self._dimmed: object = None  # what the robot's values were dimmed for
         self._closed: set[str] = set()  # groups, by people
         self._looked_at: str | None = None  # the parameter that was chosen last, also while it is left out
         self._filtering = False
@@ -151,9 +152,17 @@ class ParameterTree(QTreeView):
             for name, info in known.items():
                 self._refresh_row(station, name, info)
                 self._refresh_facts(station, name, info, pinned)
+            self._dim(is_old=not station.is_linked)
         if (shape, file, self._says) != self._fitted:
             self._fitted = shape, file, self._says
             self._show_columns()
+
+    def _dim(self, *, is_old: bool) -> None:
+        """Dim the robot's values where they are old, or no more."""
+        if (shown := (self._shape, is_old)) != self._dimmed:
+            self._dimmed = shown
+            for items in self._rows.values():
+                items[ROBOT].setForeground(self._theme.colour("dim" if is_old else "text"))
 
     def show_only(self, words: str, names: Iterable[str] | None) -> None:
         """Show rows that match all words and are one of `names`, with open groups; the selection stays."""

@@ -42,6 +42,8 @@ from server_gui.views.workspace.page import AROUND_S, Signals
 
 ROOMY: Final = 440  # high, at text of 100 %: what is lower shows plots alone beside labels
 ALL: Final = 960  # high, likewise: what is lower begins with all of the robot rather than with what labels it
+EVENTS_HINT: Final = "Its events; choose one to see its instant"
+NO_EVENTS_HINT: Final = "Nothing happened in it: no mark, no change of a drive, no line of the journal"
 SLOW: Final = 5  # frames between two looks at what people read
 SIGNALS: Final = 1  # of the two views
 AROUND_NS: Final = round(AROUND_S * SECOND_NS)
@@ -219,7 +221,6 @@ class Player(QWidget):
         self.export.setToolTip("The chosen span, or all of it, as a file; made in the background")
         self.events = QPushButton("Events")
         self.events.setAccessibleName("Events of the recording")
-        self.events.setToolTip("Its events; choose one to see its instant")
         happened = QMenu(self.events)
         happened.aboutToShow.connect(lambda: self._list_events(happened))
         self.events.setMenu(happened)
@@ -254,8 +255,10 @@ class Player(QWidget):
         known = f" · events not known: {happened.problem}" if happened.problem else ""
         looking = " · looking for events …" if happened.is_looking else known
         set_text(self.place, f"{clock_text(since, 1)} of {clock_text(length, 1)}{looking}")
-        self.events.setEnabled(bool(len(happened.flags)))
         self._refresh_flags(tape)
+        has_events = bool(len(happened.flags))  # as the time axis shows them
+        self.events.setEnabled(has_events)
+        set_tip(self.events, EVENTS_HINT if has_events else NO_EVENTS_HINT)
         self._refresh_alarms()
         self.beside_bar.refresh()
         self.labels.refresh(tape)

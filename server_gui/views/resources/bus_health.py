@@ -171,7 +171,9 @@ class BusCard(Card):
             counters.append(
                 (wrong if count else text, "▲" if count else "", f"{count} {one if count == 1 else many}")
             )
-        self._counters.say([*counters, (text, "", f"opened {bus.opened} ×")])
+        self._counters.say(
+            [*counters, (text, "", "opened once" if bus.opened == 1 else f"opened {bus.opened} times")]
+        )
         self._kinds.say([(css(self._theme, "dim"), "", f"{kind} {rate:.0f}/s") for kind, rate in _kinds(bus)])
         self._show_nodes(bus, {alarm.subject: alarm.mark.colour for alarm in alarms.each})
 

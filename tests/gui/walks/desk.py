@@ -186,7 +186,7 @@ def learning(bench: Bench) -> None:
     hand.sees(JUDGE)
     hand.keep("train")
     hand.click("Start training")
-    hand.sees("Not compared: F1", within_s=AGAIN_S)
+    hand.sees("Not compared with", within_s=AGAIN_S)
     hand.sees("Train a model")  # the form is gone, and its result in sight
     hand.keep("trained")
     hand.insist("Promote…", lambda: hand.reads("Serves now"))

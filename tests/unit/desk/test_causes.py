@@ -62,7 +62,7 @@ def test_a_flood_after_a_stall_is_one_alarm_as_bad_as_its_worst() -> None:
     (one,) = gathered([stood(), *flood], (STALL,), 104.0)
     assert one.alarm.line == "computer paused: computer: the robot's computer stood still for 1.2 s"
     assert (one.alarm.mark.colour, one.alarm.mark.word) == ("bad", "computer paused")
-    assert "not to be believed: left hip, left knee" in one.alarm.consequences
+    assert "unreliable: left hip, left knee" in one.alarm.consequences
     assert len(one.alarm.under) == len(flood)
 
 

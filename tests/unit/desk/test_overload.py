@@ -84,6 +84,19 @@ def test_it_is_overloaded_while_nine_tenths_of_its_time_are_taken_and_a_little_l
     assert said[3:] == [place * EVERY_S <= LASTS_S for place in range(1, 9)]
 
 
+def test_it_is_full_after_seconds_of_it_until_it_is_not_overloaded_any_more() -> None:
+    taken = [100, 100, 94, 100, 100, 100, 92, 92, *[50] * 7]  # percent of each second
+    times = [sum(taken[:place]) for place in range(len(taken) + 1)]
+    lines = iter([stat(busy, 100 * place - busy) for place, busy in enumerate(times)])
+    clock = iter(place * EVERY_S for place in range(len(times)))
+    load = OwnLoad(lambda: next(lines), lambda: next(clock))
+    said = [load.is_full() for _ in times]
+    begins, ends = said.index(True), len(said) - said[::-1].index(True)
+    assert begins == 6, "the third full second in a row"
+    assert ends == 8 + 1 + LASTS_S / EVERY_S
+    assert all(said[begins:ends])
+
+
 @pytest.mark.parametrize("line", ["", "cpu one two\n", "intr 5\n"])
 def test_where_nothing_is_told_nothing_is_overloaded(line: str) -> None:
     assert told([line] * 4) == [False] * 4

@@ -40,7 +40,8 @@ def test_a_promotion_says_what_serves_now_and_what_will(registry: Registry) -> N
     one, other = publish(registry), publish(registry, 1)
     first = promotion(registry.url, one.id, "")
     assert first.sentences[0] == (
-        "Serves now: no promoted model; until then a robot is served by what came with GWRMS and fits it."
+        "Serves now: no promoted model; robots use the model that came with GWRMS, "
+        "where it fits their sensors."
     )
     assert registry.history("falling") == []
     carry_out(registry.url, first, "Ada", "a test")
@@ -182,7 +183,7 @@ def test_what_was_judged_not_better_is_not_promoted(desk: Desk, registry: Regist
     desk.models.trained[model] = Trained(model, "not better", ("macro_f1 on held-out people: 0.5",))
     desk.models.ask_promotion(model, "")
     assert desk.models.tone is Tone.BAD
-    assert "is not better: F1, mean over classes, on held-out people: 0.5" in desk.models.said
+    assert "is not better: F1 on held-out people: 0.5" in desk.models.said
     assert not desk.models.said.startswith("Looking")
     assert registry.history("falling") == []
 

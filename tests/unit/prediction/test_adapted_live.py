@@ -9,7 +9,7 @@ from msgspec.structs import replace
 from ml.registry.registry import Registry
 from server_gui.core.fleet.live_prediction import RecordedPrediction
 from server_gui.core.follow.events import Telemetry
-from server_gui.core.models.names import told_name
+from server_gui.core.models.names import told_name, told_task
 from server_gui.core.prediction import adapting, inbox, robot_predictor
 from server_gui.core.prediction.adaptation import AdaptationState, Adapting, Happening, Tried, Wearing
 from server_gui.core.prediction.service import BARRED, PredictionService
@@ -160,4 +160,6 @@ def test_a_recording_keeps_which_model_served_and_until_when_without_a_name() ->
         ("adapted", "gait_phase-77.w1 serves no more", "gait_phase-77.w1"),
     ]
     assert told_name("gait_phase-77ab12.w1") == "model 77ab of gait phase, learned from its wearer"
+    assert told_task("gait_phase-77ab12.w1") == "the gait phase model, learned from its wearer"
+    assert told_task("gait_phase-77ab12") == "the gait phase model"
     assert told_name("gait_phase-77ab12") == "model 77ab of gait phase"

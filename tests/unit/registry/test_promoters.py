@@ -106,7 +106,7 @@ def test_the_commands_sign_with_the_desks_key_and_say_unsigned_without_one(
         return said.out + said.err
 
     config.write_text(f'[store]\nurl = "{registry.url}"\n')
-    assert "unsigned, so no rule stops a robot by it" in run("promote", name)
+    assert "unsigned, so its predictions cannot stop a robot" in run("promote", name)
     assert "every robot (unsigned)" in run("ls")
     assert "(unsigned)" in run("history", "falling")
     line = run("key")

@@ -93,16 +93,20 @@ def test_the_first_model_must_know_more_than_nothing(figures: Any, serves: bool)
     assert (decision.may_serve, decision.better) == (serves, False), (
         "nothing is better than what is not there"
     )
-    assert "saying always the same has 20.0 %; no model that was promoted serves yet" in decision.why[0]
+    ours = f"{100 * figures['macro_f1']:.1f} %"
+    assert decision.why == (
+        f"macro_f1 {ours} on wearers it has not seen (always guessing the same: 20.0 %)",
+        "not compared with another: no promoted model serves yet",
+    )
 
 
 def test_what_came_with_gwrms_and_cannot_judge_these_sessions_is_named() -> None:
     lacking = ("imu.roll", "imu.yaw", "left_insole.force", "right_insole.force")
     decision = decide(ACTIVITY, judged(better(), None), None, lacking)
     assert not decision.better
-    assert (
-        "these sessions lack: 4 (imu.roll, imu.yaw, left_insole.force, …); so it is not compared"
-        in (decision.why[1])
+    assert decision.why[1] == (
+        "not compared with the model that came with GWRMS: these sessions lack 4 of its channels "
+        "(imu.roll, imu.yaw, left_insole.force, …)"
     )
 
 

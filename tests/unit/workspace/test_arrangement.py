@@ -178,7 +178,8 @@ def test_by_now_the_newest_rows_stand_where_their_age_says_and_stay_there(bench:
     found = shift_ns(one, other, Align.NOW)
     assert found == pytest.approx(0, abs=1e9), "both robots' clocks are known to be ours"
     assert shift_ns(one, other, Align.NOW, 123) == 123, "it trembles"
-    assert offset_text(one, other, 0, 0.25) == "its newest row is at −499.75 s, moved by +0.25 s"
+    assert offset_text(one, other, 0, 0.25) == "its newest row is 499.75 s earlier, moved by +0.25 s"
+    assert offset_text(one, other, 500 * SECOND_NS, 0.0) == "its newest row is of the same instant"
 
 
 def test_what_is_beside_is_joined_and_an_expression_may_have_both(bench: Bench) -> None:
