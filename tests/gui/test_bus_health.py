@@ -80,6 +80,9 @@ def test_a_full_bus_is_an_alarm(view: BusHealthView, bench: Bench) -> None:
     show(view, bench, BUS)
     assert not view.said.isVisible()
     assert not view.checks.isVisible()
+    assert view.cards[0]._icon.accessibleName() == "not known", "nothing new comes from the robot"
+    bench.station.take([walking(1)])
+    show(view, bench, BUS)
     assert view.cards[0]._icon.accessibleName() == "ok"
 
 

@@ -51,9 +51,11 @@ class Library:
         self._deliver = deliver
         self._looking = False
         self._knocking = False
+        self._knock_again = False
 
     def close(self, within_s: float) -> bool:
         """Look no more; False where a look under way hangs. Idempotent."""
+        self._knock_again = False
         return self.reading.close(within_s)
 
     @property
@@ -78,7 +80,10 @@ class Library:
 
     def knock(self, *, now: bool = False) -> None:
         """See whether the store is there, where it is time or at once: one small file of it."""
-        if self._knocking or self._looking or not (now or self.reach.is_due):
+        if self._knocking or self._looking:
+            self._knock_again |= now  # what is under way may have begun before
+            return
+        if not (now or self.reach.is_due):
             return
         if self.reach.list_problem is not None:
             self.look()  # one file would not say whether its list is whole again
@@ -122,6 +127,9 @@ class Library:
 
     def _reached(self, found: Found) -> None:
         self.reach.looked(None if found.is_reached else found.problem, is_empty=found.is_empty)
+        again, self._knock_again = self._knock_again, False
+        if again:
+            self.knock(now=True)
 
 
 def look(settings: ServerSettings) -> Found:
