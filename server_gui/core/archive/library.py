@@ -86,7 +86,7 @@ class Library:
         if not (now or self.reach.is_due):
             return
         if self.reach.list_problem is not None:
-            self.look()  # one file would not say whether its list is whole again
+            self.look(now=now)  # one file would not say whether its list is whole again
             return
         self._knocking = True
         settings = self.settings
