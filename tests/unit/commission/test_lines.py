@@ -143,9 +143,8 @@ def test_a_stop_that_comes_just_before_a_question_waits_is_heard(
         monkeypatch.setattr(lines._read, "get", uninterrupted)
         late = threading.Timer(WAIT_S / 2, pipe.write, ("an answer",))
         late.start()
-        pipe.write('{"stop": true}')
         with pytest.raises(MotionEnded):
-            JsonFace(lines).ask(Ask("?"))
+            stopped_in(pipe, lines, lambda lines: JsonFace(lines).ask(Ask("?")))
         late.cancel()
 
 
