@@ -7,12 +7,12 @@ import tty
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-_OPENED = b"O\r"  # the last word of slcan's handshake
+_FRAME = b"t"  # begins a frame of slcan, and is in no word of its handshake
 
 
 @contextmanager
 def blocked_bus() -> Iterator[str]:
-    """Its port. From when it has been opened, every write to it waits for ever."""
+    """Its port. From the first frame on, every write to it waits for ever."""
     master, slave = pty.openpty()
     tty.setraw(slave)
     ending = threading.Event()
@@ -28,15 +28,18 @@ def blocked_bus() -> Iterator[str]:
 
 
 def _serve(master: int, slave: int, ending: threading.Event) -> None:
-    """Hear the handshake to its end; then fill, from our own side, all the room that there is."""
+    """Hear the handshake, and that a frame begins; then fill, from our own side, all the room that there is.
+
+    Not before: pyserial returns from the last word of the handshake only once there is room again.
+    """
     os.set_blocking(master, False)
     os.set_blocking(slave, False)
     heard = b""
-    while _OPENED not in heard:  # the first frames may come with it
+    while _FRAME not in heard:
         if ending.wait(0.001):
             return
         try:
-            heard = heard[-len(_OPENED) :] + os.read(master, 100)  # it may come in two pieces
+            heard = os.read(master, 100)
         except BlockingIOError:
             continue
     try:
