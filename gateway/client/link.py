@@ -15,6 +15,7 @@ from gateway.client.backoff import Backoff
 from gateway.client.clock import ClockTracker
 from gateway.client.connection import UNREADABLE, Connection
 from gateway.client.errors import (
+    NOTHING_SENT,
     CallTimeout,
     ClientError,
     LinkLost,
@@ -156,8 +157,7 @@ class Link:
         if method.urgent:
             await self._dial()
         if self._connection is None:
-            why = f" ({self.problem})" if self.problem is not None else ""
-            raise NotConnected(f"there is no link to {self.address} now, and nothing was sent{why}")
+            raise NotConnected(f"{NOTHING_SENT}; {self.problem or f'there is no link to {self.address} yet'}")
         return await self._ask(self._connection, method, params, timeout_s)
 
     def dial(self) -> None:
