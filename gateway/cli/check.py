@@ -15,9 +15,9 @@ from gateway.tables.line_numbers import Places
 from gateway.tables.reading import Unreadable, as_far_as_readable, parse, read
 
 _DESCRIPTION = """\
-Check a robot's file, a server's file or a scenario as a gateway, a collector or `gwrms sim run` would read it,
-and report all mistakes at once: line, table, key, what is allowed and what was probably meant. The kind of a
-file is recognised by its tables. Nothing is started, and nothing is written.
+Check a robot's file, a server's file or a scenario as a gateway, a collector or `gwrms sim run` would read
+it, and report all mistakes at once: line, table, key, what is allowed and what was probably meant. The kind
+of a file is recognised by its tables. Nothing is started, and nothing is written.
 
 For a robot's file, its surroundings are checked too: whether EDS files, layouts and calibrations are usable
 and allow its parameters, whether the ports exist and this user may open them, whether the CAN links are up

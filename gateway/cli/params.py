@@ -38,7 +38,7 @@ A .toml file holds parameters of a whole robot, a .dcf file (CiA 306) all of one
 gwrms params COMMAND --help says more.
 """
 
-SAVE_EPILOG = """A .toml file contains the parameters that can be changed, by name, in the units of the robot's file.
+SAVE_EPILOG = """A .toml file contains the changeable parameters, by name, in the units of the robot's file.
 A .dcf file is made from the device's EDS and contains all of its writable objects except commands.
 Exit status 1 if a device did not give a value: the file is written without it.
 
