@@ -28,7 +28,7 @@ from server_gui.core.settings.server_file import load
 USAGE: Final = """usage: gwrms models COMMAND [--config server.toml] [--url URL] [--json]
 
   ls             list the models of the store, and those that come with GWRMS; which one serves
-  show MODEL     show its data, its judgement and on whom, and whether it can serve here
+  show MODEL     show what it learned from, how and on whom it was judged, and if it can serve here
   promote MODEL  let it serve every robot, or with --robot one
   rollback TASK  return to the model that served before
   history TASK   show what has served, who promoted it, and why
