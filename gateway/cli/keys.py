@@ -127,7 +127,7 @@ def _drawn(text: str) -> list[str]:
 
 
 def _address() -> str:
-    """How others reach this computer, as far as it knows itself."""
+    """Return the address by which others reach this computer, as far as it knows it."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe, contextlib.suppress(OSError):
         probe.connect(("192.0.2.1", 9))  # nothing is sent (RFC 5737)
         return str(probe.getsockname()[0])
