@@ -86,7 +86,7 @@ def commands() -> Iterator[Command]:
 
 
 def parser_of(words: tuple[str, ...]) -> argparse.ArgumentParser:
-    """What reads the arguments of a command; found by running it up to there."""
+    """Return the parser of a command's arguments; found by running it up to there."""
 
     def capture(parser: argparse.ArgumentParser, *_arguments: object, **_named: object) -> None:
         raise _Captured(parser)
