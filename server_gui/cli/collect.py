@@ -205,7 +205,7 @@ def _predicted(state: PredictingState | None) -> list[str]:
 
 
 def _labelled(found: Figures) -> str:
-    """How right predictions were, where labels say what was so."""
+    """Return how right predictions were, by labels."""
     if not found:
         return f"no prediction of the last {WITHIN_DAYS} days is labelled in the store (gwrms label)\n"
     rows = [

@@ -286,7 +286,7 @@ def _follow(
 
 
 def _is_watched(run: Run) -> bool:
-    """Whether this command is in the foreground; a line on its standard input ends the experiment."""
+    """Return whether this command is in the foreground; a line on its standard input ends the experiment."""
     try:
         if sys.stdin.isatty() and os.tcgetpgrp(sys.stdin.fileno()) != os.getpgrp():
             return False

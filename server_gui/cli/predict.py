@@ -150,7 +150,7 @@ class _Linked:
 
 @contextlib.contextmanager
 def _shown(arguments: argparse.Namespace) -> Iterator[Show]:
-    """How it is shown: as JSON lines, as a picture that is drawn anew, or as lines of what is new."""
+    """Provide the output: JSON lines, a picture that is drawn anew, or lines of what is new."""
     if arguments.json:
         yield _show_json
     elif sys.stdout.isatty():

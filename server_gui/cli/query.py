@@ -85,7 +85,7 @@ def _csv(result: QueryResult) -> None:
 
 
 def _is_plain(kind: pa.DataType) -> bool:
-    """Whether a CSV says it as it is."""
+    """Return whether a CSV shows it as it is."""
     return any(is_kind(kind) for is_kind in _PLAIN)
 
 

@@ -81,7 +81,7 @@ def _settings() -> "ServerSettings | None":
 
 
 def _foresees(settings: "ServerSettings | None") -> bool:
-    """Whether the server's file wants danger foreseen."""
+    """Return whether the server's file wants danger foreseen."""
     return settings is not None and settings.prediction.enabled and settings.prediction.danger
 
 

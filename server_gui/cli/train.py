@@ -115,7 +115,7 @@ class _Stages:
 def _promoted(
     registry: Registry, model: str, trained: "Trained", arguments: argparse.Namespace
 ) -> tuple[bool, str]:
-    """Whether it serves now; why not, where it was better but something else serves since it was judged."""
+    """Promote it if it may serve. Return whether it serves now; else why another model still does."""
     if not (arguments.promote and trained.decision.may_serve):
         return False, ""
     who, why = user_name(), "; ".join(trained.decision.why)
