@@ -125,7 +125,7 @@ class FrameScanner(Generic[F]):
         raise NotImplementedError
 
     def _find(self, buffer: bytearray, start: int, end: int) -> int:
-        """Where the next frame could begin, from `start` and before `end`; −1 for nowhere."""
+        """Return where the next frame could begin, from `start` and before `end`; −1 for nowhere."""
         return buffer.find(self.sync, start, end + len(self.sync) - 1)
 
     @property
@@ -198,7 +198,7 @@ class FrameScanner(Generic[F]):
             heappush(self._due, (start + length + behind, _END, start, start + length))
 
     def _may_look_at(self, start: int, end: int) -> bool:
-        """Whether what was looked at leaves room for it."""
+        """Return whether what was looked at leaves room for it."""
         if end > self._paid_to:
             self._granted = min(SAVED, self._granted + GRANT * (end - self._paid_to))
             self._paid_to = end
@@ -261,7 +261,7 @@ class Sequence:
         self._late_run = 0
 
     def is_late(self, number: int) -> bool:
-        """Whether the frame is a repetition or older than one before it; counts what `number` shows."""
+        """Return whether the frame is a repetition, or older than one before; counts what `number` shows."""
         if self._newest is None or number == (self._newest + 1) % self._modulus:  # as it mostly is
             self._newest, self._late_run = number, 0
             return False

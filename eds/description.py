@@ -45,7 +45,7 @@ class Description:
     digest: str = ""  # SHA-256 of the file's text
 
     def has(self, index: int, subindex: int = 0) -> bool:
-        """Whether the file describes this object."""
+        """Return whether the file describes this object."""
         return self.variable(index, subindex) is not None
 
     def variable(self, index: int, subindex: int = 0) -> ODVariable | None:

@@ -35,7 +35,7 @@ class ProfileObject:
         return f"{self.index:04X}h:{self.subindex}"
 
     def is_in(self, description: Description) -> bool:
-        """Whether the file has it as it should be."""
+        """Return whether the file has it as it should be."""
         variable = description.variable(self.index, self.subindex)
         known = None if variable is None else DATA_TYPES.get(variable.data_type or 0)
         return known is not None and known.name == self.type
@@ -65,7 +65,7 @@ class Profile:
     eds: str | None  # the file of such a product that ships
 
     def fits(self, description: Description) -> bool:
-        """Whether it is for the device that this file describes (1018h, CiA 301 §7.5.2.19)."""
+        """Return whether it is for the device of this file (1018h, CiA 301 §7.5.2.19)."""
         if description.vendor_id is None or description.vendor_id != self.vendor_id:
             return False
         if self.products:

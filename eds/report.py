@@ -90,7 +90,7 @@ def axes(description: Description) -> int:
 
 
 def joint_text(description: Description) -> str:
-    """Whether the device can be a joint, and what it lacks."""
+    """Return whether the device can be a joint, and what it lacks, in words."""
     count = axes(description)
     if count:
         return "yes" if count == 1 else f"yes, {count} axes"

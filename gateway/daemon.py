@@ -219,7 +219,7 @@ class Daemon:
         self._loop.call_later(WATCH_S, self._look_who_is_known)
 
     def _tidy_after(self, gone: Session) -> None:
-        """Where somebody who moved much has gone, the system soon gets back what that took."""
+        """Give memory back to the system soon after a client that moved much has gone."""
         if gone.received_bytes + gone.sent_bytes >= MUCH_BYTES and not self._tidying:
             self._tidying = True
             self._loop.call_later(TIDY_S, self._tidy)

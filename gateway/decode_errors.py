@@ -47,7 +47,7 @@ def said(error: Exception) -> str:
 
 
 def key_of(error: Exception) -> str:
-    """Where it is, as `rules[0].above`; empty where it is the whole."""
+    """Return the path of the key, as `rules[0].above`; empty for the whole."""
     return _parts(error)[1]
 
 

@@ -86,7 +86,7 @@ def alone_in(folder: Path) -> Iterator[None]:
 
 
 def _locked(descriptor: int) -> bool:
-    """Whether it is our turn; the lock goes with the descriptor, also where its owner is killed."""
+    """Try to lock, and return whether it is locked; the lock ends with the descriptor, also after a kill."""
     import fcntl
 
     try:

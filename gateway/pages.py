@@ -8,7 +8,7 @@ _WORKING_COPY: Final = Path(__file__).parents[1] / "docs"
 
 
 def folder() -> Path:
-    """Where the pages are."""
+    """Return the folder of the pages."""
     return _INSTALLED if _INSTALLED.is_dir() else _WORKING_COPY
 
 

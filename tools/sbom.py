@@ -100,6 +100,6 @@ def _component(package: Package) -> dict[str, Any]:
 
 
 def _dependencies(own: str, known: Sequence[Package]) -> Iterator[dict[str, Any]]:
-    """What needs what; of a package with several versions, each needs what any of them does."""
+    """Yield the dependencies of each package; of one with several versions, those of all of them."""
     for name, ref in [(OWN, own), *((package.name, package.purl) for package in known)]:
         yield {"ref": ref, "dependsOn": sorted(package.purl for package in known if name in package.via)}

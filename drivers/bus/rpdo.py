@@ -26,7 +26,7 @@ class Rpdo:
     objects: tuple[MappedObject, ...]
 
     def takes_effect(self, *, our_sync: bool) -> bool:
-        """Whether a frame of ours is certain to: at once, or at the next SYNC, which is ours."""
+        """Return whether a frame of ours is certain to act: at once, or at the next SYNC, which is ours."""
         return self.transmission_type in _ASYNCHRONOUS or (
             our_sync and self.transmission_type in _SYNCHRONOUS
         )

@@ -130,7 +130,7 @@ class Sender:
         self.offer(can_id, data)()
 
     def send_urgent(self, can_id: int, data: bytes) -> bool:
-        """Whether the frame was taken at once. Else it goes ahead of all others, for `URGENT_S`.
+        """Return whether the frame was taken at once. Else it goes ahead of all others, for `URGENT_S`.
 
         Never blocks and never raises. Where the bus is not open, nothing is sent.
         """
@@ -227,7 +227,7 @@ class Sender:
         return _is_flushed(transport)
 
     def _hand_over(self, transport: Transport, can_id: int, data: bytes) -> bool:
-        """Whether the interface took it; raises `Unavailable`, whatever went wrong."""
+        """Return whether the interface took it; raises `Unavailable`, whatever went wrong."""
         try:
             taken = transport.try_send(can_id, data)
         except Unavailable:
@@ -252,7 +252,7 @@ class Sender:
         return None
 
     def _is_wanted(self, frame: _Frame) -> bool:
-        """Whether it may still leave; who waits for one that may not is told."""
+        """Return whether it may still leave; tell its sender if it may not."""
         try:
             wanted = frame.wanted() and time.monotonic() < frame.until
         except Exception as error:  # noqa: BLE001 - it is its owner's, and nobody else's

@@ -183,7 +183,7 @@ def leave(axis: Axis, mode: bytes) -> None:
 
 
 def look(axis: Axis) -> AxisReading:
-    """Where it is, and how far. A position beside UNDER_WAY counts from the old zero: it was read before."""
+    """Read position and progress. A position beside UNDER_WAY counts from the old zero: it was read first."""
     position, lag = axis.position(), None
     with suppress(DeviceAbort):
         lag = int.from_bytes(axis.read(FOLLOWING_ERROR, 4), "little", signed=True)

@@ -179,7 +179,7 @@ def _write(sdo: SdoChannel, index: int, subindex: int, value: int, size: int) ->
 
 
 def _takes_timer(sdo: SdoChannel, parameter: int, ms: int) -> bool:
-    """Whether the device sends by a timer; many know the object from their EDS only."""
+    """Return whether the device sends by a timer; many know the object from their EDS only."""
     try:
         _write(sdo, parameter, 5, ms, 2)
     except DeviceAbort:

@@ -148,7 +148,7 @@ class LssMaster:
         return self._scan(number, bit, part, then, self.scan_s)
 
     def is_anybody_unconfigured(self) -> bool:
-        """Whether a device without a node id answers, also one that knows no fastscan (it is older)."""
+        """Return whether a device without node id answers, also one that knows no fastscan (it is older)."""
         return bool(self._answers(_IDENTIFY_UNCONFIGURED, b"", _UNCONFIGURED, self._timeout_s))
 
     def begin_scan(self) -> bool:

@@ -66,7 +66,7 @@ class Traffic:
         return {base + node: self.seen[base + node] for base in TPDOS if base + node in self.seen}
 
     def master(self) -> Iterator[str]:
-        """Why somebody is the bus's master, in words; nothing where nobody is heard to be."""
+        """Yield why a node is the bus's master, in words; nothing if none is heard to be."""
         if (nmt := self.seen.get(NMT)) is not None:
             yield f"NMT commands ({nmt.count})"
         if (sync := self.seen.get(SYNC)) is not None:

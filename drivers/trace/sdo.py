@@ -202,7 +202,7 @@ class Conversation:
         return "an untold number of bytes" if self._announced is None else f"{self._announced} bytes"
 
     def _missing(self) -> SdoText | None:
-        """Where the value that is over now was not heard as a whole."""
+        """Return what is said of a finished value that was not heard as a whole."""
         if self._object is None:
             return SdoText("the end of a transfer whose beginning was not heard")
         if self._announced in (None, len(self._data)):

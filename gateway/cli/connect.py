@@ -155,7 +155,7 @@ def choose(argv: list[str], commands: Mapping[str, Callable[[list[str]], int]], 
 
 
 def ask(question: str, *, yes: bool) -> bool:
-    """Whether a person says yes; `yes` where `--yes` said it already.
+    """Return whether a person says yes; `yes` if `--yes` said it already.
 
     Raises:
         NobodyToAsk: there is no terminal.

@@ -161,7 +161,7 @@ def _stop(robot: Description) -> str:
 
 
 def _stop_beyond(stop: StopInfo) -> str:
-    """Whether one is held, and what it does beside the drives' quick stop."""
+    """Return whether one is held, and what it does beside the drives' quick stop, in words."""
     lines = [f"a stop is held: {stop.reason or 'no reason given'}" if stop.held else "no stop is held"]
     lines += [] if stop.problem is None else [stop.problem]
     for name, why_not in stop.controllers.items():

@@ -110,7 +110,7 @@ def _parser(test: str) -> argparse.ArgumentParser:
 
 
 def _motion(parser: argparse.ArgumentParser, kind: JointTestKind) -> None:
-    """How it moves; the defaults are gentle ones."""
+    """Add the arguments of the motion; the defaults are gentle ones."""
     usual = {
         JointTestKind.STEP: (1.0, 10.0),
         JointTestKind.CHIRP: (1.0, 15.0),

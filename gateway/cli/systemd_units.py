@@ -208,7 +208,7 @@ def _quoted(word: str) -> str:
 
 
 def folder(*, of_user: bool) -> Path:
-    """Where units are installed."""
+    """Return the folder of the units."""
     if not of_user:
         return Path("/etc/systemd/system")
     given = os.environ.get("XDG_CONFIG_HOME")

@@ -63,7 +63,7 @@ def typed(where: str, code: str = "") -> tuple[Address, str]:
 
 
 def place(where: str) -> Address:
-    """Where a robot pairs, as a person typed it; raises `ValueError` where it is no HOST:PORT."""
+    """Return the typed address of a robot that pairs; raises `ValueError` if it is no HOST:PORT."""
     found = Address.parse(where.strip())
     if found.path is not None:
         raise ValueError("a robot pairs at HOST:PORT, as it shows it, not at a path")

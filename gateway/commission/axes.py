@@ -29,7 +29,7 @@ class Axis:
         return f"node {self.node}" + (f", axis {self.number}" if self.number else "")
 
     def index(self, index: int) -> int:
-        """Where this axis has the object that the first one has at `index` (CiA 402-2 §5)."""
+        """Return the index, on this axis, of the first axis's object at `index` (CiA 402-2 §5)."""
         return index + self.number * AXIS_OFFSET
 
 

@@ -201,7 +201,7 @@ def _new_zero(
 
 
 def _is_there(known: HomingBasis, method: int, outcome: PoweredRunResult, offset: int | None) -> bool:
-    """Whether nothing has moved, and the drive counts as homing makes it count: its 607Ch is where it is."""
+    """Return whether nothing has moved, and the drive counts as homing makes it: its 607Ch is where it is."""
     if METHODS[method].moves or outcome.problem is not None or outcome.after is None:
         return False
     return (

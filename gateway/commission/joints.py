@@ -35,7 +35,7 @@ def table(joint: str) -> str:
 
 
 def words(joint: str) -> str:
-    """How a person calls it: left knee."""
+    """Return its name for people: left knee."""
     return joint.replace("_", " ")
 
 
@@ -73,7 +73,7 @@ def unpowered(bench: Bench, axes: Sequence[Axis]) -> Talk[None]:
 
 
 def stayed_off(bench: Bench, axes: Sequence[Axis]) -> Talk[bool]:
-    """Whether no drive has got power since `unpowered`: what was read meanwhile may not be by hand alone."""
+    """Return whether no drive has had power since `unpowered`: else readings may not be by hand alone."""
     live = yield from answered(lambda: powered(bench, axes))
     if live:
         yield Say(

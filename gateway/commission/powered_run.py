@@ -144,7 +144,7 @@ class PoweredRun:
         return None
 
     def _ready(self) -> None:
-        """Whether the way up may be begun; raises `RunEnded`."""
+        """Check that powering up may begin; raises `RunEnded`."""
         led = self._wait(self._power.drive.look())
         if led.problem is not None:
             raise RunEnded(led.problem)

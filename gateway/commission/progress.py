@@ -114,7 +114,7 @@ class Progress:
         return StepState.PASSED if is_past else StepState.NEXT
 
     def _is_behind(self, where: At) -> bool:
-        """Whether a later part was begun already."""
+        """Return whether a later part was begun already."""
         if not self._seen:
             return False
         order = [at for at, _, _ in self._all()]

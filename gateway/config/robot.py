@@ -137,7 +137,7 @@ class RobotConfig(Struct, frozen=True, kw_only=True):
         return [name for table in tables for name in (*getattr(self, table), *self.lost.get(table, ()))]
 
     def node_of(self, component: str) -> Node:
-        """Where a joint or device is: bus and node id."""
+        """Return the bus and node id of a joint or device."""
         table = self.joint[component] if component in self.joint else self.device[component]
         return table.bus, table.node_id
 

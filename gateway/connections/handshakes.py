@@ -151,7 +151,7 @@ class Handshakes:
         self._settle()
 
     def _look(self) -> None:
-        """Whether clients or roles have changed; if so, they count from now on."""
+        """Look for changed clients or roles; they count from now on."""
         known = self._access.now()
         if known is self._known:
             return

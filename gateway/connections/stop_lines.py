@@ -115,13 +115,13 @@ class StopSearch:
         return self.feed(line) or self.end()
 
     def feed(self, piece: bytes) -> bool:
-        """Whether it is there, with this piece."""
+        """Return whether it is there, with this piece."""
         bare = self._tail + piece.translate(None, _BLANK)
         self._tail = bare[-_KEPT_BYTES:]
         return _METHOD.search(_ESCAPED.sub(_unescape, bare).replace(b"\\", b"")) is not None
 
     def end(self) -> bool:
-        """Whether it is there, now that the line has ended."""
+        """Return whether it is there, now that the line has ended."""
         return self.feed(b"}")
 
 
@@ -145,7 +145,7 @@ class StopSplitter(LineSplitter):
         return super().feed(data)
 
     def _may_stop(self, data: bytes) -> bool:
-        """Whether there may be a stop in what these bytes end or hold; costs little."""
+        """Return whether there may be a stop in what these bytes end or hold; costs little."""
         seam = bytes(self._rest[-_LONGEST_MARK:]) + data
         return self._search is not None or any(mark in seam or mark in self._rest for mark in _MARKS)
 

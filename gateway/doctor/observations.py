@@ -131,7 +131,7 @@ class Observations:
         return self.objects.get(place.name, {}).get((index + shift, subindex))
 
     def unanswered(self, place: Place, index: int, subindex: int = 0) -> bool:
-        """Whether its file has the object, and it is not known what the device holds there."""
+        """Return whether its file has the object, but the device's value is unknown."""
         shift = AXIS_OFFSET * place.axis if index >= FIRST_PROFILE_OBJECT else 0
         description = self.descriptions.get(place.name)
         asked = (index + shift, subindex) in self.objects.get(place.name, {})
@@ -143,7 +143,7 @@ class Observations:
         return None if value is None else int(value)
 
     def why_no(self, channel: str) -> str:
-        """Why a channel could not be judged by."""
+        """Return why a channel cannot be used."""
         component = channel.partition(".")[0]
         late = "its values came too late, or not at all"
         known = channel in self.samples.columns

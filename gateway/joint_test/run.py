@@ -244,7 +244,7 @@ class TestRun(PoweredRun):
     # Whether all is as it must be.
 
     def _check_place(self, angle: float) -> None:
-        """Whether it still stands where it was when somebody agreed to what will move."""
+        """Check that it still stands where it was when somebody agreed to the motion."""
         plan = self._plan
         if abs(angle - plan.angle) > DRIFT:
             raise RunEnded(

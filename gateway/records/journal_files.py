@@ -38,7 +38,7 @@ class Tail(NamedTuple):
 
 
 def head_file(journal: Path) -> Path:
-    """Where the newest hash of a journal is kept."""
+    """Return the file that keeps the newest hash of a journal."""
     return journal.with_name(f"{journal.name}.head")
 
 
@@ -58,7 +58,7 @@ def read_head(journal: Path) -> Head | None:
 
 
 def closed_piece(journal: Path, last: int) -> ClosedJournalFile:
-    """How a piece is called that ends with this line."""
+    """Return the name of a piece that ends with this line."""
     return ClosedJournalFile(last, journal.with_name(f"{journal.name}.{last:012}"))
 
 

@@ -102,7 +102,7 @@ class Limits:
         self._left_out: dict[str, _LeftOut] = {}
 
     def refusal(self, who: str, what: str, share: Share, size: int, now_ns: int) -> str | None:
-        """Why this entry is not written, in words; it is counted either way."""
+        """Return why this entry is not written, in words; it is counted either way."""
         found = self._account(client(who), share, now_ns)
         if found is None:
             return None

@@ -86,7 +86,7 @@ class Feed:
         self.shed = shed
 
     def was_late_s(self) -> float:
-        """How late its rows were at most since this was asked last; forgotten by that."""
+        """Return its rows' largest delay since the last call, and forget it."""
         late_ns, self._late_ns = self._late_ns, 0
         return late_ns / 1e9
 

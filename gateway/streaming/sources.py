@@ -92,7 +92,7 @@ class Wanted:
 
 
 def matches(name: str, globs: Sequence[str] | None) -> bool:
-    """Whether one of the globs means this name; no globs mean every name. For many names: `Wanted`."""
+    """Return whether a glob means this name; no globs mean every name. For many names: `Wanted`."""
     return globs is None or any(fnmatch.fnmatchcase(name, glob) for glob in globs)
 
 

@@ -91,7 +91,7 @@ class Decoding:
             self.complain(where, *((key, rest) if key in known else ("", text)))
 
     def _value(self, where: str, key: str, value: Any, kind: Any) -> bool:
-        """Whether it can be the value of a key of this type."""
+        """Return whether it can be the value of a key of this type."""
         before = len(self.findings)
         entry = _struct_of(kind)
         if entry is not None and isinstance(value, list):

@@ -383,4 +383,4 @@ class _Layer:
         self._node.reset_communication()
 
     def bitrate_changed(self) -> None:
-        """Whether it hears and is heard is asked at each frame."""
+        """Do nothing: each frame is checked by itself whether it hears and is heard."""

@@ -104,7 +104,7 @@ def fallen(judged: Judged, impact_s: float) -> Judged:
 
 
 def _stood(one: Watched) -> bool:
-    """Whether advice stood when the fall began."""
+    """Return whether advice stood when the fall began."""
     first = int(np.argmax(one.judged.seen.danger > HEALTHY))
     return bool(one.judged.level[max(first - 1, 0)] >= Level.ADVICE)
 

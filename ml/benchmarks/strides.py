@@ -129,7 +129,7 @@ def _of_foot(
 
 
 def heel_strikes(pitch: npt.NDArray[np.float64]) -> npt.NDArray[np.intp]:
-    """Where a foot's pitch rate falls through zero after a swing; with hindsight, for judging labels."""
+    """Return where a foot's pitch rate falls through zero after a swing; in hindsight, to judge labels."""
     if len(pitch) < AT_LEAST:
         return np.array([], dtype=np.intp)
     smooth = np.convolve(pitch, np.ones(3) / 3.0, mode="same")

@@ -264,7 +264,7 @@ class Store:
         return about
 
     def _has_lost_its_log(self, location: str) -> bool:
-        """Whether there are files of rows; a table's log is made before them."""
+        """Return whether there are files of rows; a table's log is made before them."""
         names = [found.path for found in self.objects.listing(location)]
         return not any(f"/{durable.LOG}/" in name for name in names) and any(
             name.endswith(".parquet") for name in names

@@ -72,7 +72,7 @@ example:
   gwrms ab left_knee.position_gain 3000 2400
 {EXIT}"""
 SWEEP: Final = f"""{RULES}
-Somebody has to watch: it ends too when this command goes into the background, or its standard input ends.
+Somebody has to watch: the sweep also ends if this command goes into the background, or its input ends.
 
 example:
   gwrms sweep left_knee.position_gain 2400 3600 200
@@ -286,7 +286,7 @@ def _follow(
 
 
 def _is_watched(run: Run) -> bool:
-    """Whether this command is in the foreground; a line on its standard input ends the experiment."""
+    """Return whether this command is in the foreground; a line on its standard input ends the experiment."""
     try:
         if sys.stdin.isatty() and os.tcgetpgrp(sys.stdin.fileno()) != os.getpgrp():
             return False

@@ -187,7 +187,7 @@ def lines(station: Station) -> Iterator[PredictionRow]:
 
 
 def _learning(adapting: Adapting) -> PredictionRow:
-    """How it goes with what is learned from the wearer, while there is nothing to decide."""
+    """Return the progress of learning from the wearer, while there is nothing to decide."""
     whom = f"from the steps of {adapting.wearer}"
     text, detail = {
         AdaptationState.UNNAMED: ("Wearer not named", adapting.text),

@@ -29,7 +29,7 @@ def help_pages() -> str:
 
 
 def completion(shell: str) -> str:
-    """What completes the command line in this shell."""
+    """Return the script that completes the command line in this shell."""
     found: str = shtab.complete(_tree(), shell=shell)
     return found
 

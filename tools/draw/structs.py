@@ -42,7 +42,7 @@ def sent(struct: type[Struct]) -> Iterator[Key]:
 
 
 def docstring(struct: type[Struct]) -> str:
-    """What is said of it, a line a paragraph, without the name that stands above it already."""
+    """Return its docstring, a line a paragraph, without the name that already stands above it."""
     paragraphs = (inspect.getdoc(struct) or "").split("\n\n")
     text = "\n\n".join(" ".join(paragraph.split()) for paragraph in paragraphs)
     text = _ABOVE.sub("", text).replace("`None`", "`null`")

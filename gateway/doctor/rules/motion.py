@@ -75,7 +75,7 @@ def _single(seen: Observations) -> Iterator[Place]:
 
 
 def _walks(seen: Observations, pairs: list[Pair | str]) -> bool:
-    """Whether legs go to and fro: two joints at least that go as far as walking takes."""
+    """Return whether the legs swing: two joints at least move as far as in walking."""
     moving = [
         one
         for pair in pairs

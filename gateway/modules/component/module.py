@@ -226,7 +226,7 @@ class ComponentModule:
         return component is None or component.quality(time.monotonic_ns()).state is not ComponentState.LOST
 
     def _is_late(self, name: str) -> bool:
-        """Whether it is being read for the first time, and is worth waiting for."""
+        """Return whether it is being read for the first time, and is worth waiting for."""
         node = getattr(self.robot.components.get(name), "node", None)
         return node is not None and node.comes_up and time.monotonic_ns() < self._late_ns
 
@@ -257,6 +257,6 @@ def _has_values(selection: Selection) -> bool:
 
 
 def _layout(component: Component) -> LayoutInfo | UnsetType:
-    """Where the cells are, of a component that has some."""
+    """Return the places of a component's cells, if it has some."""
     layout = getattr(component, "layout", None)
     return UNSET if layout is None else LayoutInfo(layout.name, list(layout.cells))

@@ -230,7 +230,7 @@ def by_eds(variable: "ODVariable") -> ObjectInfo:
 
 
 def unreadable(variable: "ODVariable | None") -> str | None:
-    """Why an object is not read; `None` where it is."""
+    """Return why an object is not read; `None` if it is."""
     if variable is None or variable.access_type.lower() not in READABLE:
         return "it cannot be read, the EDS says"
     if variable.data_type == DOMAIN:

@@ -47,7 +47,7 @@ def thermal() -> dict[str, float | None]:
 
 
 def throttling(root: Path = SYS) -> Throttling:
-    """Whether the cores are held back; `root` is where sysfs is mounted."""
+    """Return whether the cores are held back; `root` is where sysfs is mounted."""
     counts = [
         int(text)
         for file in root.glob("devices/system/cpu/cpu*/thermal_throttle/core_throttle_count")

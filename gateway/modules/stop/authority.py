@@ -35,7 +35,7 @@ class Permit:
     asked_ns: int  # when it came in
 
     def objection(self, address: Address) -> str | None:
-        """Why the object must not be written now, in words; `None` where it may. From any thread."""
+        """Return why the object must not be written now, in words; `None` if it may. From any thread."""
         if self.authority.state.asked_ns >= self.asked_ns:
             return "the robot was stopped before this was written"
         return self.authority.objection_to(address) or self.authority.frozen()
@@ -81,7 +81,7 @@ class Authority:
         return self._lock
 
     def is_newest(self, number: int) -> bool:
-        """Whether nothing has begun since the undertaking of this number."""
+        """Return whether nothing has begun since the undertaking of this number."""
         return self.state.number == number
 
     def unproved(self, findings: Mapping[str, ResetFinding]) -> list[str]:
@@ -93,5 +93,5 @@ class Authority:
         return Permit(self, asked_ns)
 
     def objection_to(self, address: Address) -> str | None:
-        """Why an object must not be written now, whoever wants it and since when."""
+        """Return why an object must not be written now, whoever wants it and since when."""
         return LOCKED if address in self.locked and self.held else None

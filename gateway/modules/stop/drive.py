@@ -56,5 +56,5 @@ def quick_stop(drive: Drive, *, wake: bool = True) -> "Future[StopOutcome]":
 
 
 def is_enabled(statusword: float) -> bool:
-    """Whether a statusword (6041h) says OPERATION ENABLED."""
+    """Return whether a statusword (6041h) says OPERATION ENABLED."""
     return drive_state(int(statusword)) is DriveState.OPERATION_ENABLED

@@ -157,7 +157,7 @@ def _after_unconfirmed(robot: Robot) -> str:
 
 
 def any_enabled(robot: Robot) -> bool:
-    """Whether some drive is, as far as is known."""
+    """Return whether some drive is enabled, as far as is known."""
     return ENABLED in _words(robot).values()
 
 
@@ -247,7 +247,7 @@ def _of_drive(robot: Robot, name: str, stopping: StopProgress) -> Iterator[Alarm
 
 
 def _cause(robot: Robot, part: FollowedComponent) -> tuple[str, int | None]:
-    """Why a drive is in fault, and its code: as the robot says, else by the code that the drive tells."""
+    """Return why a drive is in fault, and its code: as the robot says, else by the drive's own code."""
     said = _LASTING.sub("", _PREFIX.sub("", part.problem or ""))
     found = _CODE.search(said)
     if found is not None:

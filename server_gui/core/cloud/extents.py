@@ -50,7 +50,7 @@ def differing(file: DataFile, metadata: pq.FileMetaData) -> Iterator[str]:
 
 
 def _fits(told: _Extent, ends: _Extent, slack: Any) -> bool:
-    """Whether rows from one end to the other are within what was told, which is hardly more."""
+    """Return whether rows from one end to the other are within what was told, which is hardly more."""
     return bool(told[0] <= ends[0] <= told[0] + slack and told[1] - slack <= ends[1] <= told[1])
 
 

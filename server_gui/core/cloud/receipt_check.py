@@ -118,7 +118,7 @@ def _here(store: Store, receipts: Sequence[Receipt | Altered], proof: Proof) -> 
 
 
 def _judge(store: Store, claim: Claim, proof: Proof, *, values: bool) -> bool:
-    """Whether its rows are as they were sent, as far as retention has left them."""
+    """Judge whether its rows are as they were sent, as far as retention has left them."""
     problem = _problem(claim, values=values)
     missing = max(claim.expected[0] - claim.there[0], 0)
     if not problem:
@@ -241,7 +241,7 @@ def _problem(claim: Claim, *, values: bool) -> str | None:
 
 
 def _is_renamed(claim: Claim) -> bool:
-    """Whether there are as many rows as were sent, and others; where values are not looked at."""
+    """Return whether there are as many rows as were sent, but others; if values are not looked at."""
     part, found = claim.part, claim.found
     return bool(part.names) and found.rows == part.rows and checksums.told(found.names) != part.names
 

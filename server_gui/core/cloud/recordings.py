@@ -209,7 +209,7 @@ class Recordings:
         return missing_rows.newer([missing_rows.by_key(self._store, location, run)], self._store, location)
 
     def _claims(self, location: str, batch: int) -> bool:
-        """Whether the table says that it has this batch of the spool, or a later one of its writer."""
+        """Return whether the table says it has this batch of the spool, or a later one of its writer."""
         return self._store is not None and self._store.has(location, self._writer(batch), batch)
 
     def _writer(self, batch: int) -> str:

@@ -194,6 +194,6 @@ def _read(spool: Path, batch: int, sql: str, *values: str) -> list[tuple[Any, ..
 
 
 def _has(database: sqlite3.Connection, sql: str) -> bool:
-    """Whether there is what is asked for: there may be no tables yet, and once there was no `meta`."""
+    """Return whether it is there: there may be no tables yet, and once there was no `meta`."""
     tables = [name for (name,) in database.execute("SELECT name FROM sqlite_master WHERE type = 'table'")]
     return bool(tables) and ("meta" in tables or " meta " not in sql)

@@ -83,7 +83,7 @@ def receipts_of(spool: Path) -> list[Receipt | Altered]:
 
 
 def _not_its_own(spool: Path, receipts: Sequence[Receipt | Altered]) -> Iterator[str]:
-    """Where the spool's name is damaged, and where receipts are another's, which prove nothing of its own."""
+    """Yield that the spool's name is damaged, or receipts are another's, which prove nothing here."""
     file, own = spool / "id", identity(spool)
     if not own and (file.exists() or receipts):
         yield (
@@ -295,7 +295,7 @@ def _there(spool: Path) -> set[int]:
 
 
 def _has_name(spool: Path, number: int) -> bool:
-    """Whether a batch was made since there are receipts."""
+    """Return whether a batch was made since there are receipts."""
     try:
         return spool_reader.writer(spool, number) != identity(spool)
     except SpoolUnusable:

@@ -40,7 +40,7 @@ def share(one: Measured) -> str:
 
 
 def _is_share(one: Measured) -> bool:
-    """Whether a percentage of what was before says something: not of next to nothing, nor of percents."""
+    """Return whether a percentage of the value before makes sense: not of almost nothing, or of percents."""
     ends = (abs(end or 0.0) for end in (one.difference, one.low, one.high))
     return bool(one.before) and one.unit != PERCENT and max(ends) <= MOST_SHARE * abs(one.before or 0.0)
 

@@ -72,7 +72,7 @@ def bits_by_name(info: ObjectInfo, value: int) -> list[tuple[int, str, bool]]:
 
 
 def is_other(value: Number | str | None, other: Number | str | None) -> bool:
-    """Whether two values are known, and are not the same."""
+    """Return whether two values are known, and are not the same."""
     return value is not None and other is not None and value != other
 
 

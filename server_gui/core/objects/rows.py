@@ -70,7 +70,7 @@ class Compared:
         return _value(self.held.get((self.with_component, info.object)))
 
     def differs(self, info: ObjectInfo) -> bool:
-        """Whether both are known, and are not the same."""
+        """Return whether both are known, and are not the same."""
         return is_other(self.value(info), self.other(info))
 
 

@@ -127,7 +127,7 @@ class Clock:
         return None if self._offset_ns is None else stamp_ns + self._offset_ns
 
     def _may_begin(self, first_ns: int, reading: ClockReading) -> bool:
-        """Whether a new connection may take the clocks as they are."""
+        """Return whether a new connection may take the clocks as they are."""
         before_ns = max((stamp_ns + offset_ns for stamp_ns, offset_ns in self._last.values()), default=0)
         goes_on = first_ns + reading.to_utc_ns - reading.robot_ns > before_ns
         return self._anew or goes_on or first_ns < self._newest_ns  # or it is another boot

@@ -299,7 +299,7 @@ class Segment:
         self._damaged = damaged
 
     def _sound(self, line: tuple[Any, ...]) -> bool:
-        """Whether a run is as it was written, as far as anybody knows."""
+        """Return whether a run is as it was written, as far as anybody knows."""
         data, crc = line[DATA], line[DATA + 1]
         if not isinstance(data, bytes):
             return False

@@ -119,7 +119,7 @@ class Scene:
         return [self.unit(place) for place in range(len(self.workspace.plots))]
 
     def drawn(self, text: str, unit: Unit | None) -> str:
-        """Why a curve of a plot in this unit is not drawn; empty where it is."""
+        """Return why a curve of a plot in this unit is not drawn; empty if it is."""
         meant = self.meaning(text)
         if meant.problem:
             return meant.problem
@@ -238,14 +238,14 @@ class Scene:
             self.frozen = None
 
     def trigger_text(self) -> str:
-        """How the trigger is, in words; empty where there is none."""
+        """Return the trigger's state, in words; empty if there is none."""
         if self.trigger.state is TriggerState.OFF:
             return ""
         problem = self.trigger_problem(self.trigger.condition)
         return f"cannot trigger: {problem}" if problem else self.trigger.text(self._newest_s())
 
     def trigger_problem(self, condition: Condition) -> str:
-        """Why this cannot trigger on this robot; empty where it can."""
+        """Return why this cannot trigger on this robot; empty if it can."""
         if condition.problem:
             return condition.problem
         if condition.on is On.EMCY:
@@ -260,7 +260,7 @@ class Scene:
         return [part for part in parts if self._errors(part) is not None]
 
     def trigger_flag(self) -> Flag | None:
-        """Where it has triggered, as a flag."""
+        """Return the instant at which it has triggered, as a flag."""
         kept = self.frozen
         if kept is None or kept.trigger_ns is None:
             return None

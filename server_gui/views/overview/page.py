@@ -116,7 +116,7 @@ class Overview(QWidget):
             self._arrange(columns)
 
     def _is_too_low(self) -> bool:
-        """Whether something has to be scrolled to."""
+        """Return whether something has to be scrolled to."""
         seen = self.parentWidget()
         if seen is None or not self.is_numbers_first:
             return False
@@ -285,7 +285,7 @@ class Overview(QWidget):
             self._maps[side].show_pressures(pressures, cop, live=live)
 
     def _is_off(self, station: Station) -> bool:
-        """Whether a foot carries by much another share than its figure says."""
+        """Return whether a foot carries by much another share than its figure says."""
         left = loads(station.robot)[SIDES[0]].share
         return left is not None and (self._share is None or abs(left - self._share) > SHARE)
 
@@ -327,7 +327,7 @@ def placed_flags(station: Station, seconds: float) -> list[PlacedFlag]:
 
 
 def _load_texts(side: str, load: Load, force: Unit) -> tuple[str, ...]:
-    """How much a foot carries, the fullest wording first."""
+    """Return how much a foot carries, the fullest wording first."""
     if load.problem or load.force is None:
         return f"{side.upper()}  {load.problem or 'not known'}", f"{side[0].upper()}  –"
     said = f"{force.text(load.force)} {force.symbol}"

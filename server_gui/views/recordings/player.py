@@ -107,7 +107,7 @@ class Player(QWidget):
         self._is_roomy, self._has_room_for_all = True, True
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Where the height begins or ends to be enough for all; else labels stay as somebody wants them."""
+        """Show or hide labels as the height begins or ends to be enough; else leave them to the user."""
         super().resizeEvent(event)
         self._is_roomy = self.height() >= self._theme.px(ROOMY)
         has_room = self.height() >= self._theme.px(ALL)

@@ -82,7 +82,7 @@ class GaitRing(QWidget):
         return [text for text, *_ in self._rows(self._places()[2])[0]]
 
     def _places(self) -> tuple[dict[Leg, QRectF], float, QRectF]:
-        """Where the rings are, how wide each is, and what is left in the middle."""
+        """Return where the rings are, how wide each is, and what is left in the middle."""
         side = min(self.width(), self.height()) - 6.0
         box = QRectF((self.width() - side) / 2, (self.height() - side) / 2, side, side)
         band = side * 0.075
@@ -161,7 +161,7 @@ class GaitRing(QWidget):
             painter.drawText(place, Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextDontClip, text)
 
     def _room(self, box: QRectF, top: float, line: float) -> float:
-        """How wide the circle within the inner ring is where a line stands: less above and below."""
+        """Return the width for a line within the inner ring: less above and below."""
         free = box.width() * FREE / 2
         off = abs(top + line / 2 - box.center().y()) + line * LETTERS / 2
         return 2 * math.sqrt(max(free**2 - off**2, 0.0))
@@ -210,7 +210,7 @@ class GaitRing(QWidget):
         return full if fits else f"{letter} {now.percent:.0f} %"
 
     def _is_read(self, text: str, box: QRectF) -> bool:
-        """Whether it has room in letters that are read."""
+        """Return whether it has room in letters that are read."""
         return self._width(text) <= box.width()
 
     def _width(self, text: str) -> float:
