@@ -5,13 +5,14 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from gateway.cli import commission_lines, joint_test
+from gateway.cli.motion_ends import ENDS
 from gateway.main import main
 from tests.support.waiting import until
 from tests.unit.commission.homing_drive import HomingDrive
@@ -105,6 +106,16 @@ gear_ratio = 100
 """
 
 
+@pytest.fixture
+def signals() -> Iterator[None]:
+    """Leave signals as they were: a stop lets nothing interrupt it, and its process ends with it."""
+    before = {number: signal.getsignal(number) for number in ENDS}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+@pytest.mark.usefixtures("signals")
 def test_a_stop_reaches_the_drives_of_every_bus_and_one_that_has_the_same_number(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
