@@ -14,7 +14,9 @@ from tests.unit.recording.robots import description
 SECOND_NS = 1_000_000_000
 
 
-def looks(*percents: float, cpu_percent: float = 20.0, nodes: int = 2, every_s: float = 1.0) -> list[BusInfo]:
+def looks(
+    *percents: float | None, cpu_percent: float = 20.0, nodes: int = 2, every_s: float = 1.0
+) -> list[BusInfo]:
     """What is known after each look."""
     watched, found = MissingPdos(), list[BusInfo]()
     for look, percent in enumerate(percents):
@@ -45,6 +47,15 @@ def test_one_look_that_misses_two_percent_is_nothing_and_twenty_are_told_at_once
         Level.WARNING,
         Level.GOOD,
     ]
+
+
+def test_a_look_that_does_not_know_it_ends_nothing_until_it_has_lasted() -> None:
+    """It counted as one that has found none: ten seconds of not knowing made a node well."""
+    unknown = [None] * 15
+    assert changes(looks(20.0, *unknown)) == [Level.WARNING]
+    assert changes(looks(20.0, *unknown, *[0.0] * 10)) == [Level.WARNING, Level.GOOD]
+    gone = looks(20.0, *unknown, *unknown, 2.0)
+    assert (changes(gone), gone[-1].nodes[0].pdos_missing_percent) == ([Level.WARNING, Level.GOOD], 2.0)
 
 
 def test_a_busy_computer_is_named_where_every_node_of_a_bus_misses_some() -> None:
