@@ -26,7 +26,7 @@ class TraceContext:
             self.all += self.on(interface)
 
     def names(self, interface: str) -> Mapping[int, str]:
-        """By node id."""
+        """Return the names by node id."""
         return {device.node_id: device.name for device in self.on(interface)}
 
     def _on(self, interface: str) -> Sequence[Device]:

@@ -47,7 +47,7 @@ def _read(
     told: "queue.Queue[Told]",
     ended: threading.Event,
 ) -> None:
-    """Until the end; what it raises is told."""
+    """Read until the end; an exception is told."""
     batches = live(settings, name, lost)
     try:
         for batch in batches:

@@ -86,7 +86,7 @@ class PoweredRun:
         self._thread.start()
 
     def keep(self) -> None:
-        """Somebody has STOP in reach, now. One gap that was too long ends it: nobody saw what came in it."""
+        """Note that somebody has STOP in reach now. A gap that was too long ends it: nobody saw what came."""
         now = time.monotonic()
         if now - self._kept > KEEP_S:
             self.stop(OUT_OF_REACH)

@@ -130,7 +130,7 @@ def line(key: str, found: DraftValue) -> str:
 
 
 def _plain(text: str) -> str:
-    """For a comment, which ends with its line."""
+    """Return the text for a comment, which ends with its line."""
     return " ".join(text.split())
 
 

@@ -108,7 +108,7 @@ class Observations:
     other_file: str | None = None  # why the gateway judges by another file than this
 
     def heard_on(self, bus: str) -> Mapping[int, IdentifierFrames] | None:
-        """By identifier, what came on a bus; `None` where it was not listened to, or nobody was heard."""
+        """Return what came on a bus, by identifier; `None` if it was not listened to, or nobody was heard."""
         facts = self.buses.get(bus)
         return None if facts is None or facts.is_silent else facts.heard
 

@@ -188,7 +188,7 @@ class TestRun(PoweredRun):
         return first.position
 
     def _cycle(self, due: float) -> DriveSample:
-        """At its time, one SYNC and what the drive answers."""
+        """Send one SYNC at its time, and return what the drive answers."""
         while (left := due - time.monotonic()) > 0:
             self._rest(left)
         self._check()

@@ -77,7 +77,7 @@ def _before(file: BinaryIO) -> Head:
 
 
 def _removed(entry: Mapping[str, Any]) -> Head | None:
-    """Up to which line the journal says that it was shortened."""
+    """Return up to which line the journal says that it was shortened."""
     if entry.get("what") != SHORTENED:
         return None
     return Head(entry["up_to"], entry["up_to_hash"])

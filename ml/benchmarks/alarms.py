@@ -144,7 +144,7 @@ def _of_walk(model: Any, trial: ipol.Trial) -> Told:
 
 
 def _spells(trial: ipol.Trial) -> Causes:
-    """From when to when somebody was in each state."""
+    """Return from when to when somebody was in each state."""
     bounds = [0, *(np.flatnonzero(np.diff(trial.status)) + 1), len(trial.status)]
     found: dict[str, list[tuple[float, float]]] = {name: [] for name in ipol.STATUSES}
     for begin, end in pairwise(bounds):

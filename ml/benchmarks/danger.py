@@ -129,7 +129,7 @@ def _counts(one: Seen) -> Floats:
 
 
 def _spans(danger: Floats) -> Iterator[tuple[int, int]]:
-    """From where on and up to where each danger is, and each time between two; not what is there first."""
+    """Yield where each danger begins and ends, and each time between two; not what is there first."""
     changes = (np.flatnonzero(np.diff(danger)) + 1).tolist()
     return pairwise([*changes, len(danger)])
 
@@ -314,7 +314,7 @@ def _mean(flags: Sequence[bool]) -> float:
 
 
 def reliability(judged: Sequence[Judged]) -> list[tuple[float, float, int]]:
-    """By tenths of what was said: the mean of it, the share that came true, how many moments."""
+    """Return, by tenths of what was said, its mean, the share that came true, how many moments."""
     said, true = _said(judged)
     bins = np.minimum((BINS * said).astype(np.int_), BINS - 1)
     return [

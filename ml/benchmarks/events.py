@@ -136,7 +136,7 @@ def _counted(model: EventModel, foot: Foot, share: float) -> Iterator[Key]:
 
 
 def _score(feet: Sequence[Foot], settings: EventSettings, train: folds.Rows, judge: folds.Rows) -> float:
-    """For a search: the mean F1 of both kinds."""
+    """Return, for a search, the mean F1 of both kinds."""
     model = _fitted([feet[row] for row in train], settings)
     counts: Counter[Key] = Counter()
     for row in judge:

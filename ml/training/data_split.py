@@ -84,7 +84,7 @@ def _known(name: str, known: Sequence[str], others: int) -> str:
 
 
 def _place(name: str) -> float:
-    """From 0 to 1, the same for ever."""
+    """Return a place from 0 to 1, the same for ever."""
     return int.from_bytes(hashlib.sha256(name.encode()).digest()[:8]) / 2**64
 
 

@@ -170,7 +170,7 @@ def _worst(recipe: Recipe, values: Samples) -> str:
 
 
 def _check_units(store: Store, ask: Ask, recipe: Recipe) -> None:
-    """By what the robot said of its channels when the session began, else by the table's columns."""
+    """Check units by the robot's description at the session's start, else by the table's columns."""
     units = store.units(TELEMETRY.location(ask.robot, store.about.shards))
     for row in newest(_rows(store, SESSIONS, ask)):
         units |= json.decode(row["units"] or "{}")
@@ -188,7 +188,7 @@ def _labels(store: Store, ask: Ask) -> list[Label]:
 
 
 def _said(labels: Sequence[Label], rows: Recorded) -> list[LabelSpan]:
-    """On the robot's clock."""
+    """Return the labels on the robot's clock."""
     times = np.array([(each.began_utc_ns, each.ended_utc_ns) for each in labels], np.int64).reshape(-1, 2)
     begins, ends = (rows.at_utc(column).tolist() for column in times.T)
     return [

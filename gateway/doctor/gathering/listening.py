@@ -71,7 +71,7 @@ class _Ear:
             self.bus.subscribe(can_id, self._taking(can_id))
 
     def begin(self) -> None:
-        """From now on it counts."""
+        """Count from now on."""
         self._began_ns = time.monotonic_ns()
         self._errors, self._frames = self.bus.health.error_frames, self.bus.frames
 

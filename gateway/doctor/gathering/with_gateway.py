@@ -60,7 +60,7 @@ def _state(words: str) -> BusState:
 
 
 def samples(robot: Robot, described: Robots, seconds: float) -> Samples:
-    """So many seconds of what motion is judged by; a second or two before that are left out."""
+    """Take so many seconds of what motion is judged by; a second or two before are left out."""
     names = [one.name for one in described.channels if one.quantity in CHANNELS]
     if not names:
         return Samples(why_none="the robot has no joint, insole or IMU that could be sampled")

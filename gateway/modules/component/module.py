@@ -111,7 +111,7 @@ class ComponentModule:
         return [whole(one) for one in (*components, *self.sources)]
 
     def when_ready(self, names: Iterable[str]) -> "Future[None]":
-        """Done when these components are there, or the time for a cold start is over.
+        """Return a future, done when these components are there, or the time for a cold start is over.
 
         A device whose first reading is still under way then (a busy computer, a slow bus) has longer.
         """
@@ -124,7 +124,7 @@ class ComponentModule:
         return self._when(over)
 
     def when_known(self, selections: Iterable[Selection]) -> "Future[None]":
-        """Done when these channels have had their first values, or the time for a cold start is over."""
+        """Return a future, done when these channels had first values, or a cold start's time is over."""
         wanted = tuple(selections)
         return self._when(lambda: self._is_warm() or all(map(_has_values, wanted)))
 

@@ -251,7 +251,7 @@ class Playback:
         return True
 
     def _begin_anew(self, tape: Tape) -> None:
-        """To views, a jump is as if the robot's computer had started anew."""
+        """Begin anew: to views, a jump is as if the robot's computer had started anew."""
         self._jumps += 1
         self._robot.row_ns = self._robot.stamp_ns = None
         self._said = {}

@@ -149,7 +149,7 @@ def tables(store: Store) -> set[str]:
 
 
 def _retained(store: Store, locations: Set[str], problems: list[str]) -> dict[str, datetime | None]:
-    """Up to which time rows were removed; where nobody can say, none were, and it is told."""
+    """Return up to which time rows were removed; if nobody can say, none were, and it is told."""
     found: dict[str, datetime | None] = {}
     for location in sorted(locations):
         try:

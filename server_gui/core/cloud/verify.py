@@ -359,7 +359,7 @@ def _locations(store: Store, batch: spool_reader.Batch) -> list[str]:
 
 
 def _newest(store: Store, location: str, writer: str) -> int:
-    """Up to which of the writer's batches the table has everything."""
+    """Return up to which of the writer's batches the table has everything."""
     try:
         return store.table(location).transaction_version(writer) or 0
     except NoSuchTable:

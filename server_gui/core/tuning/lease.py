@@ -35,7 +35,7 @@ class LeaseState:
         self.taken(Lease("", ttl_s))
 
     def refused(self, why: str) -> None:
-        """Somebody else has it, or nobody answered."""
+        """Note that somebody else has it, or nobody answered."""
         self.asking, self.problem = False, why
 
     def gone(self) -> None:

@@ -203,7 +203,7 @@ class GaitRing(QWidget):
         return [one for one in next(fits, []) if one]
 
     def _phase_text(self, leg: Leg, now: LegPhase, room: float, *, is_short: bool) -> str:
-        """With the phase's name where that has room in letters that are read."""
+        """Return the phase, with its name if that has room in letters that are read."""
         letter = leg.value[0].upper()
         full = f"{letter}  {now.phase} {now.percent:.0f} %"
         fits = not is_short and self._width(full) <= room
