@@ -114,7 +114,7 @@ def write_file(file: Path, content: bytes, mode: int) -> None:
 
 
 def _new_key() -> bytes:
-    """As PEM."""
+    """Return it as PEM."""
     return run(["ecparam", "-name", _CURVE, "-genkey", "-noout"], b"")
 
 

@@ -64,7 +64,7 @@ def lead_down(axis: Axis, errand: Errand) -> Led:
 
 
 def _why_in_fault(axis: Axis) -> str:
-    """Its error code in words, and what to do."""
+    """Return its error code in words, and what to do."""
     try:
         code = axis.error_code()
     except DriverError:

@@ -18,7 +18,7 @@ Told = Batch | DriverError
 
 
 def merged(buses: Mapping[str, CanSettings], lost: Callable[[int], object]) -> Batches:
-    """Frames of all of these, `HOLD_NS` after they came; by interface, as candump names it.
+    """Return frames of all of these, `HOLD_NS` after they came; by interface, as candump names it.
 
     Raises:
         Unavailable: one of them cannot be opened, or goes.

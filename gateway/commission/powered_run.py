@@ -185,7 +185,7 @@ class PoweredRun:
         return None if led is None else led.state
 
     def _asked(self, ask: "Callable[[], Future[T]]", within_s: float = RESET_S + STOP_S) -> T | None:
-        """Its answer; `None` where there is none in time. Our heartbeat goes on meanwhile."""
+        """Return its answer; `None` where there is none in time. Our heartbeat goes on meanwhile."""
         try:
             future = ask()
             until = time.monotonic() + within_s

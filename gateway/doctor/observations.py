@@ -116,7 +116,7 @@ class Observations:
         return (Place("joint", name, table) for name, table in self.config.joint.items())
 
     def nodes(self) -> Iterator[Place]:
-        """Joints and devices, one for each node."""
+        """Yield joints and devices, one for each node."""
         seen: set[tuple[str, int]] = set()
         devices = (Place("device", name, table) for name, table in self.config.device.items())
         for place in (*self.joints(), *devices):

@@ -85,7 +85,7 @@ class _LeftOut:
     counts: dict[str, int] = field(default_factory=dict)
 
     def entry(self, whose: str) -> Entry:
-        """As it is summed up."""
+        """Return it as it is summed up."""
         count = sum(self.counts.values())
         said = f"{count} more of {whose}'s were not written out"
         said += "; what must be written before it is done was refused"

@@ -105,7 +105,7 @@ class RecordedNode:
         return _expedited(data) if command == _UPLOADED else None
 
     def _mappings(self) -> dict[int, Mapping]:
-        """Each PDO's mapping by its identifier."""
+        """Return each PDO's mapping by its identifier."""
         numbers = self.dictionary.number
         found: dict[int, Mapping] = {}
         for communication, mapping in (

@@ -64,7 +64,7 @@ def _late(data: Decisions, minute: dict[int, int]) -> npt.NDArray[np.bool_]:
 
 
 def _minutes(trials: list[ipol.Trial]) -> dict[int, int]:
-    """Each subject's trial in which the first minute of walking ends."""
+    """Return each subject's trial in which the first minute of walking ends."""
     walked: dict[int, float] = {}
     ends: dict[int, int] = {}
     for trial in trials:

@@ -109,7 +109,7 @@ def _detector(data: fall.Decisions, rows: folds.Rows) -> FallDetector:
 
 
 def _rows(data: fall.Decisions, recordings: int) -> Iterator[folds.Rows]:
-    """Each recording's decisions."""
+    """Yield each recording's decisions."""
     bounds = np.searchsorted(data.recording, np.arange(recordings + 1))
     yield from (np.arange(begin, end) for begin, end in pairwise(bounds))
 

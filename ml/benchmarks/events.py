@@ -76,7 +76,7 @@ Counts = Mapping[Key, int]
 
 
 def feet_of(trials: Sequence[ipol.Trial]) -> list[Foot]:
-    """Both feet of every trial."""
+    """Return both feet of every trial."""
     return [
         _foot(trial, recipe, mended(trial.samples[:, spin].T), in_air)
         for trial in trials

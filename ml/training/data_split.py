@@ -34,7 +34,7 @@ def recipe_for(task: Task, channels: Sequence[Set[str]]) -> Recipe:
 
 
 def judging(parts: Sequence[SessionDecisions]) -> list[SessionDecisions]:
-    """Those that may judge: one without a wearer's name may be of any wearer that has one."""
+    """Return those that may judge: one without a wearer's name may be of any wearer that has one."""
     return [each for each in parts if each.named] or list(parts)
 
 

@@ -128,7 +128,7 @@ def _part(ask: Ask) -> SessionDecisions:
 
 
 def _decisions(recipe: Recipe, rows: Recorded) -> tuple[Features, Instants, Samples]:
-    """Features of every full window that a decision is due about, its newest stamp, and the ranges."""
+    """Return features of every full window that a decision is due about, its newest stamp, and the ranges."""
     _check_rows(recipe, rows)
     every_ns = EVERY_MS[recipe.name.partition("/")[0]] * 1_000_000
     parts, stamps, seen = [], [], []
@@ -247,7 +247,7 @@ def _version(store: Store, ask: Ask) -> int:
 
 
 def _rows(store: Store, table: Table, ask: Ask) -> list[dict[str, Any]]:
-    """Those of the session; none where the table was not there yet."""
+    """Return those of the session; none where the table was not there yet."""
     if table.name not in ask.versions:
         return []
     field = pyarrow.dataset.field

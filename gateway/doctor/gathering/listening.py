@@ -50,7 +50,7 @@ class Listening:
         return {name: ear.facts(asked_by_us.get(name, {})) for name, ear in self._ears.items()}
 
     def asked(self, bus: str) -> frozenset[int]:
-        """Nodes that somebody asks by SDO."""
+        """Return nodes that somebody asks by SDO."""
         return self._ears[bus].traffic.asked()
 
     def _await_open(self) -> None:

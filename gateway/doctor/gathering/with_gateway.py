@@ -28,7 +28,7 @@ def transfers(buses: Buses) -> dict[str, dict[int, int]]:
 
 
 def begun_between(before: Buses, after: Buses) -> dict[str, dict[int, int]]:
-    """Those that it began meanwhile."""
+    """Return those that it began meanwhile."""
     old = transfers(before)
     return {
         bus: {node: count - old.get(bus, {}).get(node, 0) for node, count in nodes.items()}

@@ -389,7 +389,7 @@ class StopControl:
     # Words
 
     def info(self, armed: Callable[[str], bool]) -> StopInfo:
-        """As `robot.describe` shows it."""
+        """Return it as `robot.describe` shows it."""
         held = self._record.held if self.held else None
         return StopInfo(
             held=self.held,

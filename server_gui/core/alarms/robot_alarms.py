@@ -160,7 +160,7 @@ def any_enabled(robot: Robot) -> bool:
 
 
 def _moving(robot: Robot) -> list[str]:
-    """Joints whose drive is enabled, or that turn."""
+    """Return joints whose drive is enabled, or that turn."""
     words = _words(robot)
     return [
         joint

@@ -100,7 +100,7 @@ def prove(
 
 
 def _here(store: Store, receipts: Sequence[Receipt | Altered], proof: Proof) -> list[Receipt]:
-    """Those of what went to this store, by its URL or by what its tables are called."""
+    """Return those of what went to this store, by its URL or by what its tables are called."""
     here = tables(store)
     sent_here = went_to((each for each in receipts if isinstance(each, Receipt)), store.url)
     here |= {part.table for each in sent_here for part in each.parts}

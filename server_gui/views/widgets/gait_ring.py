@@ -95,7 +95,7 @@ class GaitRing(QWidget):
         return self._theme.colour(leg.value if self._live else "old")
 
     def _picture(self, rings: Mapping[Leg, QRectF], band: float) -> QPixmap:
-        """Both rings, the phases that are now bright; drawn when they become others."""
+        """Return both rings, the phases that are now bright; drawn when they become others."""
         ratio, names = self.devicePixelRatioF(), [now.phase if now else "" for now in self._phases.values()]
         key = (self.size(), ratio, self._theme.colours, self._live, *names)
         if key != self._key:
