@@ -32,7 +32,7 @@ LEARNED: Final = {state: ("ring", "dim", state.value) for state in AdaptationSta
 AGREES: Final = 8.0  # % of a stride, that steps and a model may be apart
 STOPPED: Final = "stopped"
 OLD: Final = "old"  # what a model said is no prediction any more
-NOT_JUDGED: Final = "Not judged while stopped"
+NOT_JUDGED: Final = "Not judged"
 WALK: Final = "walk"  # a label of the models
 SEEN, SEEN_SHORT = "from the steps seen, without a model", "from the steps seen"
 UNSEEN: Final = "not judged"  # for the model does not see all
@@ -281,9 +281,10 @@ def _stride(station: Station, line: PredictionRow) -> PredictionRow:
     if not differences:
         return replace(line, text="by the model alone")
     if max(differences) <= AGREES:
-        return replace(line, text="steps and model agree", brief="both agree")
+        return replace(line, text="steps and model agree", brief="model agrees")
     mark = Mark("triangle", "warn", "differs")
-    return replace(line, mark=mark, text=f"{max(differences):.0f} % apart")
+    apart_by = f"{max(differences):.0f} % apart"
+    return replace(line, mark=mark, text=f"steps and model {apart_by}", brief=apart_by)
 
 
 def _knows(shown: Told) -> bool:

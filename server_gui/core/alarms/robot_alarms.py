@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from gateway.client import ConnectionState
+from gateway.client import NOTHING_SENT, ConnectionState
 from gateway.wire.bus import CLOSED
 from gateway.wire.robot import GuardRuleInfo
 from ml.danger.levels import Level
@@ -121,7 +121,7 @@ def _of_stop(robot: Robot, stopping: StopProgress) -> Iterator[Alarm]:
 
 def _then(why: str) -> str:
     """Return why a STOP failed, said when that is past: there is a link again."""
-    return "there was no link" if why.startswith("there is no link") else why
+    return "there was no link" if why.startswith(NOTHING_SENT) else why
 
 
 def role_of(robot: Robot) -> str | None:
@@ -132,7 +132,9 @@ def role_of(robot: Robot) -> str | None:
 def remedy(robot: Robot) -> str:
     """Return what to do after a STOP that nobody has confirmed."""
     is_off = _is_live(robot) and None not in _words(robot).values() and not _moving(robot)
-    return "STOP again to be sure" if is_off else "use the hardware stop"
+    if is_off:
+        return "STOP again to be sure"
+    return "STOP again, or use the hardware stop" if _is_live(robot) else "use the hardware stop"
 
 
 def _after_stop(robot: Robot, stopping: StopProgress) -> str:

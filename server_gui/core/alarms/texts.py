@@ -111,7 +111,7 @@ TEXTS: Final = dict(
             Kind.STOPPED,
             "triangle",
             "warn",
-            f"to go on: see that nobody is in danger, “Reset stop…”, then {_ENABLE}",
+            f"to go on: “Reset stop…” once nobody is in danger; then {_ENABLE}",
         ),
         _text(Kind.PART_STALE, "triangle", "warn", "check its power, and its cable or radio"),
         _text(
@@ -146,7 +146,7 @@ TEXTS: Final = dict(
             Kind.RESET,
             "ring",
             "dim",
-            f"to go on: {_ENABLE}; nothing moves until then",
+            f"to go on: {_ENABLE}",
         ),
     )
 )
