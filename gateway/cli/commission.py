@@ -60,8 +60,14 @@ def main(argv: list[str]) -> int:
         draft = Draft(options.file)
         if not options.json:
             return _lead(draft, bench, settings, options, Terminal(), None)
-        lines = ends.enter_context(Lines(stdin()))
-        return _lead(draft, bench, settings, options, JsonFace(lines), lines)
+        lines = Lines(stdin())
+        try:
+            ends.enter_context(lines)
+            return _lead(draft, bench, settings, options, JsonFace(lines), lines)
+        except MotionEnded:  # before `_lead` was led by anything: the stop stood in the pipe already
+            if not lines.stop_asked:
+                raise
+            return stop_drives(draft, bench, as_json=True)
 
 
 def _lead(

@@ -12,6 +12,7 @@ null}` when that is over.
 import contextlib
 import os
 import queue
+import re
 import select
 import signal
 import sys
@@ -33,6 +34,8 @@ SHOW_S = 0.5  # between two words of a joint that moves
 LIVE_S = 0.2  # between two looks while a question waits; a signal just before a wait is heard after it
 CHUNK = 4096
 LONGEST = 65_536  # of a line; whoever sends a longer one is not heard any more
+STOP_WORD = re.compile(r"\bstop\b", re.IGNORECASE)
+OBJECT_MARKS = frozenset("{[\"'")  # before that word: an object that went wrong on its way
 
 
 class Answer(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -91,16 +94,18 @@ class Lines:
 
     def drop(self) -> None:
         """Forget what came meanwhile: it was not an answer."""
+        is_over = False
         with contextlib.suppress(queue.Empty):
-            while self._read.get_nowait() is not None:
-                pass
+            while True:
+                is_over |= self._read.get_nowait() is None
+        if is_over:
             self._read.put(None)
 
     def _run(self) -> None:
         held = b""
         while True:
             ready, _, _ = select.select([self._source, self._woken], [], [])
-            chunk = b"" if self._woken in ready else os.read(self._source, CHUNK)
+            chunk = b"" if self._woken in ready else self._chunk()
             *lines, held = (held + chunk).split(b"\n")
             if not chunk or len(held) > LONGEST:
                 lines += [held] if held and not chunk else []
@@ -109,6 +114,12 @@ class Lines:
             if not chunk or len(held) > LONGEST:
                 self._read.put(None)
                 return
+
+    def _chunk(self) -> bytes:
+        try:
+            return os.read(self._source, CHUNK)
+        except OSError:  # a terminal that was closed
+            return b""
 
     def _take(self, line: bytes) -> None:
         read = _read(line.decode(errors="replace").strip())
@@ -122,15 +133,27 @@ class Lines:
 def _read(text: str) -> Answer:
     """Return what a line says: whatever could be meant as a stop is one; what is no answer is plain text."""
     try:
-        found = msgspec.json.decode(text) if text.startswith("{") else {}
-    except msgspec.DecodeError:
-        found = {}
-    if any(key.lower() == "stop" and value for key, value in found.items()):
+        found = msgspec.json.decode(text)
+    except (msgspec.DecodeError, RecursionError):
+        found = None
+    if not isinstance(found, dict):
+        return Answer(stop=True) if _looks_like_stop(text) else Answer(text)
+    said = [value for key, value in found.items() if key.lower() == "stop"]
+    if any(said) or (not said and "answer" not in found and _looks_like_stop(text)):
         return Answer(stop=True)
     try:
         return msgspec.convert(found, Answer) if "answer" in found else Answer(text)
     except msgspec.ValidationError:
         return Answer(text)
+
+
+def _looks_like_stop(text: str) -> bool:
+    """Whether a line that is no answer has the word alone, or as a part of what looks like an object."""
+    word = STOP_WORD.search(text)
+    if word is None:
+        return False
+    before = text[: word.start()]
+    return not OBJECT_MARKS.isdisjoint(before) or not any(map(str.isalnum, before + text[word.end() :]))
 
 
 class JsonFace:

@@ -12,11 +12,11 @@ from drivers.errors import DriverError, SettingsError
 from gateway.cli.calibrate import alone_on, named_joint
 from gateway.cli.commission_faces import Terminal
 from gateway.cli.commission_lines import JsonFace, Lines, stdin
-from gateway.cli.motion_ends import MotionEnded, ending, stop_drives
+from gateway.cli.motion_ends import MotionEnded, ending, stop_robot
 from gateway.cli.text import say_json, warn
 from gateway.commission.bench import CanBench
 from gateway.commission.dialogue import run
-from gateway.commission.draft import Draft, alone
+from gateway.commission.draft import alone
 from gateway.commission.powered_run import NotStopped, PoweredRunResult
 from gateway.config.reading import load
 from gateway.config.robot import RobotConfig
@@ -29,6 +29,7 @@ from gateway.records.records import Records
 from gateway.user_name import user_name
 
 FOLDER = "joint-tests"
+LEFT = "this command has left no drive under power"  # of others it says nothing: who ends it early saw none
 _EPILOG = """\
 example
   gwrms joint-test step bench.toml:left_knee --amplitude 1
@@ -64,9 +65,15 @@ def main(argv: list[str]) -> int:
         config = _load(file, joint)
         records = ends.enter_context(_records(config))
         if not options.json:
-            return _lead(config, joint, argv[0], options, Terminal(), records)
-        face = JsonFace(ends.enter_context(Lines(stdin())))
-        return _lead(config, joint, argv[0], options, face, records)
+            return _lead(config, joint, argv[0], options, Terminal(), None, records)
+        lines = Lines(stdin())
+        try:
+            ends.enter_context(lines)
+            return _lead(config, joint, argv[0], options, JsonFace(lines), lines, records)
+        except MotionEnded:  # before anything was begun: the stop stood in the pipe already
+            if not lines.stop_asked:
+                raise
+            return stop_robot(config, _benches(config), as_json=True) or 1
 
 
 def _parser(test: str) -> argparse.ArgumentParser:
@@ -242,6 +249,7 @@ def _lead(
     kind: str,
     options: argparse.Namespace,
     face: "Terminal | JsonFace",
+    lines: Lines | None,
     records: Records,
 ) -> int:
     began = datetime.datetime.now(datetime.UTC).strftime("%Y%m%dT%H%M%SZ")
@@ -260,7 +268,7 @@ def _lead(
         records,
     )
     result = "nothing got power"
-    benches = {name: CanBench(name, settings) for name, settings in config.can.items()}
+    benches = _benches(config)
     bench = benches[test.settings.bus]
     try:
         alone_on(config.can[test.settings.bus], test.settings)
@@ -275,14 +283,16 @@ def _lead(
     except NotStopped as error:
         warn("joint-test", f"NOT STOPPED: {error}")
         result = f"NOT STOPPED: {error}"
-        return stop_drives(Draft(config.path, go_on=False), bench, as_json=options.json) or 1
+        return stop_robot(config, benches, as_json=options.json) or 1
     except MotionEnded as end:
         result = "interrupted"
-        warn("joint-test", "interrupted; the drive is without power")
+        if lines is not None and lines.stop_asked:
+            return stop_robot(config, benches, as_json=True) or 1
+        warn("joint-test", f"interrupted; {LEFT}")
         return end.status
     except EOFError:
         result = "nobody answered any more"
-        warn("joint-test", "nobody answers any more; the drive is without power")
+        warn("joint-test", f"nobody answers any more; {LEFT}")
         return 1
     except (NotAllowed, DriverError, OSError) as error:
         result = str(error)
@@ -296,6 +306,10 @@ def _lead(
         )
 
 
+def _benches(config: RobotConfig) -> dict[str, CanBench]:
+    return {name: CanBench(name, settings) for name, settings in config.can.items()}
+
+
 def _told(test: Test, outcome: PoweredRunResult, *, as_json: bool) -> int:
     if as_json:
         say_json({"tested": {"file": str(test.file), "problem": outcome.problem, "off": outcome.off}})
@@ -304,8 +318,7 @@ def _told(test: Test, outcome: PoweredRunResult, *, as_json: bool) -> int:
 
 def _stop(file: Path, joint: str, *, as_json: bool) -> int:
     config = _load(file, joint)
-    bus = config.joint[joint].bus
-    status = stop_drives(Draft(file, go_on=False), CanBench(bus, config.can[bus]), as_json=as_json)
+    status = stop_robot(config, _benches(config), as_json=as_json)
     if (words := _cut_off(config)) is not None:
         warn("joint-test", f"{words}. The next gwrms joint-test puts it back before it asks for its phrase")
     return status

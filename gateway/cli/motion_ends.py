@@ -1,29 +1,45 @@
 """The end of a command that may have powered a joint: by a signal, or by a stop of every drive."""
 
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from types import FrameType
 
 from drivers.errors import DriverError
 from gateway.cli.text import say, say_json
+from gateway.commission.axes import Axis
 from gateway.commission.bench import CanBench
 from gateway.commission.draft import Draft
-from gateway.commission.stopping import Stopped, stop
+from gateway.commission.stopping import Stopped, stop, stop_all
+from gateway.config.robot import RobotConfig
 
 ENDS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 def stop_drives(draft: Draft, bench: CanBench, *, as_json: bool) -> int:
     """Quick stop to every drive that is known; nothing but SIGKILL keeps it from its end."""
+    return _stop(lambda: stop(bench, draft), [bench], as_json=as_json)
+
+
+def stop_robot(config: RobotConfig, benches: Mapping[str, CanBench], *, as_json: bool) -> int:
+    """Quick stop to every joint of a robot's file, each on its own bus; likewise."""
+    axes: dict[str, set[Axis]] = {}
+    for joint in config.joint.values():
+        axes.setdefault(joint.bus, set()).add(Axis(joint.node_id, joint.axis))
+    buses = {name: (benches[name], found) for name, found in axes.items()}
+    return _stop(lambda: stop_all(buses), benches.values(), as_json=as_json)
+
+
+def _stop(ask: Callable[[], Stopped], benches: Iterable[CanBench], *, as_json: bool) -> int:
     for number in ENDS:
         signal.signal(number, signal.SIG_IGN)
     try:
-        stopped = stop(bench, draft)
+        stopped = ask()
     except DriverError as error:
         stopped = Stopped({}, str(error))
     finally:
-        bench.close()
+        for bench in benches:
+            bench.close()
     if as_json:
         told = {"confirmed": stopped.confirmed, "drives": stopped.drives, "words": stopped.words}
         say_json({"stopped": told})

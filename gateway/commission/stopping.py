@@ -3,7 +3,8 @@
 Like every stop it can enable nothing (`drivers.joint.commands`). It is software, not an emergency stop.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -48,18 +49,18 @@ class Stopped:
 
     @property
     def words(self) -> str:
-        if self.problem:
+        if self.problem and not self.drives:
             return f"NOT CONFIRMED: {self.problem}"
         if not self.drives:
             return "NOT CONFIRMED: no drive is known yet; all 127 node ids were asked to stop"
         if self.confirmed:
             return f"STOP is confirmed by {', '.join(self.drives)}"
-        missing = (
+        missing = [
             f"{axis} is {outcome}"
             for axis, outcome in self.drives.items()
             if outcome != StopOutcome.CONFIRMED
-        )
-        return f"NOT CONFIRMED: {', '.join(missing)}"
+        ]
+        return f"NOT CONFIRMED: {', '.join(missing)}" + (f" ({self.problem})" if self.problem else "")
 
 
 def stop(bench: CanBench, draft: Draft) -> Stopped:
@@ -71,13 +72,36 @@ def stop(bench: CanBench, draft: Draft) -> Stopped:
         DriverError: the bus does not open.
 
     """
-    known = set(axes_of(draft)) or set(_axes_in(draft.file))
+    found = _stopped(bench, set(axes_of(draft)) or set(_axes_in(draft.file)))
+    return Stopped({str(axis): outcome for axis, outcome in found.items()})
+
+
+def stop_all(buses: Mapping[str, tuple[CanBench, Collection[Axis]]]) -> Stopped:
+    """Stop the drives of several buses, all at once: one that is dead keeps no other waiting.
+
+    Drives of a bus that does not open are not reached.
+    """
+    drives: dict[str, StopOutcome] = {}
+    problems: list[str] = []
+    with ThreadPoolExecutor(len(buses), "stop") as pool:
+        stopping = {name: pool.submit(_stopped, *of) for name, of in buses.items()}
+    for name, future in stopping.items():
+        try:
+            found = future.result()
+        except DriverError as error:
+            problems.append(str(error))
+            found = dict.fromkeys(buses[name][1], StopOutcome.UNREACHABLE)
+        where = f" on {name}" if len(buses) > 1 else ""
+        drives |= {f"{axis}{where}": outcome for axis, outcome in found.items()}
+    return Stopped(drives, "; ".join(problems))
+
+
+def _stopped(bench: CanBench, known: Collection[Axis]) -> dict[Axis, StopOutcome]:
     for axis in sorted(known, key=_place) or map(Axis, EVERY_NODE):
         bench.send_urgent(axis.node, _request(axis))
     found = _confirmed(bench, known)
     further = [axis for axis in _further(bench, found) if axis not in found]
-    found |= _confirmed(bench, further)
-    return Stopped({str(axis): outcome for axis, outcome in found.items()})
+    return found | _confirmed(bench, further)
 
 
 def axes_of(draft: Draft) -> Iterator[Axis]:

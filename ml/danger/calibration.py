@@ -1,5 +1,6 @@
 """One probability from all detectors: calibrated log odds, which evidence of danger can only raise."""
 
+import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Final
@@ -26,7 +27,8 @@ class Calibration(msgspec.Struct, frozen=True):
 
     `floor` and `scale` of each detector turn its spreads into evidence; `weights` of the largest and the
     second largest, and `bias`, turn evidence into log odds; `odds` → `share` maps those to the share of harm.
-    `thresholds` are log odds by level's name, `budgets` the false alarms an hour that they allow.
+    `thresholds` are log odds by level's name, `budgets` the false alarms an hour that they allow. `seal` is
+    of all the others: a file in which one digit has changed looks like any other.
     """
 
     detectors: tuple[str, ...]
@@ -39,6 +41,13 @@ class Calibration(msgspec.Struct, frozen=True):
     thresholds: dict[str, float]
     budgets: dict[str, float]
     learned_from: str
+    seal: str = ""
+
+    @property
+    def sealed(self) -> "Calibration":
+        """The same, as it may be written into a file."""
+        told = msgspec.json.encode(msgspec.structs.replace(self, seal=""))
+        return msgspec.structs.replace(self, seal=hashlib.sha256(told).hexdigest())
 
     def log_odds(self, above: Floats) -> Floats:
         """Return the log odds (…,) of spreads above normal (…, detectors), NaN without data."""
@@ -112,7 +121,7 @@ def load(path: Path = SHIPPED) -> Calibration:
     """
     try:
         found = msgspec.json.decode(path.read_bytes(), type=Calibration)
-    except (OSError, msgspec.DecodeError) as error:
+    except (OSError, ValueError, msgspec.DecodeError) as error:
         raise UnusableModel(f"{path}: the calibration of danger cannot be read: {error}") from error
     for why in _unfit(found):
         raise UnusableModel(f"{path}: the calibration of danger cannot be used: {why}")
@@ -135,3 +144,5 @@ def _unfit(one: Calibration) -> Iterator[str]:
     given = [one.thresholds[level.word] for level in URGENT if level.word in one.thresholds]
     if given != sorted(given):
         yield "a more urgent level has a lower threshold than one before it"
+    if one.seal != one.sealed.seal:
+        yield "it is damaged, or was changed by hand: its seal is of other numbers"

@@ -56,6 +56,11 @@ class Levels:
         self._above = dict.fromkeys(URGENT, 0)
         self._calm_s: float | None = None  # since when it is below what its level needs
 
+    @property
+    def is_met(self) -> bool:
+        """Whether the newest moment is one that keeps its level, and none of those after which it falls."""
+        return self._calm_s is None
+
     def take(self, at_s: float, odds: float) -> Level:
         """Take the log odds of a moment."""
         for level in URGENT:

@@ -34,6 +34,8 @@ LEARNS_BELOW: Final = 15.0  # spreads above normal: the models follow smaller de
 TOLD: Final = 3  # reasons
 STRANGE_S: Final = 0.8  # for so long after a sample without neighbours, these detectors cannot judge
 COMPARE: Final = ("tracking", "torque", "strides", "support", "rhythm", "agreement")
+HARM_S: Final = 30.0  # within which what has begun does harm; so long a level is not over unseen
+WATCHED: Final = np.r_[0:24, 30:32]  # joints but their temperatures, and loads: they come with every row
 TELLING: Final = 2.0  # spreads from which on a detector is a reason
 
 
@@ -135,6 +137,9 @@ class DangerMonitor:
         self._held = np.full(len(CHANNELS), np.nan)
         self._held_ns = np.zeros(len(CHANNELS), dtype=np.int64)
         self._taken_ns = -(2**62)
+        self._reached = Level.NONE
+        self._seen_by = np.zeros(len(WATCHED), dtype=np.bool_)  # channels that were there when it was met
+        self._until_s = -math.inf
 
     def take(self, stamp_ns: int, values: Sequence[float | None]) -> DangerVerdict | None:
         """Take a row in the order of `CHANNELS`; return the verdict if one was due.
@@ -160,10 +165,19 @@ class DangerMonitor:
         above = self._evidence.take(stamp_ns / 1e9, values)
         silent = tuple(name for name, one in zip(DETECTORS, above, strict=True) if math.isnan(one))
         odds = float(self._calibration.log_odds(above))
-        level = self._levels.take(stamp_ns / 1e9, odds)
+        level = self._unless_blind(self._levels.take(stamp_ns / 1e9, odds), stamp_ns / 1e9, values)
         if len(silent) == len(DETECTORS):
             return DangerVerdict(stamp_ns, None, Level.UNKNOWN, (), silent)
         if level is Level.NONE and 2 * len(silent) > len(DETECTORS):
             level = Level.UNKNOWN  # too few detectors have data to rule danger out
         why = self._evidence.why(above) if level > Level.NONE else ()
         return DangerVerdict(stamp_ns, float(self._calibration.probability(odds)), level, why, silent)
+
+    def _unless_blind(self, level: Level, at_s: float, values: Floats) -> Level:
+        """Return the level; UNKNOWN where it would fall only because what has raised it is not seen."""
+        there = np.isfinite(values[WATCHED])
+        if level < self._reached and at_s < self._until_s and bool((self._seen_by & ~there).any()):
+            return Level.UNKNOWN
+        if self._levels.is_met or level is not self._reached:
+            self._reached, self._seen_by, self._until_s = level, there, at_s + HARM_S
+        return level

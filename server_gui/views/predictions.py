@@ -89,8 +89,8 @@ def said(shown: Told, *, stopped: str = "", unseen: str = "") -> PredictionRow:
     if prediction.label == UNKNOWN:
         return PredictionRow(Mark("ring", "dim", UNKNOWN), word, *details, _tip(shown))
     shape = ("square", "bad") if falls else ("diamond", "accent")
-    text = f"{word} {100 * prediction.probability:.0f} %"
-    is_doubtful = worth.worth is Worth.DOUBTFUL
+    is_doubtful = worth.worth is Worth.DOUBTFUL  # then a percentage would look sure
+    text = f"{word}?" if is_doubtful else f"{word} {100 * prediction.probability:.0f} %"
     return PredictionRow(Mark(*shape, prediction.label), text, *details, _tip(shown), is_doubtful=is_doubtful)
 
 
@@ -147,8 +147,6 @@ def doing(station: Station) -> tuple[str, ...]:
     line, gait = activity(station), station.processing.derived().gait
     walks = gait.walking and gait.cadence_spm is not None and line.mark.word != STOPPED
     between = " " if line.mark.colour == "accent" else " · "  # the steps are not those of what is not known
-    if line.is_doubtful:  # a percentage would look sure
-        line = replace(line, text=f"{PROBABLE.sub('', line.text)}?")
     short = line.short_text
     cadence = f"{line.text}{between}{gait.cadence_spm:.0f} steps/min" if walks else short
     least = f"{PROBABLE.sub('', short)} · {count.replace(' of ', '/')}"

@@ -157,7 +157,7 @@ def test_a_doubtful_prediction_does_not_look_sure_in_header_and_card(window: Par
     station.take_prediction(predicted("walk", {"walk": 1.0}, trust=drifted))
     window.header.refresh()
     words = window.header._chips["status"]._words
-    assert (words.main, words.parts) == ("Walk 100 %", ("doubtful", "predicted"))
+    assert (words.main, words.parts) == ("Walk?", ("doubtful", "predicted"))
     assert all("%" not in wording for wording in doing(station))
     assert doing(station)[0].startswith("Walk? 120 steps/min · ")
     station.take_prediction(predicted("walk", {"walk": 1.0}))

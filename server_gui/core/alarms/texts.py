@@ -105,7 +105,7 @@ TEXTS: Final = dict(
             "warn",
             "look at the wearer and the robot; it is on trial, and may be wrong (gwrms docs danger)",
         ),
-        _text(Kind.IMPLAUSIBLE, "square", "bad", "check the encoder or sensor, and its cable"),
+        _text(Kind.IMPLAUSIBLE, "square", "bad", "look its code up in the device's manual; check its cable"),
         _text(Kind.LOST, "cross", "bad", "check its power, its cable and its address"),
         _text(
             Kind.STOPPED,

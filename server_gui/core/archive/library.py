@@ -116,7 +116,7 @@ class Library:
         self._reached(found)
 
     def _failed(self, error: Exception) -> None:
-        self._looked(Found(problem=f"internal error, {type(error).__name__}"))
+        self._looked(Found(problem=f"internal error, {type(error).__name__}", is_reached=False))
 
     def _knocked(self, found: Found) -> None:
         self._knocking = False

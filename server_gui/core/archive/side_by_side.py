@@ -59,6 +59,8 @@ class Followed(Playback):
         if self._show_until(tape, within_ns):
             self.position_ns = within_ns
             self._robot.shown_ns = max(target_ns, tape.first_ns)
+        elif self.problem:
+            self._robot.row_ns = None  # what is shown still is of another instant: it has no age here
 
     def _fetch(self, tape: Tape, place: int | None) -> None:
         if self._again_s is None or self._clock_s() >= self._again_s:

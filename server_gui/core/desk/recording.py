@@ -148,7 +148,7 @@ class Recording:
             if told.get(thread) != text:
                 self._news.add(NewsKind.WARNING, WHO, text)
         for thread in told.keys() - now.keys():
-            self._news.add(NewsKind.STATE, WHO, f"over: {told[thread]}")
+            self._news.add(NewsKind.STATE, WHO, f"no longer: {told[thread]}")
         self._threads[by] = tuple(threads)
 
     @property
@@ -318,7 +318,7 @@ class Recording:
         for kind in now.keys() - self._trouble.keys():
             self._news.add(NewsKind.WARNING, WHO, now[kind])
         for kind in self._trouble.keys() - now.keys():
-            self._news.add(NewsKind.STATE, WHO, f"over: {self._trouble[kind]}")
+            self._news.add(NewsKind.STATE, WHO, f"no longer: {self._trouble[kind]}")
         self._trouble = now
 
     def _failed(self, keeper: Keeper, error: Exception) -> None:

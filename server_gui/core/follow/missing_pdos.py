@@ -41,6 +41,11 @@ def told_percent(node: NodeInfo) -> float:
     return percent if percent >= SOME_PERCENT else 0.0
 
 
+def _percent(node: NodeInfo) -> float | None:
+    """Return the share of a look, None where it is not known."""
+    return None if node.pdos_missing_percent is None else told_percent(node)
+
+
 def told_words(node: NodeInfo) -> tuple[str, str]:
     """Return what is told of it, and what to check where that is known."""
     words = f"{told_percent(node):.0f} % of its PDOs are missing"
@@ -56,8 +61,16 @@ class NodeHistory:
     looks: collections.deque[tuple[int, float]] = field(default_factory=collections.deque)  # when, and share
     is_told: bool = False
 
-    def take(self, now_ns: int, percent: float) -> float:
-        """Return the share that is told after another look: the newest that is not zero."""
+    def take(self, now_ns: int, percent: float | None) -> float:
+        """Return the share that is told after another look: the newest that is not zero.
+
+        A look that does not know it is no fine one: what was told stays so, for a while.
+        """
+        if percent is None:
+            if self.looks and now_ns - self.looks[-1][0] > LOST_NS:
+                self.looks.clear()
+            self.is_told = self.is_told and bool(self.looks)
+            return next(share for _, share in reversed(self.looks) if share) if self.is_told else 0.0
         self.looks.append((now_ns, percent))
         while len(self.looks) > KEPT_LOOKS and now_ns - self.looks[0][0] > KEPT_NS:
             self.looks.popleft()
@@ -67,6 +80,11 @@ class NodeHistory:
         else:
             self.is_told |= percent >= MANY_PERCENT or self._lasts(now_ns, places)
         return self.looks[places[-1]][1] if self.is_told else 0.0
+
+    def join(self, percent: float | None) -> float:
+        """Return the share of a look that is told at once, as another node of the bus is."""
+        self.is_told = bool(percent)
+        return percent or 0.0
 
     def _is_over(self, now_ns: int, newest: int) -> bool:
         fine = len(self.looks) - 1 - newest
@@ -100,7 +118,12 @@ class MissingPdos:
         return tuple(self._bus(bus, now_ns, (cpu_percent or 0.0) >= BUSY_PERCENT) for bus in buses)
 
     def _bus(self, bus: BusInfo, now_ns: int, is_busy: bool) -> BusInfo:
-        told = [self._nodes[bus.name, node.node_id].take(now_ns, told_percent(node)) for node in bus.nodes]
+        known = [(self._nodes[bus.name, node.node_id], _percent(node)) for node in bus.nodes]
+        told = [history.take(now_ns, percent) for history, percent in known]
+        if any(told):  # it is the bus's trouble: nobody is told that others with as many are fine
+            told = [
+                found or history.join(percent) for found, (history, percent) in zip(told, known, strict=True)
+            ]
         is_busy = is_busy and len(told) > 1 and all(told)  # one alone has a cable of its own
         nodes = [
             node

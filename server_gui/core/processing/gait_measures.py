@@ -9,6 +9,7 @@ from server_gui.core.processing.gait_events import EventKind, GaitEvent, Leg
 
 STRIDES = 10  # the measures are over so many of the newest strides of each leg
 LONGEST_STRIDE_NS = 3_500_000_000  # who takes longer has stood in between
+OLD_NS = 2 * LONGEST_STRIDE_NS  # after a leg's newest stride: it tells nothing of this walk any more
 WALKING_NS = 2_500_000_000  # since the last heel strike; who takes longer has stopped
 UNSEEN_NS = 500_000_000  # a gap in which a step may have been made
 FEWEST = 5  # strides for a variability
@@ -119,7 +120,7 @@ class GaitMeasures:
             return Gait(walking=False)
         if now_ns - newest_ns > WALKING_NS:
             return Gait()
-        return summary(_without_pauses({leg: list(found.strides) for leg, found in self._legs.items()}))
+        return summary(_without_pauses({leg: found.newest(now_ns) for leg, found in self._legs.items()}))
 
 
 def _without_pauses(strides: Mapping[Leg, list[Stride]]) -> dict[Leg, list[Stride]]:
@@ -160,6 +161,11 @@ class _Leg:
         """Break: the next event does not continue the last stride."""
         self.strike_ns: int | None = None
         self.off_ns: int | None = None
+
+    def newest(self, now_ns: int) -> list[Stride]:
+        """Return its newest strides; none of a leg that is not seen any more, or only in part."""
+        is_old = not self.strides or now_ns - self.strides[-1].ended_ns > OLD_NS
+        return [] if is_old else list(self.strides)
 
     def ended(self, strike: GaitEvent, other: "_Leg", ranges: Mapping[str, float]) -> Stride | None:
         """Return the stride that `strike` ends, where its own toe off was seen."""

@@ -462,7 +462,7 @@ class Recorder:
         if text is None:
             if known is not None:
                 del self._alarms[kind]
-                log.warning("over: %s", known.text)
+                log.warning("no longer: %s", known.text)
             return
         self._alarms[kind] = Alarm(kind, text)
         if known is None:

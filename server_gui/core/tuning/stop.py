@@ -12,6 +12,7 @@ from gateway.wire.stop import Stopped
 
 ENABLED = "operation enabled"
 HELD_BY = frozenset({"stop", "stop still held"})  # entries of the journal
+AGAIN = "stopped again"  # while one is held: by somebody, or a drive by the gateway
 
 
 class StopState(Enum):
@@ -88,6 +89,7 @@ class StopProgress:
     _off: Collection[str] = ()  # drives that were not enabled when it was sent
     _confirmed: Collection[str] = ()  # drives that have confirmed it
     _entry: int = 0  # of the journal: the newest that was read
+    _is_written: bool = True  # whether the latest STOP was read in the journal: resets before are older
 
     @property
     def stage(self) -> tuple[StopState, bool]:
@@ -106,7 +108,7 @@ class StopProgress:
         self.state, self.text, self.at_ns = StopState.SENT, "STOP sent …", now_ns if at_ns is None else at_ns
         self.why, self.answered_ms, self.was_ended = "", None, False
         self.since_s = time.time() - (now_ns - self.at_ns) / 1e9
-        self.proofs, self._off, self._confirmed = {}, off, ()
+        self.proofs, self._off, self._confirmed, self._is_written = {}, off, (), False
         return self.number
 
     def answered(self, number: int, stopped: Stopped, at_ns: int | None = None) -> None:
@@ -131,38 +133,55 @@ class StopProgress:
         if number == self.number:
             self._not_confirmed(reason)
 
-    def was_reset(self, held: bool) -> None:
-        """Take the result of a reset."""
+    def was_reset(self, held: bool, at_s: float | None = None) -> None:
+        """Take the result of a reset, and its UTC (default: now)."""
         self.held = held
         if not held:
             self.state, self.text, self.why, self.reason = StopState.IDLE, "", "", ""
-            self.was_ended, self.since_s = True, time.time()
+            self.was_ended, self.since_s = True, time.time() if at_s is None else at_s
 
     # --- what the robot shows meanwhile
 
     def described(self, held: bool, reason: str | None) -> None:
-        """Take the robot's description on every new link."""
+        """Take the robot's description on every new link: a stop may have ended while there was none."""
         self.held, self.reason = held, (reason or "") if held else ""
+        if not held and self.state is StopState.CONFIRMED and self._is_written:
+            self.was_reset(held=False)
 
     def read(self, entries: Iterable[Mapping[str, Any]]) -> None:
         """Take the newest entries of the robot's journal, oldest first: others stop and reset it too.
 
-        They may be older than a STOP that was not confirmed: what they hold and reset is not that one.
+        They may be older than our STOP: what they hold and reset is not that one.
         """
+        told = [(number, entry) for entry in entries if isinstance(number := entry.get("n"), int)]
+        if told and told[-1][0] < self._entry:
+            self._entry = 0  # another journal
         is_open = self.state is StopState.NOT_CONFIRMED and not self.held
-        for entry in entries:
-            number, what = entry.get("n"), entry.get("what")
-            if not isinstance(number, int) or number <= self._entry:
-                continue
-            self._entry = number
-            if what in HELD_BY:
-                self._holds(entry)
-            elif what == "reset":
-                held = bool(entry.get("held"))
-                if is_open and not held:
-                    self.held, self.reason = False, ""
-                elif self.held and not held and self.state is not StopState.SENT:
-                    self.was_reset(held=False)
+        was_ended, is_history = self.was_ended, self._entry == 0
+        for number, entry in told:
+            if number > self._entry:
+                self._entry = number
+                self._read(entry, is_open=is_open)
+        if is_history and not was_ended:
+            self.was_ended = False  # nobody knows what was enabled since
+
+    def _read(self, entry: Mapping[str, Any], *, is_open: bool) -> None:
+        what = entry.get("what")
+        self._is_written |= what in HELD_BY or (what == AGAIN and "drive" not in entry)
+        if what in HELD_BY:
+            self._holds(entry)
+        elif what == "reset" and not entry.get("held"):
+            if is_open:
+                self.held, self.reason = False, ""
+            elif self._is_ended_by_reset:
+                self.was_reset(held=False, at_s=_utc_s(entry))
+
+    @property
+    def _is_ended_by_reset(self) -> bool:
+        """Whether a reset in the journal is one of what is known to be held."""
+        if self.state is StopState.CONFIRMED:
+            return self._is_written
+        return self.held and self.state is not StopState.SENT
 
     def show(
         self, stamps_ns: Sequence[int], columns: Mapping[str, Sequence[str | None]], offset_ns: int
@@ -233,13 +252,18 @@ class StopProgress:
         if not self.held or not self.reason:
             self.reason = said
         if not self.held:
-            utc_ns = entry.get("utc_ns")
-            self.since_s = utc_ns / 1e9 if isinstance(utc_ns, int) else time.time()
+            self.since_s = _utc_s(entry)
         self.held, self.was_ended = True, False
 
     def _not_confirmed(self, why: str) -> None:
         self.state, self.why = StopState.NOT_CONFIRMED, why
         self.text = f"STOP NOT CONFIRMED: {why}. Use the hardware stop"
+
+
+def _utc_s(entry: Mapping[str, Any]) -> float:
+    """Return when it was written; now where it does not say."""
+    utc_ns = entry.get("utc_ns")
+    return utc_ns / 1e9 if isinstance(utc_ns, int) else time.time()
 
 
 def _listed(names: Iterable[str]) -> str:

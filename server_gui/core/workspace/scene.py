@@ -310,6 +310,8 @@ class Scene:
         """Return the companion's name, and the alignment of both."""
         if self.beside is None or self._station is None:
             return ""
+        if self._station.robot.is_recording and self.beside.station.robot.is_recording:
+            return f"┅ {self.beside.station.title}, played together"  # by what, stands where it is chosen
         said = offset_text(self._station, self.beside.station, self._shift_ns, self.nudge_s)
         by = "their clocks" if self.align is Align.NOW else self.align.value
         return f"┅ {self.beside.station.title}, aligned by {by}: {said}"

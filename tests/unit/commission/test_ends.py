@@ -1,16 +1,22 @@
 """However the command is ended, it says so, keeps what was found, and lets the file go."""
 
 import json
+import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from gateway.cli import commission_lines, joint_test
+from gateway.cli.motion_ends import ENDS
 from gateway.main import main
+from tests.support.waiting import until
+from tests.unit.commission.homing_drive import HomingDrive
+from tests.unit.joint.standard import S
 
 Process = subprocess.Popen[str]
 
@@ -72,6 +78,103 @@ def test_a_bus_that_is_not_there_is_said_before_anything_is_asked_and_leaves_no_
     assert "none9" in said.err
     assert "ask" not in said.out
     assert list(tmp_path.iterdir()) == []
+
+
+TWO_BUSES = """
+[robot]
+name = "exo-01"
+[gateway]
+role = "master"
+[can.one]
+interface = "virtual"
+channel = "one"
+[can.two]
+interface = "virtual"
+channel = "two"
+[joint.left_knee]
+bus = "one"
+node_id = 5
+eds = "joint_drive.eds"
+counts_per_revolution = 4096
+gear_ratio = 100
+[joint.right_knee]
+bus = "two"
+node_id = 5
+eds = "joint_drive.eds"
+counts_per_revolution = 4096
+gear_ratio = 100
+"""
+
+
+@pytest.fixture
+def signals() -> Iterator[None]:
+    """Leave signals as they were: a stop lets nothing interrupt it, and its process ends with it."""
+    before = {number: signal.getsignal(number) for number in ENDS}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+@pytest.mark.usefixtures("signals")
+def test_a_stop_reaches_the_drives_of_every_bus_and_one_that_has_the_same_number(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It was asked on the bus of the joint alone, and its node stood for that of the other bus as well."""
+    file = tmp_path / "robot.toml"
+    file.write_text(TWO_BUSES, encoding="utf-8")
+    drives = [HomingDrive(channel, 5, state=S.OPERATION_ENABLED) for channel in ("one", "two")]
+    with drives[0], drives[1]:
+        assert main(["joint-test", "stop", f"{file}:left_knee"]) == 0
+    assert [drive.state for drive in drives] == [S.SWITCH_ON_DISABLED] * 2
+    assert "node 5 on one, node 5 on two" in capsys.readouterr().out
+    with drives[1]:
+        assert main(["joint-test", "stop", f"{file}:right_knee"]) == 1
+    assert "NOT CONFIRMED: node 5 on one is unreachable" in capsys.readouterr().out
+
+
+def test_a_stop_by_a_line_before_a_joint_is_tested_stops_every_drive(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It said that the drive is without power, which it had not asked yet."""
+    file = tmp_path / "robot.toml"
+    file.write_text(TWO_BUSES, encoding="utf-8")
+    source, sink = os.pipe()
+    monkeypatch.setattr(joint_test, "stdin", lambda: source)
+    left = HomingDrive("one", 5, state=S.OPERATION_ENABLED, delay_s=0.2)
+
+    def stop(_drive: HomingDrive) -> None:
+        os.write(sink, b'{"stop": true}\n')
+
+    left.on_look = stop  # as soon as its state is read
+    with left, HomingDrive("two", 5, state=S.OPERATION_ENABLED) as right:
+        assert main(["joint-test", "step", f"{file}:right_knee", "--json"]) == 1
+        assert (left.state, right.state) == (S.SWITCH_ON_DISABLED,) * 2
+    os.close(sink)
+    os.close(source)
+    told = capsys.readouterr()
+    assert '"stopped":{"confirmed":true' in told.out
+    assert "without power" not in told.err
+
+
+def test_a_stop_that_waits_before_anything_is_read_is_carried_out(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It ended the command, now and then, before that would have taken it for a stop."""
+    taken = commission_lines.Lines.__enter__
+
+    def late(lines: commission_lines.Lines) -> commission_lines.Lines:
+        found = taken(lines)
+        until(lambda: lines.stop_asked)
+        return found
+
+    source, sink = os.pipe()
+    os.write(sink, b'{"stop": true}\n')
+    monkeypatch.setattr(commission_lines.Lines, "__enter__", late)
+    monkeypatch.setattr("gateway.cli.commission.stdin", lambda: source)
+    assert main(["commission", "--json", str(tmp_path / "exo-01.toml"), "virtual:waits"]) == 1
+    os.close(sink)
+    os.close(source)
+    assert "all 127 node ids were asked to stop" in capsys.readouterr().out
 
 
 def _read(said: str) -> dict[str, Any]:

@@ -102,11 +102,56 @@ def test_an_object_that_is_no_answer_is_not_taken_for_enter(pipe: Pipe) -> None:
 
 
 @pytest.mark.parametrize(
-    "line", [' {"stop": true}\r', '{"STOP": true}', '{"stop": 1}', '{"stop": true, "x": 1}']
+    "line",
+    [
+        ' {"stop": true}\r',
+        '{"STOP": true}',
+        '{"stop": 1}',
+        '{"stop": true, "x": 1}',
+        '{"stop": true}{"stop": true}',
+        '{"stop": tr',
+        '{"answer": "y", "num{"stop": true}',
+        "{'stop': True}",
+        '\ufeff{"stop": true}',
+        '[{"stop": true}]',
+        '{"command": "stop"}',
+        '"stop"',
+        "STOP!",
+    ],
 )
 def test_whatever_could_be_meant_as_a_stop_is_one(pipe: Pipe, line: str) -> None:
     with ending(), Lines(pipe.source) as lines, pytest.raises(MotionEnded):
         stopped_in(pipe, lines, lambda lines: JsonFace(lines).ask(Ask("?")), line)
+
+
+def test_the_word_in_an_answer_is_no_stop(pipe: Pipe) -> None:
+    pipe.write('{"answer": "stop"}', "stop watch", "non-stop", '{"stop": false}', "a/stop.toml")
+    with Lines(pipe.source) as lines:
+        face = JsonFace(lines)
+        said = [face.ask(Ask("?")) for _ in range(5)]
+    assert said == ["stop", "stop watch", "non-stop", '{"stop": false}', "a/stop.toml"]
+
+
+def test_a_line_that_nothing_can_read_takes_no_hearing(pipe: Pipe) -> None:
+    """Thousands of brackets ended the thread that reads: a stop after them was not heard any more."""
+    pipe.write("[" * 20_000)
+    with ending(), Lines(pipe.source) as lines:
+        assert JsonFace(lines).ask(Ask("?")).startswith("[[")
+        with pytest.raises(MotionEnded):
+            stopped_in(pipe, lines, lambda lines: JsonFace(lines).ask(Ask("?")))
+
+
+@pytest.mark.parametrize("looks", [1, 2])
+def test_a_stop_with_the_end_of_the_input_answers_no_question(pipe: Pipe, looks: int) -> None:
+    """The line stood behind the end once it was looked at, and was taken for the next answer."""
+    pipe.write("y")
+    pipe.end()
+    with Lines(pipe.source) as lines:
+        face = JsonFace(lines)
+        until(lambda: lines._read.qsize() == 2)
+        assert all(face.moving("under power") for _ in range(looks))
+        with pytest.raises(EOFError):
+            face.ask(Ask("Is its zero right?"))
 
 
 def stopped_in(

@@ -104,6 +104,9 @@ def test_a_second_that_could_not_be_read_is_tried_again_by_a_jump_by_play_and_af
     beside.second.away = True
     beside.jump(45.0)
     assert beside.both.problem == "the store is away"
+    station = beside.both.station
+    assert station is not None
+    assert station.robot.is_stale(), "what is seen is of another instant"
     reads = beside.second.reads
     beside.draw(50)
     assert (beside.second.reads, beside.is_together) == (reads, False), "not with every frame"
@@ -116,7 +119,7 @@ def test_a_second_that_could_not_be_read_is_tried_again_by_a_jump_by_play_and_af
     else:
         beside.now_s += AGAIN_S
     beside.draw()
-    assert (beside.both.problem, beside.is_together) == ("", True)
+    assert (beside.both.problem, beside.is_together, station.robot.is_stale()) == ("", True, False)
 
 
 def test_what_is_read_already_is_shown_while_what_comes_next_cannot_be_read(beside: Beside) -> None:

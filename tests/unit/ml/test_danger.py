@@ -19,7 +19,7 @@ from ml.danger.false_alarm_budget import (
     thresholds,
 )
 from ml.danger.levels import CALM_S, HOLD, URGENT, Level, Levels, sustained
-from ml.danger.monitor import DangerMonitor
+from ml.danger.monitor import DangerMonitor, Evidence
 from ml.danger.observation import CHANNELS
 
 PERIOD_NS = 140_000_000  # as seldom as can be: it is learned from seconds, not from rows
@@ -164,6 +164,40 @@ def test_the_shipped_calibration_names_its_detectors_levels_and_source() -> None
     assert set(CALIBRATION.thresholds) == {level.word for level in URGENT}
     assert all(math.isfinite(one) for one in CALIBRATION.thresholds.values())
     assert "simulated" in CALIBRATION.learned_from
+
+
+def test_a_level_does_not_end_because_the_joint_that_raised_it_is_lost(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It was called over: of that joint nobody knew anything any more."""
+    above = np.zeros(len(DETECTORS))
+    monkeypatch.setattr(Evidence, "take", lambda _self, _at_s, _values: above.copy())
+    monkeypatch.setattr(Evidence, "why", lambda _self, _above: ("the left knee lags",))
+    watch, stamp_ns = DangerMonitor(CALIBRATION), 0
+
+    def levels(seconds: float, lost: str = "nothing") -> list[Level]:
+        nonlocal stamp_ns
+        found = []
+        for _ in range(int(seconds * 25)):
+            stamp_ns += 40_000_000
+            row = [None if name.startswith(lost) else 1.0 for name in CHANNELS]
+            found.append(watch.take(stamp_ns, row))
+        return list(dict.fromkeys(one.level for one in found if one is not None))
+
+    above[0] = 50.0
+    assert levels(1.0)[-1] is Level.STOP
+    above[0] = math.nan
+    assert levels(10.0, "left_knee") == [Level.STOP, Level.UNKNOWN]
+    above[0] = 0.0
+    assert levels(1.0) == [Level.NONE]
+    above[0] = 50.0
+    assert levels(1.0)[-1] is Level.STOP
+    above[0] = 0.0
+    assert levels(5.0) == [Level.STOP, Level.NONE]
+    above[0] = 50.0
+    assert levels(1.0)[-1] is Level.STOP
+    above[0] = math.nan
+    assert levels(40.0, "left_knee")[-1] is Level.NONE
 
 
 def test_a_clock_that_jumps_back_silences_nobody_for_long() -> None:

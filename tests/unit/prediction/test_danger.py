@@ -158,6 +158,8 @@ def test_no_rule_begins_to_hold_by_what_is_unknown() -> None:
         ({"odds": ()}, "how often"),
         ({"thresholds": {"alarm": 1.0}}, "no threshold of early warning, advice, stop"),
         ({"thresholds": {**CALIBRATION.thresholds, "stop": -9.0}}, "lower threshold"),
+        ({"bias": -CALIBRATION.bias}, "it is damaged"),
+        ({"odds": CALIBRATION.odds[::-1]}, "it is damaged"),
     ],
 )
 def test_a_calibration_of_something_else_is_refused(
@@ -171,6 +173,10 @@ def test_a_calibration_of_something_else_is_refused(
 
 def test_a_damaged_calibration_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "calibration.json"
-    file.write_bytes(SHIPPED.read_bytes()[:200])
-    with pytest.raises(UnusableModel, match="cannot be read"):
-        load(file)
+    whole = SHIPPED.read_bytes()
+    for damaged in (whole[:200], whole.replace(b"drift", b"dr\xe9ft")):
+        file.write_bytes(damaged)
+        with pytest.raises(UnusableModel, match="cannot be read"):
+            load(file)
+    file.write_bytes(msgspec.json.encode(CALIBRATION))
+    assert load(file) == CALIBRATION

@@ -140,6 +140,15 @@ def test_a_stride_in_which_somebody_stood_is_no_part_of_the_cadence() -> None:
     assert gait.legs[Leg.LEFT].stride_s == pytest.approx(1.6)
 
 
+def test_a_leg_that_is_not_seen_any_more_has_no_part_in_what_is_measured_now() -> None:
+    """Its strides of a minute ago gave a cadence, and were compared with those of the other leg."""
+    right = [one for one in walk(60) if one.leg is Leg.RIGHT or one.stamp_ns < 12e9]
+    gait = taken(right)[0].now(round(60 * 1.2e9))
+    assert gait.walking
+    assert (gait.legs[Leg.RIGHT].strides, gait.legs[Leg.LEFT].strides) == (10, 0)
+    assert (gait.cadence_spm, set(gait.symmetry.values())) == (None, {None})
+
+
 def test_running_has_no_double_support() -> None:
     strides = taken(walk(6, stance=0.4))[1]
     assert [stride.double_support for stride in strides] == [None] * len(strides)

@@ -4,7 +4,7 @@ from msgspec.structs import replace
 
 from gateway.wire.bus import BusInfo
 from server_gui.core.follow.events import BusesSeen, Described
-from server_gui.core.follow.missing_pdos import BEGINS_NS, LOST_NS, MissingPdos
+from server_gui.core.follow.missing_pdos import BEGINS_NS, LOST_NS, MissingPdos, told_percent
 from server_gui.core.follow.robot import Robot
 from server_gui.core.processing.bus_health import BusHealthLevel as Level
 from server_gui.core.processing.bus_health import findings, level
@@ -14,7 +14,9 @@ from tests.unit.recording.robots import description
 SECOND_NS = 1_000_000_000
 
 
-def looks(*percents: float, cpu_percent: float = 20.0, nodes: int = 2, every_s: float = 1.0) -> list[BusInfo]:
+def looks(
+    *percents: float | None, cpu_percent: float = 20.0, nodes: int = 2, every_s: float = 1.0
+) -> list[BusInfo]:
     """What is known after each look."""
     watched, found = MissingPdos(), list[BusInfo]()
     for look, percent in enumerate(percents):
@@ -47,12 +49,33 @@ def test_one_look_that_misses_two_percent_is_nothing_and_twenty_are_told_at_once
     ]
 
 
+def test_a_look_that_does_not_know_it_ends_nothing_until_it_has_lasted() -> None:
+    """It counted as one that has found none: ten seconds of not knowing made a node well."""
+    unknown = [None] * 15
+    assert changes(looks(20.0, *unknown)) == [Level.WARNING]
+    assert changes(looks(20.0, *unknown, *[0.0] * 10)) == [Level.WARNING, Level.GOOD]
+    gone = looks(20.0, *unknown, *unknown, 2.0)
+    assert (changes(gone), gone[-1].nodes[0].pdos_missing_percent) == ([Level.WARNING, Level.GOOD], 2.0)
+
+
 def test_a_busy_computer_is_named_where_every_node_of_a_bus_misses_some() -> None:
     ((words, check),) = findings(looks(*[20.0] * 3, cpu_percent=97.0)[-1])
     assert words.endswith("20 % of their PDOs are missing; the robot's computer is busy")
     assert "gwrms blame" in check
     assert "busy" not in findings(looks(*[20.0] * 3, cpu_percent=40.0)[-1])[0][0]
     assert "busy" not in findings(looks(*[20.0] * 3, cpu_percent=97.0, nodes=1)[-1])[0][0]
+
+
+def test_where_one_node_is_told_no_other_with_as_many_looks_fine() -> None:
+    watched, of_look = MissingPdos(), ((20.0, 2.3, 0.4), (0.0, 0.0, 0.0))
+    told = []
+    for second, percents in enumerate(of_look):
+        each = [
+            replace(NODE, node_id=number, pdos_missing_percent=one) for number, one in enumerate(percents)
+        ]
+        (bus,) = watched.take((replace(BUS, nodes=each),), second * SECOND_NS)
+        told.append([told_percent(node) for node in bus.nodes])
+    assert told == [[20.0, 2.3, 0.0]] * 2, "and both last as long"
 
 
 def test_what_was_seen_before_a_time_without_a_look_lasts_no_longer() -> None:
