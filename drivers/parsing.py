@@ -110,7 +110,7 @@ class FrameScanner(Generic[F]):
         return []
 
     def _restart(self) -> None:
-        """Another stream begins."""
+        """Begin another stream."""
 
     def _length(self, buffer: bytearray, start: int) -> int:
         """Length of the frame that begins at `start` in `buffer`, or `needs(…)`, or IMPOSSIBLE."""
@@ -255,7 +255,7 @@ class Sequence:
         self.restart()
 
     def restart(self) -> None:
-        """Another stream begins: any number may come first."""
+        """Begin another stream: any number may come first."""
         self._newest: int | None = None
         self._late = 0
         self._late_run = 0
@@ -320,7 +320,7 @@ class DelimitedParser(Generic[F]):
         return frames
 
     def _restart(self) -> None:
-        """Another stream begins."""
+        """Begin another stream."""
 
     def _decode(self, raw: bytes) -> list[F] | None:
         """Return the frames in `raw`, none for a comment.

@@ -31,7 +31,7 @@ class ReaderStalls(FindingState):
         self._row, self._longest_s = 0, 0.0  # of those that follow each other
 
     def closed(self) -> None:
-        """Nobody reads any more, and nobody has to."""
+        """Note that nobody reads any more, and nobody has to."""
         self._passed_ns = None
         self.clear()
 
@@ -49,7 +49,7 @@ class ReaderStalls(FindingState):
         self._passed_ns = now_ns  # last: who reads meanwhile takes it for standing still, not for a silence
 
     def silent_ns(self, since_ns: int, now_ns: int) -> int:
-        """For how long nothing has come since `since_ns`, as far as somebody looked; 0 at least.
+        """Return for how long nothing came since `since_ns`, as far as somebody looked; 0 at least.
 
         What passed until the last standstill's end does not count, up to `EXCUSED_NS`: who stands still again
         and again would never miss anybody. While it stands still all counts: nobody knows then.

@@ -60,7 +60,7 @@ class Description:
         return found if members is None or subindex in members else None
 
     def variables(self) -> Iterator[ODVariable]:
-        """Every object and sub-object of the device, by index and sub-index."""
+        """Yield every object and sub-object of the device, by index and sub-index."""
         for index in self.object_dictionary:
             if index < FIRST_OBJECT:
                 continue

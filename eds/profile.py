@@ -73,7 +73,7 @@ class Profile:
         return self.mark is not None and self.mark.is_in(description)
 
     def found(self, description: Description) -> tuple[Mapping[str, ProfileObject], ...]:
-        """Its quantities and its gains, as far as this device has them."""
+        """Return its quantities and its gains, as far as this device has them."""
         both = (self.quantities, self.gains)
         return tuple({name: one for name, one in some.items() if one.is_in(description)} for some in both)
 
@@ -86,7 +86,7 @@ def profile_of(description: Description) -> Profile | None:
 
 @functools.cache
 def profiles() -> tuple[Profile, ...]:
-    """All that ship, by their files' names."""
+    """Return all that ship, by their files' names."""
     return tuple(_read(path) for path in sorted(FOLDER.glob("*.toml")))
 
 

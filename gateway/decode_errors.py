@@ -32,7 +32,7 @@ _TABLE = tuple((re.compile(pattern, re.DOTALL), words) for pattern, words in _PA
 
 
 def plainly(error: Exception) -> str:
-    """As `ttl_s must be a number, not text`; what is not in the table stays as it is."""
+    """Return it as `ttl_s must be a number, not text`; what is not in the table stays as it is."""
     what, key = _parts(error)
     found = _known(what)
     if found is None:

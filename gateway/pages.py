@@ -13,7 +13,7 @@ def folder() -> Path:
 
 
 def pages() -> dict[str, Path]:
-    """Every page by its name, such as `how-to/predict`."""
+    """Return every page by its name, such as `how-to/predict`."""
     found = sorted(folder().rglob("*.md"))
     return {str(page.relative_to(folder()).with_suffix("")): page for page in found}
 

@@ -60,7 +60,7 @@ class Streamed(Protocol):
         """Components that are not there, and why."""
 
     def selections(self) -> list[Selection]:
-        """All its channels, by their sources."""
+        """Return all its channels, by their sources."""
 
 
 class Service:

@@ -269,7 +269,7 @@ _TURNED: Final = (
 
 
 def _place(address: str) -> Object:
-    """Index and subindex, as of the first axis of a drive."""
+    """Return index and subindex, as of the first axis of a drive."""
     index, _, subindex = address.partition(":")
     number = int(index, 16)
     if FIRST_OF_PROFILE <= number <= LAST_OF_PROFILE:

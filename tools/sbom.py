@@ -33,7 +33,7 @@ class Package:
 
 
 def packages(lock: str) -> list[Package]:
-    """Every package of a lock file as `uv pip compile --generate-hashes` writes it.
+    """Return every package of a lock file as `uv pip compile --generate-hashes` writes it.
 
     Raises:
         ValueError: a line that cannot be read, so that nothing is left out in silence.
@@ -56,7 +56,7 @@ def packages(lock: str) -> list[Package]:
 
 
 def bill(version: str, epoch_s: int, lock: str) -> dict[str, Any]:
-    """The whole document; the same for the same release, whenever and wherever it is made."""
+    """Return the whole document; the same for the same release, whenever and wherever it is made."""
     known = packages(lock)
     own = f"pkg:pypi/{OWN}@{version}"
     return {

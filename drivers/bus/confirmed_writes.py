@@ -61,7 +61,7 @@ class ConfirmedWrites:
             self._unsure.discard(key)
 
     def leave(self) -> None:
-        """Nobody knows."""
+        """Note that nobody knows."""
         self._before = None
 
     def forget(self) -> None:

@@ -41,7 +41,7 @@ class Rpdo:
 
 
 def find_rpdo(sdo: SdoChannel, description: Description, index: int) -> tuple[Rpdo, ...]:
-    """Every valid RPDO that carries the object `index`; raises `DriverError`."""
+    """Return every valid RPDO that carries the object `index`; raises `DriverError`."""
     return tuple(
         rpdo for rpdo in _read_all(sdo, description) if any(one.index == index for one in rpdo.objects)
     )
@@ -70,5 +70,5 @@ def _read_all(sdo: SdoChannel, description: Description) -> Iterator[Rpdo]:
 
 
 def identifier(cob_id: int) -> int:
-    """As a frame has it, of a PDO's COB-ID (1400h:1, 1800h:1)."""
+    """Return it as a frame has it, of a PDO's COB-ID (1400h:1, 1800h:1)."""
     return cob_id & 0x1FFF_FFFF | EXTENDED if cob_id & EXTENDED_ID else cob_id & 0x7FF

@@ -107,7 +107,7 @@ class Sender:
                 pass
 
     def join(self) -> None:
-        """After `stop`, and after a transport that may block was closed."""
+        """Join the thread: after `stop`, and after a transport that may block was closed."""
         if self._thread is not None:
             self._thread.join()
             self._thread = None
@@ -287,7 +287,7 @@ class Sender:
             older.settle(self._overtaken())
 
     def _put_back(self, frame: _Frame, full: str) -> None:
-        """There was no room for it: it is still the first of its queue, unless a newer one stands for it."""
+        """Keep it as the first of its queue, as there was no room, unless a newer one stands for it."""
         if not frame.is_urgent and frame.given_up:
             frame.settle(BusFull(full))
         elif not frame.is_urgent:

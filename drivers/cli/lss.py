@@ -147,7 +147,7 @@ class _Task:
         self.activated: Device | None = None  # which is at another bit rate now
 
     def say(self, text: str) -> None:
-        """For people: on stderr where stdout is for machines."""
+        """Tell people: on stderr if stdout is for machines."""
         stream = sys.stderr if self.options.json else sys.stdout
         stream.write(text + "\n")
         stream.flush()

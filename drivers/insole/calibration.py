@@ -140,7 +140,7 @@ def _end(cell: CellCalibration) -> Callable[[float], bool] | None:
 
 
 def _interpolated(table: tuple[tuple[float, float], ...], counts: float) -> float:
-    """Between the table's points; its ends hold beyond them."""
+    """Interpolate between the table's points; its ends hold beyond them."""
     place = bisect.bisect_right(table, counts, key=lambda point: point[0])
     if place == 0:
         return table[0][1]

@@ -19,7 +19,7 @@ class Order:
         self._times: dict[Foot | None, Sequence] = {}
 
     def restart(self) -> None:
-        """Another stream begins."""
+        """Begin another stream."""
         self._sequences.clear()
         self._times.clear()
 

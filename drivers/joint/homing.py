@@ -96,7 +96,7 @@ class Setup:
     acceleration: int | None = None
 
     def writes(self) -> Iterator[tuple[int, int, bytes]]:
-        """Index, sub-index and data, in their order."""
+        """Yield index, sub-index and data, in their order."""
         yield METHOD, 0, self.method.to_bytes(1, "little", signed=True)
         for index, subindex, value in (
             (SPEEDS, SWITCH, self.switch_speed),

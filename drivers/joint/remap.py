@@ -43,7 +43,7 @@ class Entry:
 
 
 def mappable(description: Description, wanted: Iterable[Quantity]) -> Iterator[Entry]:
-    """Those that may come by themselves, as the EDS says."""
+    """Yield those that may come by themselves, as the EDS says."""
     for one in wanted:
         variable = description.variable(one.index, one.subindex)
         data_type = None if variable is None else DATA_TYPES.get(variable.data_type or 0)

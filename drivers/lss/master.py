@@ -137,7 +137,7 @@ class LssMaster:
         self._single(answers, f"the identity {identity}")
 
     def release(self) -> None:
-        """Nobody is to be configured any more; a device without a node id boots, if it was given one."""
+        """End the configuration of all; a device without a node id boots, if it was given one."""
         self._tell(_SWITCH_ALL, b"\x00")
 
     def matches(self, part: int, number: int, bit: int, then: int) -> bool:

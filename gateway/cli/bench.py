@@ -142,7 +142,7 @@ def _quantiles(values: list[float]) -> tuple[float | None, float | None]:
 
 
 def text(figures: list[Figure]) -> str:
-    """For people."""
+    """Return the figures for people."""
     header = ("", "COUNT", "LOST", "P50", "P99", "CPU A REQUEST", "CPU", "MEMORY")
     rows = [
         (

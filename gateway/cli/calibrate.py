@@ -106,7 +106,7 @@ def _lead(config: RobotConfig, joint: str, options: argparse.Namespace) -> int:
 
 
 def _text(file: Path) -> str:
-    """With its own ends of lines."""
+    """Return the file's text with its own ends of lines."""
     return file.read_bytes().decode()
 
 

@@ -47,7 +47,7 @@ def main(argv: list[str]) -> int:
 
 
 def _measured(robot: Robot) -> Description:
-    """Its description; where nobody had the buses open before, as soon as their load was measured."""
+    """Return its description; where nobody had the buses open before, as soon as their load was measured."""
     deadline_s = time.monotonic() + LOAD_S
     while True:
         description = robot.describe()

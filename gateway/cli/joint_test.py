@@ -235,7 +235,7 @@ def _records(config: RobotConfig) -> Iterator[Records]:
 
 
 def _folder(folder: Path) -> Path:
-    """There, before anything is asked; raises `SettingsError`."""
+    """Make the folder before anything is asked; raises `SettingsError`."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -129,7 +129,7 @@ def _tell(path: Path, found: Judgement) -> None:
 
 
 def _witnesses(arguments: argparse.Namespace) -> tuple[list[SignedHead], list[str]]:
-    """Those that count, and why others do not."""
+    """Return those that count, and why others do not."""
     key, why = _key(arguments)
     heads: list[SignedHead] = []
     problems = list(why)

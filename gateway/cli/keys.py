@@ -97,7 +97,7 @@ def pair(argv: list[str]) -> int:
 
 
 def _warn_of_loopback(listener: socket.socket, arguments: argparse.Namespace) -> None:
-    """Before a code is shown that no other desk could use."""
+    """Warn before a code is shown that no other desk could use."""
     if is_loopback(listener.getsockname()):
         warn(
             "keys",

@@ -94,7 +94,7 @@ def _arguments(argv: list[str]) -> argparse.Namespace:
 
 
 def name_of(text: str) -> str:
-    """For argparse: a name that a client can have."""
+    """Return a name that a client can have, for argparse."""
     if not NAME.fullmatch(text):
         raise argparse.ArgumentTypeError(f"{text!r} is no name: letters, digits, _, . and -, at most 64")
     return text

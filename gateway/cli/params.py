@@ -139,7 +139,7 @@ def _parser(command: str, what: str, epilog: str) -> argparse.ArgumentParser:
 
 
 def _read(robot: Robot, names: Sequence[str]) -> dict[str, ParameterValue]:
-    """As the devices hold them now, a few at a time."""
+    """Return it as the devices hold them now, a few at a time."""
     held: dict[str, ParameterValue] = {}
     for start in range(0, len(names), _AT_ONCE):
         held |= robot.read(*names[start : start + _AT_ONCE]).values

@@ -197,7 +197,7 @@ def _readable(given: str, what: str) -> None:
 
 
 def _escaped(path: Path | str) -> str:
-    """As it stands in a unit: a per cent sign begins a specifier."""
+    """Return it as it stands in a unit: a per cent sign begins a specifier."""
     return str(path).replace("%", "%%")
 
 

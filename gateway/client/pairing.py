@@ -212,7 +212,7 @@ def _pin(robot: str, address: Address, file: Path) -> str:
 
 
 def _entry_of(document: Mapping[str, Any], robot: str, address: Address) -> tuple[str, str | None]:
-    """Its name in the file, and the pin that stands there.
+    """Return its name in the file, and the pin that stands there.
 
     A robot says itself how it is called: that gives it no other one's line.
     """

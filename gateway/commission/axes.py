@@ -34,7 +34,7 @@ class Axis:
 
 
 def axes_of(told: Mapping[int, NodeAnswers]) -> tuple[Axis, ...]:
-    """Every axis of every node that says that it is a drive."""
+    """Return every axis of every node that says that it is a drive."""
     return tuple(Axis(node, axis.number) for node, one in sorted(told.items()) for axis in one.axes)
 
 
@@ -45,7 +45,7 @@ def state(bench: Bench, axis: Axis) -> DriveState | None:
 
 
 def powered(bench: Bench, axes: Sequence[Axis]) -> tuple[Axis, ...]:
-    """Those that might move by themselves, or whose state is not known. Raises `DriverError`."""
+    """Return those that might move by themselves, or whose state is not known. Raises `DriverError`."""
     return tuple(axis for axis in axes if (found := state(bench, axis)) is None or found in ENERGISED)
 
 

@@ -99,7 +99,7 @@ def _one(draft: Draft, bench: Bench, joint: str, axis: Axis, scale: Scale, metho
 
 
 def _forget_zero(draft: Draft, joint: str) -> DraftValue:
-    """Also on disk: whatever becomes of this program, the zero from before a homing is not gone on with."""
+    """Forget the zero from before a homing, also on disk, whatever becomes of this program."""
     zero = draft.tables[table(joint)]["zero_offset"]
     draft.forget(table(joint), "zero_offset")
     draft.put(told(joint), "homing_begun", True)

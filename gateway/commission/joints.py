@@ -64,7 +64,7 @@ def _names_problem(names: Sequence[str], most: int) -> str | None:
 
 
 def unpowered(bench: Bench, axes: Sequence[Axis]) -> Talk[None]:
-    """Nobody moves a joint by hand whose drive might move it: wait until none has power."""
+    """Wait until no drive has power: nobody moves a joint by hand whose drive might move it."""
     while live := (yield from answered(lambda: powered(bench, axes))):
         yield from press(
             f"{', '.join(map(str, live))} may be under power. Switch the drives off (controller off, or STO) "

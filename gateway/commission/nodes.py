@@ -117,7 +117,7 @@ def _called(node: int, told: NodeAnswers) -> str:
 
 
 def _named(path: Path, draft: Draft) -> str:
-    """As the robot's file names it."""
+    """Return it as the robot's file names it."""
     if path.parent == SHIPPED:
         return path.name
     folder = draft.file.resolve().parent

@@ -94,7 +94,7 @@ class Progress:
         self._is_at_end = True
 
     def steps(self) -> tuple[CommissionStep, ...]:
-        """All that are known by now: joints are once they have names."""
+        """Return all that are known by now: joints are once they have names."""
         return tuple(
             CommissionStep(where.part, title, self._state(where, has)) for where, title, has in self._all()
         )

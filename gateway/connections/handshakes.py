@@ -248,7 +248,7 @@ class _Handshake:
             self._owner.is_over(self)
 
     def _begun(self) -> TlsStream | None:
-        """By the first byte: to what is no TLS not even an alert is said."""
+        """Begin by the first byte: what is no TLS is not even told an alert."""
         first = self._socket.recv(1, socket.MSG_PEEK)
         if first and first[0] == _HANDSHAKE:
             self._stream = TlsStream(self._socket, self._context)

@@ -75,7 +75,7 @@ def _id(found: dict[str, Any]) -> Id | float | UnsetType:
 
 
 def _reason(params: Any) -> str:
-    """By name as it should be, or the first of a list, or what there is."""
+    """Return the reason: by name as it should be, or the first of a list, or what there is."""
     if isinstance(params, list):
         params = params[0] if params else None
     if isinstance(params, dict):
@@ -111,7 +111,7 @@ class StopSearch:
         self._tail = b""
 
     def is_in(self, line: bytes) -> bool:
-        """For a line that is there as a whole."""
+        """Return whether a stop is in a whole line."""
         return self.feed(line) or self.end()
 
     def feed(self, piece: bytes) -> bool:

@@ -175,7 +175,7 @@ class Mender:
 
 
 def _touched(fix: Fix) -> set[str]:
-    """Names of joints, devices and sensors whose table or object it changes."""
+    """Return names of joints, devices and sensors whose table or object it changes."""
     if isinstance(fix, Write):
         return {fix.component}
     edits = fix.edits if isinstance(fix, Together) else (fix,) if isinstance(fix, Edit) else ()

@@ -108,7 +108,7 @@ class Observations:
     other_file: str | None = None  # why the gateway judges by another file than this
 
     def heard_on(self, bus: str) -> Mapping[int, IdentifierFrames] | None:
-        """By identifier, what came on a bus; `None` where it was not listened to, or nobody was heard."""
+        """Return what came on a bus, by identifier; `None` if it was not listened to, or nobody was heard."""
         facts = self.buses.get(bus)
         return None if facts is None or facts.is_silent else facts.heard
 
@@ -116,7 +116,7 @@ class Observations:
         return (Place("joint", name, table) for name, table in self.config.joint.items())
 
     def nodes(self) -> Iterator[Place]:
-        """Joints and devices, one for each node."""
+        """Yield joints and devices, one for each node."""
         seen: set[tuple[str, int]] = set()
         devices = (Place("device", name, table) for name, table in self.config.device.items())
         for place in (*self.joints(), *devices):

@@ -84,7 +84,7 @@ class GuardModule:
         return why
 
     def info(self) -> GuardInfo:
-        """As `robot.describe` shows it."""
+        """Return it as `robot.describe` shows it."""
         return GuardInfo(
             configured=True,
             heartbeat_ms=self._settings.heartbeat_ms,

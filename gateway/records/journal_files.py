@@ -63,7 +63,7 @@ def closed_piece(journal: Path, last: int) -> ClosedJournalFile:
 
 
 def closed_pieces(journal: Path) -> list[ClosedJournalFile]:
-    """Those that are there, oldest first."""
+    """Return those that are there, oldest first."""
     try:
         paths = list(journal.parent.iterdir())
     except FileNotFoundError:
@@ -156,7 +156,7 @@ def lines_backwards(file: BinaryIO) -> Iterator[bytes]:
 
 
 def _newest_first(journal: Path) -> Iterator[bytes]:
-    """Lines of all pieces. Pieces may be closed and removed meanwhile: each line is given once."""
+    """Yield lines of all pieces. Pieces may be closed and removed meanwhile: each line is given once."""
     oldest = None
     with contextlib.suppress(FileNotFoundError), journal.open("rb") as file:
         for oldest in lines_backwards(file):

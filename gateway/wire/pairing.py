@@ -78,7 +78,7 @@ def has_code(text: str) -> bool:
 
 
 def of_link(text: str) -> tuple[str, str]:
-    """Both again; raises `ValueError` where the text is no such link."""
+    """Return both again; raises `ValueError` where the text is no such link."""
     where, slash, code = text.strip()[len(SCHEME) :].partition("/")
     if not (is_link(text) and where and slash):
         raise ValueError(f"a robot's link is {SCHEME}HOST:PORT/CODE, as it shows it")

@@ -110,7 +110,7 @@ def _stood(one: Watched) -> bool:
 
 
 def outcome(found: Sequence[Watched]) -> Outcome:
-    """Every figure."""
+    """Return every figure."""
     falls = [one for one in found if one.activity.startswith("F")]
     daily = [one for one in found if not one.activity.startswith("F")]
     said = [event for one in falls for event in events(one.judged, Level.ADVICE)]

@@ -178,7 +178,7 @@ class Store:
             raise StoreError(str(found)) from None
 
     def mend(self, location: str) -> None:
-        """Before anything is built on a table in a folder: set aside what a power cut has torn off.
+        """Set aside what a power cut has torn off, before anything is built on a table in a folder.
 
         What is there is made to last, whoever wrote it: that may have been killed before.
 

@@ -207,7 +207,7 @@ def again(store: Store, location: str, work: Callable[[], Done]) -> Done:
 
 
 def retained(store: Store, location: str) -> datetime | None:
-    """Up to which time rows of the table were removed because they were old; None where none were.
+    """Return up to which time old rows of the table were removed; None if none were.
 
     Raises:
         StoreError: a note of that is damaged.
@@ -355,7 +355,7 @@ def _mend(store: Store, tables: Sequence[Table]) -> None:
 
 
 def _check_writable(folder: Path) -> None:
-    """Before the table format's library panics."""
+    """Check it before the table format's library panics."""
     if not os.access(folder, os.W_OK):
         raise StoreRefused(
             f"{folder} cannot be written: run this as whom it belongs to, on a disk for writing"

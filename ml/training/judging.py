@@ -151,7 +151,7 @@ def _losses(task: Task, found: Judged) -> Iterator[str]:
 
 
 def _percents(task: Task, *figures: float) -> list[str]:
-    """As tables show them, `95.2 %`; with more digits where else they would look alike."""
+    """Return it as tables show them, `95.2 %`; with more digits where else they would look alike."""
     scale = 100.0 if task.fold else 1.0  # an error of the stride is in percent already
     for digits in range(1, 4):
         told = [f"{scale * figure:.{digits}f} %" for figure in figures]

@@ -154,7 +154,7 @@ def _add_shared(made: argparse.ArgumentParser) -> None:
 
 
 def _spaced(argv: list[str]) -> list[str]:
-    """With a space before what is below zero: argparse would take -3deg for an option."""
+    """Put a space before what is below zero: argparse would take -3deg for an option."""
     return [f" {word}" if NEGATIVE.match(word) else word for word in argv]
 
 
@@ -267,7 +267,7 @@ def _begin(plan: ExperimentPlan, followed: FollowedRobot, ending_: ShutdownSigna
 def _follow(
     run: Run, followed: FollowedRobot, ending_: ShutdownSignals, arguments: argparse.Namespace
 ) -> None:
-    """Until it is over; whoever asks to end it waits for what is read back."""
+    """Follow it until it is over; whoever asks to end it waits for what is read back."""
     said = ""
     while not run.is_over:
         followed.update()
@@ -301,7 +301,7 @@ def _is_watched(run: Run) -> bool:
 
 
 def _say_progress(run: Run, said: str, arguments: argparse.Namespace) -> str:
-    """On a terminal a line that stays in its place; elsewhere one for each value."""
+    """Say it on a terminal in a line that stays in its place; elsewhere in one for each value."""
     if arguments.json:
         now = f"{run.state.name} {run.place}"
         if now != said:

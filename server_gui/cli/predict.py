@@ -84,7 +84,7 @@ def _settings(arguments: argparse.Namespace) -> ServerSettings:
 
 
 def _addresses(settings: ServerSettings, asked: list[str]) -> dict[str, Address]:
-    """By name in the server's file, else by address."""
+    """Return them by name in the server's file, else by address."""
     names = [_name(settings, text) for text in asked]
     given = {
         name: text.removeprefix(f"{name}=")

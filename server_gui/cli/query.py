@@ -113,7 +113,7 @@ def _list(column: pa.Array) -> list[object]:
 
 
 def _text(value: object) -> str:
-    """For people."""
+    """Return it for people."""
     if value is None:
         return NONE
     if isinstance(value, float):

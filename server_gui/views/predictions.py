@@ -292,7 +292,7 @@ def _knows(shown: Told) -> bool:
 
 
 def _as_predicted(line: PredictionRow) -> PredictionRow:
-    """As it is said where other things stand beside it; what is old is no prediction."""
+    """Return it as it is said where other things stand beside it; what is old is no prediction."""
     if line.mark.word == OLD:
         return line
     return replace(line, detail=" · ".join(filter(None, ("predicted", line.detail))))

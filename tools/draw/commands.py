@@ -66,7 +66,7 @@ class Command:
 
 
 def draw() -> str:
-    """The page."""
+    """Return the page."""
     found = list(commands())
     overview = ["| command | |", "|---|---|"]
     overview += [
@@ -76,7 +76,7 @@ def draw() -> str:
 
 
 def commands() -> Iterator[Command]:
-    """Every command that has arguments of its own, in the order of `gwrms --help`."""
+    """Yield every command that has arguments of its own, in the order of `gwrms --help`."""
     for name in main.COMMANDS:
         words = WORDS.get(name, ())
         if not words or name in ALONE:

@@ -53,7 +53,7 @@ raise alarms ([promoters](models.md#who-promoted-it))."""
 
 
 def draw() -> str:
-    """The page."""
+    """Return the page."""
     return "\n\n".join([_HEAD, *_sections(), _PROMOTERS]) + "\n"
 
 

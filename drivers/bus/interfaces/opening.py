@@ -107,7 +107,7 @@ def _daemon_obstacle(settings: CanSettings) -> str | None:
 
 
 def interfaces() -> tuple[str, ...]:
-    """Every name of an interface that comes with us."""
+    """Return every name of an interface that comes with us."""
     return (*sorted(_OWN), *_PYTHON_CAN)
 
 

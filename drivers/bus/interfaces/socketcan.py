@@ -91,7 +91,7 @@ class SocketCanTransport:
             time.sleep(QUEUE_LOOK_S)
 
     def carried(self) -> tuple[int, int] | None:
-        """As the kernel counts for the interface, whatever its filters keep from us."""
+        """Return it as the kernel counts for the interface, whatever its filters keep from us."""
         if self._statistics is None:
             return None
         try:

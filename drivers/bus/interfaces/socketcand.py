@@ -154,7 +154,7 @@ class SocketcandTransport:
         self._room.register(self._out, select.POLLOUT)
 
     def receive(self, timeout_s: float) -> Sequence[Frame]:
-        """Frames that came, stamped when they were read; those that waited by `waited_stamps`."""
+        """Return frames that came, stamped when they were read; those that waited by `waited_stamps`."""
         messages = self._early or self._read(timeout_s)
         self._early = []
         since_ns, self._read_ns = self._read_ns, time.monotonic_ns()

@@ -304,7 +304,7 @@ class SdoChannel:
         return self._outstanding.holds(transfer.about) and transfer.late_answer is None
 
     def _read_another(self, transfer: Transfer[Any], deadline: float, needed: Callable[[], bool]) -> None:
-        """Until it is answered, or no longer needed."""
+        """Read another object until it is answered, or no longer needed."""
         index, subindex = self._outstanding.probe(transfer.about)
         probe = read(self.label, index, subindex, transfer.timeout_s)
         request = self._hand_over(probe, next(probe.begin()))

@@ -99,7 +99,7 @@ class Outstanding:
             self._late = None
 
     def probe(self, avoid: bytes) -> tuple[int, int]:
-        """Another object than `avoid` to ask for, so that its answer settles what was asked before.
+        """Return another object than `avoid` to ask for, so that its answer settles what was asked before.
 
         One that is not asked for already, because its answer settles everything. A node that stays silent is
         asked for the same ones again: such objects are left for when it is heard.

@@ -164,7 +164,7 @@ class Objects:
         return None if found is None else found.node
 
     def read_all(self, wanted: Sequence[Wanted]) -> "Future[list[ObjectValue]]":
-        """For `Reads`: these are of one device."""
+        """Read these for `Reads`: they are of one device."""
         why = {name: self._why_unasked(name) for name in {one.component for one in wanted}}
         asked = [one for one in wanted if why[one.component] is None and self._unreadable(one) is None]
         if not asked:

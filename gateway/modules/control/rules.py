@@ -162,7 +162,7 @@ class Rules:
                 raise parameter.refusal(ErrorKind.WRONG_STATE, text)
 
     def states(self, drives: Collection[str]) -> dict[str, Known]:
-        """Each drive's state as it says now, all of them asked at once."""
+        """Return each drive's state as it says now, all of them asked at once."""
         components = self._component.robot.components
         told = results({drive: self._ask(drive) for drive in drives if drive in components})
         return {drive: self._known(drive, told.get(drive)) for drive in drives}

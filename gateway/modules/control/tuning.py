@@ -207,7 +207,7 @@ class Tuning:
         return _value(parameter, value, stamp_ns, problem)
 
     def _read_any(self, chosen: "Sequence[Parameter | Wanted]") -> "Future[list[Any]]":
-        """For `Reads`: these are of one request, which is for parameters or for objects."""
+        """Read these for `Reads`: they are of one request, which is for parameters or for objects."""
         parameters = [one for one in chosen if isinstance(one, Parameter)]
         objects = [one for one in chosen if isinstance(one, Wanted)]
         return self._read_all(parameters) if parameters else self.objects.read_all(objects)

@@ -77,7 +77,7 @@ class Authority:
         return after
 
     def settled(self) -> "contextlib.AbstractContextManager[object]":
-        """While inside, nothing happens."""
+        """Keep everything from happening within the block."""
         return self._lock
 
     def is_newest(self, number: int) -> bool:
@@ -89,7 +89,7 @@ class Authority:
         return list(unproved(self.state, findings))
 
     def permit(self, asked_ns: int) -> Permit:
-        """For a write that came in at that time (monotonic)."""
+        """Return the permit for a write that came in at that time (monotonic)."""
         return Permit(self, asked_ns)
 
     def objection_to(self, address: Address) -> str | None:

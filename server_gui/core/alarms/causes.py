@@ -65,7 +65,7 @@ class Stalls:
         return stall.lasted_s >= max(STOOD_S, NEWS_TIMES * before)
 
     def forget(self) -> None:
-        """Another link: what lies between is not the gateway's."""
+        """Forget the past at another link: what lies between is not the gateway's."""
         self._before = None
 
     def take(

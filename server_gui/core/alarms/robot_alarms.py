@@ -162,7 +162,7 @@ def any_enabled(robot: Robot) -> bool:
 
 
 def _moving(robot: Robot) -> list[str]:
-    """Joints whose drive is enabled, or that turn."""
+    """Return joints whose drive is enabled, or that turn."""
     words = _words(robot)
     return [
         joint
@@ -396,7 +396,7 @@ def undriven(robot: Robot, stopping: StopProgress) -> str:
 
 
 def _of_danger(facts: Facts) -> Iterator[Alarm]:
-    """From advice on; what was so when it was known last does not end by being unknown."""
+    """Yield the alarm from advice on; what was so last does not end by being unknown."""
     shown = facts.danger
     known = None if shown is None else shown.known
     if shown is None or known is None or known.level < Level.ADVICE:

@@ -62,7 +62,7 @@ def _words(name: str, told: _Extent, ends: _Extent, who: str) -> str:
 
 
 def _of_footer(metadata: pq.FileMetaData) -> dict[str, _Extent]:
-    """As its row groups have it together; without what one of them does not tell."""
+    """Return it as its row groups have it together; without what one of them does not tell."""
     places = {metadata.schema.column(place).path: place for place in range(metadata.num_columns)}
     found: dict[str, _Extent] = {}
     for name in places.keys() & set(COLUMNS):

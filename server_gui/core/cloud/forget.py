@@ -194,7 +194,7 @@ def _begun(folder: Path, name: str) -> list[Name]:
 
 
 def digest(name: str) -> str:
-    """By what the event names somebody: whoever knows the name can see that it was them."""
+    """Return what the event names somebody by: whoever knows the name can see that it was them."""
     return hashlib.sha256(f"gwrms wearer {person(name)}".encode()).hexdigest()
 
 

@@ -100,7 +100,7 @@ def prove(
 
 
 def _here(store: Store, receipts: Sequence[Receipt | Altered], proof: Proof) -> list[Receipt]:
-    """Those of what went to this store, by its URL or by what its tables are called."""
+    """Return those of what went to this store, by its URL or by what its tables are called."""
     here = tables(store)
     sent_here = went_to((each for each in receipts if isinstance(each, Receipt)), store.url)
     here |= {part.table for each in sent_here for part in each.parts}
@@ -149,7 +149,7 @@ def tables(store: Store) -> set[str]:
 
 
 def _retained(store: Store, locations: Set[str], problems: list[str]) -> dict[str, datetime | None]:
-    """Up to which time rows were removed; where nobody can say, none were, and it is told."""
+    """Return up to which time rows were removed; if nobody can say, none were, and it is told."""
     found: dict[str, datetime | None] = {}
     for location in sorted(locations):
         try:

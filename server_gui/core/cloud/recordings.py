@@ -274,7 +274,7 @@ class _Waiting:
         return pyarrow.dataset.dataset(pa.concat_tables(found, promote_options="default"))
 
     def channels(self, stored: Sequence[Channel]) -> list[Channel]:
-        """With those that the store has of the session."""
+        """Return the channels, with those that the store has of the session."""
         samples = self._samples + Counter({each.name: each.samples for each in stored})
         told = {each.name: each.unit for each in stored}
         return [Channel(name, told.get(name, self._unit(name)), samples[name]) for name in sorted(samples)]

@@ -162,7 +162,7 @@ def named(spool: Path, number: int) -> set[tuple[str, str]]:
 
 
 def _records(spool: Path, batch: int) -> list[tuple[int, Record]]:
-    """With their numbers; without those that are damaged."""
+    """Return the records with their numbers, without damaged ones."""
     found = _read(spool, batch, "SELECT rowid, * FROM record ORDER BY rowid")  # older ones have no checksums
     return [
         (rowid - 1, _decoder.decode(content)) for rowid, _, content, *crc in found if unaltered(content, *crc)

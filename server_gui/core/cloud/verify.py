@@ -332,7 +332,7 @@ def _without_receipt(spool: Path, unproven: Sequence[spool_reader.Batch]) -> Ite
 
 
 def told_batches(numbers: Iterable[int]) -> str:
-    """Numbers of batches in words, those that follow each other together."""
+    """Return numbers of batches in words, those that follow each other together."""
     runs: list[list[int]] = []
     for number in sorted(numbers):
         if runs and number == runs[-1][-1] + 1:
@@ -359,7 +359,7 @@ def _locations(store: Store, batch: spool_reader.Batch) -> list[str]:
 
 
 def _newest(store: Store, location: str, writer: str) -> int:
-    """Up to which of the writer's batches the table has everything."""
+    """Return up to which of the writer's batches the table has everything."""
     try:
         return store.table(location).transaction_version(writer) or 0
     except NoSuchTable:

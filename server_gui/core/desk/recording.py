@@ -162,7 +162,7 @@ class Recording:
         return since_ns is not None and now_ns() - since_ns >= for_s * 1e9
 
     def taken_over(self, keeper: Keeper, pausing: Pausing | None = None) -> None:
-        """Nobody else records any more, and this window does from now on."""
+        """Note that nobody else records any more, and this window does from now on."""
         self.by, self._keeper, self._pausing, self.why = By.WINDOW, keeper, pausing, ""
         self.report, self.problem, self._alone_since_ns, self._asking = None, None, None, False
         self._news.add(NewsKind.STATE, WHO, "nobody else records any more: this window does from now on")

@@ -187,7 +187,7 @@ class Collector:
         return self._do(lambda: self._report(""))
 
     def follow(self, robot: str, address: Address) -> "concurrent.futures.Future[None]":
-        """Another robot, from now on."""
+        """Follow another robot from now on."""
         return self._do(lambda: self._follow(robot, address))
 
     def leave(self, robot: str) -> "concurrent.futures.Future[None]":

@@ -165,6 +165,6 @@ def _value(held: ReadValue | None) -> Number | str | None:
 
 
 def _text(info: ObjectInfo) -> str:
-    """All that words may be of."""
+    """Return all that words may be of."""
     parts = (info.object, info.name, info.type, info.access, info.unit, *info.pdos, info.parameter or "")
     return " ".join(parts)

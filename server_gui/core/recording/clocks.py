@@ -70,11 +70,11 @@ class Clock:
         self._anew = True  # and a session, before which UTC may have been anything
 
     def session(self) -> None:
-        """Another session begins: the next connection takes the clocks as they are."""
+        """Begin another session: the next connection takes the clocks as they are."""
         self._anew = True
 
     def connection(self) -> None:
-        """Another connection begins."""
+        """Begin another connection."""
         self._begins = True
 
     def take(self, stream: int, stamps_ns: Sequence[int], reading: ClockReading) -> int:

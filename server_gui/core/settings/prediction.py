@@ -30,7 +30,7 @@ class PredictionSettings(Struct, frozen=True, forbid_unknown_fields=True):
         _refuse(_strange("every_ms", self.every_ms, CLASSES))
 
     def every_ns(self, task: str) -> int:
-        """Between two decisions of a task."""
+        """Return the time between two decisions of a task."""
         return self.every_ms.get(task, EVERY_MS[task]) * 1_000_000
 
 

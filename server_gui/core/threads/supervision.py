@@ -125,7 +125,7 @@ class ThreadWatch:
         self._known: dict[str, Trouble] = {}
 
     def add(self, worker: Worker) -> None:
-        """Another one, from now on."""
+        """Watch another one from now on."""
         with self._lock:
             self._workers += (worker,)
 

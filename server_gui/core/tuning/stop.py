@@ -129,7 +129,7 @@ class StopProgress:
             self.text = self.timed(f"STOP confirmed by all {self.drives} drives")
 
     def failed(self, number: int, reason: str) -> None:
-        """Nobody answered: consider the robot not stopped."""
+        """Note that nobody answered: consider the robot not stopped."""
         if number == self.number:
             self._not_confirmed(reason)
 

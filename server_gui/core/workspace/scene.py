@@ -139,7 +139,7 @@ class Scene:
         return np.full(rows, np.nan) if column is None else column[len(column) - rows :]
 
     def values_beside(self, text: str, times: Floats) -> Floats:
-        """Those of what is beside it, at these times; not to be kept."""
+        """Return those of what is beside it, at these times; not to be kept."""
         if self.frozen is not None:
             return self.values(f"{BESIDE_KEY}{text}", len(times))
         meant = self.meaning_beside(text)

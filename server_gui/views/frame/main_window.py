@@ -335,7 +335,7 @@ class MainWindow(QMainWindow):
         self._panels.fit(scaled=scaled)
 
     def _hold_header(self) -> None:
-        """Never narrower than the header, which Qt does not see to, nor larger than the screen."""
+        """Keep it as wide as the header, which Qt does not see to, and no larger than the screen."""
         needed = QSize(self.header.minimumSizeHint().width(), self._theme.px(LEAST))
         self.setMinimumSize(needed.boundedTo(self.screen().availableSize()))
 

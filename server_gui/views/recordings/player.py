@@ -117,7 +117,7 @@ class Player(QWidget):
         self._make_room()
 
     def _make_room(self) -> None:
-        """While somebody labels, what is labelled is in sight: the plots, beside what it was then."""
+        """Keep what is labelled in sight while somebody labels: the plots, beside what it was then."""
         alone = not self._has_room_for_all and self.labelling.isChecked()
         with_now = self._is_roomy or not (alone or self._was_wrong)  # an alarm says more of the drives
         self.overview.show_plots_alone(alone, with_now=with_now)

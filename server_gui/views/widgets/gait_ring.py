@@ -95,7 +95,7 @@ class GaitRing(QWidget):
         return self._theme.colour(leg.value if self._live else "old")
 
     def _picture(self, rings: Mapping[Leg, QRectF], band: float) -> QPixmap:
-        """Both rings, the phases that are now bright; drawn when they become others."""
+        """Return both rings, the phases that are now bright; drawn when they become others."""
         ratio, names = self.devicePixelRatioF(), [now.phase if now else "" for now in self._phases.values()]
         key = (self.size(), ratio, self._theme.colours, self._live, *names)
         if key != self._key:
@@ -203,7 +203,7 @@ class GaitRing(QWidget):
         return [one for one in next(fits, []) if one]
 
     def _phase_text(self, leg: Leg, now: LegPhase, room: float, *, is_short: bool) -> str:
-        """With the phase's name where that has room in letters that are read."""
+        """Return the phase, with its name if that has room in letters that are read."""
         letter = leg.value[0].upper()
         full = f"{letter}  {now.phase} {now.percent:.0f} %"
         fits = not is_short and self._width(full) <= room
