@@ -121,10 +121,9 @@ class MissingPdos:
         known = [(self._nodes[bus.name, node.node_id], _percent(node)) for node in bus.nodes]
         told = [history.take(now_ns, percent) for history, percent in known]
         if any(told):  # it is the bus's trouble: nobody is told that others with as many are fine
-            told = [
-                found or history.join(percent) for found, (history, percent) in zip(told, known, strict=True)
-            ]
-        is_busy = is_busy and len(told) > 1 and all(told)  # one alone has a cable of its own
+            told = [one or history.join(share) for one, (history, share) in zip(told, known, strict=True)]
+        counted = [one for one, (_, share) in zip(told, known, strict=True) if one or share is not None]
+        is_busy = is_busy and len(counted) > 1 and all(counted)  # one alone has a cable of its own
         nodes = [
             node
             if (percent, is_busy) == (told_percent(node), False)

@@ -101,7 +101,7 @@ class Overview(QWidget):
         self._grid = QGridLayout(self)
         self._grid.setContentsMargins(6, 6, 6, 6)
         self._grid.setSpacing(6)
-        self._columns, self._is_plots, self._is_low, self._low_in = 0, False, False, QSize()
+        self._columns, self._is_plots, self._is_low = 0, False, False
         self._arrange(len(SHARES))
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -116,13 +116,10 @@ class Overview(QWidget):
             self._arrange(columns)
 
     def _is_too_low(self) -> bool:
-        """Return whether something has to be scrolled to; once so, while the room for it stays."""
+        """Return whether something has to be scrolled to."""
         seen = self.parentWidget()
         if seen is None or not self.is_numbers_first:
             return False
-        if self._is_low and seen.size() == self._low_in:  # words that come and go move nothing
-            return True
-        self._low_in = seen.size()
         spare = seen.height() - self._grid.totalMinimumSize().height()
         return spare < (self._theme.px(LEEWAY) if self._is_low else 0)
 

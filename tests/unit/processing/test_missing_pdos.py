@@ -66,6 +66,13 @@ def test_a_busy_computer_is_named_where_every_node_of_a_bus_misses_some() -> Non
     assert "busy" not in findings(looks(*[20.0] * 3, cpu_percent=97.0, nodes=1)[-1])[0][0]
 
 
+def test_a_node_that_sends_no_pdos_does_not_hide_that_the_computer_is_busy() -> None:
+    each = [replace(NODE, node_id=number, pdos_missing_percent=one) for number, one in ((1, 9.0), (2, 8.0))]
+    without = replace(NODE, node_id=16, pdos_missing_percent=None)
+    (bus,) = MissingPdos().take((replace(BUS, nodes=[*each, without]),), 0, 97.0)
+    assert "busy" in findings(bus)[0][0]
+
+
 def test_where_one_node_is_told_no_other_with_as_many_looks_fine() -> None:
     watched, of_look = MissingPdos(), ((20.0, 2.3, 0.4), (0.0, 0.0, 0.0))
     told = []
