@@ -301,6 +301,37 @@ def test_what_every_drive_does_at_once_is_one_short_event(bench: Bench) -> None:
     ]
 
 
+@pytest.mark.parametrize(
+    ("said", "why"),
+    [
+        (Stopped({}, held=True), "no drive answered"),
+        (Stopped(ALL.drives, held=True, controllers={"gait": "unreachable"}), "controller gait unreachable"),
+    ],
+)
+def test_a_stop_is_confirmed_by_drives_and_every_controller_or_not_at_all(
+    bench: Bench, said: Stopped, why: str
+) -> None:
+    stopping = bench.station.stopping
+    old, new = stopping.sent(), stopping.sent()
+    stopping.failed(old, "the link of the one before broke")
+    assert stopping.state is StopState.SENT
+    stopping.answered(new, said)
+    assert (stopping.state, stopping.why) == (StopState.NOT_CONFIRMED, why)
+
+
+def test_the_answer_dates_no_drive_that_has_not_confirmed_the_stop(bench: Bench) -> None:
+    stopping = bench.station.stopping
+    number = stopping.sent(at_ns=0)
+    columns = {"left_knee": ["quick stop active"], "right_knee": ["quick stop active"]}
+    stopping.show([200_000_000], columns, 0)
+    said = Stopped({"left_knee": "confirmed", "right_knee": "unconfirmed"}, held=True)
+    stopping.answered(number, said, at_ns=100_000_000)
+    assert {name: proof.after_ms for name, proof in stopping.proofs.items()} == {
+        "left_knee": 100.0,
+        "right_knee": 200.0,
+    }
+
+
 def test_the_result_of_a_stop_does_not_hide_a_fault(bench: Bench) -> None:
     fault(bench.station)
     bench.station.stop("test")
